@@ -1,0 +1,1 @@
+"""Critical values and loci, arrays only."""

@@ -1,0 +1,63 @@
+"""Exceptions that phasekit raises, and the integer codes that its results hold.
+
+The codes are stored as int8 with CF ``flag_values`` and ``flag_meanings``; the enumerations
+give them names: ``ds.kind == pk.EquilibriumKind.SADDLE``.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class PhasekitError(Exception):
+    """Base class of everything that phasekit raises on purpose."""
+
+
+class ParameterError(PhasekitError, ValueError):
+    """An argument is unusable; the message names it, what it got and what it wants."""
+
+
+class ConvergenceError(PhasekitError, RuntimeError):
+    """An iteration ended without reaching its tolerance."""
+
+
+class StoreError(PhasekitError, OSError):
+    """A stored map cannot be read, written or continued."""
+
+
+class EquilibriumKind(IntEnum):
+    """Type of an equilibrium, by the sign of V''."""
+
+    NOT_COMPUTED = -1
+    ABSENT = 0
+    CENTER = 1
+    SADDLE = 2
+    DEGENERATE = 3
+
+
+class Topology(IntEnum):
+    """What the separatrices of one system look like on the cylinder."""
+
+    NOT_COMPUTED = -1
+    NONE = 0
+    WINDING = 1
+    FIGURE_EIGHT = 2
+    HETEROCLINIC = 3
+
+
+class Loop(IntEnum):
+    """What the separatrix of one saddle does: close on itself, wind round, or reach the partner."""
+
+    ABSENT = 0
+    LOBES = 1
+    WINDING = 2
+    HETEROCLINIC = 3
+
+
+class OrbitKind(IntEnum):
+    """Type of an orbit."""
+
+    EQUILIBRIUM = 0
+    LIBRATION = 1
+    ROTATION = 2
+    ASYMPTOTIC = 3

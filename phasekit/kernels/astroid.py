@@ -1,0 +1,115 @@
+"""Where a system stands against the fold: exact sign of the discriminant, and the gap.
+
+For A, B, C >= 0 four equilibria exist iff B^(2/3) + C^(2/3) < A^(2/3), the inside of an
+astroid, that is iff
+
+    Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2 < 0.
+
+Delta is computed in double-double arithmetic, with a bound on its error. Where the bound does
+not decide the sign and the leading digits, the caller supplies Delta from exact arithmetic.
+"""
+
+from __future__ import annotations
+
+import math
+
+from phasekit.kernels.compile import inline
+from phasekit.kernels.elementary import cbrt
+
+SPLITTER = 134217729.0  # 2^27 + 1 (Veltkamp)
+
+# Inputs are scaled to [0, 4). The double-double result below is within 32 * 2^-104 of the sum of
+# its terms; asking for 2^-48 of it leaves a relative error under 2^-50. Products that underflow
+# lose at most 1e-290.
+DECIDED = 2.0**-48
+UNDERFLOW = 1e-280
+
+
+@inline
+def two_sum(a: float, b: float) -> tuple[float, float]:
+    """Sum a + b as an unevaluated sum of two doubles, exactly."""
+    s = a + b
+    v = s - a
+    return s, (a - (s - v)) + (b - v)
+
+
+@inline
+def two_product(a: float, b: float) -> tuple[float, float]:
+    """Product a * b as an unevaluated sum of two doubles, exactly (without underflow)."""
+    p = a * b
+    t = SPLITTER * a
+    ah = t - (t - a)
+    al = a - ah
+    t = SPLITTER * b
+    bh = t - (t - b)
+    bl = b - bh
+    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
+
+
+@inline
+def dd_add(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
+    """Sum of two double-doubles; relative error 3 * 2^-104 even where it cancels."""
+    sh, se = two_sum(ah, bh)
+    th, te = two_sum(al, bl)
+    h, e = two_sum(sh, se + th)
+    return two_sum(h, te + e)
+
+
+@inline
+def dd_multiply(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
+    """Product of two double-doubles; relative error 8 * 2^-104."""
+    p, e = two_product(ah, bh)
+    e += ah * bl + al * bh
+    return two_sum(p, e)
+
+
+@inline
+def discriminant(a: float, b: float, c: float) -> tuple[float, bool]:
+    """Delta of a, b, c in [0, 4) and whether sign and 48 bits of it are certain."""
+    big = b if b > c else c
+    small = c if b > c else b
+    # big^2 - a^2 as a product: no cancellation next to the cusps, where big = a.
+    dh, dl = two_sum(big, -a)
+    sh, sl = two_sum(big, a)
+    ph, pl = dd_multiply(dh, dl, sh, sl)
+    qh, ql = two_product(small, small)
+    xh, xl = dd_add(ph, pl, qh, ql)
+    x2h, x2l = dd_multiply(xh, xl, xh, xl)
+    x3h, x3l = dd_multiply(x2h, x2l, xh, xl)
+    abh, abl = two_product(a, big)
+    yh, yl = dd_multiply(abh, abl, small, 0.0)
+    y2h, y2l = dd_multiply(yh, yl, yh, yl)
+    y3h, y3l = dd_multiply(y2h, y2l, 27.0, 0.0)
+    delta, _ = dd_add(x3h, x3l, y3h, y3l)
+    bound = DECIDED * (abs(x3h) + y3h) + UNDERFLOW
+    # Without the product term the sign is that of big - a; big^2 - a^2 = 0 is then exact.
+    flat = small == 0.0 or a == 0.0
+    return delta, flat or abs(delta) > bound
+
+
+@inline
+def fold_margin(a: float, b: float, c: float, delta: float) -> tuple[float, float, float]:
+    """1 - ((b^(2/3) + c^(2/3)) / a^(2/3))^(3/2), and the cube roots of b and c.
+
+    With p, q, t = a^(2/3), b^(2/3), c^(2/3), X = q^3 + t^3 - p^3 and Y = 3 p q t,
+    Delta = (q + t - p) (q^2 + t^2 + p^2 - q t + q p + t p) (X^2 - X Y + Y^2), where
+    only the first factor can vanish.
+    """
+    ra = cbrt(a)
+    rb = cbrt(b)
+    rc = cbrt(c)
+    p = ra * ra
+    q = rb * rb
+    t = rc * rc
+    big = b if b > c else c
+    small = c if b > c else b
+    x = (big - a) * (big + a) + small * small
+    y = 3.0 * p * q * t
+    cofactor = (q * q + t * t + p * p - q * t + q * p + t * p) * ((x - y) * x + y * y)
+    gap = delta / cofactor / p
+    ratio = (q + t) / p
+    near = -gap * (1.0 + ratio + ratio * ratio) / (1.0 + ratio * math.sqrt(ratio))
+    far = 1.0 - ratio * math.sqrt(ratio)
+    margin = near if ratio < 4.0 else far
+    margin = 0.0 if delta == 0.0 else margin
+    return (margin if a > 0.0 else -math.inf), rb, rc

@@ -1,0 +1,117 @@
+"""The skew, eccentric disk: coefficients of its equation of motion and its inertia."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+def disk_coefficients(
+    beta: npt.ArrayLike,
+    e: npt.ArrayLike,
+    a: npt.ArrayLike,
+    r: npt.ArrayLike,
+    omega1: npt.ArrayLike,
+    g: npt.ArrayLike = 9.80665,
+) -> tuple[Array, Array, Array]:
+    """Coefficients A, B, C of phi'' + B sin phi - A sin phi cos phi - C cos phi = 0, 1/s^2.
+
+    With s = sin beta and N = 4 e^2 s^2 + r^2 (1 + s^2),
+    A = omega1^2 (2 e s - r cos beta)(2 e s + r cos beta)/N, B = 4 g e s/N,
+    C = 4 omega1^2 a e s/N: the length form, regular where the papers' lambda and psi are not.
+
+    Parameters
+    ----------
+    beta : array_like
+        Angle between the shaft and the diameter through the disk's center, rad, in [0, pi].
+    e, r : array_like
+        Distance of the disk's center from the pole, and the disk's radius, m; not negative.
+    a : array_like
+        Distance between the two axes, m, of any sign.
+    omega1 : array_like
+        Angular velocity of the support, rad/s.
+    g : array_like
+        Acceleration of gravity, m/s^2.
+
+    Returns
+    -------
+    A, B, C : ndarray
+        NaN where the disk is not a body.
+
+    Notes
+    -----
+    [Veljovic2015] (12), (13) with Omega^2 = A, lambda = B/A, psi = C/A; the printed psi of (13)
+    is wrong (it is (eps - 1) a sin beta/(e (eps sin^2 beta - 1))), and the papers' "eccentricity"
+    e is the distance to the pole: the distance to the shaft is e sin beta.
+
+    Examples
+    --------
+    >>> [round(float(x), 6) for x in disk_coefficients(0.3, 0.1, 0.05, 0.1, 10.0)]
+    [-39.21169, 80.688856, 41.139867]
+    """
+    beta, e, a, r, omega1, g = np.broadcast_arrays(
+        *(np.asarray(value, dtype=float) for value in (beta, e, a, r, omega1, g))
+    )
+    with np.errstate(all="ignore"):
+        s = _sine(beta)
+        offset = 2.0 * e * s
+        reach = r * np.cos(beta)
+        inertia = offset * offset + r * r * (1.0 + s * s)
+        legal = (beta >= 0.0) & (beta <= np.pi) & (e >= 0.0) & (r >= 0.0) & (inertia > 0.0)
+        inertia = np.where(legal, inertia, np.nan)
+        omega_sq = omega1 * omega1
+        A = omega_sq * ((offset - reach) * (offset + reach) / inertia)
+        B = 2.0 * g * offset / inertia
+        C = 2.0 * omega_sq * a * offset / inertia
+    return A, B, C
+
+
+def disk_mixing(r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
+    """Coefficient kappa of the term kappa omega1'(t) cos phi that a varying support speed adds.
+
+    kappa = (r^2 + 4 e^2) sin beta cos beta/N, dimensionless; it is missing from [Veljovic2015]
+    (11), where the product of inertia J_u1n1 is taken as zero.
+
+    Examples
+    --------
+    >>> round(float(disk_mixing(0.1, 0.1, 0.3)), 6)
+    0.98256
+    """
+    r, e, beta = (np.asarray(value, dtype=float) for value in (r, e, beta))
+    with np.errstate(all="ignore"):
+        s = _sine(beta)
+        inertia = 4.0 * e * e * s * s + r * r * (1.0 + s * s)
+        return np.asarray((r * r + 4.0 * e * e) * s * np.cos(beta) / inertia)
+
+
+def disk_inertia(
+    m: npt.ArrayLike, r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike
+) -> tuple[Array, Array, Array, Array]:
+    """Moments of inertia (Ju, Jv, Jn, Jvn) of the disk at the pole O2, kg m^2.
+
+    With J = m r^2/4 and eps = 1 + 4 e^2/r^2: Ju = J eps, Jv = J (1 + eps cos^2 beta),
+    Jn = J (1 + eps sin^2 beta), Jvn = J eps sin beta cos beta, in the frame (u2, v2, n2) with u2
+    tangential, v2 radial inward and n2 along the shaft ([HedrihVeljovic2013] (22) to (28)).
+
+    Parameters
+    ----------
+    m, r, e, beta : array_like
+        Mass in kg, radius and distance of the center from the pole in m, skew angle in rad.
+
+    Examples
+    --------
+    >>> [round(float(x), 6) for x in disk_inertia(2.0, 0.1, 0.1, 0.3)]
+    [0.025, 0.027817, 0.007183, 0.007058]
+    """
+    m, r, e, beta = (np.asarray(value, dtype=float) for value in (m, r, e, beta))
+    s, c = _sine(beta), np.cos(beta)
+    ju = m * (0.25 * r * r + e * e)
+    j = 0.25 * m * r * r
+    return ju, j + ju * c * c, j + ju * s * s, ju * s * c
+
+
+def _sine(beta: Array) -> Array:
+    """Sine, exactly 0 at the double nearest to pi (a shaft in the disk's plane)."""
+    return np.where(beta == np.pi, 0.0, np.sin(beta))

@@ -1,0 +1,1 @@
+"""Phase space of phi'' = -V'(phi), arrays only."""
