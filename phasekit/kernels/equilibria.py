@@ -99,7 +99,8 @@ def find_outer(j: int, i: int, w: Array) -> None:
     """The global minimum (quadrant 1 of the reduced system) or maximum (quadrant 3)."""
     center = j == LOWER_CENTER
     swap = BLOCK if center else 0  # rows B and C are neighbours
-    s, f, slope = outer_root(w[A + i], w[B + swap + i], w[C - swap + i])
+    root = w[ROOT_B + swap + i]
+    s, f, slope = outer_root(w[A + i], w[B + swap + i], w[C - swap + i], root)
     p = j * BLOCK + i
     w[X + p] = f if center else s
     w[Y + p] = s if center else f

@@ -112,6 +112,11 @@ def phase_space_one_by_one(
         sx.turn(0, w)
         sx.measure_lobes(0, w)
         sx.measure_winding(0, w)
+        sx.shape(0, w)
+        for j in range(2):
+            sx.describe(j, 0, w)
+        for j in range(2):
+            sx.arrange(j, 0, w)
         sx.write(0, k, w, loops)
 
 
@@ -126,10 +131,18 @@ def phase_space_in_blocks(
         for i in range(n):
             sx.turn(i, w)
         for i in range(n):
-            if w[eq.COUNT + i] == 4.0:
-                sx.measure_lobes(i, w)
+            sx.measure_lobes(i, w)
         for i in range(n):
             sx.measure_winding(i, w)
         for i in range(n):
+            sx.shape(i, w)
+        for j in range(2):
+            for i in range(n):
+                sx.describe(j, i, w)
+        for j in range(2):
+            for i in range(n):
+                sx.arrange(j, i, w)
+        for i in range(n):
             eq.write(i, first + i, w, points)
+        for i in range(n):
             sx.write(i, first + i, w, loops)

@@ -19,7 +19,7 @@ from __future__ import annotations
 import math
 
 from phasekit.kernels.compile import inline
-from phasekit.kernels.elementary import cbrt_rough
+from phasekit.kernels.elementary import inverse_cbrt
 
 
 @inline
@@ -31,8 +31,11 @@ def rotate(s: float, f: float, turn: float) -> tuple[float, float]:
 
 
 @inline
-def outer_root(a: float, p: float, q: float) -> tuple[float, float, float]:
-    """Root of R(alpha) = q sin - a sin cos - p cos in [0, pi/2], where R increases."""
+def outer_root(a: float, p: float, q: float, root_p: float) -> tuple[float, float, float]:
+    """Root of R(alpha) = q sin - a sin cos - p cos in [0, pi/2], where R increases.
+
+    ``root_p`` is the cube root of p.
+    """
     # 1/|(p/nu, q/(a+nu))| is concave in nu (a power mean of linear functions), so its tangents
     # bound the root from below: at the pole, on the axis p = 0, and at infinity.
     excess = q - a
@@ -42,13 +45,12 @@ def outer_root(a: float, p: float, q: float) -> tuple[float, float, float]:
     low = p if p > low else low
     # Next to the cusp (p -> 0, q -> a) these are far off. There nu^2 (nu - excess) = K(nu) with a
     # slowly growing K, so K at a lower bound gives another one: with y = K^(1/3)/nu it is
-    # y^3 + d y = 1, convex, and Newton from above stays above.
-    load = p * p * (a + low) * (a + low) / (a + low + q) if p > 0.0 else 1.0
-    k = cbrt_rough(load)
-    d = excess / k
+    # y^3 + d y = 1, convex, and a Newton step from above stays above.
+    inverse = inverse_cbrt((a + low) * (a + low) / (a + low + q), 1)
+    k = root_p * root_p / inverse
+    d = excess / k if p > 0.0 else 0.0
     y = math.sqrt(1.0 - d) if d < 0.0 else (1.0 / d if d > 1.0 else 1.0)
-    for _ in range(2):
-        y = (2.0 * y * y * y + 1.0) / (3.0 * y * y + d)
+    y = (2.0 * y * y * y + 1.0) / (3.0 * y * y + d)
     nu = k / y if k / y > low else low
     nu = nu if p > 0.0 else (excess if excess > 0.0 else 0.0)
     reach = 1.0 / (a + nu) if a + nu > 0.0 else 0.0
@@ -66,6 +68,7 @@ def outer_root(a: float, p: float, q: float) -> tuple[float, float, float]:
         slope = f * bracket + s * (a * s + p) * g
         turn = (s * bracket - p * f * g) / slope if slope > 0.0 else 0.0
         s, f = rotate(s, f, turn)
+    f = q * s / (a * s + p) if f < s else f  # a small cosine has lost its digits
     slope = f * (excess + a * (s * s / (1.0 + f))) + s * (a * s + p)
     return s, f, slope
 
@@ -126,6 +129,7 @@ def inner_root(
     s, f = rotate(s1, f1, force / slope if slope > 0.0 else 0.0)
     along = (q - a) + a * (s * s / (1.0 + f)) if shallow else q - a * f
     across = p - a * s if shallow else (p - a) + a * (f * f / (1.0 + s))
+    f = f if shallow else q * s / -across
     slope = f * along - s * across
     folding = t < 0.125 * s0 and t < 0.125 * f0
     return (s1 if folding else s), (f1 if folding else f), (slope1 if folding else slope)
