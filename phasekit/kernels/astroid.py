@@ -13,6 +13,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from phasekit.kernels.compile import inline
 from phasekit.kernels.elementary import cbrt
 
@@ -108,8 +110,8 @@ def fold_margin(a: float, b: float, c: float, delta: float) -> tuple[float, floa
     cofactor = (q * q + t * t + p * p - q * t + q * p + t * p) * ((x - y) * x + y * y)
     gap = delta / cofactor / p
     ratio = (q + t) / p
-    near = -gap * (1.0 + ratio + ratio * ratio) / (1.0 + ratio * math.sqrt(ratio))
-    far = 1.0 - ratio * math.sqrt(ratio)
+    near = -gap * (1.0 + ratio + ratio * ratio) / (1.0 + ratio * np.sqrt(ratio))
+    far = 1.0 - ratio * np.sqrt(ratio)
     margin = near if ratio < 4.0 else far
     margin = 0.0 if delta == 0.0 else margin
     return (margin if a > 0.0 else -math.inf), rb, rc

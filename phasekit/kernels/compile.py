@@ -1,10 +1,11 @@
 """How the kernels are compiled.
 
 ``kernel`` marks what Python calls: compiled on first use, cached on disk, running without the
-GIL. ``inline`` marks the arithmetic inside: always inlined, so that a loop over it vectorises.
-``compose`` marks what only strings such functions together. Division by zero gives inf or NaN, as
-in NumPy. Fast-math stays off: the exact steps need IEEE arithmetic, and a result must not depend
-on how a loop was vectorised.
+GIL; its ``py_func`` is the same code interpreted, which gives the same bits and is the faster way
+to a first result. ``inline`` marks the arithmetic inside: an ordinary function in Python, always
+inlined when compiled, so that a loop over it vectorises. ``compose`` marks what only strings such
+functions together. Division by zero gives inf or NaN, as in NumPy. Fast-math stays off: the
+exact steps need IEEE arithmetic, and a result must not depend on how a loop was vectorised.
 """
 
 from __future__ import annotations
@@ -15,10 +16,10 @@ from typing import Any, TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 from numba import njit
+from numba.extending import overload
 
 Array = npt.NDArray[np.float64]
 Outputs = tuple[npt.NDArray[Any], ...]
-
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
@@ -28,10 +29,15 @@ def kernel(function: Function) -> Function:
 
 
 def inline(function: Function) -> Function:
-    """Compile as part of each caller, always inlined by LLVM."""
-    return cast(Function, njit(forceinline=True, error_model="numpy")(function))
+    """Compile as part of each caller, always inlined; integer literals are constants inside."""
+    options: Any = {"forceinline": True, "error_model": "numpy"}
+    overload(function, jit_options=options, strict=False, prefer_literal=True)(
+        lambda *args: function
+    )
+    return function
 
 
 def compose(function: Function) -> Function:
     """Paste into the caller before compilation: for what only strings functions together."""
-    return cast(Function, njit(inline="always", error_model="numpy")(function))
+    overload(function, inline="always", strict=False)(lambda *args: function)
+    return function

@@ -73,7 +73,7 @@ def cbrt(x: float) -> float:
     r = z * y2
     r -= (r * r * r - z) * (y2 * (1.0 / 3.0))
     r = r * 2.0**-200 if small else r
-    return r if x > 0.0 else 0.0
+    return r if x > 0.0 else x
 
 
 @inline
@@ -103,7 +103,7 @@ def angle_half(y: float, x: float) -> float:
 
 @inline
 def atanh(z: float, rest: float) -> float:
-    """Inverse hyperbolic tangent of 0 <= z < 1, where rest = 1 - z^2 is known without cancellation."""
+    """Inverse hyperbolic tangent of 0 <= z < 1; rest = 1 - z^2, given without cancellation."""
     # atanh z = log(r)/2 with r = (1 + z)^2/rest = 2^e f, and log f = 2 atanh((f - 1)/(f + 1)).
     bits = np.float64((1.0 + z) * (1.0 + z) / rest).view(np.int64)
     e = (bits - BITS_OF_ROOT_HALF) >> 52

@@ -178,7 +178,7 @@ def measure(j: int, i: int, w: Array) -> None:
     kind = w[KIND + p]
     slope = w[SLOPE + p] * w[UNIT + i]
     slope = 0.0 if kind == DEGENERATE else slope
-    rate = math.sqrt(slope)
+    rate = np.sqrt(slope)
     center = j == LOWER_CENTER or j == UPPER_CENTER
     curvature = slope if center else 0.0 - slope
     w[CURVATURE + p] = math.nan if kind == ABSENT else curvature

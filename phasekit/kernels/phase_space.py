@@ -1,12 +1,12 @@
-"""Drivers of the steps: one system after the other, or block by block.
+"""Drivers of the steps: every step over a block of systems, block after block.
 
-Both run the same arithmetic and give the same bits. The first compiles in half the time, the
-second runs several times as fast. Each fills cells ``start`` to ``stop`` of the output arrays.
-A count of ``UNDECIDED`` asks for the discriminant from exact arithmetic, which the first takes
-as ``exact`` (empty: none). ``w`` is a work array of the size that the steps name.
+Each fills cells ``start`` to ``stop`` of the output arrays. A count of ``UNDECIDED`` asks for the
+discriminant from exact arithmetic, which a second call takes as ``exact`` (empty: none).
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 from phasekit.kernels import equilibria as eq
 from phasekit.kernels import separatrices as sx
@@ -17,28 +17,7 @@ from phasekit.kernels.equilibria import LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER
 
 
 @compose
-def solve_one(a: Array, b: Array, c: Array, exact: Array, k: int, w: Array) -> None:
-    """Results of system k in column 0."""
-    w[eq.A0] = a[k]
-    w[eq.B0] = b[k]
-    w[eq.C0] = c[k]
-    eq.reduce(0, w)
-    eq.discriminate(0, w)
-    if exact.size > 0:
-        w[eq.DELTA] = exact[k]
-    eq.count(0, w)
-    for j in eq.OUTER:
-        eq.find_outer(j, 0, w)
-    for j in eq.INNER:
-        eq.find_inner(j, 0, w)
-    for j in range(4):
-        eq.classify(j, 0, w)
-        eq.place(j, 0, w)
-        eq.measure(j, 0, w)
-
-
-@compose
-def solve_block(a: Array, b: Array, c: Array, first: int, n: int, w: Array) -> None:
+def solve(a: Array, b: Array, c: Array, exact: Array, first: int, n: int, w: Array) -> None:
     """Results of n systems in the columns of a block."""
     for i in range(n):
         w[eq.A0 + i] = a[first + i]
@@ -48,6 +27,9 @@ def solve_block(a: Array, b: Array, c: Array, first: int, n: int, w: Array) -> N
         eq.reduce(i, w)
     for i in range(n):
         eq.discriminate(i, w)
+    if exact.size > 0:
+        for i in range(n):
+            w[eq.DELTA + i] = exact[first + i]
     for i in range(n):
         eq.count(i, w)
     for i in range(n):
@@ -72,29 +54,20 @@ def solve_block(a: Array, b: Array, c: Array, first: int, n: int, w: Array) -> N
 
 
 @kernel
-def equilibria_one_by_one(
-    a: Array, b: Array, c: Array, exact: Array, start: int, stop: int, points: Outputs, w: Array
+def equilibria(
+    a: Array, b: Array, c: Array, exact: Array, start: int, stop: int, points: Outputs
 ) -> None:
-    """Equilibria of each system in turn."""
-    for k in range(start, stop):
-        solve_one(a, b, c, exact, k, w)
-        eq.write(0, k, w, points)
-
-
-@kernel
-def equilibria_in_blocks(
-    a: Array, b: Array, c: Array, start: int, stop: int, points: Outputs, w: Array
-) -> None:
-    """Equilibria, a block at a time."""
+    """Equilibria of systems with the coefficients a, b, c."""
+    w = np.zeros(eq.SIZE)
     for first in range(start, stop, eq.BLOCK):
-        n = eq.BLOCK if stop - first > eq.BLOCK else stop - first
-        solve_block(a, b, c, first, n, w)
+        n = min(eq.BLOCK, stop - first)
+        solve(a, b, c, exact, first, n, w)
         for i in range(n):
             eq.write(i, first + i, w, points)
 
 
 @kernel
-def phase_space_one_by_one(
+def phase_space(
     a: Array,
     b: Array,
     c: Array,
@@ -103,31 +76,12 @@ def phase_space_one_by_one(
     stop: int,
     points: Outputs,
     loops: Outputs,
-    w: Array,
 ) -> None:
-    """Equilibria and separatrices of each system in turn."""
-    for k in range(start, stop):
-        solve_one(a, b, c, exact, k, w)
-        eq.write(0, k, w, points)
-        sx.turn(0, w)
-        sx.measure_lobes(0, w)
-        sx.measure_winding(0, w)
-        sx.shape(0, w)
-        for j in range(2):
-            sx.describe(j, 0, w)
-        for j in range(2):
-            sx.arrange(j, 0, w)
-        sx.write(0, k, w, loops)
-
-
-@kernel
-def phase_space_in_blocks(
-    a: Array, b: Array, c: Array, start: int, stop: int, points: Outputs, loops: Outputs, w: Array
-) -> None:
-    """Equilibria and separatrices, a block at a time."""
+    """Equilibria and separatrices of systems with the coefficients a, b, c."""
+    w = np.zeros(sx.SIZE)
     for first in range(start, stop, eq.BLOCK):
-        n = eq.BLOCK if stop - first > eq.BLOCK else stop - first
-        solve_block(a, b, c, first, n, w)
+        n = min(eq.BLOCK, stop - first)
+        solve(a, b, c, exact, first, n, w)
         for i in range(n):
             sx.turn(i, w)
         for i in range(n):

@@ -16,7 +16,7 @@ steps on every input, which the tests measure over 40 orders of magnitude.
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
 from phasekit.kernels.compile import inline
 from phasekit.kernels.elementary import inverse_cbrt
@@ -40,7 +40,7 @@ def outer_root(a: float, p: float, q: float, root_p: float) -> tuple[float, floa
     # bound the root from below: at the pole, on the axis p = 0, and at infinity.
     excess = q - a
     norm2 = p * p + q * q
-    far = math.sqrt(norm2) - a * (q / norm2) * q if norm2 > 0.0 else 0.0
+    far = np.sqrt(norm2) - a * (q / norm2) * q if norm2 > 0.0 else 0.0
     low = excess if excess > far else far
     low = p if p > low else low
     # Next to the cusp (p -> 0, q -> a) these are far off. There nu^2 (nu - excess) = K(nu) with a
@@ -49,15 +49,15 @@ def outer_root(a: float, p: float, q: float, root_p: float) -> tuple[float, floa
     inverse = inverse_cbrt((a + low) * (a + low) / (a + low + q), 1)
     k = root_p * root_p / inverse
     d = excess / k if p > 0.0 else 0.0
-    y = math.sqrt(1.0 - d) if d < 0.0 else (1.0 / d if d > 1.0 else 1.0)
+    y = np.sqrt(1.0 - d) if d < 0.0 else (1.0 / d if d > 1.0 else 1.0)
     y = (2.0 * y * y * y + 1.0) / (3.0 * y * y + d)
     nu = k / y if k / y > low else low
     nu = nu if p > 0.0 else (excess if excess > 0.0 else 0.0)
     reach = 1.0 / (a + nu) if a + nu > 0.0 else 0.0
     # On either side of the cusp, the form that keeps the small component's digits.
     f = q * reach
-    s = p / nu if excess > 0.0 else math.sqrt((nu - excess) * (a + q + nu)) * reach
-    length = 1.0 / math.sqrt(s * s + f * f)
+    s = p / nu if excess > 0.0 else np.sqrt((nu - excess) * (a + q + nu)) * reach
+    length = 1.0 / np.sqrt(s * s + f * f)
     s *= length
     f *= length
     # Newton on the angle; q - a f = excess + a s^2/(1 + f) does not cancel, and all is multiplied
@@ -87,17 +87,17 @@ def inner_root(
     P = sin alpha* cos alpha*, Q = cos 2 alpha*: the gap w enters as a datum, and the terms that
     cancel at the fold are gone.
     """
-    norm = math.sqrt(root_p * root_p + root_q * root_q)
-    s0 = root_p / norm if norm > 0.0 else math.sqrt(0.5)
-    f0 = root_q / norm if norm > 0.0 else math.sqrt(0.5)
+    norm = np.sqrt(root_p * root_p + root_q * root_q)
+    s0 = root_p / norm if norm > 0.0 else np.sqrt(0.5)
+    f0 = root_q / norm if norm > 0.0 else np.sqrt(0.5)
     big_p = s0 * f0
     big_q = (f0 - s0) * (f0 + s0)
     v = 2.0 - margin
     # Start: the quadratic that is left without t^3 and t^4, at most the root left without P.
     linear = margin * big_q
     constant = margin * big_p
-    root = math.sqrt(linear * linear + 6.0 * constant * big_p)
-    most = math.sqrt(margin / v)
+    root = np.sqrt(linear * linear + 6.0 * constant * big_p)
+    most = np.sqrt(margin / v)
     rising = big_q > 0.0
     top = linear + root if rising else constant
     bottom = 6.0 * big_p if rising else root - linear

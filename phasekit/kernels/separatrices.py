@@ -24,9 +24,7 @@ UPPER = eq.UPPER_SADDLE * BLOCK
 
 # Rows after those of the equilibria: of the reduced system, the angles from the lower saddle to
 # the ends of its small and its big lobe, their areas, and the area under a winding loop.
-SMALL_OFFSET, BIG_OFFSET, SMALL_AREA, BIG_AREA, WINDING = range(
-    eq.SIZE, eq.SIZE + 5 * BLOCK, BLOCK
-)
+SMALL_OFFSET, BIG_OFFSET, SMALL_AREA, BIG_AREA, WINDING = range(eq.SIZE, eq.SIZE + 5 * BLOCK, BLOCK)
 # Then the results, two rows each (lower, upper saddle).
 LOOP, SADDLE_PHI, SADDLE_ENERGY, SADDLE_EXPONENT, WINDING_AREA = range(
     eq.SIZE + 5 * BLOCK, eq.SIZE + 15 * BLOCK, 2 * BLOCK
@@ -75,7 +73,7 @@ def turn(i: int, w: Array) -> None:
     y = w[eq.Y + LOWER + i]
     k2 = w[eq.SLOPE + LOWER + i]
     mu = b / x if b > 0.0 else 0.0
-    reach = math.sqrt(mu) * math.sqrt(k2 + a * y * y) + a * x * y
+    reach = np.sqrt(mu) * np.sqrt(k2 + a * y * y) + a * x * y
     big = 2.0 * angle_half(reach, mu - a * y * y)
     w[SMALL_OFFSET + i] = 2.0 * angle_quadrant(k2, reach)
     w[BIG_OFFSET + i] = big if reach > 0.0 else PI
@@ -92,8 +90,8 @@ def measure_lobes(i: int, w: Array) -> None:
     x = w[eq.X + LOWER + i]
     y = w[eq.Y + LOWER + i]
     k2 = w[eq.SLOPE + LOWER + i]
-    k = math.sqrt(k2)
-    root = math.sqrt(a)
+    k = np.sqrt(k2)
+    root = np.sqrt(a)
     x2 = a * x * x
     y2 = a * y * y
     mu = w[eq.B + i] / x
@@ -103,7 +101,7 @@ def measure_lobes(i: int, w: Array) -> None:
     near = k2 / y2
     area = (y2 + k2) * (root * y / k) * angle_quadrant(k, root * y)
     across = near * k2 * tail(-near) if near <= SERIES else y2 + (2.0 / 3.0) * k2 - area
-    unit = math.sqrt(w[eq.UNIT + i])
+    unit = np.sqrt(w[eq.UNIT + i])
     small = 4.0 * k / a * (along + across)
     w[SMALL_AREA + i] = small * unit
     w[BIG_AREA + i] = (small + 4.0 * PI * w[eq.C + i] / root) * unit
@@ -120,8 +118,8 @@ def measure_winding(i: int, w: Array) -> None:
     s = w[eq.X + UPPER + i]
     f = w[eq.Y + UPPER + i]
     k2 = w[eq.SLOPE + UPPER + i]
-    k = math.sqrt(k2)
-    root = math.sqrt(w[eq.A + i])
+    k = np.sqrt(k2)
+    root = np.sqrt(w[eq.A + i])
     x = root * s / k
     y = root * f
     # atanh(z)/z and atan(z)/z, 1 at z = 0
@@ -129,7 +127,7 @@ def measure_winding(i: int, w: Array) -> None:
     across = angle_quadrant(y, k) / y if y > 0.0 else 1.0 / k
     area = 4.0 * k + 4.0 * c * f * across
     area += 4.0 * b * s / k * along if b > 0.0 else 0.0
-    w[WINDING + i] = area * math.sqrt(w[eq.UNIT + i])
+    w[WINDING + i] = area * np.sqrt(w[eq.UNIT + i])
 
 
 @inline

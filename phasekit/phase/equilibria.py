@@ -75,12 +75,5 @@ def equilibria(
     >>> equilibria(2.0, 1.0, 0.0).phi.round(6).tolist()
     [1.047198, 0.0, -1.047198, 3.141593]
     """
-    (points,) = solve(
-        kernels.equilibria_one_by_one,
-        kernels.equilibria_in_blocks,
-        (SHAPES,),
-        COUNT,
-        (A, B, C),
-        threads,
-    )
+    (points,) = solve(kernels.equilibria, (SHAPES,), COUNT, (A, B, C), threads)
     return Equilibria(*points)

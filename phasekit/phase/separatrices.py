@@ -67,14 +67,8 @@ def phase_space(
     >>> int(points.n_equilibria), bool(loops.figure_eight)
     (4, True)
     """
-    points, loops = solve(
-        kernels.phase_space_one_by_one,
-        kernels.phase_space_in_blocks,
-        (points_floor.SHAPES, SHAPES),
-        points_floor.COUNT,
-        (A, B, C),
-        threads,
-    )
+    shapes = (points_floor.SHAPES, SHAPES)
+    points, loops = solve(kernels.phase_space, shapes, points_floor.COUNT, (A, B, C), threads)
     return Equilibria(*points), Separatrices(*loops)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -12,24 +12,25 @@ import numpy.typing as npt
 
 from phasekit.kernels.equilibria import UNDECIDED
 from phasekit.kernels.exact import exact_discriminant
-from phasekit.kernels.separatrices import SIZE
 
-# The block kernel takes seconds to compile on first use; below this size it would not pay.
-BLOCKS_FROM = 10_000
+# A kernel takes seconds to compile when it is not in numba's cache, and half a millisecond a
+# system when interpreted. So small inputs are interpreted, until a process has interpreted so
+# many systems by one kernel that compiling it has paid.
+INTERPRETED_AT_MOST = 4_000
 THREADS_FROM = 100_000
+_interpreted: dict[Callable[..., None], int] = {}
 
-Kernel = Callable[..., None]
+Arrays = tuple[npt.NDArray[Any], ...]
 Shapes = tuple[tuple[tuple[int, ...], Any], ...]
 
 
 def solve(
-    one_by_one: Kernel,
-    in_blocks: Kernel,
+    kernel: Callable[..., None],
     shapes: tuple[Shapes, ...],
     count: int,
     coefficients: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     threads: int | None,
-) -> list[tuple[npt.NDArray[Any], ...]]:
+) -> Iterator[Arrays]:
     """Run a kernel over broadcast coefficients.
 
     ``shapes`` gives, for each group of outputs, the trailing shape and dtype of its arrays, and
@@ -37,31 +38,45 @@ def solve(
     """
     arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in coefficients))
     shape = arrays[0].shape
-    a, b, c = (np.ascontiguousarray(array).reshape(-1) for array in arrays)
-    size = a.size
-    groups = [tuple(np.empty((size, *tail), dtype) for tail, dtype in group) for group in shapes]
-    nothing = np.empty(0)
-    if size < BLOCKS_FROM:
-        one_by_one(a, b, c, nothing, 0, size, *groups, np.empty(SIZE))
-    else:
-        workers = (threads or os.cpu_count() or 1) if size >= THREADS_FROM else 1
-        edges = [size * j // workers for j in range(workers + 1)]
-        parts = zip(edges[:-1], edges[1:], strict=True)
-        with ThreadPoolExecutor(workers) as pool:
-            jobs = [
-                pool.submit(in_blocks, a, b, c, *part, *groups, np.empty(SIZE)) for part in parts
-            ]
-        for job in jobs:
-            job.result()
-    open_cells = np.flatnonzero(groups[0][count] == UNDECIDED)
-    if open_cells.size:
-        a, b, c = a[open_cells], b[open_cells], c[open_cells]
-        exact = np.array([exact_discriminant(*abc) for abc in zip(a, b, c, strict=True)])
-        decided = [
-            tuple(np.empty((a.size, *tail), dtype) for tail, dtype in group) for group in shapes
-        ]
-        one_by_one(a, b, c, exact, 0, a.size, *decided, np.empty(SIZE))
+    flat = tuple(np.ascontiguousarray(array).reshape(-1) for array in arrays)
+    groups = _allocate(flat[0].size, shapes)
+    _run(kernel, flat, np.empty(0), groups, threads)
+    undecided = np.flatnonzero(groups[0][count] == UNDECIDED)
+    if undecided.size:
+        few = tuple(array[undecided] for array in flat)
+        exact = np.array([exact_discriminant(*abc) for abc in zip(*few, strict=True)])
+        decided = _allocate(undecided.size, shapes)
+        _run(kernel, few, exact, decided, threads)
         for group, part in zip(groups, decided, strict=True):
             for array, values in zip(group, part, strict=True):
-                array[open_cells] = values
-    return [tuple(array.reshape(shape + array.shape[1:]) for array in group) for group in groups]
+                array[undecided] = values
+    return (tuple(array.reshape(shape + array.shape[1:]) for array in group) for group in groups)
+
+
+def _allocate(size: int, shapes: tuple[Shapes, ...]) -> list[Arrays]:
+    return [tuple(np.empty((size, *tail), dtype) for tail, dtype in group) for group in shapes]
+
+
+def _run(
+    kernel: Callable[..., None],
+    coefficients: Arrays,
+    exact: Arrays | npt.NDArray[Any],
+    groups: list[Arrays],
+    threads: int | None,
+) -> None:
+    size = coefficients[0].size
+    spent = _interpreted.get(kernel, 0) + size
+    if spent <= INTERPRETED_AT_MOST and hasattr(kernel, "py_func"):
+        _interpreted[kernel] = spent
+        with np.errstate(all="ignore"):
+            kernel.py_func(*coefficients, exact, 0, size, *groups)
+        return
+    workers = (threads or os.cpu_count() or 1) if size >= THREADS_FROM else 1
+    edges = [size * part // workers for part in range(workers + 1)]
+    with ThreadPoolExecutor(workers) as pool:
+        jobs = [
+            pool.submit(kernel, *coefficients, exact, start, stop, *groups)
+            for start, stop in zip(edges[:-1], edges[1:], strict=True)
+        ]
+    for job in jobs:
+        job.result()

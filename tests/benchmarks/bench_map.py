@@ -16,7 +16,6 @@ import pytest
 from scipy.optimize import brentq
 
 from phasekit.kernels import phase_space as kernels
-from phasekit.kernels.separatrices import SIZE
 from phasekit.phase.equilibria import SHAPES as POINTS
 from phasekit.phase.separatrices import SHAPES as LOOPS
 from phasekit.phase.separatrices import phase_space
@@ -122,13 +121,13 @@ def test_map_of_a_million_systems(capsys: pytest.CaptureFixture[str]) -> None:
     few = tuple(values[:sample] for values in systems)
     some = tuple(values[:100_000] for values in systems)
     points, loops = allocate(size)
-    work = np.empty(SIZE)
+    none = np.empty(0)
 
     def blocks() -> None:
-        kernels.equilibria_in_blocks(*systems, 0, size, points, work)
+        kernels.equilibria(*systems, none, 0, size, points)
 
     def both() -> None:
-        kernels.phase_space_in_blocks(*systems, 0, size, points, loops, work)
+        kernels.phase_space(*systems, none, 0, size, points, loops)
 
     first = seconds(lambda: phase_space(*systems, threads=1), 1)
     blocks()
