@@ -36,9 +36,10 @@ def solve(
     ``shapes`` gives, for each group of outputs, the trailing shape and dtype of its arrays, and
     ``count`` the place of n_equilibria in the first group. ``threads`` defaults to all cores.
     """
-    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in coefficients))
-    shape = arrays[0].shape
-    flat = tuple(np.ascontiguousarray(array).reshape(-1) for array in arrays)
+    arrays = [np.asarray(value, dtype=float) for value in coefficients]
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
+    flat = tuple(np.array(np.broadcast_to(array, shape)).reshape(-1) for array in arrays)
     groups = _allocate(flat[0].size, shapes)
     _run(kernel, flat, np.empty(0), groups, threads)
     undecided = np.flatnonzero(groups[0][count] == UNDECIDED)

@@ -1,0 +1,95 @@
+"""phasekit: bifurcation and phase-space analysis of coupled rotations.
+
+Public names are loaded when they are first used, so ``import phasekit`` itself loads neither
+numpy nor anything built on it.
+
+Examples
+--------
+>>> import phasekit as pk
+>>> disk = pk.GyroRotorDisk(beta=18 * pk.deg, e=0.001153, a=0.002, r=0.2, omega1=24 * pk.rpm)
+>>> pk.equilibria(disk).n_equilibria.item()
+4
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from phasekit import plot as plot
+    from phasekit.errors import ConvergenceError as ConvergenceError
+    from phasekit.errors import EquilibriumKind as EquilibriumKind
+    from phasekit.errors import Loop as Loop
+    from phasekit.errors import OrbitKind as OrbitKind
+    from phasekit.errors import ParameterError as ParameterError
+    from phasekit.errors import PhasekitError as PhasekitError
+    from phasekit.errors import StoreError as StoreError
+    from phasekit.errors import Topology as Topology
+    from phasekit.labelled.critical import critical as critical
+    from phasekit.labelled.guises import ParticleOnCircle as ParticleOnCircle
+    from phasekit.labelled.guises import Pendulum as Pendulum
+    from phasekit.labelled.guises import Reduced as Reduced
+    from phasekit.labelled.guises import StonerWohlfarth as StonerWohlfarth
+    from phasekit.labelled.integral import curvature as curvature
+    from phasekit.labelled.integral import energy as energy
+    from phasekit.labelled.integral import gradient as gradient
+    from phasekit.labelled.integral import phase_velocity as phase_velocity
+    from phasekit.labelled.integral import potential as potential
+    from phasekit.labelled.models import Coefficients as Coefficients
+    from phasekit.labelled.models import GyroRotorDisk as GyroRotorDisk
+    from phasekit.labelled.phase_space import equilibria as equilibria
+    from phasekit.labelled.phase_space import separatrices as separatrices
+    from phasekit.labelled.quantities import quantities as quantities
+    from phasekit.labelled.store import open_map as open_map
+    from phasekit.labelled.sweep import sweep as sweep
+
+__version__ = "0.1.0"
+
+#: One degree in radians, one revolution a minute in s^-1: ``30 * pk.deg``, ``24 * pk.rpm``.
+deg: float = 0.017453292519943295
+rpm: float = 0.10471975511965977
+
+_MODULES = {
+    "phasekit.errors": (
+        "ConvergenceError",
+        "EquilibriumKind",
+        "Loop",
+        "OrbitKind",
+        "ParameterError",
+        "PhasekitError",
+        "StoreError",
+        "Topology",
+    ),
+    "phasekit.labelled.critical": ("critical",),
+    "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "Reduced", "StonerWohlfarth"),
+    "phasekit.labelled.integral": (
+        "curvature",
+        "energy",
+        "gradient",
+        "phase_velocity",
+        "potential",
+    ),
+    "phasekit.labelled.models": ("Coefficients", "GyroRotorDisk"),
+    "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
+    "phasekit.labelled.quantities": ("quantities",),
+    "phasekit.labelled.store": ("open_map",),
+    "phasekit.labelled.sweep": ("sweep",),
+}
+_HOME = {name: module for module, names in _MODULES.items() for name in names}
+
+__all__ = ["__version__", "deg", "plot", "rpm", *_HOME]  # noqa: PLE0604
+
+
+def __getattr__(name: str) -> Any:
+    if name == "plot":
+        return importlib.import_module("phasekit.plot")
+    if name not in _HOME:
+        raise AttributeError(f"module 'phasekit' has no attribute {name!r}")
+    value = getattr(importlib.import_module(_HOME[name]), name)
+    globals()[name] = value  # later uses find it without coming here
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,98 @@
+"""The accessor ``ds.phasekit``: from any selection of a map to its system and its pictures.
+
+It holds nothing but the Dataset that it was asked of (xarray keeps accessors), and never fails
+when it is made.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Any
+
+import xarray as xr
+
+from phasekit.errors import ParameterError
+from phasekit.labelled.schema import model_name
+from phasekit.labelled.system import MODELS, Model
+
+
+@xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
+class PhasekitAccessor:
+    """What a map can do beyond plain xarray."""
+
+    def __init__(self, ds: xr.Dataset) -> None:
+        self._ds = ds
+
+    def system(self) -> Model:
+        """Rebuild the system of this map, or of the selected cells.
+
+        Returns
+        -------
+        Model
+            The model that made the map; with scalars where single cells are selected, and with
+            arrays along the axes that are left.
+
+        Raises
+        ------
+        ParameterError
+            If the Dataset is not a map of phasekit, a parameter's coordinate is gone, or the
+            selected cell is not valid.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> ds = pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2, 0.3])
+        >>> ds.sel(lam=0.2).phasekit.system()
+        Reduced(lam=0.2, psi=0.2, Omega_sq=1.0)
+        """
+        name = model_name(self._ds)
+        if name not in MODELS:
+            raise ParameterError(
+                f"ds: got a map of the model {name!r}, wants one of {', '.join(MODELS)}"
+            )
+        return MODELS[name].from_dataset(self._ds)
+
+    @property
+    def plot(self) -> MapPlots:
+        """Pictures of this map: see `MapPlots`."""
+        return MapPlots(self._ds)
+
+
+class MapPlots:
+    """Pictures of a map; each takes the keywords of its namesake in ``phasekit.plot``."""
+
+    def __init__(self, ds: xr.Dataset) -> None:
+        self._ds = ds
+
+    def phase_portrait(self, **options: Any) -> Any:
+        """Draw the phase portrait of the one selected cell; returns the Axes."""
+        return _plot("phase_portrait")(self._cell(), **options)
+
+    def potential_well(self, **options: Any) -> Any:
+        """Draw the potential of the one selected cell over its portrait; returns both Axes."""
+        return _plot("potential_well")(self._cell(), **options)
+
+    def bifurcation_diagram(self, **options: Any) -> Any:
+        """Draw the equilibria against a swept parameter; returns the Axes."""
+        return _plot("bifurcation_diagram")(self._ds, **options)
+
+    def parameter_map(self, variable: str, **options: Any) -> Any:
+        """Draw a variable over two swept parameters; returns the Axes."""
+        return _plot("parameter_map")(self._ds, variable, **options)
+
+    def _cell(self) -> Model:
+        system = PhasekitAccessor(self._ds).system()
+        axes = [name for name, value in system.parameters.items() if not isinstance(value, float)]
+        if axes:
+            raise ParameterError(
+                f"ds: got several cells along {', '.join(axes)}, wants a single one; select it "
+                f"first: ds.sel({axes[0]}=..., method='nearest')"
+            )
+        return system
+
+
+def _plot(name: str) -> Callable[..., Any]:
+    # Plots stand above this floor and load matplotlib, so they are looked up when one is asked for.
+    function: Callable[..., Any] = getattr(importlib.import_module("phasekit.plot"), name)
+    return function

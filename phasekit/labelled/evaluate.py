@@ -1,0 +1,272 @@
+"""Compute rows of the table on a grid of cells: tile by tile in threads, or lazily with dask.
+
+`Cells` is one tile: it knows the inputs of the tile and finds everything else by name, computing
+coefficients and other groups once, when first asked. It holds plain arrays and pickles, so the
+same object serves threads here and blocks of a lazy graph.
+"""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import prod
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import FloatArray, Value
+from phasekit.labelled.grid import Grid, make_grid, variable
+from phasekit.labelled.memory import refuse_too_large
+from phasekit.labelled.quantities import LABELS, ROWS, STATES, Pass, Quantity, pass_of
+from phasekit.labelled.schema import dataset_attrs, input_attrs, label_coords
+from phasekit.labelled.system import Model
+from phasekit.labelled.tiling import cut, run_tasks, tiles
+
+_COEFFICIENTS = ("A", "B", "C")
+
+
+@dataclass
+class Cells:
+    """Inputs of some cells as arrays that broadcast, and what was computed from them so far."""
+
+    model: type[Model]
+    passes: tuple[Pass, ...]
+    inputs: Mapping[str, FloatArray]
+    computed: dict[str, Any] = field(default_factory=dict)
+    done: set[Pass] = field(default_factory=set)
+
+    def get(self, name: str) -> Any:
+        """Return an input, a coefficient or a quantity as an array."""
+        if name not in self.computed:
+            if name in _COEFFICIENTS:
+                abc = self.model.valid_coefficients(self.inputs)
+                self.computed.update(zip(_COEFFICIENTS, abc, strict=True))
+            elif name in STATES:
+                state = self.inputs[name]
+                self.computed[name] = np.where(np.isfinite(state), state, np.nan)
+            elif name in self.inputs:
+                return self.inputs[name]
+            else:
+                self.run(pass_of(ROWS[name].group, self.passes))
+        return self.computed[name]
+
+    def run(self, one: Pass) -> None:
+        """Compute the groups of one pass, once."""
+        if one in self.done:
+            return
+        self.done.add(one)
+        arrays = [self.get(name) for name in one.inputs]
+        with np.errstate(all="ignore"):  # invalid cells give NaN, and no warning
+            self.computed.update(one.call(*arrays))
+
+
+def leaves(system: Model, names: Iterable[str], passes: Sequence[Pass]) -> list[str]:
+    """Return the parameters and states on which inputs of passes depend, in the end."""
+    found: dict[str, None] = {}
+    for name in names:
+        if name in _COEFFICIENTS:
+            found.update(dict.fromkeys(system.formula_inputs()))
+        elif name in ROWS:
+            found.update(
+                dict.fromkeys(leaves(system, pass_of(ROWS[name].group, passes).inputs, passes))
+            )
+        else:
+            found[name] = None
+    return list(found)
+
+
+def evaluate(
+    system: Model,
+    rows: Sequence[Quantity],
+    passes: Sequence[Pass],
+    *,
+    states: Mapping[str, Value] | None = None,
+    state_dim: str | None = None,
+    order: Sequence[str] = (),
+    progress: bool | None = False,
+) -> xr.Dataset:
+    """Compute rows of the table for a system, at states where they need them.
+
+    Parameters
+    ----------
+    system : Model
+        Its array parameters span the cells.
+    rows, passes : sequence
+        What to compute, and the passes that do it.
+    states : mapping of str to Value, optional
+        States by the names of the table.
+    state_dim : str, optional
+        Dim of bare state arrays; without it each lies on a dim of its own name.
+    order : sequence of str
+        Dims that come first.
+    progress : bool or None
+        Show a bar; None: if it takes long and standard error is a terminal.
+
+    Raises
+    ------
+    ParameterError
+        If an input is missing, dims disagree, or the result would not fit into memory.
+    """
+    states = dict(states or {})
+    inputs = {**system.parameters, **states}
+    axis = dict.fromkeys(states, state_dim) if state_dim else {}
+    grid = make_grid(inputs, axis=axis, order=order)
+    needs = {one: leaves(system, one.inputs, passes) for one in passes}
+    _refuse_missing(system, needs, inputs)
+    dims = {group: grid.dims_of(need) for one, need in needs.items() for group in one.groups}
+    _refuse_taken(grid, rows)
+    compute = _lazy if grid.lazy else functools.partial(_eager, progress=progress)
+    data = compute(type(system), grid, rows, needs, dims)
+    return _assemble(system, grid, rows, data)
+
+
+def _refuse_missing(
+    system: Model, needs: Mapping[Pass, Sequence[str]], inputs: Mapping[str, Value]
+) -> None:
+    for one, names in needs.items():
+        for name in names:
+            if name not in inputs:
+                declared = [parameter.name for parameter in system.declared]
+                way = f"give {name}=" if name in declared or name.startswith("state") else "none"
+                raise ParameterError(
+                    f"{name}: got nothing, wants a value for {' and '.join(one.groups)} of "
+                    f"{type(system).__name__}"
+                    + (f"; {way}" if way != "none" else ", which has no such parameter")
+                )
+
+
+def _refuse_taken(grid: Grid, rows: Sequence[Quantity]) -> None:
+    taken = {row.name for row in rows} | {dim for row in rows for dim in row.dims}
+    for dim in grid.sizes:
+        if dim in taken:
+            raise ParameterError(
+                f"dim {dim!r}: got it as a dim of an argument, wants another name, because the "
+                f"result has a variable or dim {dim!r}; rename it with .rename({dim}=...)"
+            )
+
+
+# ------------------------------------------------------------------------------ in memory
+
+
+def _eager(
+    model: type[Model],
+    grid: Grid,
+    rows: Sequence[Quantity],
+    needs: Mapping[Pass, Sequence[str]],
+    dims: Mapping[str, tuple[str, ...]],
+    progress: bool | None,
+) -> dict[str, xr.Variable]:
+    cells = {group: prod(grid.sizes[d] for d in used) for group, used in dims.items()}
+    refuse_too_large({row.name: cells[row.group] * row.cell_bytes for row in rows}, grid.sizes)
+    out = {
+        row.name: np.empty(
+            tuple(grid.sizes[d] for d in dims[row.group]) + row.label_shape, dtype=row.dtype
+        )
+        for row in rows
+    }
+    tasks: list[tuple[Callable[[], None], int]] = []
+    for used in dict.fromkeys(dims.values()):  # passes on the same dims share their tiles
+        passes = tuple(one for one in needs if dims[one.groups[0]] == used)
+        names = dict.fromkeys(name for one in passes for name in needs[one])
+        arrays = {name: grid.aligned(name, used) for name in names}
+        results = {row.name: out[row.name] for row in rows if dims[row.group] == used}
+        shape = tuple(grid.sizes[dim] for dim in used)
+        for tile in tiles(shape):
+            task = functools.partial(_fill, model, passes, arrays, results, tile)
+            tasks.append((task, prod(part.stop - part.start for part in tile)))
+    run_tasks(tasks, progress)
+    return {
+        row.name: variable((*dims[row.group], *row.dims), out[row.name], row.attrs) for row in rows
+    }
+
+
+def _fill(
+    model: type[Model],
+    passes: tuple[Pass, ...],
+    arrays: Mapping[str, FloatArray],
+    results: Mapping[str, Any],
+    tile: tuple[slice, ...],
+) -> None:
+    """Compute one tile straight into its part of the results."""
+    cells = Cells(model, passes, {name: cut(array, tile) for name, array in arrays.items()})
+    for one in passes:
+        cells.run(one)
+    for name, result in results.items():
+        result[tile] = cells.computed[name]
+
+
+# ------------------------------------------------------------------------------ lazily
+
+
+def _lazy(
+    model: type[Model],
+    grid: Grid,
+    rows: Sequence[Quantity],
+    needs: Mapping[Pass, Sequence[str]],
+    dims: Mapping[str, tuple[str, ...]],
+) -> dict[str, xr.Variable]:
+    out: dict[str, xr.Variable] = {}
+    for one, names in needs.items():
+        wanted = [row for row in rows if row.group in one.groups]
+        block = functools.partial(_block, model, one, tuple(names), wanted)
+        sizes = {dim: len(LABELS[dim][0]) for row in wanted for dim in row.dims}
+        with warnings.catch_warnings():
+            # Axes make an outer product: many more chunks than each of them has is what is meant.
+            warnings.filterwarnings("ignore", message="Increasing number of chunks")
+            results = xr.apply_ufunc(
+                block,
+                *(grid.inputs[name] for name in names),
+                output_core_dims=[list(row.dims) for row in wanted],
+                dask="parallelized",
+                output_dtypes=[np.dtype(row.dtype) for row in wanted],
+                dask_gufunc_kwargs={"output_sizes": sizes},
+            )
+        for row, result in zip(
+            wanted, results if isinstance(results, tuple) else (results,), strict=True
+        ):
+            out[row.name] = result.transpose(*dims[row.group], *row.dims)
+            out[row.name].attrs = row.attrs
+    return {row.name: out[row.name] for row in rows}
+
+
+def _block(
+    model: type[Model],
+    one: Pass,
+    names: tuple[str, ...],
+    rows: Sequence[Quantity],
+    *arrays: FloatArray,
+) -> Any:
+    """Compute one block of a lazy graph."""
+    shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
+    cells = Cells(model, (one,), dict(zip(names, arrays, strict=True)))
+    cells.run(one)
+    results = []
+    for row in rows:
+        full = np.broadcast_to(cells.computed[row.name], shape + row.label_shape)
+        results.append(np.array(full, dtype=row.dtype))
+    return tuple(results) if len(results) > 1 else results[0]
+
+
+# ------------------------------------------------------------------------------ labels
+
+
+def _assemble(
+    system: Model, grid: Grid, rows: Sequence[Quantity], data: Mapping[str, xr.Variable]
+) -> xr.Dataset:
+    coords: dict[str, xr.Variable] = {}
+    for dim in grid.sizes:
+        if dim in grid.coords:
+            coords[dim] = _with_attrs(system, dim, grid.coords[dim])
+    coords.update(label_coords(dim for row in rows for dim in row.dims))
+    for name, given in grid.inputs.items():
+        if name not in coords:
+            coords[name] = _with_attrs(system, name, given)
+    return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(system))
+
+
+def _with_attrs(system: Model, name: str, given: xr.Variable) -> xr.Variable:
+    return variable(map(str, given.dims), given.data, input_attrs(system, name) or given.attrs)

@@ -1,0 +1,253 @@
+"""The systems of the papers: the coefficients themselves, and the disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad
+from phasekit.labelled.grid import combine
+from phasekit.labelled.system import MODELS, Model, Parameter, model, named_arguments
+from phasekit.mechanics.disk import disk_coefficients, disk_inertia
+
+STANDARD_GRAVITY = 9.80665
+
+
+class _ABC(NamedTuple):
+    A: Any
+    B: Any
+    C: Any
+
+
+class Coefficients(Model, _ABC):
+    """Coefficients of ``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``, in s^-2.
+
+    A system by themselves; every other system reduces to them. Of any sign, zero included.
+
+    Parameters
+    ----------
+    A, B, C : float, 1-D array_like or xarray.DataArray
+        Coefficients of the potential ``V = -B cos phi + (A/2) cos^2 phi - C sin phi``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a real, finite number or an array of numbers.
+
+    Notes
+    -----
+    In the papers' notation ``A = Omega^2``, ``B = lambda Omega^2``, ``C = psi Omega^2``
+    ([Veljovic2015] (12)).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> c = pk.Coefficients(4.0, 1.0, 0.5)
+    >>> c
+    Coefficients(A=4.0, B=1.0, C=0.5)
+    >>> A, B, C = c
+    >>> c.replace(B=[1.0, 2.0])
+    Coefficients(A=4.0, B=[1.0, 2.0], C=0.5)
+    """
+
+    __slots__ = ()
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="A", units="s-2", long_name="coefficient of -sin(phi) cos(phi), Omega^2"),
+        Parameter(name="B", units="s-2", long_name="coefficient of sin(phi), lambda Omega^2"),
+        Parameter(name="C", units="s-2", long_name="coefficient of -cos(phi), psi Omega^2"),
+    )
+
+    def __new__(cls, A: NumberLike, B: NumberLike, C: NumberLike) -> Coefficients:
+        """Check the values and keep them."""
+        kept = [p.check(x) for p, x in zip(cls.declared, (A, B, C), strict=True)]
+        return super().__new__(cls, *kept)
+
+    def coefficients(self) -> Coefficients:
+        """Return itself: coefficients are a system."""
+        return self
+
+    @staticmethod
+    def _abc(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
+        return A, B, C
+
+    def __eq__(self, other: object) -> bool:
+        """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
+        return Model.__eq__(self, other) if isinstance(other, Model) else tuple.__eq__(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        """Return the opposite of ``==``, in place of the tuple's."""
+        return not self == other
+
+    def __hash__(self) -> int:
+        """Hash as the tuple that it equals."""
+        return tuple.__hash__(self)
+
+
+Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
+MODELS["Coefficients"] = Coefficients
+
+
+class DiskInertia(NamedTuple):
+    """Moments of inertia of the disk at O2, in kg m^2: about u2, v2, n2, and the deviation."""
+
+    Ju: Any
+    Jv: Any
+    Jn: Any
+    Jvn: Any
+
+
+@model
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class GyroRotorDisk(Model):
+    """Heavy disk, skew and eccentric on its shaft, the shaft carried round the vertical.
+
+    The disk turns by phi about a horizontal shaft, which itself is carried with the angular
+    velocity omega1 about the vertical at the distance a. ``phi = 0``: the mass centre hangs
+    straight down; ``phi = +pi/2`` is outward for ``a > 0``.
+
+    Parameters
+    ----------
+    beta : float, 1-D array_like or xarray.DataArray
+        Angle between the shaft and the disk's plane, 0 to pi rad; pi/2: square to its shaft.
+    e : float or array_like
+        Distance of the mass centre from the point O2 of the shaft, in m, >= 0. The true
+        eccentricity, the distance from the shaft, is ``e sin beta``.
+    a : float or array_like
+        Distance of the shaft from the vertical axis, in m, of either sign.
+    r : float or array_like
+        Radius of the disk in m, >= 0; with ``r = 0`` it is a particle.
+    omega1 : float or array_like
+        Angular velocity about the vertical axis in s^-1, of either sign.
+    m : float or array_like, optional
+        Mass in kg, > 0. Only moments of inertia and forces need it.
+    g : float or array_like, default 9.80665
+        Acceleration of gravity in m s^-2, of either sign.
+    half_span : float or array_like, optional
+        Half the distance between the bearings of the shaft, in m, > 0. Only forces need it.
+
+    Raises
+    ------
+    ParameterError
+        If a scalar is unusable, or r and ``e sin beta`` are both zero. Inside arrays such cells
+        give NaN.
+
+    Notes
+    -----
+    Each parameter is a scalar, a 1-D array (an axis of its own name; two make an outer product)
+    or a DataArray (broadcast by the names of its dims; a chunked one stays lazy).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> disk = pk.GyroRotorDisk(beta=18 * pk.deg, e=0.001153, a=0.002, r=0.2, omega1=2.518)
+    >>> A, B, C = disk.coefficients()
+    >>> bool(A < 0)
+    True
+    >>> try:
+    ...     disk.replace(beta=30)
+    ... except pk.ParameterError as error:
+    ...     print(error)
+    beta: got 30, wants a number from 0 to 3.14159 in radians; if it is in degrees: 30 * pk.deg
+    """
+
+    beta: NumberLike
+    e: NumberLike
+    a: NumberLike
+    r: NumberLike
+    omega1: NumberLike
+    m: NumberLike | None = None
+    g: NumberLike = STANDARD_GRAVITY
+    half_span: NumberLike | None = None
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(
+            name="beta",
+            units="rad",
+            long_name="angle between the shaft and the disk's plane",
+            low=0.0,
+            high=np.pi,
+        ),
+        Parameter(name="e", units="m", long_name="distance of the mass centre from O2", low=0.0),
+        Parameter(name="a", units="m", long_name="distance of the shaft from the vertical axis"),
+        Parameter(name="r", units="m", long_name="radius of the disk", low=0.0),
+        Parameter(name="omega1", units="s-1", long_name="angular velocity about the vertical axis"),
+        Parameter(name="m", units="kg", long_name="mass of the disk", positive=True, optional=True),
+        Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
+        Parameter(
+            name="half_span",
+            units="m",
+            long_name="half the distance between the bearings of the shaft",
+            positive=True,
+            optional=True,
+        ),
+    )
+
+    def __post_init__(self) -> None:
+        """Check each parameter, then that the disk is a body."""
+        super().__post_init__()
+        zero_e = isinstance(self.e, float) and self.e == 0.0
+        zero_beta = isinstance(self.beta, float) and self.beta in (0.0, np.pi)
+        if isinstance(self.r, float) and self.r == 0.0 and (zero_e or zero_beta):
+            culprit = "e" if zero_e else "beta"
+            raise ParameterError(
+                f"r: got 0.0 together with {culprit} = {getattr(self, culprit)!r}, wants r > 0 or "
+                "e sin(beta) > 0; with both zero nothing has inertia about the shaft"
+            )
+
+    @staticmethod
+    def _abc(
+        beta: FloatArray,
+        e: FloatArray,
+        a: FloatArray,
+        r: FloatArray,
+        omega1: FloatArray,
+        g: FloatArray,
+    ) -> tuple[FloatArray, ...]:
+        return disk_coefficients(beta, e, a, r, omega1, g)
+
+    @property
+    def eccentricity(self) -> Value:
+        """Distance of the mass centre from the shaft, ``e sin beta``, in m."""
+        value: Value = self._derived("eccentricity", lambda beta, e: e * np.sin(beta), "beta", "e")
+        return value
+
+    @property
+    def skew(self) -> Value:
+        """Angle between the disk's normal and the shaft, ``pi/2 - beta``, in rad."""
+        value: Value = self._derived("skew", lambda beta: np.pi / 2 - beta, "beta")
+        return value
+
+    def inertia(self) -> DiskInertia:
+        """Moments of inertia at O2 in the disk's own frame, in kg m^2.
+
+        Returns
+        -------
+        DiskInertia
+            Ju, Jv, Jn about the axes u2, v2, n2, and the deviation moment Jvn; floats, or
+            DataArrays where a parameter is an array.
+
+        Raises
+        ------
+        ParameterError
+            If the mass is not given.
+
+        Notes
+        -----
+        [Veljovic2015] before (12), at the pole O2; the papers' formulas at the mass centre hold
+        only for e = 0.
+        """
+        if self.m is None:
+            raise bad("m", None, "a mass for the moments of inertia", "use disk.replace(m=...)")
+        names = ("m", "r", "e", "beta")
+        values = {name: self.parameters[name] for name in names}
+        return DiskInertia(
+            *combine(disk_inertia, values, DiskInertia._fields, tuple(self.parameters))
+        )
+
+    def _derived(self, name: str, function: Any, *inputs: str) -> Any:
+        values = {key: self.parameters[key] for key in inputs}
+        return combine(lambda *arrays: (function(*arrays),), values, (name,))[0]

@@ -1,0 +1,85 @@
+"""Importing phasekit is cheap, and its public names are complete."""
+
+import ast
+import importlib.metadata
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+import phasekit as pk
+
+HEAVY = ("numpy", "numba", "scipy", "xarray", "matplotlib", "pandas", "dask", "zarr", "tqdm")
+
+
+def loaded_after(code):
+    program = f"{code}\nimport sys\nprint([m for m in {HEAVY!r} if m in sys.modules])"
+    result = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    return ast.literal_eval(result.stdout.splitlines()[-1])
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import phasekit",
+        "import phasekit as pk; dir(pk); pk.deg; pk.rpm; pk.__version__",
+        "import phasekit as pk; pk.ParameterError; pk.Topology.FIGURE_EIGHT",
+        "import phasekit as pk\ntry:\n    pk.no_such_name\nexcept AttributeError:\n    pass",
+    ],
+)
+def test_import_loads_nothing_heavy(code):
+    assert loaded_after(code) == []
+
+
+def test_labelled_floor_loads_neither_plots_nor_stores_nor_dask():
+    code = "import phasekit as pk; pk.equilibria; pk.sweep; pk.open_map; pk.GyroRotorDisk"
+    assert set(loaded_after(code)) <= {"numpy", "numba", "xarray", "pandas"}
+
+
+def test_first_result_does_not_load_dask():
+    code = (
+        "import phasekit as pk\n"
+        "disk = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)\n"
+        "assert pk.equilibria(disk).n_equilibria.item() == 4\n"
+        "import sys\n"
+        "assert 'dask.array' not in sys.modules\n"
+    )
+    assert not {"matplotlib", "zarr", "tqdm"} & set(loaded_after(code))
+
+
+@pytest.mark.parametrize("name", sorted(set(pk.__all__) - {"plot"}))
+def test_every_public_name_is_there(name):
+    assert getattr(pk, name) is getattr(pk, name)
+    assert name in dir(pk)
+
+
+def test_type_checkers_see_the_same_names():
+    tree = ast.parse(inspect.getsource(pk))
+    block = next(
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
+    seen = {alias.asname for node in block.body for alias in node.names}
+    assert seen == set(pk.__all__) - {"__version__", "deg", "rpm"}
+
+
+def test_unknown_name():
+    with pytest.raises(AttributeError, match="module 'phasekit' has no attribute 'equilibrio'"):
+        pk.equilibrio  # noqa: B018
+
+
+def test_constants():
+    assert 180 * pk.deg == 3.141592653589793
+    assert 60 * pk.rpm == 2 * 3.141592653589793
+
+
+def test_version_is_that_of_the_package():
+    try:
+        installed = importlib.metadata.version("phasekit")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("phasekit is run from its folder")
+    assert pk.__version__ == installed
