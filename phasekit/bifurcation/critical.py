@@ -52,7 +52,11 @@ def critical_disk(
     a_, g_ = np.abs(a_), np.abs(g_)
     with np.errstate(all="ignore"):
         weight = g_ / (omega1_ * omega1_)
+        given = {"beta": beta_, "e": e_, "a": a_, "omega1": omega1_, "r": r_, "g": g_}
         legal = (r_ >= 0.0) & ((e_ >= 0.0) | (parameter == "e"))
+        for name, values in given.items():
+            legal &= np.isfinite(values) | (name == parameter)
+        legal &= np.isfinite(weight) | (parameter == "omega1")
         r_ = np.where(legal, r_, np.nan)
         if parameter == "beta":
             return _critical_beta(e_, r_, _length(weight, a_))
@@ -67,7 +71,8 @@ def critical_disk(
         length = np.abs(span) / (4.0 * e_ * s)
         if parameter == "a":
             return _by_sign(span, _positive(_remainder(length, weight)))
-        return _by_sign(span, _positive(np.sqrt(g_ / _remainder(length, a_))))
+        speed = np.sqrt(np.where(g_ > 0.0, g_, np.nan) / _remainder(length, a_))
+        return _by_sign(span, _positive(speed))
 
 
 def critical_reduced(
@@ -107,7 +112,9 @@ def _floats(*values: npt.ArrayLike) -> tuple[Array, ...]:
 
 def _length(first: Array, second: Array) -> Array:
     """(first^(2/3) + second^(2/3))^(3/2)."""
-    return np.asarray((np.cbrt(first) ** 2 + np.cbrt(second) ** 2) ** 1.5)
+    both = (np.cbrt(first) ** 2 + np.cbrt(second) ** 2) ** 1.5
+    # Exact where one is 0, so that a cusp (length = e) is met exactly.
+    return np.where(first == 0.0, second, np.where(second == 0.0, first, both))
 
 
 def _remainder(whole: Array, part: Array) -> Array:

@@ -26,6 +26,8 @@ SPLITTER = 134217729.0  # 2^27 + 1 (Veltkamp)
 DECIDED = 2.0**-48
 UNDERFLOW = 1e-280
 
+LEAST = 5e-324
+
 
 @inline
 def two_sum(a: float, b: float) -> tuple[float, float]:
@@ -97,21 +99,28 @@ def fold_margin(a: float, b: float, c: float, delta: float) -> tuple[float, floa
     Delta = (q + t - p) (q^2 + t^2 + p^2 - q t + q p + t p) (X^2 - X Y + Y^2), where
     only the first factor can vanish.
     """
-    ra = cbrt(a)
-    rb = cbrt(b)
-    rc = cbrt(c)
-    p = ra * ra
-    q = rb * rb
-    t = rc * rc
+    root_b = cbrt(b)
+    root_c = cbrt(c)
+    p = cbrt(a) * cbrt(a)
+    q = root_b * root_b
+    t = root_c * root_c
     big = b if b > c else c
     small = c if b > c else b
+    high = q if b > c else t
+    low = t if b > c else q
+    # The gap as a difference of two terms; where these cancel, next to the fold, from Delta.
+    rise = (big - a) * (big + a) / (high * high + high * p + p * p)
+    gap = rise + low
     x = (big - a) * (big + a) + small * small
     y = 3.0 * p * q * t
     cofactor = (q * q + t * t + p * p - q * t + q * p + t * p) * ((x - y) * x + y * y)
-    gap = delta / cofactor / p
+    gap = delta / cofactor if abs(gap) < 0.25 * (abs(rise) + low) else gap
+    gap /= p
     ratio = (q + t) / p
     near = -gap * (1.0 + ratio + ratio * ratio) / (1.0 + ratio * np.sqrt(ratio))
     far = 1.0 - ratio * np.sqrt(ratio)
     margin = near if ratio < 4.0 else far
-    margin = 0.0 if delta == 0.0 else margin
-    return (margin if a > 0.0 else -math.inf), rb, rc
+    # Its sign is that of -delta also where it underflows.
+    least = 0.0 if delta == 0.0 else (LEAST if delta < 0.0 else -LEAST)
+    margin = least if delta == 0.0 or margin == 0.0 else margin
+    return (margin if a > 0.0 else -math.inf), root_b, root_c

@@ -21,6 +21,8 @@ import numpy as np
 from phasekit.kernels.compile import inline
 from phasekit.kernels.elementary import inverse_cbrt
 
+SLIGHTLY_LESS = 1.0 - 2.0**-48
+
 
 @inline
 def rotate(s: float, f: float, turn: float) -> tuple[float, float]:
@@ -40,7 +42,8 @@ def outer_root(a: float, p: float, q: float, root_p: float) -> tuple[float, floa
     # bound the root from below: at the pole, on the axis p = 0, and at infinity.
     excess = q - a
     norm2 = p * p + q * q
-    far = np.sqrt(norm2) - a * (q / norm2) * q if norm2 > 0.0 else 0.0
+    # (The last one less a rounding error, which is large against the root next to a cusp.)
+    far = SLIGHTLY_LESS * np.sqrt(norm2) - a * (q / norm2) * q if norm2 > 0.0 else 0.0
     low = excess if excess > far else far
     low = p if p > low else low
     # Next to the cusp (p -> 0, q -> a) these are far off. There nu^2 (nu - excess) = K(nu) with a

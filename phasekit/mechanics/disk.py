@@ -60,6 +60,7 @@ def disk_coefficients(
         reach = r * np.cos(beta)
         inertia = offset * offset + r * r * (1.0 + s * s)
         legal = (beta >= 0.0) & (beta <= np.pi) & (e >= 0.0) & (r >= 0.0) & (inertia > 0.0)
+        legal &= np.isfinite(inertia + a + omega1 + g)
         inertia = np.where(legal, inertia, np.nan)
         omega_sq = omega1 * omega1
         A = omega_sq * ((offset - reach) * (offset + reach) / inertia)

@@ -22,8 +22,9 @@ def potential(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.Arr
     0.0
     """
     A, B, C, phi = _floats(A, B, C, phi)
-    cos = np.cos(phi)
-    return np.asarray((0.5 * A * cos - B) * cos - C * np.sin(phi))
+    cos, sin = _cos_sin(phi)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((0.5 * A * cos - B) * cos - C * sin)
 
 
 def gradient(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.ArrayLike) -> Array:
@@ -35,8 +36,9 @@ def gradient(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.Arra
     -0.5
     """
     A, B, C, phi = _floats(A, B, C, phi)
-    cos, sin = np.cos(phi), np.sin(phi)
-    return np.asarray((B - A * cos) * sin - C * cos)
+    cos, sin = _cos_sin(phi)
+    with np.errstate(invalid="ignore"):
+        return np.asarray((B - A * cos) * sin - C * cos)
 
 
 def curvature(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.ArrayLike) -> Array:
@@ -48,8 +50,9 @@ def curvature(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.Arr
     -1.0
     """
     A, B, C, phi = _floats(A, B, C, phi)
-    cos, sin = np.cos(phi), np.sin(phi)
-    return np.asarray(B * cos - A * (cos - sin) * (cos + sin) + C * sin)
+    cos, sin = _cos_sin(phi)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(B * cos - A * (cos - sin) * (cos + sin) + C * sin)
 
 
 def energy(
@@ -80,6 +83,12 @@ def phase_velocity(
     """
     kinetic = np.asarray(energy, dtype=float) - potential(A, B, C, phi)
     return np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan))
+
+
+def _cos_sin(phi: Array) -> tuple[Array, Array]:
+    """Cosine and sine, NaN where phi is infinite."""
+    with np.errstate(invalid="ignore"):
+        return np.cos(phi), np.sin(phi)
 
 
 def _floats(*values: npt.ArrayLike) -> tuple[Array, ...]:
