@@ -37,10 +37,10 @@ def main() -> None:
             color=color,
             label=rf"$\beta$ = {name} $\pi$",
         )
-        four = int(pk.equilibria(disk).n_equilibria) == 4
+        eight = bool(pk.separatrices(disk).figure_eight)
         print(
             f"beta = {name:5} pi: phi from {x.min():+.4f} to {x.max():+.4f} rad, "
-            f"{'figure-eight' if four else 'no figure-eight'} in the portrait"
+            f"{'figure-eight' if eight else 'no figure-eight'} in the portrait"
         )
     ax.plot(*START, "k*", markersize=11, label="start")
     ax.set_xlim(-np.pi, np.pi)

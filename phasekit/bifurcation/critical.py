@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ParameterError
+
 Array = npt.NDArray[np.float64]
 Critical = tuple[Array, Array, Array]
 
@@ -42,12 +44,19 @@ def critical_disk(
         unit; beta in [0, pi/2]. The sign of A does not depend on a and omega1: there only the
         fold of that sign is given.
 
+    Raises
+    ------
+    ParameterError
+        If the parameter is not one of these.
+
     Examples
     --------
     >>> minus, plus, star = critical_disk("beta", e=0.1, a=0.03, r=0.05, omega1=20.0, g=0.0)
     >>> round(float(minus), 6), round(float(plus), 6), round(float(star), 6)
     (0.139912, 0.435439, 0.244979)
     """
+    if parameter not in ("beta", "e", "a", "omega1"):
+        raise ParameterError(f"parameter: got {parameter!r}, wants beta, e, a or omega1")
     beta_, e_, a_, r_, omega1_, g_ = _floats(beta, e, a, r, omega1, g)
     a_, g_ = np.abs(a_), np.abs(g_)
     with np.errstate(all="ignore"):
@@ -95,15 +104,22 @@ def critical_reduced(
     minus, plus, sign_change : ndarray
         Dimensionless; the fold stands on the side of A's own sign, sign_change is NaN.
 
+    Raises
+    ------
+    ParameterError
+        If the parameter is not one of these.
+
     Examples
     --------
     >>> round(float(critical_reduced("lam", 2.0, 0.3, 1.0)[1]), 6)
     0.225098
     """
+    if parameter not in ("lam", "psi"):
+        raise ParameterError(f"parameter: got {parameter!r}, wants 'lam' or 'psi'")
     a, b, c = _floats(A, B, C)
-    size, other = np.abs(a), np.abs(c if parameter == "lam" else b)
     with np.errstate(all="ignore"):
-        return _by_sign(a, _positive(_remainder(size, other) / size))
+        other = np.abs((c if parameter == "lam" else b) / a)
+        return _by_sign(a, _positive(_remainder(np.ones_like(other), other)))
 
 
 def _floats(*values: npt.ArrayLike) -> tuple[Array, ...]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import difflib
 import numbers
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -77,6 +77,12 @@ def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
     return ParameterError(text + ", ".join(names))
 
 
+def flag(argument: str, value: object) -> None:
+    """Raise a `ParameterError` unless `value` is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise bad(argument, value, "True or False")
+
+
 def numeric(argument: str, value: Any) -> Value:
     """Return `value` as a float, a read-only 1-D float64 array or a float64 DataArray.
 
@@ -106,6 +112,8 @@ def numeric(argument: str, value: Any) -> Value:
         raise bad(argument, value, wants)
     if isinstance(value, (list, tuple)) and any(isinstance(v, (bool, np.bool_)) for v in value):
         raise bad(argument, value, wants, "it holds a bool")
+    if isinstance(value, (xr.Dataset, Mapping)):
+        raise bad(argument, value, wants, "name one variable of it")
     array = _plain(value)
     if array.dtype.kind not in "iuf":
         raise bad(argument, value, wants)
@@ -144,6 +152,8 @@ def _data_array(argument: str, value: xr.DataArray, wants: str) -> Value:
         raise bad(argument, value, "at least one value")
     if not all(isinstance(dim, str) for dim in value.dims):
         raise bad(argument, value, "dims that are strings")
+    if len(set(value.dims)) < value.ndim:
+        raise bad(argument, value, "dims that differ")
     # Only the coordinates of its own dims travel on: others (the fixed parameters of the map
     # that it was taken from, say) would contradict the system that it is put into.
     keep = {dim: value.coords[dim] for dim in value.dims if _is_plain_axis(value, dim)}

@@ -117,6 +117,8 @@ def evaluate(
     grid = make_grid(inputs, axis=axis, order=order)
     needs = {one: leaves(system, one.inputs, passes) for one in passes}
     _refuse_missing(system, needs, inputs)
+    if not grid.sizes and any("A" in one.inputs for one in passes):
+        system.coefficients()  # scalars that are invalid raise, where cells of arrays become NaN
     dims = {group: grid.dims_of(need) for one, need in needs.items() for group in one.groups}
     _refuse_taken(grid, rows)
     compute = _lazy if grid.lazy else functools.partial(_eager, progress=progress)

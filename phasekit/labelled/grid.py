@@ -143,12 +143,13 @@ def combine(
     function: Callable[..., tuple[Any, ...]],
     values: Mapping[str, Value],
     names: Sequence[str],
+    attrs: Mapping[str, Mapping[str, str]],
     order: Sequence[str] = (),
 ) -> tuple[Any, ...]:
     """Apply an array function to values: floats in, floats out; arrays in, DataArrays out.
 
-    The function takes the values as they come and returns an array for each of `names`; `order`
-    tells which dims come first in the results.
+    The function takes the values as they come and returns an array for each of `names`; `attrs`
+    holds the attributes of values and results by name, and `order` tells which dims come first.
     """
     if all(isinstance(value, float) for value in values.values()):
         return tuple(float(result) for result in function(*values.values()))
@@ -162,10 +163,13 @@ def combine(
         dask="parallelized",
         output_dtypes=[np.float64 for _ in names],
     )
-    coords = {name: given for name, given in grid.inputs.items() if name not in grid.coords}
+    coords = {
+        name: variable(map(str, given.dims), given.data, attrs.get(name, given.attrs))
+        for name, given in {**grid.inputs, **grid.coords}.items()
+    }
     results = results if isinstance(results, tuple) else (results,)
     return tuple(
-        xr.DataArray(result.transpose(*grid.sizes), coords={**grid.coords, **coords}, name=name)
+        xr.DataArray(result.transpose(*grid.sizes), coords=coords, name=name, attrs=attrs.get(name))
         for result, name in zip(results, names, strict=True)
     )
 

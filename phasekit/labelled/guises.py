@@ -11,7 +11,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, NumberLike
 from phasekit.labelled.grid import combine
 from phasekit.labelled.models import STANDARD_GRAVITY
-from phasekit.labelled.system import Model, Parameter, model
+from phasekit.labelled.system import Model, Parameter, attrs_of, model
 
 
 @model
@@ -78,7 +78,14 @@ def reduce(system: Model) -> Reduced:
         with np.errstate(all="ignore"):
             return np.where(A == 0, np.nan, B / A), np.where(A == 0, np.nan, C / A), A + 0 * (B + C)
 
-    return Reduced(*combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq")))
+    attrs = attrs_of(*system.declared, *Reduced.declared)
+    values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
+    if not all(np.isfinite(value) for value in values if isinstance(value, float)):
+        raise ParameterError(
+            f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which lambda = B/A and "
+            "psi = C/A are finite; use .coefficients(), which has no such limit"
+        )
+    return Reduced(*values)
 
 
 @model
@@ -97,9 +104,9 @@ class ParticleOnCircle(Model):
     tilt : float or array_like, default 0.0
         Angle of the circle's plane from the vertical in rad, -pi/2 to pi/2.
     offset : float or array_like, default 0.0
-        Distance of the circle's centre from the axis in m, along the plane's horizontal.
+        Distance of the circle's center from the axis in m, along the plane's horizontal.
     normal_offset : float or array_like, default 0.0
-        Distance of the circle's centre from the axis in m, along the horizontal square to that.
+        Distance of the circle's center from the axis in m, along the horizontal square to that.
     g : float or array_like, default 9.80665
         Acceleration of gravity in m s^-2.
 
@@ -141,12 +148,12 @@ class ParticleOnCircle(Model):
         Parameter(
             name="offset",
             units="m",
-            long_name="distance of the circle's centre from the axis, in the plane",
+            long_name="distance of the circle's center from the axis, in the plane",
         ),
         Parameter(
             name="normal_offset",
             units="m",
-            long_name="distance of the circle's centre from the axis, square to the plane",
+            long_name="distance of the circle's center from the axis, square to the plane",
         ),
         Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
     )

@@ -2,16 +2,25 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad
+from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, same
 from phasekit.labelled.grid import combine
-from phasekit.labelled.system import MODELS, Model, Parameter, model, named_arguments
-from phasekit.mechanics.disk import disk_coefficients, disk_inertia
+from phasekit.labelled.system import (
+    MODELS,
+    Model,
+    Parameter,
+    attrs_of,
+    model,
+    named_arguments,
+)
+from phasekit.mechanics.disk import disk_coefficients, disk_eccentricity, disk_inertia
 
 STANDARD_GRAVITY = 9.80665
 
@@ -66,6 +75,11 @@ class Coefficients(Model, _ABC):
         kept = [p.check(x) for p, x in zip(cls.declared, (A, B, C), strict=True)]
         return super().__new__(cls, *kept)
 
+    @classmethod
+    def _make(cls, iterable: Iterable[Any]) -> Coefficients:
+        """Make coefficients from three values, checked; ``_replace`` comes here as well."""
+        return cls(*iterable)
+
     def coefficients(self) -> Coefficients:
         """Return itself: coefficients are a system."""
         return self
@@ -76,19 +90,37 @@ class Coefficients(Model, _ABC):
 
     def __eq__(self, other: object) -> bool:
         """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
-        return Model.__eq__(self, other) if isinstance(other, Model) else tuple.__eq__(self, other)
+        if isinstance(other, Model):
+            return Model.__eq__(self, other)
+        if not isinstance(other, tuple) or len(other) != 3:
+            return NotImplemented
+        return all(same(x, y) for x, y in zip(self, other, strict=True))
 
     def __ne__(self, other: object) -> bool:
         """Return the opposite of ``==``, in place of the tuple's."""
         return not self == other
 
     def __hash__(self) -> int:
-        """Hash as the tuple that it equals."""
-        return tuple.__hash__(self)
+        """Hash as the tuple that it equals, or by the arrays that it holds."""
+        return (
+            tuple.__hash__(self) if all(isinstance(x, float) for x in self) else super().__hash__()
+        )
 
 
 Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
 MODELS["Coefficients"] = Coefficients
+
+
+INERTIA_NAMES = (
+    "moment of inertia about u2",
+    "moment of inertia about v2",
+    "moment of inertia about n2",
+    "deviation moment of v2 and n2",
+)
+
+
+def _eccentricity(e: FloatArray, beta: FloatArray) -> tuple[FloatArray]:
+    return (disk_eccentricity(e, beta),)
 
 
 class DiskInertia(NamedTuple):
@@ -106,7 +138,7 @@ class GyroRotorDisk(Model):
     """Heavy disk, skew and eccentric on its shaft, the shaft carried round the vertical.
 
     The disk turns by phi about a horizontal shaft, which itself is carried with the angular
-    velocity omega1 about the vertical at the distance a. ``phi = 0``: the mass centre hangs
+    velocity omega1 about the vertical at the distance a. ``phi = 0``: the mass center hangs
     straight down; ``phi = +pi/2`` is outward for ``a > 0``.
 
     Parameters
@@ -114,7 +146,7 @@ class GyroRotorDisk(Model):
     beta : float, 1-D array_like or xarray.DataArray
         Angle between the shaft and the disk's plane, 0 to pi rad; pi/2: square to its shaft.
     e : float or array_like
-        Distance of the mass centre from the point O2 of the shaft, in m, >= 0. The true
+        Distance of the mass center from the point O2 of the shaft, in m, >= 0. The true
         eccentricity, the distance from the shaft, is ``e sin beta``.
     a : float or array_like
         Distance of the shaft from the vertical axis, in m, of either sign.
@@ -171,7 +203,7 @@ class GyroRotorDisk(Model):
             low=0.0,
             high=np.pi,
         ),
-        Parameter(name="e", units="m", long_name="distance of the mass centre from O2", low=0.0),
+        Parameter(name="e", units="m", long_name="distance of the mass center from O2", low=0.0),
         Parameter(name="a", units="m", long_name="distance of the shaft from the vertical axis"),
         Parameter(name="r", units="m", long_name="radius of the disk", low=0.0),
         Parameter(name="omega1", units="s-1", long_name="angular velocity about the vertical axis"),
@@ -211,14 +243,16 @@ class GyroRotorDisk(Model):
 
     @property
     def eccentricity(self) -> Value:
-        """Distance of the mass centre from the shaft, ``e sin beta``, in m."""
-        value: Value = self._derived("eccentricity", lambda beta, e: e * np.sin(beta), "beta", "e")
+        """Distance of the mass center from the shaft, ``e sin beta``, in m."""
+        result = Parameter(name="eccentricity", units="m", long_name="distance from the shaft")
+        value: Value = self._derived(_eccentricity, ("e", "beta"), [result])[0]
         return value
 
     @property
     def skew(self) -> Value:
         """Angle between the disk's normal and the shaft, ``pi/2 - beta``, in rad."""
-        value: Value = self._derived("skew", lambda beta: np.pi / 2 - beta, "beta")
+        result = Parameter(name="skew", units="rad", long_name="angle of the normal to the shaft")
+        value: Value = self._derived(lambda beta: (np.pi / 2 - beta,), ("beta",), [result])[0]
         return value
 
     def inertia(self) -> DiskInertia:
@@ -237,17 +271,29 @@ class GyroRotorDisk(Model):
 
         Notes
         -----
-        [Veljovic2015] before (12), at the pole O2; the papers' formulas at the mass centre hold
+        [Veljovic2015] before (12), at the pole O2; the papers' formulas at the mass center hold
         only for e = 0.
         """
         if self.m is None:
             raise bad("m", None, "a mass for the moments of inertia", "use disk.replace(m=...)")
-        names = ("m", "r", "e", "beta")
-        values = {name: self.parameters[name] for name in names}
-        return DiskInertia(
-            *combine(disk_inertia, values, DiskInertia._fields, tuple(self.parameters))
-        )
+        moments = [
+            Parameter(name=name, units="kg m2", long_name=f"{what} at O2")
+            for name, what in zip(DiskInertia._fields, INERTIA_NAMES, strict=True)
+        ]
+        return DiskInertia(*self._derived(disk_inertia, ("m", "r", "e", "beta"), moments))
 
-    def _derived(self, name: str, function: Any, *inputs: str) -> Any:
+    def _derived(
+        self, function: Any, inputs: tuple[str, ...], results: list[Parameter]
+    ) -> tuple[Any, ...]:
+        """Apply an array function to parameters; NaN where one of them leaves its domain."""
+        declared = {p.name: p for p in self.declared}
+
+        def masked(*arrays: FloatArray) -> tuple[FloatArray, ...]:
+            valid = [declared[n].valid(x) for n, x in zip(inputs, arrays, strict=True)]
+            inside = functools.reduce(np.logical_and, valid)
+            return tuple(np.where(inside, result, np.nan) for result in function(*arrays))
+
         values = {key: self.parameters[key] for key in inputs}
-        return combine(lambda *arrays: (function(*arrays),), values, (name,))[0]
+        attrs = attrs_of(*self.declared, *results)
+        names = [result.name for result in results]
+        return combine(masked, values, names, attrs, tuple(self.parameters))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import tempfile
 from collections.abc import Iterator
@@ -13,8 +14,8 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.arguments import bad
-from phasekit.labelled.schema import model_name, restore
+from phasekit.labelled.arguments import bad, flag
+from phasekit.labelled.schema import MODEL, model_name, restore
 
 ZARR, NETCDF = ".zarr", ".nc"
 
@@ -23,6 +24,7 @@ class StoreTarget:
     """A place for a map; everything that can be refused is refused before the map is made."""
 
     def __init__(self, store: str | PathLike[str], *, overwrite: bool = False) -> None:
+        flag("overwrite", overwrite)
         self.path = _path(store)
         self.overwrite = overwrite
         if not self.path.parent.is_dir():
@@ -137,7 +139,11 @@ def _as_store_error(path: Path) -> Iterator[None]:
 def _path(store: Any, *, suffix: bool = True) -> Path:
     if not isinstance(store, (str, PathLike)) or not os.fspath(store):
         raise bad("store", store, "a path that ends in .zarr or .nc")
-    path = Path(store).expanduser()
+    try:
+        path = Path(store).expanduser()
+        path.exists()  # refuses what cannot be a path, such as a null byte
+    except (RuntimeError, ValueError, OSError) as error:
+        raise bad("store", os.fspath(store), f"a path that can exist ({error})") from None
     if "://" in os.fspath(store):
         raise StoreError(f"store: {os.fspath(store)} is a URL; maps are written to local paths")
     if suffix and path.suffix not in (ZARR, NETCDF):
@@ -146,15 +152,18 @@ def _path(store: Any, *, suffix: bool = True) -> Path:
 
 
 def _is_map_file(path: Path) -> bool:
-    """Whether overwriting may remove it: a Zarr v3 store, or a netCDF (HDF5) file."""
+    """Whether overwriting may remove it: a store that says which model of phasekit made it."""
     if path.is_symlink():
         return False
-    if path.suffix == ZARR:
-        return path.is_dir() and (path / "zarr.json").is_file()
-    if not path.is_file():
+    try:
+        if path.suffix == ZARR:
+            return MODEL in json.loads((path / "zarr.json").read_bytes())["attributes"]
+        import h5netcdf
+
+        with h5netcdf.File(path, "r") as file:
+            return MODEL in file.attrs
+    except (OSError, ValueError, KeyError, TypeError):
         return False
-    with path.open("rb") as file:
-        return file.read(8) == b"\x89HDF\r\n\x1a\n"
 
 
 def _need_h5netcdf() -> None:

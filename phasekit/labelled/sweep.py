@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import Value, bad, numeric, unknown
+from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labelled.evaluate import evaluate, leaves
 from phasekit.labelled.quantities import STATES, plan_passes, select
 from phasekit.labelled.store import StoreTarget
@@ -72,6 +72,9 @@ def sweep(
     >>> ds.sel(beta=0.5, a=0.01, method="nearest").phasekit.system().a
     0.01
     """
+    flag("overwrite", overwrite)
+    if progress is not None:
+        flag("progress", progress)
     system = as_system(system)
     rows = select(of)
     passes = plan_passes(rows)

@@ -49,7 +49,9 @@ def as_system(system: Any) -> Model:
     if isinstance(system, Model):
         return system
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
-        return MODELS["Coefficients"](*system.coefficients())
+        coefficients = system.coefficients()
+        if isinstance(coefficients, tuple) and len(coefficients) == 3:
+            return MODELS["Coefficients"](*coefficients)
     hint = ""
     if isinstance(system, (tuple, list)) and len(system) == 3:
         hint = "three coefficients make one: pk.Coefficients(A, B, C)"
@@ -102,8 +104,8 @@ class Parameter:
         kept = numeric(self.name, value)
         if isinstance(kept, float):
             if not self.valid(kept):
-                in_degrees = self.units == "rad" and abs(kept) <= 360.0
-                hint = f"if it is in degrees: {value!r} * pk.deg" if in_degrees else ""
+                in_degrees = self.units == "rad" and self.valid(kept * np.pi / 180.0)
+                hint = f"if it is in degrees: {kept:.15g} * pk.deg" if in_degrees else ""
                 raise bad(self.name, value, self.wants, hint)
             return kept
         if isinstance(kept, np.ndarray):
@@ -127,6 +129,11 @@ class Parameter:
         array = np.array(kept.values)
         array.flags.writeable = False
         return array
+
+
+def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:
+    """Attributes of the coordinates or results that are named as these parameters."""
+    return {p.name: {"long_name": p.long_name, "units": p.units} for p in parameters}
 
 
 class Model:
@@ -191,7 +198,15 @@ class Model:
         def abc(*arrays: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
             return self.valid_coefficients(dict(zip(names, arrays, strict=True)))
 
-        return Coefficients(*combine(abc, used, ("A", "B", "C")))
+        attrs = attrs_of(*self.declared, *Coefficients.declared)
+        results = combine(abc, used, ("A", "B", "C"), attrs)
+        if not all(np.isfinite(x) for x in results if isinstance(x, float)):
+            got = ", ".join(f"{name}={brief(value)}" for name, value in used.items())
+            raise ParameterError(
+                f"{type(self).__name__}: got {got}, whose coefficients are {results}; wants "
+                "parameters of a size for which A, B and C are finite"
+            )
+        return Coefficients(*results)
 
     def reduced(self) -> Reduced:
         """Return the papers' form (lambda, psi, Omega^2); cells with ``A = 0`` become NaN.
@@ -204,6 +219,13 @@ class Model:
         from phasekit.labelled.guises import reduce
 
         return reduce(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore a pickled model; its arrays are read-only again."""
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed.
@@ -258,7 +280,8 @@ class Model:
     def __hash__(self) -> int:
         """Hash of the parameters; a model that holds DataArrays has none."""
         values = (getattr(self, p.name) for p in self.declared)
-        keys = (v.tobytes() if isinstance(v, np.ndarray) else v for v in values)
+        # 0.0 is added because -0.0 equals it
+        keys = ((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values)
         return hash((type(self).__name__, *keys))
 
 

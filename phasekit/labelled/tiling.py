@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 from phasekit.labelled.arguments import FloatArray
+from phasekit.phase.solve import cpus
 
 #: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
 TILE_CELLS = 1 << 16
@@ -45,12 +45,12 @@ def tiles(shape: Sequence[int], cells: int = TILE_CELLS) -> Iterator[tuple[slice
 
 def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | None) -> None:
     """Run tasks in threads (the kernels release the interpreter), with a bar that counts cells."""
-    if len(tasks) <= 1:
+    if len(tasks) <= 1 and progress is not True:
         for task, _ in tasks:
             task()
         return
     with _bar(sum(cells for _, cells in tasks), progress) as bar:
-        pool = ThreadPoolExecutor(max_workers=min(_cpus(), len(tasks)))
+        pool = ThreadPoolExecutor(max_workers=max(1, min(cpus(), len(tasks))))
         try:
             futures = {pool.submit(task): cells for task, cells in tasks}
             for future in as_completed(futures):
@@ -58,12 +58,6 @@ def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | 
                 bar.update(futures[future])
         finally:
             pool.shutdown(cancel_futures=True)
-
-
-def _cpus() -> int:
-    if hasattr(os, "sched_getaffinity"):  # what this process may use, not what the machine has
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class _NoBar:

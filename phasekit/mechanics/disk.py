@@ -87,6 +87,20 @@ def disk_mixing(r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike) -> Arra
         return np.asarray((r * r + 4.0 * e * e) * s * np.cos(beta) / inertia)
 
 
+def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
+    """Distance e sin beta of the disk's center from the shaft, m.
+
+    The length of the papers' vector of eccentricity; their formulas mean e, the distance from
+    the pole ([Veljovic2015] (13)).
+
+    Examples
+    --------
+    >>> float(disk_eccentricity(0.1, np.pi))
+    0.0
+    """
+    return np.asarray(np.asarray(e, dtype=float) * _sine(np.asarray(beta, dtype=float)))
+
+
 def disk_inertia(
     m: npt.ArrayLike, r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike
 ) -> tuple[Array, Array, Array, Array]:
@@ -94,7 +108,7 @@ def disk_inertia(
 
     With J = m r^2/4 and eps = 1 + 4 e^2/r^2: Ju = J eps, Jv = J (1 + eps cos^2 beta),
     Jn = J (1 + eps sin^2 beta), Jvn = J eps sin beta cos beta, in the frame (u2, v2, n2) with u2
-    tangential, v2 radial inward and n2 along the shaft ([HedrihVeljovic2013] (22) to (28)).
+    tangential, v2 radial inward and n2 along the shaft ([Veljovic2015] before (12)).
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ParameterError
 from phasekit.kernels.equilibria import UNDECIDED
 from phasekit.kernels.exact import exact_discriminant
 
@@ -36,6 +37,8 @@ def solve(
     ``shapes`` gives, for each group of outputs, the trailing shape and dtype of its arrays, and
     ``count`` the place of n_equilibria in the first group. ``threads`` defaults to all cores.
     """
+    if threads is not None and (not isinstance(threads, int) or threads < 1):
+        raise ParameterError(f"threads: got {threads!r}, wants a number of threads >= 1, or None")
     arrays = [np.asarray(value, dtype=float) for value in coefficients]
     shape = np.broadcast_shapes(*(array.shape for array in arrays))
     # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
@@ -52,6 +55,13 @@ def solve(
             for array, values in zip(group, part, strict=True):
                 array[undecided] = values
     return (tuple(array.reshape(shape + array.shape[1:]) for array in group) for group in groups)
+
+
+def cpus() -> int:
+    """Number of cores that this process may use, not that the machine has."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def _allocate(size: int, shapes: tuple[Shapes, ...]) -> list[Arrays]:
@@ -72,7 +82,7 @@ def _run(
         with np.errstate(all="ignore"):
             kernel.py_func(*coefficients, exact, 0, size, *groups)
         return
-    workers = (threads or os.cpu_count() or 1) if size >= THREADS_FROM else 1
+    workers = (threads or cpus()) if size >= THREADS_FROM else 1
     edges = [size * part // workers for part in range(workers + 1)]
     with ThreadPoolExecutor(workers) as pool:
         jobs = [

@@ -1,8 +1,9 @@
 """A map of 10^6 systems, side by side with what a user would write today.
 
 Run with ``pytest tests/benchmarks/bench_map.py``; the tables are printed. Ratios within one run are
-what carries over between machines. Every method gives, for each system, the number of
-equilibria, their angles, V'' and V, whether a figure-eight exists and its two turning points.
+what carries over between machines. The methods give, for each system, the number of equilibria,
+their angles, V'' and V, and where a figure-eight turns (the batched one only its energy);
+phasekit gives frequencies, exponents and areas as well.
 """
 
 from __future__ import annotations

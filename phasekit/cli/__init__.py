@@ -1,0 +1,85 @@
+"""The command line: ``phasekit demo | portrait | diagram | sweep``.
+
+What a command needs is imported when it runs, so that ``phasekit --version`` and ``--help`` answer
+at once. Whatever a user can get wrong ends in one line that says what to do, and exit code 2.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from typing import NoReturn
+
+from phasekit import __version__
+from phasekit.errors import PhasekitError
+
+COMMANDS = {
+    "demo": "map a real rotor, draw it, store it",
+    "portrait": "draw the phase portrait of one system",
+    "diagram": "draw the equilibria against one parameter",
+    "sweep": "make a map from a TOML file",
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with exit code 2 and one line."""
+        raise SystemExit(_complain(f"{message}; see {self.prog} --help"))
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        The arguments; those of the process if left out.
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 2 after an error that the user can mend.
+
+    Examples
+    --------
+    >>> main([])
+    usage: phasekit [-h] [--version] COMMAND ...
+    <BLANKLINE>
+    ...
+    0
+    """
+    parser = Parser(
+        prog="phasekit",
+        usage="%(prog)s [-h] [--version] COMMAND ...",
+        description="Bifurcation and phase-space analysis of rotors and other oscillators.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="commands:\n"
+        + "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
+        + "\n\nphasekit COMMAND --help says more.",
+    )
+    parser.add_argument("--version", action="version", version=f"phasekit {__version__}")
+    parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
+    parser.add_argument("rest", nargs=argparse.REMAINDER, help=argparse.SUPPRESS)
+    options = parser.parse_args(argv)
+    if options.command is None:
+        parser.print_help()
+        return 0
+    if options.command not in COMMANDS:
+        parser.error(f"unknown command {options.command!r}; wants one of {', '.join(COMMANDS)}")
+    command = importlib.import_module(f"phasekit.cli.{options.command}")
+    try:
+        command.run(options.rest)
+    except (PhasekitError, OSError) as error:
+        return _complain(str(error))
+    except KeyboardInterrupt:
+        return _complain("interrupted") + 128
+    return 0
+
+
+def _complain(message: str) -> int:
+    print(f"phasekit: {' '.join(message.split())}", file=sys.stderr)
+    return 2

@@ -1,0 +1,122 @@
+"""What the commands share: options for a model's parameters, and files that are never lost."""
+
+from __future__ import annotations
+
+import inspect
+import io
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from phasekit.cli import Parser
+from phasekit.cli.values import glue_negative_values, is_range, number, span
+from phasekit.errors import ParameterError, StoreError
+from phasekit.labelled.arguments import unknown
+from phasekit.labelled.system import MODELS, Model
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+PICTURES = (".pdf", ".png", ".svg")
+
+
+def model_called(name: Any) -> type[Model]:
+    """Return the model of a name."""
+    if name not in MODELS:
+        raise unknown("model", name, MODELS)
+    return MODELS[name]
+
+
+def read_model(
+    command: str,
+    description: str,
+    argv: Sequence[str],
+    more: Callable[[Parser], None],
+) -> tuple[Any, type[Model], Mapping[str, str]]:
+    """Parse a command whose options are those of a model.
+
+    Returns
+    -------
+    options, model, parameters
+        The command's own options; the model; the text given for each of its parameters.
+    """
+    words = glue_negative_values(list(argv))
+    first = Parser(prog=f"phasekit {command}", add_help=False, allow_abbrev=False)
+    first.add_argument("--model", default="GyroRotorDisk")
+    model = model_called(first.parse_known_args(words)[0].model)
+    parser = Parser(prog=f"phasekit {command}", description=description, allow_abbrev=False)
+    parser.add_argument(
+        "--model", default="GyroRotorDisk", help=f"one of {', '.join(MODELS)} (%(default)s)"
+    )
+    group = parser.add_argument_group(
+        f"parameters of {model.__name__}", "a number in SI units and radians, or with a unit"
+    )
+    for parameter in model.declared:
+        group.add_argument(
+            f"--{parameter.name}",
+            dest=f"parameter_{parameter.name}",
+            metavar="VALUE",
+            help=f"{parameter.long_name}, {parameter.units}",
+        )
+    more(parser)
+    options = parser.parse_args(words)
+    given = {p.name: getattr(options, f"parameter_{p.name}") for p in model.declared}
+    return options, model, {name: text for name, text in given.items() if text is not None}
+
+
+def build(model: type[Model], given: Mapping[str, str]) -> tuple[Model, list[str]]:
+    """Return the system, and the names of the parameters that are ranges."""
+    units = {parameter.name: parameter.units for parameter in model.declared}
+    expected = inspect.signature(model).parameters.values()
+    missing = [f"--{p.name}" for p in expected if p.default is p.empty and p.name not in given]
+    if missing:
+        raise ParameterError(f"parameters: got none for {', '.join(missing)}, wants a value each")
+    swept = [name for name, text in given.items() if is_range(text)]
+    values = {
+        name: span(name, text, units[name]) if name in swept else number(name, text, units[name])
+        for name, text in given.items()
+    }
+    return model(**values), swept
+
+
+def output_file(name: str, *, overwrite: bool, suffixes: Sequence[str] = PICTURES) -> Path:
+    """Return the path of a file that may be written; refuse everything else before any work."""
+    path = Path(name).expanduser()
+    if path.suffix.lower() not in suffixes:
+        raise ParameterError(
+            f"--out: got {name!r}, wants a name that ends in {' or '.join(suffixes)}"
+        )
+    if not path.parent.is_dir():
+        raise StoreError(f"--out: the folder {path.parent} does not exist; make it first")
+    if path.is_dir() or (path.exists() and not overwrite):
+        raise StoreError(f"--out: {path} exists; choose another name or pass --overwrite")
+    return path
+
+
+def save(drawn: Figure | Axes, path: Path, *, dpi: int = 150) -> None:
+    """Write a picture whole or not at all."""
+    import matplotlib
+
+    figure: Any = getattr(drawn, "figure", drawn)
+    buffer = io.BytesIO()
+    kind = path.suffix.lower().lstrip(".")
+    # Without date and random names, the same picture is the same file.
+    dated = {"svg": "Date", "pdf": "CreationDate"}.get(kind)
+    metadata = {dated: None} if dated else None
+    with matplotlib.rc_context({"svg.hashsalt": "phasekit"}):
+        figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
+    path.write_bytes(buffer.getvalue())
+
+
+def quiet_backend() -> None:
+    """Draw into files only; nothing may ask for a screen."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+
+
+def say(text: str) -> None:
+    """Print a line at once."""
+    print(text, file=sys.stdout, flush=True)

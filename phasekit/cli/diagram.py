@@ -1,0 +1,39 @@
+"""``phasekit diagram``: draw the equilibria against one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phasekit.cli import Parser, common
+from phasekit.errors import ParameterError
+
+
+def run(argv: Sequence[str]) -> None:
+    """Draw a bifurcation diagram into a file."""
+    options, model, given = common.read_model(
+        "diagram",
+        "Draw the equilibria against one parameter, given as a range FROM:TO:COUNT, such as "
+        "--beta 0:90deg:181.",
+        argv,
+        _options,
+    )
+    path = common.output_file(options.out, overwrite=options.overwrite)
+    system, swept = common.build(model, given)
+    if len(swept) != 1:
+        found = f"the ranges {', '.join(swept)}" if swept else "no range"
+        raise ParameterError(
+            f"parameters: got {found}, wants exactly one FROM:TO:COUNT, such as 0:90deg:181"
+        )
+    common.quiet_backend()
+    from phasekit import equilibria, plot
+
+    axes = plot.bifurcation_diagram(equilibria(system), y=options.y, angles=options.angles)
+    common.save(axes, path)
+    common.say(f"{system}\nwrote {path}")
+
+
+def _options(parser: Parser) -> None:
+    parser.add_argument("--y", default="phi", help="quantity to draw (%(default)s)")
+    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+    parser.add_argument("--out", default="diagram.png", help="picture file (%(default)s)")
+    parser.add_argument("--overwrite", action="store_true", help="replace an existing file")

@@ -1,0 +1,134 @@
+"""Values as people write them: ``30deg``, ``1.153 mm``, ``300rpm``, ``0:90deg:181``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phasekit import deg, rpm
+from phasekit.errors import ParameterError
+
+#: Units by the unit that results carry; each is the number to multiply by. Decimal, so that 1.153mm
+#: becomes the double nearest to 0.001153.
+UNITS: Mapping[str, Mapping[str, Decimal]] = {
+    "rad": {"rad": Decimal(1), "deg": Decimal(deg), "°": Decimal(deg)},
+    "m": {"m": Decimal(1), "cm": Decimal("1e-2"), "mm": Decimal("1e-3"), "um": Decimal("1e-6")},
+    "kg": {"kg": Decimal(1), "g": Decimal("1e-3"), "t": Decimal(1000)},
+    "s-1": {
+        "rad/s": Decimal(1),
+        "1/s": Decimal(1),
+        "s-1": Decimal(1),
+        "deg/s": Decimal(deg),
+        "rpm": Decimal(rpm),
+    },
+    "s-2": {"1/s2": Decimal(1), "s-2": Decimal(1)},
+    "m s-2": {"m/s2": Decimal(1), "m s-2": Decimal(1)},
+    "1": {},
+}
+#: Most values that a range may have.
+LONGEST = 10_000_000
+
+_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
+
+
+def number(name: str, text: Any, units: str) -> float:
+    """Read one number with an optional unit; without one it is in SI units and radians.
+
+    Parameters
+    ----------
+    name : str
+        Name used in messages.
+    text : str, int or float
+        What the user wrote.
+    units : str
+        Unit of the result, as the models declare it.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a number, or the unit does not fit.
+
+    Examples
+    --------
+    >>> number("e", "1.153mm", "m")
+    0.001153
+    >>> number("beta", "30mm", "rad")
+    Traceback (most recent call last):
+    ...
+    phasekit.errors.ParameterError: beta: got '30mm', wants a number in rad or deg or °
+    """
+    known = UNITS.get(units, {})
+    wants = f"a number in {' or '.join(known)}" if known else "a number without unit"
+    if isinstance(text, (int, float)) and not isinstance(text, bool):
+        return float(text)
+    match = _NUMBER.fullmatch(text) if isinstance(text, str) else None
+    if match is None or (match[2] and match[2] not in known):
+        raise ParameterError(f"{name}: got {text!r}, wants {wants}")
+    return float(Decimal(match[1]) * known.get(match[2], Decimal(1)))
+
+
+def is_range(text: str) -> bool:
+    """Return whether a value on the command line is a range ``FROM:TO:COUNT``."""
+    return ":" in text
+
+
+def span(name: str, text: str, units: str) -> NDArray[np.float64]:
+    """Read a range ``FROM:TO:COUNT``; a unit on TO alone holds for both.
+
+    Examples
+    --------
+    >>> span("a", "0:2mm:3", "m").tolist()
+    [0.0, 0.001, 0.002]
+    """
+    parts = text.split(":")
+    if len(parts) != 3:
+        raise ParameterError(f"{name}: got {text!r}, wants FROM:TO:COUNT, such as 0:90deg:181")
+    first, last, count = parts
+    bare = _NUMBER.fullmatch(first)
+    suffix = _NUMBER.fullmatch(last)
+    if bare is not None and suffix is not None and not bare[2]:
+        first += suffix[2]
+    return between(name, first, last, count, units)
+
+
+def between(
+    name: str, first: Any, last: Any, count: Any, units: str, spacing: Any = "linear"
+) -> NDArray[np.float64]:
+    """Return `count` values from `first` to `last`, evenly spaced or by equal ratios."""
+    start, stop = number(name, first, units), number(name, last, units)
+    try:
+        size = int(count) if not isinstance(count, (bool, float)) else -1
+    except (TypeError, ValueError):
+        size = -1
+    if not 2 <= size <= LONGEST:
+        raise ParameterError(
+            f"{name}: got {count!r} as count, wants a whole number from 2 to {LONGEST}"
+        )
+    if spacing == "log":
+        if not (start > 0.0 and stop > 0.0):
+            raise ParameterError(f"{name}: got a log range from {start!r} to {stop!r}, wants > 0")
+        return np.geomspace(start, stop, size)
+    if spacing != "linear":
+        raise ParameterError(f"{name}: got spacing {spacing!r}, wants 'linear' or 'log'")
+    return np.linspace(start, stop, size)
+
+
+def glue_negative_values(argv: list[str]) -> list[str]:
+    """Join ``--a -2mm`` to ``--a=-2mm``: argparse takes -2mm for an option.
+
+    >>> glue_negative_values(["--a", "-2mm", "--out", "x.png"])
+    ['--a=-2mm', '--out', 'x.png']
+    """
+    glued: list[str] = []
+    for word in argv:
+        previous = glued[-1] if glued else ""
+        if re.match(r"-[\d.]", word) and previous.startswith("--") and "=" not in previous:
+            glued[-1] = f"{previous}={word}"
+        else:
+            glued.append(word)
+    return glued

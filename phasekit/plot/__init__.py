@@ -1,0 +1,8 @@
+"""Pictures of systems and of Datasets: every function takes ``ax=`` and returns the Axes."""
+
+from phasekit.plot.diagram import bifurcation_diagram
+from phasekit.plot.maps import parameter_map
+from phasekit.plot.portrait import phase_portrait
+from phasekit.plot.well import potential_well
+
+__all__ = ["bifurcation_diagram", "parameter_map", "phase_portrait", "potential_well"]

@@ -1,0 +1,135 @@
+"""Phase portrait of one system on the cylinder."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike, NDArray
+
+from phasekit.labelled.arguments import bad
+from phasekit.plot import strokes, style
+from phasekit.plot.landscape import Landscape, Level
+
+FloatArray = NDArray[np.float64]
+
+
+def phase_portrait(
+    system: Any,
+    *,
+    energies: ArrayLike | None = None,
+    orbits: ArrayLike | None = None,
+    angles: style.Angles = "rad",
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    r"""Draw the phase portrait of one system on the cylinder.
+
+    Level curves of the energy integral :math:`h = \dot\varphi^2/2 + V(\varphi)` lie below, solid
+    where they close and dotted where they run round the cylinder; separatrices lie on top; centers
+    and saddles are marked, and the lobes of a figure-eight are filled. The left and right edges are
+    the same line of the cylinder.
+
+    Parameters
+    ----------
+    system
+        A system whose parameters are scalars.
+    energies : array_like, optional
+        Energies (s^-2) of the level curves. Left out, they are chosen evenly in speed between the
+        centers and saddles and above them. An empty list draws none; an energy below the least
+        potential has no curve.
+    orbits : array_like, optional
+        Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs; the level
+        curve through each is drawn over the others and its start is marked.
+    angles : {"rad", "deg"}
+        Unit of the angle on both axes.
+    legend : bool
+        Whether to explain lines and markers under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out. A given figure without layout engine gets the
+        constrained one, unless `legend` is False.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    The level curves are [Veljovic2015] eq. (14); the figure-eight is the homoclinic orbit of its
+    Section 5 and encloses the trigger of coupled singularities (center, saddle, center).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ax = pk.plot.phase_portrait(pk.Reduced(lam=0.4, psi=0.1))
+    >>> ax.get_xlabel()
+    '$\\varphi$ (rad)'
+    """
+    land = Landscape.of(system)
+    factor = style.angle_factor(angles)
+    chosen = levels_of(land, energies)
+    starts = starts_of(orbits)
+    axes = style.axes_for(ax, legend=legend)
+
+    for level in chosen:
+        strokes.draw_level(axes, land, level, factor)
+    handles = strokes.draw_separatrices(axes, land, factor)
+    handles += strokes.draw_points(axes, land, factor, on_potential=False)
+    handles += [
+        strokes.draw_orbit(axes, land, start, number, factor) for number, start in enumerate(starts)
+    ]
+
+    given = [energy for energy, _ in chosen] if energies is not None else []
+    reach = factor * _reach(land, [*given, *(land.energy(*start) for start in starts)])
+    style.circle_axis(axes, "x", angles)
+    axes.set_ylim(-reach, reach)
+    axes.set_xlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
+    axes.set_ylabel(rf"$\dot\varphi$ ({style.angle_unit(angles)}/s)")
+    if legend:
+        style.legend_below(axes, handles)
+    return axes
+
+
+def _reach(land: Landscape, energies: list[float]) -> float:
+    """Return the greatest speed to show: past the separatrices, and past what was asked for."""
+    reach = (1.42 if land.phi.size else 3.5) * land.top_speed
+    highest = max(energies, default=land.floor)
+    return max(reach, 1.08 * float(np.sqrt(2.0 * max(highest - land.floor, 0.0))))
+
+
+def levels_of(land: Landscape, energies: ArrayLike | None) -> list[Level]:
+    """Return the levels to draw: those asked for, or a choice."""
+    if energies is None:
+        return land.levels()
+    return [(float(energy), None) for energy in _finite(energies, "energies", "s^-2").ravel()]
+
+
+def starts_of(orbits: ArrayLike | None) -> list[tuple[float, float]]:
+    """Return initial conditions as pairs of floats."""
+    if orbits is None:
+        return []
+    pairs = _finite(orbits, "orbits", "rad and rad/s")
+    if not pairs.size:
+        return []
+    if pairs.ndim == 1:
+        pairs = pairs[np.newaxis]
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise bad("orbits", orbits, "pairs (phi0, dphi0), of shape (2,) or (n, 2)")
+    return [(float(phi), float(speed)) for phi, speed in pairs]
+
+
+def _finite(values: ArrayLike, argument: str, unit: str) -> FloatArray:
+    wants = f"finite numbers in {unit}"
+    try:
+        array = np.asarray(values, dtype=float)
+    except (TypeError, ValueError):
+        raise bad(argument, values, wants) from None
+    if not np.isfinite(array).all():
+        raise bad(argument, values, wants)
+    return array

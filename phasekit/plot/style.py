@@ -1,0 +1,245 @@
+"""How things look: colours, line styles and markers for every picture, in one place.
+
+The colours are those of Okabe and Ito, which the colour-blind can tell apart. No meaning hangs on a
+colour alone: each also has its own line style or marker, so that a picture survives grey print.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator
+from matplotlib.transforms import ScaledTranslation
+
+from phasekit.errors import EquilibriumKind, Topology
+from phasekit.labelled.arguments import bad
+
+Angles = Literal["rad", "deg"]
+Look = dict[str, Any]
+
+BLACK, GREY = "#000000", "#6E6E6E"
+BLUE, SKY, GREEN = "#0072B2", "#56B4E9", "#009E73"
+ORANGE, VERMILLION, PURPLE, YELLOW = "#E69F00", "#D55E00", "#CC79A7", "#F0E442"
+
+# Markers of equilibria, by kind.
+POINTS: Mapping[EquilibriumKind, Look] = {
+    EquilibriumKind.CENTER: {
+        "marker": "o",
+        "markersize": 7,
+        "markerfacecolor": BLUE,
+        "markeredgecolor": "white",
+        "label": "center",
+    },
+    EquilibriumKind.SADDLE: {
+        "marker": "D",
+        "markersize": 6.5,
+        "markerfacecolor": "white",
+        "markeredgecolor": VERMILLION,
+        "markeredgewidth": 1.8,
+        "label": "saddle",
+    },
+    EquilibriumKind.DEGENERATE: {
+        "marker": "s",
+        "markersize": 7,
+        "markerfacecolor": PURPLE,
+        "markeredgecolor": BLACK,
+        "label": "degenerate",
+    },
+}
+
+# Curves of equilibria in bifurcation diagrams, by kind.
+BRANCHES: Mapping[EquilibriumKind, Look] = {
+    EquilibriumKind.CENTER: {
+        "color": BLUE,
+        "linestyle": "-",
+        "linewidth": 1.8,
+        "label": "center",
+    },
+    EquilibriumKind.SADDLE: {
+        "color": VERMILLION,
+        "linestyle": (0, (5, 2)),
+        "linewidth": 1.8,
+        "label": "saddle",
+    },
+}
+
+# Points where equilibria meet.
+MERGERS: Mapping[str, Look] = {
+    "fold": {
+        "marker": "s",
+        "markersize": 7,
+        "markerfacecolor": YELLOW,
+        "markeredgecolor": BLACK,
+        "label": "fold",
+    },
+    "pitchfork": {
+        "marker": "^",
+        "markersize": 8,
+        "markerfacecolor": PURPLE,
+        "markeredgecolor": BLACK,
+        "label": "pitchfork",
+    },
+}
+
+LEVEL: Look = {"color": GREY, "linestyle": "-", "linewidth": 0.8}
+ROTATION: Look = {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 1.1}
+EIGHT: Look = {"color": VERMILLION, "linestyle": "-", "linewidth": 2.0, "label": "figure-eight"}
+WINDING: Look = {
+    "color": BLACK,
+    "linestyle": (0, (6, 2)),
+    "linewidth": 1.8,
+    "label": "winding separatrix",
+}
+CYCLE: Look = {
+    "color": VERMILLION,
+    "linestyle": (0, (7, 2, 1.5, 2)),
+    "linewidth": 2.0,
+    "label": "heteroclinic cycle",
+}
+DEGENERATE: Look = {
+    "color": PURPLE,
+    "linestyle": (0, (4, 1.5, 1, 1.5, 1, 1.5)),
+    "linewidth": 1.8,
+    "label": "level of the degenerate point",
+}
+EIGHT_FILL: Look = {"facecolor": ORANGE, "alpha": 0.28, "edgecolor": "none"}
+EIGHT_KEY: Look = {
+    "facecolor": to_rgba(ORANGE, 0.28),
+    "edgecolor": VERMILLION,
+    "linewidth": 2.0,
+    "label": "figure-eight",
+}
+REST: Look = {"color": PURPLE, "linestyle": "-", "linewidth": 3.0, "label": "rest, at every angle"}
+FOLD_CURVE: Look = {"color": BLACK, "linestyle": "-", "linewidth": 2.0, "label": "fold"}
+SIGN_CHANGE: Look = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 1.4, "label": "$A = 0$"}
+ORBIT_COLORS = (GREEN, PURPLE, SKY, ORANGE, BLUE)
+ORBIT_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (6, 2, 1.5, 2)), (0, (1.5, 1.5)))
+
+# Cells of coded maps; the lightness falls from one code to the next.
+NOTHING = "#DDDDDD"
+CODE_COLORS = ("#CFE8F7", ORANGE, "#7A2E00", GREEN, BLUE, PURPLE)
+TOPOLOGY_COLORS: Mapping[int, str] = {
+    Topology.NOT_COMPUTED: "#FFFFFF",
+    Topology.NONE: NOTHING,
+    Topology.WINDING: CODE_COLORS[0],
+    Topology.FIGURE_EIGHT: CODE_COLORS[1],
+    Topology.HETEROCLINIC: CODE_COLORS[2],
+}
+COUNT_COLORS: Mapping[int, str] = {
+    -1: "#FFFFFF",
+    0: NOTHING,
+    2: CODE_COLORS[0],
+    3: GREEN,
+    4: CODE_COLORS[1],
+}
+KIND_COLORS: Mapping[int, str] = {
+    EquilibriumKind.NOT_COMPUTED: "#FFFFFF",
+    EquilibriumKind.ABSENT: NOTHING,
+    EquilibriumKind.CENTER: SKY,
+    EquilibriumKind.SADDLE: VERMILLION,
+    EquilibriumKind.DEGENERATE: BLACK,
+}
+SEQUENTIAL = "cividis"
+
+
+def new_figure(width: float = 6.4, height: float = 4.8) -> Figure:
+    """Return an empty pyplot figure that keeps labels and legends inside."""
+    return plt.figure(figsize=(width, height), layout="constrained")
+
+
+def axes_for(ax: object, *, legend: bool, width: float = 6.4) -> Axes:
+    """Return the Axes to draw in: the given one, or that of a new figure."""
+    if ax is None:
+        return new_figure(width).add_subplot()
+    return check_axes(ax, legend=legend)
+
+
+def check_axes(ax: object, argument: str = "ax", *, legend: bool = False) -> Axes:
+    """Return `ax` if it is a matplotlib Axes, with room for a legend under it if it gets one.
+
+    Without a layout engine a figure would cut the legend off; this has to be settled before a
+    colour bar is made.
+    """
+    if not isinstance(ax, Axes):
+        raise bad(argument, ax, "a matplotlib Axes", "figure, ax = plt.subplots() makes one")
+    figure = ax.get_figure(root=True)
+    if legend and figure is not None and figure.get_layout_engine() is None:
+        # Refused where a colour bar of the old layout stands already.
+        with contextlib.suppress(RuntimeError):
+            figure.set_layout_engine("constrained")
+    return ax
+
+
+def angle_factor(angles: object) -> float:
+    """Return what radians are multiplied by to be shown in `angles`."""
+    if angles == "rad":
+        return 1.0
+    if angles == "deg":
+        return 180.0 / np.pi
+    raise bad("angles", angles, "'rad' or 'deg'")
+
+
+def _multiple_of_pi(value: float, _position: object = None) -> str:
+    halves = round(value / (np.pi / 2))
+    if halves == 0:
+        return "0"
+    sign = "-" if halves < 0 else ""
+    whole, odd = divmod(abs(halves), 2)
+    if odd:
+        top = "" if abs(halves) == 1 else f"{abs(halves)}"
+        return rf"${sign}{top}\pi/2$"
+    return rf"${sign}{'' if whole == 1 else whole}\pi$"
+
+
+def angle_unit(angles: Angles) -> str:
+    """Return the symbol of the unit in which angles are shown."""
+    return "rad" if angles == "rad" else "°"
+
+
+def circle_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
+    """Show the whole circle on one axis, with ticks at multiples of a quarter turn."""
+    factor = angle_factor(angles)
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    quarters = np.arange(-2, 3) * (np.pi / 2)
+    axis.set_major_locator(FixedLocator(list(quarters * factor)))
+    axis.set_minor_locator(MultipleLocator(np.pi / 8 * factor))
+    if angles == "rad":
+        axis.set_major_formatter(FuncFormatter(_multiple_of_pi))
+    ax.set(**{f"{which}lim": (-np.pi * factor, np.pi * factor)})
+
+
+def letters(ax: Axes, which: Literal["x", "y"]) -> int:
+    """Return about how many letters of a label fit along one axis."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    box = ax.get_window_extent().transformed(ax.figure.dpi_scale_trans.inverted())
+    inches = box.width if which == "x" else box.height
+    return max(20, int(72.0 * inches / (0.6 * float(axis.label.get_fontsize()))))
+
+
+def legend_below(ax: Axes, handles: list[Artist]) -> None:
+    """Put a legend under the axis label, where it cannot cover what is drawn."""
+    if not handles:
+        return
+    text = ax.xaxis.label
+    lines = text.get_text().count("\n") + 1
+    points = 22.0 + 1.35 * lines * float(text.get_fontsize())
+    offset = ScaledTranslation(0.0, -points / 72.0, ax.figure.dpi_scale_trans)
+    ax.legend(
+        handles=handles,
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=ax.transAxes + offset,
+        ncols=min(3, len(handles)),
+        frameon=False,
+        borderaxespad=0.0,
+        fontsize="small",
+        handlelength=2.6,
+    )

@@ -1,0 +1,263 @@
+"""The command line: what it writes, what it prints, and how it refuses."""
+
+import subprocess
+import sys
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.cli import COMMANDS, main
+from phasekit.cli.values import between, glue_negative_values, number, span
+
+matplotlib.use("Agg")
+
+DISK = ["--beta", "40deg", "--e", "50mm", "--a", "-24mm", "--r", "200 mm", "--omega1", "300rpm"]
+RECIPE = """
+store = "map.zarr"
+of = ["equilibria"]
+
+[parameters]
+e = "50 mm"
+r = 0.2
+omega1 = "300 rpm"
+
+[axes]
+beta = { from = "0 deg", to = "90 deg", count = 4 }
+a = ["0 mm", "12 mm", 0.024]
+"""
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    yield
+    plt.close("all")
+
+
+def refused(capsys, *argv):
+    """Run a command that must be refused; return its one line."""
+    try:
+        code = main([str(word) for word in argv])
+    except SystemExit as error:
+        code = error.code
+    err = capsys.readouterr().err
+    assert code == 2
+    assert err.startswith("phasekit: ")
+    assert err.count("\n") == 1
+    return err.removeprefix("phasekit: ").strip()
+
+
+def test_version_and_help_are_quick():
+    code = (
+        "import sys, runpy; sys.argv = ['phasekit', '--version']\n"
+        "from phasekit.cli import main\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "heavy = {'numpy', 'numba', 'xarray', 'matplotlib'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert result.stdout == f"phasekit {pk.__version__}\n"
+
+
+def test_bare_call_lists_the_commands(capsys):
+    assert main([]) == 0
+    out = capsys.readouterr().out
+    assert all(f"  {name}" in out for name in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_has_help(command, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main([command, "--help"])
+    assert stop.value.code == 0
+    assert f"usage: phasekit {command}" in capsys.readouterr().out
+
+
+def test_help_lists_the_parameters_of_the_model(capsys):
+    with pytest.raises(SystemExit):
+        main(["portrait", "--model", "Pendulum", "--help"])
+    out = capsys.readouterr().out
+    assert "--length" in out
+    assert "--beta" not in out
+
+
+def test_demo(tmp_path, capsys):
+    assert main(["demo", "--out", "here"]) == 0
+    out = capsys.readouterr().out
+    assert "figure-eight" in out
+    assert "folds lie at beta = 54.6111 and 78.9041 deg" in out
+    assert (tmp_path / "here" / "map.png").read_bytes().startswith(b"\x89PNG")
+    ds = pk.open_map("here/map.zarr")
+    assert set(np.unique(ds.topology)) == {1, 2, 3}
+    system = ds.isel(beta=3, a=4).phasekit.system()
+    assert system.omega1 == 300 * pk.rpm
+
+    before = (tmp_path / "here" / "map.png").read_bytes()
+    assert refused(capsys, "demo", "--out", "here").startswith("--out: here/map.png exists; choose")
+    assert main(["demo", "--out", "here", "--overwrite"]) == 0
+    assert (tmp_path / "here" / "map.png").read_bytes() == before
+
+
+def test_demo_leaves_other_files_alone(tmp_path, capsys):
+    (tmp_path / "notes").mkdir()
+    (tmp_path / "notes" / "mine.txt").write_text("keep")
+    (tmp_path / "notes" / "map.zarr").mkdir()
+    (tmp_path / "notes" / "map.zarr" / "mine.txt").write_text("keep")
+    refused(capsys, "demo", "--out", "notes")
+    assert "is not a map" in refused(capsys, "demo", "--out", "notes", "--overwrite")
+    assert (tmp_path / "notes" / "map.zarr" / "mine.txt").read_text() == "keep"
+    (tmp_path / "file").write_text("keep")
+    assert "is a file" in refused(capsys, "demo", "--out", "file")
+
+
+@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+def test_portrait(tmp_path, capsys, suffix):
+    assert main(["portrait", *DISK, "--orbit", "-45deg,15deg/s", "--out", f"x.{suffix}"]) == 0
+    assert f"wrote x.{suffix}" in capsys.readouterr().out
+    assert (tmp_path / f"x.{suffix}").stat().st_size > 10_000
+
+
+def test_the_same_picture_is_the_same_file(tmp_path):
+    for suffix in ("svg", "pdf", "png"):
+        files = [tmp_path / f"{name}.{suffix}" for name in "ab"]
+        for file in files:
+            main(["portrait", "--model", "Pendulum", "--length", "0.7", "--out", str(file)])
+        assert files[0].read_bytes() == files[1].read_bytes()
+        assert b"CreationDate" not in files[0].read_bytes()
+        assert b"dc:date" not in files[0].read_bytes()
+
+
+def test_portrait_with_well_of_another_model(tmp_path):
+    argv = ["portrait", "--model", "Reduced", "--lam", "0.4", "--psi", "-0.1", "--well"]
+    assert main([*argv, "--angles", "deg", "--out", "x.png"]) == 0
+    assert (tmp_path / "x.png").exists()
+
+
+def test_diagram(tmp_path, capsys):
+    argv = ["diagram", "--beta", "0:90deg:61", *DISK[2:], "--y", "energy", "--out", "d.png"]
+    assert main(argv) == 0
+    assert "wrote d.png" in capsys.readouterr().out
+    assert (tmp_path / "d.png").exists()
+
+
+def test_sweep(tmp_path, capsys):
+    (tmp_path / "map.toml").write_text(RECIPE)
+    assert main(["sweep", "map.toml"]) == 0
+    assert "beta 4 x a 3 cells" in capsys.readouterr().out
+    ds = pk.open_map("map.zarr").load()
+    disk = pk.GyroRotorDisk(beta=0.3, e=0.05, a=0.0, r=0.2, omega1=300 * pk.rpm)
+    axes = {"beta": np.array([0.0, 30.0, 60.0, 90.0]) * pk.deg, "a": [0.0, 0.012, 0.024]}
+    expected = pk.sweep(disk, axes, of="equilibria")
+    assert ds.sizes == expected.sizes
+    np.testing.assert_allclose(ds.beta, expected.beta, rtol=1e-15)
+    np.testing.assert_array_equal(ds.a, expected.a)
+    np.testing.assert_array_equal(ds.n_equilibria, expected.n_equilibria)
+    assert "topology" not in ds
+
+
+def test_sweep_never_overwrites_unasked(tmp_path, capsys):
+    (tmp_path / "map.toml").write_text(RECIPE)
+    (tmp_path / "map.zarr").mkdir()
+    (tmp_path / "map.zarr" / "mine.txt").write_text("keep")
+    assert "exists" in refused(capsys, "sweep", "map.toml")
+    refused(capsys, "sweep", "map.toml", "--overwrite")
+    assert (tmp_path / "map.zarr" / "mine.txt").read_text() == "keep"
+    assert main(["sweep", "map.toml", "--store", "other.zarr"]) == 0
+    assert main(["sweep", "map.toml", "--store", "other.zarr", "--overwrite"]) == 0
+
+
+@pytest.mark.parametrize(
+    ("argv", "message"),
+    [
+        (["prtrait"], "unknown command 'prtrait'; wants one of demo, portrait"),
+        (["demo", "--output", "x"], "unrecognized arguments"),
+        (["portrait", *DISK, "--bta", "3"], "unrecognized arguments: --bta 3; see"),
+        (["portrait", *DISK, "--beta", "40"], "beta: got 40.0, wants a number from 0 to 3.14159"),
+        (["portrait", *DISK, "--beta", "40mm"], "beta: got '40mm', wants a number in rad or deg"),
+        (["portrait", *DISK, "--beta", "steep"], "beta: got 'steep', wants a number in rad"),
+        (["portrait", *DISK, "--beta", "nan"], "beta: got 'nan', wants a number"),
+        (["portrait", *DISK, "--e", "-1mm"], "e: got -0.001, wants a number >= 0"),
+        (["portrait", *DISK, "--beta", "0:1:5"], "--beta: got a range, wants one value"),
+        (["portrait", *DISK[2:]], "parameters: got none for --beta, wants"),
+        (["portrait", *DISK, "--orbit", "45deg"], "--orbit: got '45deg', wants PHI,DPHI"),
+        (["portrait", *DISK, "--orbit", "1,2mm"], "--orbit: got '2mm', wants a number in rad/s"),
+        (["portrait", *DISK, "--out", "x.gif"], "--out: got 'x.gif', wants a name that ends in"),
+        (["portrait", *DISK, "--out", "no/x.png"], "--out: the folder no does not exist; make it"),
+        (["portrait", *DISK, "--out", "there.png"], "--out: there.png exists; choose another"),
+        (["portrait", "--model", "Disk"], "model 'Disk' is unknown; "),
+        (["portrait", *DISK, "--angles", "grad"], "argument --angles: invalid choice"),
+        (["diagram", *DISK], "parameters: got no range, wants exactly one"),
+        (["diagram", *DISK, "--e", "1:2:3", "--r", "1:2:3"], "parameters: got the ranges e, r"),
+        (["diagram", *DISK, "--beta", "0:1"], "beta: got '0:1', wants FROM:TO:COUNT"),
+        (["diagram", *DISK, "--beta", "0:1:1"], "beta: got '1' as count, wants a whole number"),
+        (["diagram", *DISK, "--beta", "0:1:3", "--y", "phy"], "y 'phy' is unknown; did you mean"),
+        (["sweep"], "the following arguments are required: FILE.toml"),
+        (["sweep", "none.toml"], "none.toml does not exist; name a TOML file"),
+        (["sweep", "."], ". is a folder; name a TOML file"),
+    ],
+)
+def test_refusals(tmp_path, capsys, argv, message):
+    (tmp_path / "there.png").write_text("keep")
+    assert message in refused(capsys, *argv)
+    assert [path.name for path in tmp_path.iterdir()] == ["there.png"]
+    assert (tmp_path / "there.png").read_text() == "keep"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('store = "map.zarr"', "", "store: got None, wants a name that ends in .zarr or .nc"),
+        ('store = "map.zarr"', 'store = "map.csv"', "wants a path that ends in .zarr or .nc"),
+        ("[axes]", "[axis]", "map.toml: key 'axis' is unknown; did you mean 'axes'?"),
+        ("[axes]", "[axes", "map.toml: not TOML"),
+        ("r = 0.2", "", "GyroRotorDisk: missing"),
+        ("r = 0.2", "r = true", "r: got True, wants a number in m"),
+        ("r = 0.2", "radius = 0.2", "parameters: parameter of GyroRotorDisk 'radius' is unknown"),
+        ("r = 0.2", "r = 0.2\na = 1.0", "a: got it in parameters and in axes, wants it once"),
+        ("count = 4", "count = 4.5", "beta: got 4.5 as count"),
+        ("count = 4", "cuont = 4", "axes: beta: key 'cuont' is unknown; did you mean 'count'"),
+        (", count = 4", "", "axes: beta: got {'from': '0 deg', 'to': '90 deg'}, wants"),
+        ("count = 4", 'count = 4, spacing = "log"', "beta: got a log range from 0.0"),
+        ('"90 deg"', '"90 rpm"', "beta: got '90 rpm', wants a number in rad or deg"),
+        ('["0 mm", "12 mm", 0.024]', "[]", "axes: a: got [], wants a list of values"),
+        ('of = ["equilibria"]', 'of = ["equilibrium"]', "of: the quantity 'equilibrium' is unkn"),
+        ('of = ["equilibria"]', "of = 3", "of: got 3"),
+        ("[parameters]", "parameters = 3\n[other]", "key 'other' is unknown"),
+        ('of = ["equilibria"]', 'model = "Disc"', "model 'Disc' is unknown"),
+    ],
+)
+def test_refused_recipes(tmp_path, capsys, old, new, message):
+    assert old in RECIPE
+    (tmp_path / "map.toml").write_text(RECIPE.replace(old, new))
+    assert message in refused(capsys, "sweep", "map.toml")
+    assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
+
+
+def test_values_with_units():
+    assert number("e", "1.153mm", "m") == 0.001153
+    assert number("beta", "30 deg", "rad") == 30 * pk.deg
+    assert number("omega1", "-300rpm", "s-1") == -300 * pk.rpm
+    assert number("lam", "1e-3", "1") == 1e-3
+    assert number("g", "9.81 m/s2", "m s-2") == 9.81
+    assert number("a", 2, "m") == 2.0
+    for wrong in ("", "mm", "1.2.3", "1 2", "0x10", None, [1], True, "1e", "inf"):
+        with pytest.raises(pk.ParameterError, match="^e: got "):
+            number("e", wrong, "m")
+
+
+def test_ranges():
+    np.testing.assert_allclose(span("beta", "0:90deg:3", "rad"), [0.0, np.pi / 4, np.pi / 2])
+    np.testing.assert_allclose(span("a", "-1cm:20mm:4", "m"), [-0.01, 0.0, 0.01, 0.02], atol=1e-17)
+    np.testing.assert_allclose(between("e", "1mm", "1m", 4, "m", "log"), [1e-3, 1e-2, 1e-1, 1.0])
+    with pytest.raises(pk.ParameterError, match="wants 'linear' or 'log'"):
+        between("e", 1, 2, 3, "m", "cubic")
+
+
+def test_negative_values_are_not_options():
+    assert glue_negative_values(["--a", "-2mm", "-h"]) == ["--a=-2mm", "-h"]
+    assert glue_negative_values(["--a=1", "-2"]) == ["--a=1", "-2"]

@@ -1,0 +1,56 @@
+"""The README and the papers around it say what is so."""
+
+import re
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import pytest
+
+import phasekit as pk
+
+matplotlib.use("Agg")
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def readme():
+    return (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_the_calls_run_and_give_what_the_comments_say(readme):
+    (block,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
+    names = {}
+    exec(block, names)
+    plt.close("all")
+    assert pk.equilibria(names["system"]).n_equilibria == 4
+    assert pk.separatrices(names["disk"]).figure_eight
+    folds = pk.critical(names["disk"], "beta").critical_fold.values / pk.deg
+    said = re.search(r"here at ([\d.]+) and ([\d.]+) degrees", block)
+    assert [f"{fold:.1f}" for fold in folds] == list(said.groups())
+
+
+def test_each_of_the_two_commands_is_one_line_that_does_everything(readme):
+    commands = re.findall(r"^python3 -m venv .*$", readme, re.MULTILINE)
+    assert len(commands) == 2
+    demo, tests = commands
+    assert demo.endswith("phasekit demo")
+    assert tests.endswith("pytest")
+    assert all("pip install" in command for command in commands)
+
+
+def test_files_that_the_readme_shows_are_there(readme):
+    for target in re.findall(r"\]\(([^)#:]+)\)", readme):
+        assert (ROOT / target).exists()
+
+
+def test_the_version_is_one():
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {pk.__version__}\n" in citation
+    changelog = (ROOT / "docs" / "changelog.md").read_text(encoding="utf-8")
+    assert f"## {pk.__version__}" in changelog
+
+
+def test_the_reference_page_lists_every_public_name():
+    listed = set(re.findall(r"\w+", (ROOT / "docs" / "api.md").read_text(encoding="utf-8")))
+    assert set(pk.__all__) <= listed
