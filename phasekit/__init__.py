@@ -14,6 +14,7 @@ Examples
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -93,3 +94,7 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+if "xarray" in sys.modules:  # then the accessor costs nothing, and maps opened by xarray have it
+    importlib.import_module("phasekit.labelled.accessor")

@@ -83,3 +83,10 @@ def test_version_is_that_of_the_package():
     except importlib.metadata.PackageNotFoundError:
         pytest.skip("phasekit is run from its folder")
     assert pk.__version__ == installed
+
+
+def test_maps_that_plain_xarray_opens_have_the_accessor():
+    """Where xarray is there first, importing phasekit is enough."""
+    code = "import xarray as xr, phasekit; print(hasattr(xr.Dataset(), 'phasekit'))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "True"

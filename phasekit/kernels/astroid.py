@@ -119,7 +119,7 @@ def fold_margin(a: float, b: float, c: float, delta: float) -> tuple[float, floa
     ratio = (q + t) / p
     near = -gap * (1.0 + ratio + ratio * ratio) / (1.0 + ratio * np.sqrt(ratio))
     far = 1.0 - ratio * np.sqrt(ratio)
-    margin = near if ratio < 4.0 else far
+    margin = near if ratio > 0.25 and ratio < 4.0 else far
     # Its sign is that of -delta also where it underflows.
     least = 0.0 if delta == 0.0 else (LEAST if delta < 0.0 else -LEAST)
     margin = least if delta == 0.0 or margin == 0.0 else margin

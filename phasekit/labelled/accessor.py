@@ -77,7 +77,7 @@ class MapPlots:
         """Draw the equilibria against a swept parameter; returns the Axes."""
         return _plot("bifurcation_diagram")(self._ds, **options)
 
-    def parameter_map(self, variable: str, **options: Any) -> Any:
+    def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
         return _plot("parameter_map")(self._ds, variable, **options)
 

@@ -34,6 +34,8 @@ def describe(value: object) -> str:
     >>> describe(30), describe([[1, 2], [3, 4]]), describe(None)
     ('30', 'a 2-D list of shape (2, 2)', 'None')
     """
+    if isinstance(value, (np.ndarray, xr.DataArray)) and value.ndim == 0:
+        value = value.item()
     if isinstance(value, xr.DataArray):
         return f"a DataArray with dims {tuple(value.dims)} and dtype {value.dtype}"
     if isinstance(value, (list, tuple, range, np.ndarray)) and np.ndim(_plain(value)) > 0:

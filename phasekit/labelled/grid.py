@@ -86,12 +86,13 @@ def make_grid(
     owner: dict[str, str] = {}
     found: dict[str, int] = {}
     for name, given in inputs.items():
+        argument = name.removeprefix("state_")
         for dim, size in given.sizes.items():
-            _check_size(str(dim), size, name, found, owner)
+            _check_size(str(dim), size, argument, found, owner)
             if str(dim) in inputs and inputs[str(dim)].dims != (dim,):
                 raise ParameterError(
-                    f"{name}: got the dim {dim!r}, but {dim!r} is an input that does not lie along "
-                    f"it; rename the dim or give {dim} as its axis"
+                    f"{argument}: got the dim {dim!r}, but {dim!r} is an input that does not lie "
+                    f"along it; rename the dim or give {dim} as its axis"
                 )
     sizes = {dim: found[dim] for dim in order if dim in found}
     sizes.update(found)
@@ -126,6 +127,7 @@ def _dim_coords(
     for name, value in values.items():
         if not isinstance(value, xr.DataArray):
             continue
+        argument = name.removeprefix("state_")
         for dim in map(str, value.dims):
             if dim not in value.coords:
                 continue
@@ -133,8 +135,8 @@ def _dim_coords(
             known = coords.setdefault(dim, coord)
             if not known.to_base_variable().equals(coord.to_base_variable()):  # type: ignore[no-untyped-call]
                 raise ParameterError(
-                    f"{name}: got {describe(value)} whose coordinate {dim!r} differs from that of "
-                    f"another argument; align them with xr.align, or select the same {dim} first"
+                    f"{argument}: got {describe(value)} whose coordinate {dim!r} differs from that "
+                    f"of another argument; align them with xr.align, or select the same {dim} first"
                 )
     return coords
 

@@ -76,7 +76,7 @@ class Coefficients(Model, _ABC):
         return super().__new__(cls, *kept)
 
     @classmethod
-    def _make(cls, iterable: Iterable[Any]) -> Coefficients:
+    def _make(cls, iterable: Iterable[Any]) -> Coefficients:  # type: ignore[override]
         """Make coefficients from three values, checked; ``_replace`` comes here as well."""
         return cls(*iterable)
 

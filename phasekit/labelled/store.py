@@ -141,9 +141,10 @@ def _path(store: Any, *, suffix: bool = True) -> Path:
         raise bad("store", store, "a path that ends in .zarr or .nc")
     try:
         path = Path(store).expanduser()
-        path.exists()  # refuses what cannot be a path, such as a null byte
-    except (RuntimeError, ValueError, OSError) as error:
-        raise bad("store", os.fspath(store), f"a path that can exist ({error})") from None
+    except RuntimeError as error:  # no such user
+        raise bad("store", os.fspath(store), f"a path that can exist: {error}") from None
+    if "\0" in os.fspath(store):
+        raise bad("store", os.fspath(store), "a path without null bytes")
     if "://" in os.fspath(store):
         raise StoreError(f"store: {os.fspath(store)} is a URL; maps are written to local paths")
     if suffix and path.suffix not in (ZARR, NETCDF):

@@ -48,10 +48,11 @@ def as_system(system: Any) -> Model:
     """
     if isinstance(system, Model):
         return system
+    make: Callable[..., Model] = MODELS["Coefficients"]
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
         coefficients = system.coefficients()
         if isinstance(coefficients, tuple) and len(coefficients) == 3:
-            return MODELS["Coefficients"](*coefficients)
+            return make(*coefficients)
     hint = ""
     if isinstance(system, (tuple, list)) and len(system) == 3:
         hint = "three coefficients make one: pk.Coefficients(A, B, C)"

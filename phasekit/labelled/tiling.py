@@ -9,7 +9,6 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 from phasekit.labelled.arguments import FloatArray
-from phasekit.phase.solve import cpus
 
 #: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
 TILE_CELLS = 1 << 16
@@ -49,6 +48,8 @@ def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | 
         for task, _ in tasks:
             task()
         return
+    from phasekit.phase.solve import cpus  # here, because it loads the kernels
+
     with _bar(sum(cells for _, cells in tasks), progress) as bar:
         pool = ThreadPoolExecutor(max_workers=max(1, min(cpus(), len(tasks))))
         try:

@@ -8,6 +8,7 @@ import pytest
 from mpmath import mpf
 
 from phasekit.bifurcation.critical import critical_disk, critical_reduced
+from phasekit.errors import ParameterError
 from phasekit.mechanics.disk import disk_coefficients
 from phasekit.phase.equilibria import equilibria
 
@@ -197,3 +198,17 @@ def test_arguments_broadcast():
     want = critical_disk("beta", beta=0.1, e=0.2, a=0.1, r=0.2, omega1=9.0, g=9.81)
     assert np.array_equal([x[1, 1] for x in got], want, equal_nan=True)
     assert [x.shape for x in critical_reduced("lam", 2.0, [0.1, 0.2], 0.3)] == [(2,)] * 3
+
+
+@pytest.mark.parametrize("scale", [1e-200, 1e-100, 1e200])
+def test_reduced_values_do_not_depend_on_the_scale(scale):
+    """(1 - 0.5^(2/3))^(3/2), by hand."""
+    _, plus, _ = critical_reduced("lam", scale, 0.0, 0.5 * scale)
+    assert abs(plus - (1.0 - 0.5 ** (2 / 3)) ** 1.5) < 1e-15
+
+
+def test_unknown_parameters_are_refused():
+    with pytest.raises(ParameterError, match="parameter: got 'speed'"):
+        critical_disk("speed", beta=0.3, e=0.1, a=0.02, r=0.2, omega1=8.0)
+    with pytest.raises(ParameterError, match="parameter: got 'phi'"):
+        critical_reduced("phi", 1.0, 0.5, 0.5)

@@ -41,7 +41,7 @@ def test_accessor_is_stateless():
     accessor = MAP.phasekit
     assert accessor.system() == accessor.system()
     assert MAP.isel(beta=0).phasekit.system() != MAP.phasekit.system()
-    assert vars(accessor) == {"_ds": MAP} or list(vars(accessor)) == ["_ds"]
+    assert list(vars(accessor)) == ["_ds"]
 
 
 def test_datasets_of_others_are_refused_when_asked():
@@ -64,8 +64,9 @@ def test_datasets_of_others_are_refused_when_asked():
 
 def test_an_invalid_cell_has_no_system():
     ds = pk.sweep(DISK, beta=[0.1, 4.0])
-    with pytest.raises(pk.ParameterError, match="beta: got"):
+    with pytest.raises(pk.ParameterError, match="beta: got 4.0, wants a number from 0") as error:
         ds.isel(beta=1).phasekit.system()
+    assert "\n" not in str(error.value)
 
 
 @pytest.fixture
@@ -86,7 +87,8 @@ def test_plots_are_asked_of_the_floor_above(drawn):
     MAP.phasekit.plot.parameter_map("topology", x="a")
     assert drawn[-1][0] == "parameter_map"
     assert drawn[-1][1][0] is MAP
-    assert drawn[-1][1:] == ((MAP, "topology"), {"x": "a"}) or drawn[-1][2] == {"x": "a"}
+    assert drawn[-1][1][1:] == ("topology",)
+    assert drawn[-1][2] == {"x": "a"}
     MAP.isel(a=0).phasekit.plot.bifurcation_diagram(x="beta")
     assert drawn[-1][0] == "bifurcation_diagram"
 

@@ -234,3 +234,83 @@ def test_dataarray_on_the_own_dim_is_an_axis():
         pk.GyroRotorDisk(**{**DISK, "beta": degrees})
     with pytest.raises(pk.ParameterError, match="beta: .*the one dim"):
         pk.GyroRotorDisk(**{**DISK, "beta": xr.DataArray(np.ones((2, 2)), dims=("beta", "x"))})
+
+
+def test_derived_values_are_invalid_where_the_disk_is():
+    disk = pk.GyroRotorDisk(beta=[0.3, 5.0], e=0.01, a=0.0, r=0.2, omega1=1.0, m=2.0)
+    for value in (*disk.inertia()[1:], disk.eccentricity, disk.skew, *disk.coefficients()):
+        assert np.isnan(value.sel(beta=5.0))
+        assert np.isfinite(value.sel(beta=0.3))
+    heavy = disk.replace(beta=0.3, m=[1.0, -1.0]).inertia().Jn
+    assert np.isnan(heavy).values.tolist() == [False, True]
+
+
+def test_a_shaft_in_the_plane_of_the_disk_has_no_eccentricity():
+    disk = pk.GyroRotorDisk(beta=np.pi, e=0.01, a=0.0, r=0.2, omega1=1.0, m=2.0)
+    assert disk.eccentricity == 0.0
+    assert disk.inertia().Jvn == 0.0
+
+
+def test_what_a_system_derives_carries_units():
+    disk = pk.GyroRotorDisk(beta=[0.3, 0.4], e=0.01, a=0.0, r=0.2, omega1=1.0, m=2.0)
+    assert disk.coefficients().A.attrs["units"] == "s-2"
+    assert disk.coefficients().A.beta.attrs["units"] == "rad"
+    assert disk.inertia().Jn.attrs["units"] == "kg m2"
+    assert disk.eccentricity.attrs["units"] == "m"
+    assert disk.skew.attrs["units"] == "rad"
+    assert disk.reduced().lam.attrs["units"] == "1"
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        pk.GyroRotorDisk(beta=0.3, e=0.1, a=0.0, r=0.1, omega1=1e200),
+        pk.Reduced(1e200, 1.0, 1e200),
+        pk.Pendulum(length=1e-320),
+        pk.StonerWohlfarth(K=1.2e308, h_x=1.0, h_y=0.0),
+    ],
+    ids=lambda system: type(system).__name__,
+)
+def test_scalars_whose_coefficients_overflow_are_refused(system):
+    name = type(system).__name__
+    for use in (type(system).coefficients, pk.equilibria, pk.separatrices):
+        with pytest.raises(pk.ParameterError, match=f"{name}: got .* wants parameters of a size"):
+            use(system)
+
+
+def test_infinite_ratios_are_refused():
+    with pytest.raises(pk.ParameterError, match="A: got 1e-310"):
+        pk.Coefficients(1e-310, 1.0, 1.0).reduced()
+
+
+def test_coefficients_stay_checked_when_they_are_made_as_tuples():
+    with pytest.raises(pk.ParameterError, match="A: got nan"):
+        pk.Coefficients(1, 2, 3)._replace(A=float("nan"))
+    with pytest.raises(pk.ParameterError, match="A: got 'x'"):
+        pk.Coefficients._make(["x", 2, 3])
+    arrays = pk.Coefficients([1.0, 2.0], 1, 1)
+    assert arrays != (1, 2, 3)
+    assert hash(arrays) == hash(pk.Coefficients([1.0, 2.0], 1, 1))
+    assert pk.Coefficients(1, 2, 3) == (1.0, 2.0, 3.0)
+
+
+def test_pickled_systems_stay_frozen():
+    again = pickle.loads(pickle.dumps(pk.Reduced([0.1, 0.2], 0.3)))
+    with pytest.raises(ValueError, match="read-only"):
+        again.lam[0] = 9.0
+
+
+def test_equal_systems_have_equal_hashes():
+    assert pk.Reduced([0.0], 1.0) == pk.Reduced([-0.0], 1.0)
+    assert hash(pk.Reduced([0.0], 1.0)) == hash(pk.Reduced([-0.0], 1.0))
+
+
+@pytest.mark.parametrize("beta", [30, 30.0, np.array(30.0), xr.DataArray(30.0), np.float32(30)])
+def test_wrong_scalars_of_any_kind_are_shown_as_numbers(beta):
+    with pytest.raises(pk.ParameterError, match=r"beta: got 30(\.0)?, .*: 30 \* pk\.deg$"):
+        pk.GyroRotorDisk(beta=beta, e=0.1, a=0.0, r=0.1, omega1=1.0)
+
+
+def test_no_hint_at_degrees_where_these_would_be_refused_too():
+    with pytest.raises(pk.ParameterError, match="in radians$"):
+        pk.GyroRotorDisk(beta=-0.1, e=0.1, a=0.0, r=0.1, omega1=1.0)

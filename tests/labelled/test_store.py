@@ -213,3 +213,40 @@ def test_chunked_opening(tmp_path):
     back = pk.open_map(path, chunks={})
     assert back.phi.chunks is not None
     assert_same(ds, back.load())
+
+
+@pytest.mark.parametrize("suffix", [".zarr", ".nc"])
+def test_files_of_others_are_never_overwritten(suffix, tmp_path):
+    """A store of the same format that phasekit did not make is data, not a map."""
+    path = tmp_path / f"thesis{suffix}"
+    measured = xr.Dataset({"measured": ("t", [1.0, 2.0])})
+    if suffix == ".zarr":
+        measured.to_zarr(path, zarr_format=3, consolidated=False)
+    else:
+        measured.to_netcdf(path, engine="h5netcdf")
+    with pytest.raises(pk.StoreError, match="is not a map"):
+        pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2], store=path, overwrite=True)
+    with xr.open_dataset(
+        path,
+        engine="zarr" if suffix == ".zarr" else "h5netcdf",
+        **({"consolidated": False} if suffix == ".zarr" else {}),
+    ) as kept:
+        assert list(kept) == ["measured"]
+
+
+@pytest.mark.parametrize(
+    ("option", "value"), [("overwrite", "no"), ("overwrite", 1), ("progress", "yes")]
+)
+def test_switches_are_true_or_false(option, value, tmp_path):
+    path = tmp_path / "map.zarr"
+    with pytest.raises(pk.ParameterError, match=f"{option}: got .* wants True or False"):
+        pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2], store=path, **{option: value})
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("store", ["~nosuchuser/x.zarr", "a\0.zarr"])
+def test_paths_that_cannot_be_are_refused(store):
+    with pytest.raises(pk.ParameterError, match="store: got"):
+        pk.open_map(store)
+    with pytest.raises(pk.ParameterError, match="store: got"):
+        pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2], store=store)

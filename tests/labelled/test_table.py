@@ -88,7 +88,9 @@ def test_quantities_reads_as_a_table_and_a_mapping():
     lines = repr(offered).splitlines()
     assert len(lines) == len(offered) + 1
     assert lines[0].split() == ["quantity", "group", "dims", "units", "meaning"]
-    assert all(len(set(line[:10])) for line in lines)
+    assert [line.split()[0] for line in lines[1:]] == list(offered)
+    column = lines[0].index("group")
+    assert [line[column:].split()[0] for line in lines[1:]] == [r.group for r in offered.values()]
 
 
 def test_a_new_row_needs_nothing_but_a_row_and_a_pass(monkeypatch):

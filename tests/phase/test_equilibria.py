@@ -8,7 +8,7 @@ import pytest
 from mpmath import mpf
 from properties.strategies import FAMILIES
 
-from phasekit.errors import EquilibriumKind
+from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.phase.equilibria import equilibria
 
 UNIT = 2.0**-53
@@ -250,3 +250,9 @@ def test_invalid_cells_leave_the_others_untouched(bad, size):
     for name in ("phi", "energy", "curvature", "natural_frequency", "exponent", "fold_margin"):
         assert np.all(np.isnan(getattr(points, name)[hit])), name
     assert equilibria(bad, 1.0, 1.0).n_equilibria == -1
+
+
+@pytest.mark.parametrize("threads", [0, -1, 1.5, "two"])
+def test_wrong_numbers_of_threads_are_refused(threads):
+    with pytest.raises(ParameterError, match="threads: got"):
+        equilibria(1.0, 0.3, 0.2, threads=threads)
