@@ -1,13 +1,15 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import phasekit
 
 project = "phasekit"
 author = "phasekit developers"
-copyright = "2025, phasekit developers"
+copyright = "2026, phasekit developers"
 release = version = phasekit.__version__
 
 extensions = [
@@ -33,6 +35,14 @@ templates_path = ["_templates"]
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
+
+# The pictures of the studies are made here, so that none can be out of date.
+_here = Path(__file__).parent
+(_here / "auto_studies").mkdir(exist_ok=True)
+for _study in sorted(_here.parent.glob("studies/*_figure_*.py")):
+    _picture = _here / "auto_studies" / f"{_study.stem}.png"
+    _command = [sys.executable, str(_study), str(_picture)]
+    subprocess.run(_command, check=True, stdout=subprocess.DEVNULL)
 
 html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"

@@ -191,7 +191,26 @@ def test_sweep_never_overwrites_unasked(tmp_path, capsys):
         (["portrait", *DISK, "--out", "there.png"], "--out: there.png exists; choose another"),
         (["portrait", "--model", "Disk"], "model 'Disk' is unknown; "),
         (["portrait", *DISK, "--angles", "grad"], "argument --angles: invalid choice"),
+        (
+            ["portrait", *DISK, "--e", "1e99999999999999999999"],
+            "e: got '1e99999999999999999999', wa",
+        ),
+        (
+            ["portrait", *DISK, "--e", "1e999mm"],
+            "e: got '1e999mm', wants a number in m or cm or mm",
+        ),
+        (["portrait", *DISK, "--e", "9" * 400], "e: got '999"),
+        (["portrait", *DISK, "--orbit", "1,1e200"], "orbits: got (1.0, 1e+200), wants pairs"),
+        (["portrait", *DISK, "--well", "--orbit", "1,1e200"], "orbits: got (1.0, 1e+200), wants"),
+        (["portrait", *DISK, "--out", "~nosuch/x.png"], "--out: got '~nosuch/x.png', but there is"),
+        (["portrait", *DISK, "--out", "x\0.png"], "--out: got 'x\\x00.png', wants the name of"),
+        (["portrait", *DISK, "--out", ""], "--out: got '', wants the name of"),
+        (["demo", "--out", "~nosuch"], "--out: got '~nosuch', but there is no such user"),
+        (["demo", "--out", "x\0"], "--out: got 'x\\x00', wants the name of"),
+        (["sweep", "~nosuch/map.toml"], "FILE.toml: got '~nosuch/map.toml', but there is no such"),
+        (["sweep", "x\0.toml"], "FILE.toml: got 'x\\x00.toml', wants the name of"),
         (["diagram", *DISK], "parameters: got no range, wants exactly one"),
+        (["diagram", *DISK, "--m", "1:2:5"], "--m: got a range, but m does not enter the equilibr"),
         (["diagram", *DISK, "--e", "1:2:3", "--r", "1:2:3"], "parameters: got the ranges e, r"),
         (["diagram", *DISK, "--beta", "0:1"], "beta: got '0:1', wants FROM:TO:COUNT"),
         (["diagram", *DISK, "--beta", "0:1:1"], "beta: got '1' as count, wants a whole number"),
@@ -227,6 +246,20 @@ def test_refusals(tmp_path, capsys, argv, message):
         ('["0 mm", "12 mm", 0.024]', "[]", "axes: a: got [], wants a list of values"),
         ('of = ["equilibria"]', 'of = ["equilibrium"]', "of: the quantity 'equilibrium' is unkn"),
         ('of = ["equilibria"]', "of = 3", "of: got 3"),
+        ("r = 0.2", f"r = {'9' * 400}", "r: got 99999"),
+        ("r = 0.2", f"r = {'9' * 5000}", "map.toml: not TOML"),
+        ("r = 0.2", f"r = {'[' * 5000}", "map.toml: not TOML"),
+        ("r = 0.2", "r = nan", "r: got nan, wants a number in m or cm or mm or um, and a finite"),
+        ('"90 deg"', "inf", "beta: got inf, wants a number in rad or deg or °, and a finite one"),
+        ('["0 mm", "12 mm", 0.024]', "[0.0, nan]", "a: got nan, wants a number in m"),
+        ('of = ["equilibria"]', 'model = ["GyroRotorDisk"]', "model ['GyroRotorDisk'] is unknown"),
+        ('of = ["equilibria"]', "of = [[1]]", "of: "),
+        ('store = "map.zarr"', 'store = "~nosuch/map.zarr"', "store: got '~nosuch/map.zarr', but"),
+        (
+            'store = "map.zarr"',
+            'store = "x\\u0000.zarr"',
+            "store: got 'x\\x00.zarr', wants the name",
+        ),
         ("[parameters]", "parameters = 3\n[other]", "key 'other' is unknown"),
         ('of = ["equilibria"]', 'model = "Disc"', "model 'Disc' is unknown"),
     ],
@@ -236,6 +269,41 @@ def test_refused_recipes(tmp_path, capsys, old, new, message):
     (tmp_path / "map.toml").write_text(RECIPE.replace(old, new))
     assert message in refused(capsys, "sweep", "map.toml")
     assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
+
+
+def test_cells_of_forgotten_degrees_are_counted(tmp_path, capsys):
+    (tmp_path / "map.toml").write_text(RECIPE.replace('"90 deg"', "90.0"))
+    assert main(["sweep", "map.toml"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line[:40] for line in lines if "cells are empty" in line] == [
+        "9 of 12 cells are empty, for their param"
+    ]
+    assert main(["diagram", "--beta", "0:40:5", *DISK[2:], "--out", "d.png"]) == 0
+    out = capsys.readouterr().out
+    assert "4 of 5 cells are empty" in out
+    assert "write degrees as 40deg" in out
+    assert main(["diagram", "--beta", "0:40deg:5", *DISK[2:], "--out", "e.png"]) == 0
+    assert "empty" not in capsys.readouterr().out
+
+
+def test_a_picture_is_replaced_whole_or_not_at_all(tmp_path, capsys, monkeypatch):
+    argv = ["portrait", *DISK, "--overwrite", "--out"]
+    (tmp_path / "x.png").write_text("keep")
+    (tmp_path / "link.png").symlink_to("x.png")
+
+    def full(path, data):
+        with open(path, "wb") as file:
+            file.write(data[:10])
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pathlib.Path.write_bytes", full)
+        assert "No space left" in refused(capsys, *argv, "x.png")
+    assert (tmp_path / "x.png").read_text() == "keep"
+    assert main([*argv, "link.png"]) == 0
+    assert (tmp_path / "link.png").is_symlink()
+    assert (tmp_path / "x.png").read_bytes().startswith(b"\x89PNG")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["link.png", "x.png"]
 
 
 def test_values_with_units():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import io
+import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,7 @@ from phasekit.labelled.arguments import unknown
 from phasekit.labelled.system import MODELS, Model
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -24,7 +26,7 @@ PICTURES = (".pdf", ".png", ".svg")
 
 def model_called(name: Any) -> type[Model]:
     """Return the model of a name."""
-    if name not in MODELS:
+    if not isinstance(name, str) or name not in MODELS:
         raise unknown("model", name, MODELS)
     return MODELS[name]
 
@@ -81,9 +83,21 @@ def build(model: type[Model], given: Mapping[str, str]) -> tuple[Model, list[str
     return model(**values), swept
 
 
+def path_called(argument: str, name: str) -> Path:
+    """Return the path that a user wrote, with ``~`` replaced; refuse what no file can be called."""
+    if not name or "\0" in name:
+        raise ParameterError(f"{argument}: got {name!r}, wants the name of a file or folder")
+    try:
+        return Path(name).expanduser()
+    except RuntimeError:
+        raise ParameterError(
+            f"{argument}: got {name!r}, but there is no such user; write ./~ for a name with ~"
+        ) from None
+
+
 def output_file(name: str, *, overwrite: bool, suffixes: Sequence[str] = PICTURES) -> Path:
     """Return the path of a file that may be written; refuse everything else before any work."""
-    path = Path(name).expanduser()
+    path = path_called("--out", name)
     if path.suffix.lower() not in suffixes:
         raise ParameterError(
             f"--out: got {name!r}, wants a name that ends in {' or '.join(suffixes)}"
@@ -107,7 +121,27 @@ def save(drawn: Figure | Axes, path: Path, *, dpi: int = 150) -> None:
     metadata = {dated: None} if dated else None
     with matplotlib.rc_context({"svg.hashsalt": "phasekit"}):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
-    path.write_bytes(buffer.getvalue())
+    # A link stays a link.
+    target = path.resolve()
+    part = target.with_name(f".phasekit-{os.getpid()}.part")
+    try:
+        part.write_bytes(buffer.getvalue())
+        os.replace(part, target)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def say_invalid(ds: xr.Dataset) -> None:
+    """Say how many cells of a map hold nothing, if any."""
+    if "n_equilibria" not in ds:
+        return
+    counts = ds["n_equilibria"]
+    invalid = int((counts == -1).sum())
+    if invalid:
+        say(
+            f"{invalid} of {counts.size} cells are empty, for their parameters are not legal; "
+            "a number without unit is in SI units and radians: write degrees as 40deg"
+        )
 
 
 def quiet_backend() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# A disk of 200 mm whose mass centre lies 50 mm from its shaft's point O2, on a carrier at 300 rpm.
+# A disk of 200 mm whose mass center lies 50 mm from its shaft's point O2, on a carrier at 300 rpm.
 ROTOR = pk.GyroRotorDisk(beta=30 * pk.deg, e=0.05, a=0.02, r=0.2, omega1=300 * pk.rpm)
 BETA = np.linspace(0.0, 90.0, 91) * pk.deg
 # Whole steps, so that the line a = 0 of the heteroclinic cycles is a row of the map.
@@ -40,7 +39,7 @@ def run(argv: Sequence[str]) -> None:
         "--overwrite", action="store_true", help="replace what an earlier run wrote"
     )
     options = parser.parse_args(argv)
-    folder = Path(options.out).expanduser()
+    folder = common.path_called("--out", options.out)
     picture, store = folder / "map.png", folder / "map.zarr"
     if folder.exists() and not folder.is_dir():
         raise StoreError(f"--out: {folder} is a file; choose another name")
@@ -56,13 +55,13 @@ def run(argv: Sequence[str]) -> None:
     start = time.perf_counter()
     ds = pk.sweep(ROTOR, {"beta": BETA, "a": A}, store=store, overwrite=options.overwrite)
     common.say(f"computed and stored in {time.perf_counter() - start:.1f} s")
-    summarise(ds)
+    summarize(ds)
     common.quiet_backend()
     common.save(draw(ds), picture, dpi=120)
     common.say(f"wrote {picture} and {store}")
 
 
-def summarise(ds: xr.Dataset) -> None:
+def summarize(ds: xr.Dataset) -> None:
     """Print what the map holds and where its folds lie."""
     codes = ds["topology"].values
     for topology in (Topology.WINDING, Topology.FIGURE_EIGHT, Topology.HETEROCLINIC):

@@ -27,9 +27,17 @@ def run(argv: Sequence[str]) -> None:
     common.quiet_backend()
     from phasekit import equilibria, plot
 
-    axes = plot.bifurcation_diagram(equilibria(system), y=options.y, angles=options.angles)
+    ds = equilibria(system)
+    if swept[0] not in ds["phi"].dims:
+        raise ParameterError(
+            f"--{swept[0]}: got a range, but {swept[0]} does not enter the equilibria; "
+            "wants a range of a parameter that does"
+        )
+    axes = plot.bifurcation_diagram(ds, y=options.y, angles=options.angles)
     common.save(axes, path)
-    common.say(f"{system}\nwrote {path}")
+    common.say(str(system))
+    common.say_invalid(ds)
+    common.say(f"wrote {path}")
 
 
 def _options(parser: Parser) -> None:

@@ -44,14 +44,14 @@ def run(argv: Sequence[str]) -> None:
     parser.add_argument("--store", help="where to write the map, instead of the file's store")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing map")
     options = parser.parse_args(argv)
-    recipe = read_recipe(Path(options.file))
+    recipe = read_recipe(common.path_called("FILE.toml", options.file))
     store = options.store if options.store is not None else recipe.get("store")
     if not isinstance(store, str) or not store:
         raise ParameterError(
             f"store: got {store!r}, wants a name that ends in .zarr or .nc, in the file "
             "or as --store"
         )
-    if Path(store).expanduser().exists() and not options.overwrite:
+    if common.path_called("store", store).exists() and not options.overwrite:
         raise StoreError(f"store: {store} exists; choose another name or pass --overwrite")
     system, axes = read_system(recipe)
     from phasekit import sweep
@@ -60,6 +60,7 @@ def run(argv: Sequence[str]) -> None:
     ds = sweep(system, axes, of=of, store=store, overwrite=options.overwrite)
     sizes = " x ".join(f"{name} {ds.sizes[name]}" for name in axes)
     common.say(f"{type(system).__name__}: {sizes} cells, {len(ds.data_vars)} quantities")
+    common.say_invalid(ds)
     common.say(f"wrote {store}; open it with phasekit.open_map({store!r})")
 
 
@@ -71,7 +72,7 @@ def read_recipe(path: Path) -> dict[str, Any]:
         raise StoreError(f"{path} does not exist; name a TOML file that says what to map") from None
     except IsADirectoryError:
         raise StoreError(f"{path} is a folder; name a TOML file that says what to map") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and what tomllib lets through
         raise ParameterError(f"{path}: not TOML: {error}") from None
     for key in recipe:
         if key not in KEYS:

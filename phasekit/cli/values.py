@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from decimal import Decimal
@@ -64,12 +65,26 @@ def number(name: str, text: Any, units: str) -> float:
     """
     known = UNITS.get(units, {})
     wants = f"a number in {' or '.join(known)}" if known else "a number without unit"
-    if isinstance(text, (int, float)) and not isinstance(text, bool):
-        return float(text)
+    plain = isinstance(text, (int, float)) and not isinstance(text, bool)
     match = _NUMBER.fullmatch(text) if isinstance(text, str) else None
-    if match is None or (match[2] and match[2] not in known):
-        raise ParameterError(f"{name}: got {text!r}, wants {wants}")
-    return float(Decimal(match[1]) * known.get(match[2], Decimal(1)))
+    if not plain and (match is None or (match[2] and match[2] not in known)):
+        raise ParameterError(f"{name}: got {_short(text)}, wants {wants}")
+    try:
+        # Decimals have bounds of their own, far beyond those of doubles.
+        value = float(
+            text if match is None else Decimal(match[1]) * known.get(match[2], Decimal(1))
+        )
+    except ArithmeticError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise ParameterError(f"{name}: got {_short(text)}, wants {wants}, and a finite one")
+    return value
+
+
+def _short(value: Any) -> str:
+    """Write a value for a message that must stay one readable line."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:40]}... ({len(text)} letters)"
 
 
 def is_range(text: str) -> bool:
@@ -107,7 +122,7 @@ def between(
         size = -1
     if not 2 <= size <= LONGEST:
         raise ParameterError(
-            f"{name}: got {count!r} as count, wants a whole number from 2 to {LONGEST}"
+            f"{name}: got {_short(count)} as count, wants a whole number from 2 to {LONGEST}"
         )
     if spacing == "log":
         if not (start > 0.0 and stop > 0.0):

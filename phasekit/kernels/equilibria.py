@@ -31,6 +31,7 @@ A0, B0, C0, A, B, C, UNIT, DELTA, MARGIN, ROOT_B, ROOT_C, COUNT = range(0, 12 * 
 X, Y, SLOPE, KIND, PHI, ENERGY, CURVATURE, FREQUENCY, EXPONENT = range(
     12 * BLOCK, 48 * BLOCK, 4 * BLOCK
 )
+SYSTEM_ROWS = 12
 SIZE = 48 * BLOCK
 
 # Values of COUNT that are not a number of equilibria.
@@ -184,6 +185,17 @@ def measure(j: int, i: int, w: Array) -> None:
     w[CURVATURE + p] = math.nan if kind == ABSENT else curvature
     w[FREQUENCY + p] = rate if kind == CENTER else math.nan
     w[EXPONENT + p] = rate if kind == SADDLE else math.nan
+
+
+@inline
+def leave_out(j: int, i: int, w: Array) -> None:
+    """Mark point j as absent without computing it."""
+    p = j * BLOCK + i
+    w[PHI + p] = math.nan
+    w[ENERGY + p] = math.nan
+    w[CURVATURE + p] = math.nan
+    w[FREQUENCY + p] = math.nan
+    w[EXPONENT + p] = math.nan
 
 
 @inline

@@ -198,6 +198,18 @@ def arrange(j: int, i: int, w: Array) -> None:
 
 
 @inline
+def leave_out(j: int, i: int, w: Array) -> None:
+    """Mark the sides of saddle j as open."""
+    q = j * BLOCK + i
+    w[LEFT_OFFSET + q] = math.nan
+    w[RIGHT_OFFSET + q] = math.nan
+    w[LEFT_PHI + q] = math.nan
+    w[RIGHT_PHI + q] = math.nan
+    w[LEFT_AREA + q] = math.nan
+    w[RIGHT_AREA + q] = math.nan
+
+
+@inline
 def write(i: int, k: int, w: Array, out: Outputs) -> None:
     """Column i becomes cell k of the output arrays."""
     topology, figure_eight, phi, energy, exponent, loop, winding, offset, turning, area = out

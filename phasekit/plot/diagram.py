@@ -79,18 +79,15 @@ def bifurcation_diagram(
     """
     factor = style.angle_factor(angles)
     ds = labels.dataset(dataset, "dataset", ("phi", "kind"))
-    offered = [str(name) for name, v in ds.data_vars.items() if "equilibrium" in v.dims]
-    if y not in offered or ds[y].dtype.kind != "f":
-        raise unknown("y", y, [name for name in offered if ds[name].dtype.kind == "f"])
+    offered = _drawable(ds)
+    if y not in offered:
+        raise unknown("y", y, offered)
     columns, along = _columns(ds, x, y)
     curves, mergers = strands.trace(columns)
     axes = style.axes_for(ax, legend=legend)
 
     values, _ = labels.shown(along, angles)
-    stretch = (
-        factor if along.attrs.get("units") == "rad" else 1.0,
-        factor if ds[y].attrs.get("units") == "rad" else 1.0,
-    )
+    stretch = (_stretch(along, factor), _stretch(ds[y], factor))
     handles = _draw_curves(axes, curves, y == "phi", stretch)
     handles |= _draw_mergers(axes, mergers, y == "phi", stretch)
     if y == "phi":
@@ -102,6 +99,19 @@ def bifurcation_diagram(
         order = ("center", "saddle", "fold", "pitchfork")
         style.legend_below(axes, [handles[name] for name in order if name in handles])
     return axes
+
+
+def _drawable(ds: xr.Dataset) -> list[str]:
+    """Return the quantities that each equilibrium has a number of."""
+    return [
+        str(name)
+        for name, values in ds.data_vars.items()
+        if "equilibrium" in values.dims and values.dtype.kind == "f"
+    ]
+
+
+def _stretch(values: xr.DataArray, factor: float) -> float:
+    return factor if values.attrs.get("units") == "rad" else 1.0
 
 
 def _draw_curves(

@@ -1,4 +1,4 @@
-"""Words on axes and colour bars, made from the attributes that Datasets carry."""
+"""Words on axes and color bars, made from the attributes that Datasets carry."""
 
 from __future__ import annotations
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import bad
 from phasekit.labelled.system import as_system
 from phasekit.phase.equilibria import Equilibria
 from phasekit.phase.potential import phase_velocity, potential
@@ -53,6 +54,9 @@ class Landscape:
     def of(cls, system: Any) -> Landscape:
         """Return the landscape of a system whose parameters are all scalars."""
         A, B, C = scalar_coefficients(system)
+        # No potential spans more than this; its square root is a speed.
+        if not np.isfinite(4.0 * abs(A) + 4.0 * abs(B) + 4.0 * abs(C)):
+            raise bad("system", system, "coefficients whose potential can be drawn")
         equilibria, separatrices = phase_space(A, B, C)
         present = np.isfinite(equilibria.phi)
         order = np.argsort(equilibria.phi[present])

@@ -21,6 +21,9 @@ from phasekit.labelled.system import MODELS
 from phasekit.plot import labels, style
 from phasekit.plot.strands import relative_gap
 
+# The values along x and along y, as shown.
+Grid = tuple[NDArray[Any], NDArray[Any]]
+
 COUNT_NAMES = {-1: "not valid", 0: "none", 2: "2", 3: "3, on a fold", 4: "4"}
 
 
@@ -37,8 +40,8 @@ def parameter_map(
 ) -> Axes:
     r"""Draw a quantity over two swept parameters, and the fold curve over it.
 
-    Codes, counts and yes-or-no quantities are drawn in one colour each and named at the colour bar,
-    others in a sequential map whose lightness rises throughout. Cells without a value are grey.
+    Codes, counts and yes-or-no quantities are drawn in one color each and named at the color bar,
+    others in a sequential map whose lightness rises throughout. Cells without a value are gray.
 
     Parameters
     ----------
@@ -53,7 +56,7 @@ def parameter_map(
     legend : bool
         Whether to explain the curves under the axes.
     ax : matplotlib.axes.Axes, optional
-        Where to draw; a new figure if left out. The colour bar takes its room from it. A given
+        Where to draw; a new figure if left out. The color bar takes its room from it. A given
         figure without layout engine gets the constrained one, unless `legend` is False.
     **sel
         Labels or values along the other dims, such as ``equilibrium="lower_saddle"`` or
@@ -85,7 +88,7 @@ def parameter_map(
     """
     style.angle_factor(angles)
     ds = labels.dataset(dataset, "dataset", ())
-    if variable not in ds.data_vars:
+    if not isinstance(variable, str) or variable not in ds.data_vars:
         raise unknown("variable", variable, map(str, ds.data_vars))
     chosen = _select(ds, variable, sel)
     field = chosen[variable]
@@ -93,13 +96,9 @@ def parameter_map(
     field = field.transpose(up.dims[0], across.dims[0])
     axes = style.axes_for(ax, legend=legend, width=6.8)
 
-    grid_x, grid_y = labels.shown(across, angles)[0], labels.shown(up, angles)[0]
-    title = labels.label(field, angles, style.letters(axes, "y"), _named(ds[variable], sel))
-    if field.dtype.kind in "iub":
-        handles = _draw_codes(axes, grid_x, grid_y, field, title)
-    else:
-        handles = _draw_values(axes, grid_x, grid_y, labels.shown(field, angles)[0], title)
-    handles += _draw_curves(axes, grid_x, grid_y, chosen, across, up)
+    grid = labels.shown(across, angles)[0], labels.shown(up, angles)[0]
+    handles = _draw_field(axes, grid, field, angles, _named(ds[variable], sel))
+    handles += _draw_curves(axes, grid, chosen, across, up)
     axes.set_xlabel(labels.label(across, angles, style.letters(axes, "x")))
     axes.set_ylabel(labels.label(up, angles, style.letters(axes, "y")))
     if legend:
@@ -162,16 +161,24 @@ def _axes_of(
     return chosen[0], chosen[1]
 
 
-def _draw_codes(
-    ax: Axes, x: NDArray[Any], y: NDArray[Any], field: xr.DataArray, text: str
+def _draw_field(
+    ax: Axes, grid: Grid, field: xr.DataArray, angles: style.Angles, selected: str
 ) -> list[Artist]:
-    """Draw integers and booleans, one colour each; the colours of a code never change."""
+    """Draw the cells and the color bar: codes by name, numbers on a scale."""
+    text = labels.label(field, angles, style.letters(ax, "y"), selected)
+    if field.dtype.kind in "iub":
+        return _draw_codes(ax, grid, field, text)
+    return _draw_values(ax, grid, labels.shown(field, angles)[0], text)
+
+
+def _draw_codes(ax: Axes, grid: Grid, field: xr.DataArray, text: str) -> list[Artist]:
+    """Draw integers and booleans, one color each; the colors of a code never change."""
     names, colors = _code_book(field)
     present = [int(code) for code in np.unique(field.values.astype(int))]
     index = np.searchsorted(present, field.values.astype(int))
-    palette = ListedColormap([colors.get(code, style.GREY) for code in present])
+    palette = ListedColormap([colors.get(code, style.GRAY) for code in present])
     norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, len(present))
-    mesh = ax.pcolormesh(x, y, index, cmap=palette, norm=norm, shading="nearest", rasterized=True)
+    mesh = ax.pcolormesh(*grid, index, cmap=palette, norm=norm, shading="nearest", rasterized=True)
     bar = ax.figure.colorbar(mesh, ax=ax, ticks=range(len(present)), label=text)
     words = [names.get(code, str(code)) for code in present]
     upright = max(map(len, words)) <= 3
@@ -181,7 +188,7 @@ def _draw_codes(
 
 
 def _code_book(field: xr.DataArray) -> tuple[Mapping[int, str], Mapping[int, str]]:
-    """Return names and colours by code."""
+    """Return names and colors by code."""
     if field.dtype.kind == "b":
         return {0: "no", 1: "yes"}, {0: style.CODE_COLORS[0], 1: style.CODE_COLORS[1]}
     if field.name == "n_equilibria":
@@ -199,10 +206,8 @@ def _code_book(field: xr.DataArray) -> tuple[Mapping[int, str], Mapping[int, str
     return names, {-1: style.NOTHING, 0: style.NOTHING, **colors}
 
 
-def _draw_values(
-    ax: Axes, x: NDArray[Any], y: NDArray[Any], numbers: NDArray[Any], text: str
-) -> list[Artist]:
-    """Draw numbers; cells without one stay grey."""
+def _draw_values(ax: Axes, grid: Grid, numbers: NDArray[Any], text: str) -> list[Artist]:
+    """Draw numbers; cells without one stay gray."""
     low, high, extend = _limits(numbers)
     finite = numbers[np.isfinite(numbers)]
     # pcolormesh would leave infinite cells out.
@@ -210,15 +215,21 @@ def _draw_values(
     values = np.ma.masked_invalid(shown)
     ax.set_facecolor(style.NOTHING)
     mesh = ax.pcolormesh(
-        x, y, values, cmap=style.SEQUENTIAL, vmin=low, vmax=high, shading="nearest", rasterized=True
+        *grid,
+        values,
+        cmap=style.SEQUENTIAL,
+        vmin=low,
+        vmax=high,
+        shading="nearest",
+        rasterized=True,
     )
     ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend)
     absent = np.ma.getmaskarray(values).any()
-    return [Patch(facecolor=style.NOTHING, edgecolor=style.GREY, label="absent")] if absent else []
+    return [Patch(facecolor=style.NOTHING, edgecolor=style.GRAY, label="absent")] if absent else []
 
 
 def _limits(values: NDArray[Any]) -> tuple[float | None, float | None, str]:
-    """Return colour limits; a pole, such as that of fold_margin, must not take all colours."""
+    """Return color limits; a pole, such as that of fold_margin, must not take all colors."""
     finite = values[np.isfinite(values)]
     if not finite.size:
         return None, None, "neither"
@@ -236,12 +247,7 @@ def _limits(values: NDArray[Any]) -> tuple[float | None, float | None, str]:
 
 
 def _draw_curves(
-    ax: Axes,
-    x: NDArray[Any],
-    y: NDArray[Any],
-    ds: xr.Dataset,
-    across: xr.DataArray,
-    up: xr.DataArray,
+    ax: Axes, grid: Grid, ds: xr.Dataset, across: xr.DataArray, up: xr.DataArray
 ) -> list[Artist]:
     """Draw the fold curve and the line A = 0, where the Dataset knows them."""
     dims = (up.dims[0], across.dims[0])
@@ -257,8 +263,7 @@ def _draw_curves(
         if not (np.nanmin(values, initial=1.0) < 0.0 < np.nanmax(values, initial=-1.0)):
             continue
         ax.contour(
-            x,
-            y,
+            *grid,
             np.ma.masked_invalid(values),
             levels=[0.0],
             colors=[look["color"]],

@@ -35,7 +35,7 @@ def phase_portrait(
     ----------
     system
         A system whose parameters are scalars.
-    energies : array_like, optional
+    energies : float or sequence of float, optional
         Energies (s^-2) of the level curves. Left out, they are chosen evenly in speed between the
         centers and saddles and above them. An empty list draws none; an energy below the least
         potential has no curve.
@@ -62,7 +62,7 @@ def phase_portrait(
     Notes
     -----
     The level curves are [Veljovic2015] eq. (14); the figure-eight is the homoclinic orbit of its
-    Section 5 and encloses the trigger of coupled singularities (center, saddle, center).
+    Section 4 and encloses the trigger of coupled singularities (center, saddle, center).
 
     Examples
     --------
@@ -74,7 +74,7 @@ def phase_portrait(
     land = Landscape.of(system)
     factor = style.angle_factor(angles)
     chosen = levels_of(land, energies)
-    starts = starts_of(orbits)
+    starts = starts_of(land, orbits)
     axes = style.axes_for(ax, legend=legend)
 
     for level in chosen:
@@ -107,10 +107,17 @@ def levels_of(land: Landscape, energies: ArrayLike | None) -> list[Level]:
     """Return the levels to draw: those asked for, or a choice."""
     if energies is None:
         return land.levels()
-    return [(float(energy), None) for energy in _finite(energies, "energies", "s^-2").ravel()]
+    array = _finite(energies, "energies", "s^-2")
+    if array.ndim > 1:
+        raise bad("energies", energies, "a number or a 1-D list of numbers, in s^-2")
+    levels: list[Level] = [(float(energy), None) for energy in array.ravel()]
+    for energy, _ in levels:
+        if not _has_speed(land, energy):
+            raise bad("energies", energy, "energies whose speeds are finite")
+    return levels
 
 
-def starts_of(orbits: ArrayLike | None) -> list[tuple[float, float]]:
+def starts_of(land: Landscape, orbits: ArrayLike | None) -> list[tuple[float, float]]:
     """Return initial conditions as pairs of floats."""
     if orbits is None:
         return []
@@ -121,15 +128,24 @@ def starts_of(orbits: ArrayLike | None) -> list[tuple[float, float]]:
         pairs = pairs[np.newaxis]
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise bad("orbits", orbits, "pairs (phi0, dphi0), of shape (2,) or (n, 2)")
-    return [(float(phi), float(speed)) for phi, speed in pairs]
+    starts = [(float(phi), float(speed)) for phi, speed in pairs]
+    for start in starts:
+        if not _has_speed(land, land.energy(*start)):
+            raise bad("orbits", start, "pairs (phi0, dphi0) whose energies are finite")
+    return starts
+
+
+def _has_speed(land: Landscape, energy: float) -> bool:
+    """Return whether the greatest speed on a level is a number."""
+    return bool(np.isfinite(2.0 * (energy - land.floor)))
 
 
 def _finite(values: ArrayLike, argument: str, unit: str) -> FloatArray:
     wants = f"finite numbers in {unit}"
     try:
-        array = np.asarray(values, dtype=float)
+        array = np.asarray(values)
     except (TypeError, ValueError):
         raise bad(argument, values, wants) from None
-    if not np.isfinite(array).all():
+    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
         raise bad(argument, values, wants)
-    return array
+    return array.astype(float)

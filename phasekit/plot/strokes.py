@@ -145,7 +145,7 @@ def draw_points(ax: Axes, land: Landscape, factor: float, *, on_potential: bool)
 
 
 def orbit_look(number: int) -> style.Look:
-    """Return colour and dashes of the `number`-th orbit."""
+    """Return color and dashes of the `number`-th orbit."""
     return {
         "color": style.ORBIT_COLORS[number % len(style.ORBIT_COLORS)],
         "linestyle": style.ORBIT_DASHES[number % len(style.ORBIT_DASHES)],

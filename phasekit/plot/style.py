@@ -1,7 +1,7 @@
-"""How things look: colours, line styles and markers for every picture, in one place.
+"""How things look: colors, line styles and markers for every picture, in one place.
 
-The colours are those of Okabe and Ito, which the colour-blind can tell apart. No meaning hangs on a
-colour alone: each also has its own line style or marker, so that a picture survives grey print.
+The colors are those of Okabe and Ito, which the color-blind can tell apart. No meaning hangs on a
+color alone: each also has its own line style or marker, so that a picture survives gray print.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from phasekit.labelled.arguments import bad
 Angles = Literal["rad", "deg"]
 Look = dict[str, Any]
 
-BLACK, GREY = "#000000", "#6E6E6E"
+BLACK, GRAY = "#000000", "#6E6E6E"
 BLUE, SKY, GREEN = "#0072B2", "#56B4E9", "#009E73"
 ORANGE, VERMILLION, PURPLE, YELLOW = "#E69F00", "#D55E00", "#CC79A7", "#F0E442"
 
@@ -89,8 +89,8 @@ MERGERS: Mapping[str, Look] = {
     },
 }
 
-LEVEL: Look = {"color": GREY, "linestyle": "-", "linewidth": 0.8}
-ROTATION: Look = {"color": GREY, "linestyle": (0, (1, 1.5)), "linewidth": 1.1}
+LEVEL: Look = {"color": GRAY, "linestyle": "-", "linewidth": 0.8}
+ROTATION: Look = {"color": GRAY, "linestyle": (0, (1, 1.5)), "linewidth": 1.1}
 EIGHT: Look = {"color": VERMILLION, "linestyle": "-", "linewidth": 2.0, "label": "figure-eight"}
 WINDING: Look = {
     "color": BLACK,
@@ -166,13 +166,13 @@ def check_axes(ax: object, argument: str = "ax", *, legend: bool = False) -> Axe
     """Return `ax` if it is a matplotlib Axes, with room for a legend under it if it gets one.
 
     Without a layout engine a figure would cut the legend off; this has to be settled before a
-    colour bar is made.
+    color bar is made.
     """
     if not isinstance(ax, Axes):
         raise bad(argument, ax, "a matplotlib Axes", "figure, ax = plt.subplots() makes one")
     figure = ax.get_figure(root=True)
     if legend and figure is not None and figure.get_layout_engine() is None:
-        # Refused where a colour bar of the old layout stands already.
+        # Refused where a color bar of the old layout stands already.
         with contextlib.suppress(RuntimeError):
             figure.set_layout_engine("constrained")
     return ax

@@ -65,7 +65,7 @@ def potential_well(
     land = Landscape.of(system)
     factor = style.angle_factor(angles)
     chosen = levels_of(land, energies)
-    starts = starts_of(orbits)
+    starts = starts_of(land, orbits)
     panels = _panels(ax)
     well = panels[0]
 

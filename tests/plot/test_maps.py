@@ -16,7 +16,7 @@ MAP = pk.sweep(DISK, beta=BETA, a=A)
 
 
 def bar(ax):
-    """Return the Axes of the colour bar."""
+    """Return the Axes of the color bar."""
     return ax.collections[0].colorbar.ax
 
 
@@ -36,7 +36,7 @@ def test_returns_the_given_axes(ax):
     assert ax.get_ylabel().startswith(r"$\psi$")
 
 
-def test_topology_is_named_and_coloured_by_code():
+def test_topology_is_named_and_colored_by_code():
     ax = pk.plot.parameter_map(MAP)
     assert names(ax) == ["winding", "figure eight", "heteroclinic"]
     assert bar(ax).get_ylabel() == "topology of the separatrices"
@@ -46,16 +46,16 @@ def test_topology_is_named_and_coloured_by_code():
     np.testing.assert_array_equal(codes[drawn], MAP.topology.values.T)
 
 
-def test_a_code_keeps_its_colour():
+def test_a_code_keeps_its_color():
     few = pk.plot.parameter_map(MAP.isel(beta=slice(0, 9), a=slice(0, 9)))
     many = pk.plot.parameter_map(MAP)
-    colour = {}
+    color = {}
     for ax in (few, many):
         mesh = ax.collections[0]
         for i, name in enumerate(names(ax)):
-            colour.setdefault(name, set()).add(mesh.cmap(mesh.norm(i)))
-    assert len(colour["figure eight"]) == 1
-    assert len(set.union(*colour.values())) == 3
+            color.setdefault(name, set()).add(mesh.cmap(mesh.norm(i)))
+    assert len(color["figure eight"]) == 1
+    assert len(set.union(*color.values())) == 3
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_values_have_units_and_absent_cells_are_told():
     np.testing.assert_array_equal(mesh.get_array().mask.reshape(expected.shape), np.isnan(expected))
 
 
-def test_a_pole_does_not_take_all_colours():
+def test_a_pole_does_not_take_all_colors():
     ax = pk.plot.parameter_map(MAP, "fold_margin")
     mesh = ax.collections[0]
     low, high = mesh.get_clim()
@@ -218,3 +218,9 @@ def test_the_accessor_draws_the_same():
     assert MAP.phasekit.plot.parameter_map("topology").get_xlabel()
     assert MAP.isel(a=3).phasekit.plot.bifurcation_diagram().get_xlabel()
     assert isinstance(MAP, xr.Dataset)
+
+
+@pytest.mark.parametrize("variable", [["topology"], {}, None, 3])
+def test_a_variable_is_named_by_a_string(variable):
+    with pytest.raises(pk.ParameterError, match="^variable .* is unknown; "):
+        pk.plot.parameter_map(PLANE, variable)

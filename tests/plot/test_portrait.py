@@ -38,7 +38,7 @@ def labelled(ax, label):
 
 
 def looks_like(ax, look):
-    """Lines with the colour, dashes and width of a style."""
+    """Lines with the color, dashes and width of a style."""
     (model,) = plt.figure().add_subplot().plot([0, 1], [0, 1], **look)
     return [
         line
@@ -277,7 +277,7 @@ def test_a_layout_is_left_alone_where_nothing_has_to_be_placed():
     assert figure.get_layout_engine() is None
 
 
-def test_meaning_does_not_hang_on_colour_alone():
+def test_meaning_does_not_hang_on_color_alone():
     looks = [style.EIGHT, style.WINDING, style.CYCLE, style.LEVEL, style.ROTATION, style.DEGENERATE]
     assert len({(str(look["linestyle"]), look["linewidth"]) for look in looks}) == len(looks)
     assert len({look["marker"] for look in style.POINTS.values()}) == 3
@@ -315,3 +315,29 @@ def test_a_wrong_call_draws_nothing(ax):
     with pytest.raises(pk.ParameterError):
         pk.plot.phase_portrait(EIGHT, orbits=[1.0], ax=ax)
     assert not ax.lines
+
+
+@pytest.mark.parametrize("draw", [pk.plot.phase_portrait, pk.plot.potential_well])
+@pytest.mark.parametrize(
+    ("argument", "value"),
+    [
+        ("energies", 1e308),
+        ("energies", [0.1, 1e308]),
+        ("energies", True),
+        ("energies", [[0.1, 0.2]]),
+        ("energies", ["0.1"]),
+        ("orbits", (1.0, 1e200)),
+        ("orbits", (True, False)),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(draw, argument, value):
+    with pytest.raises(pk.ParameterError, match=f"^{argument}: got "):
+        draw(EIGHT, **{argument: value})
+    assert not plt.get_fignums()
+
+
+def test_a_potential_beyond_the_doubles_is_refused():
+    with pytest.raises(pk.ParameterError, match="^system: got "):
+        pk.plot.phase_portrait(pk.Coefficients(1e308, 1e308, 0.0))
+    ax = pk.plot.phase_portrait(pk.Coefficients(1e306, 1e305, 0.0), energies=1e307)
+    assert np.isfinite(ax.get_ylim()).all()
