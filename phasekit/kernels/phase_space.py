@@ -40,6 +40,7 @@ def partition(n: int, v: Array, order: npt.NDArray[np.int64], w: Array) -> int:
     """Copy the columns of v to w, first those with inner points; their number.
 
     So the steps for inner points and lobes run over full vectors of systems that have them.
+    ``order`` has a place more than columns: each index is written before it is known to count.
     """
     m = 0
     for i in range(n):

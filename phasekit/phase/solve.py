@@ -71,7 +71,7 @@ def _allocate(size: int, shapes: tuple[Shapes, ...]) -> list[Arrays]:
 def _run(
     kernel: Callable[..., None],
     coefficients: Arrays,
-    exact: Arrays | npt.NDArray[Any],
+    exact: npt.NDArray[Any],
     groups: list[Arrays],
     threads: int | None,
 ) -> None:
@@ -83,6 +83,9 @@ def _run(
             kernel.py_func(*coefficients, exact, 0, size, *groups)
         return
     workers = (threads or cpus()) if size >= THREADS_FROM else 1
+    if workers == 1:
+        kernel(*coefficients, exact, 0, size, *groups)
+        return
     edges = [size * part // workers for part in range(workers + 1)]
     with ThreadPoolExecutor(workers) as pool:
         jobs = [
