@@ -57,6 +57,7 @@ class Loop(IntEnum):
 class OrbitKind(IntEnum):
     """Type of an orbit."""
 
+    NOT_COMPUTED = -1
     EQUILIBRIUM = 0
     LIBRATION = 1
     ROTATION = 2

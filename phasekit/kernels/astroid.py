@@ -16,9 +16,8 @@ import math
 import numpy as np
 
 from phasekit.kernels.compile import inline
+from phasekit.kernels.double_double import dd_add, dd_multiply, two_product, two_sum
 from phasekit.kernels.elementary import cbrt
-
-SPLITTER = 134217729.0  # 2^27 + 1 (Veltkamp)
 
 # Inputs are scaled to [0, 4). The double-double result below is within 32 * 2^-104 of the sum of
 # its terms; asking for 2^-48 of it leaves a relative error under 2^-50. Products that underflow
@@ -27,44 +26,6 @@ DECIDED = 2.0**-48
 UNDERFLOW = 1e-280
 
 LEAST = 5e-324
-
-
-@inline
-def two_sum(a: float, b: float) -> tuple[float, float]:
-    """Sum a + b as an unevaluated sum of two doubles, exactly."""
-    s = a + b
-    v = s - a
-    return s, (a - (s - v)) + (b - v)
-
-
-@inline
-def two_product(a: float, b: float) -> tuple[float, float]:
-    """Product a * b as an unevaluated sum of two doubles, exactly (without underflow)."""
-    p = a * b
-    t = SPLITTER * a
-    ah = t - (t - a)
-    al = a - ah
-    t = SPLITTER * b
-    bh = t - (t - b)
-    bl = b - bh
-    return p, ((ah * bh - p) + ah * bl + al * bh) + al * bl
-
-
-@inline
-def dd_add(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
-    """Sum of two double-doubles; relative error 3 * 2^-104 even where it cancels."""
-    sh, se = two_sum(ah, bh)
-    th, te = two_sum(al, bl)
-    h, e = two_sum(sh, se + th)
-    return two_sum(h, te + e)
-
-
-@inline
-def dd_multiply(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
-    """Product of two double-doubles; relative error 8 * 2^-104."""
-    p, e = two_product(ah, bh)
-    e += ah * bl + al * bh
-    return two_sum(p, e)
 
 
 @inline

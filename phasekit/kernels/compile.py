@@ -3,7 +3,8 @@
 ``kernel`` marks what Python calls: compiled on first use, cached on disk, running without the
 GIL; its ``py_func`` is the same code interpreted, which gives the same bits and is the faster way
 to a first result. ``inline`` marks the arithmetic inside: an ordinary function in Python, always
-inlined when compiled, so that a loop over it vectorises. ``compose`` marks what only strings such
+inlined when compiled, so that a loop over it vectorises. ``routine`` marks what is only called,
+not inlined. ``compose`` marks what only strings such
 functions together. Division by zero gives inf or NaN, as in NumPy. Fast-math stays off: the
 exact steps need IEEE arithmetic, and a result must not depend on how a loop was vectorised.
 """
@@ -34,6 +35,12 @@ def inline(function: Function) -> Function:
     overload(function, jit_options=options, strict=False, prefer_literal=True)(
         lambda *args: function
     )
+    return function
+
+
+def routine(function: Function) -> Function:
+    """Compile as a function of its own: for what is long, or called at several places."""
+    overload(function, jit_options={"error_model": "numpy"}, strict=False)(lambda *args: function)
     return function
 
 

@@ -1,0 +1,210 @@
+"""Where a state stands: the kind of its orbit, and its energy above the nearest equilibrium.
+
+The energy above an equilibrium decides on which side of a separatrix a state lies, and carries the
+digits of its period there. So it is never the difference of two energies: it is computed from the
+angle to the equilibrium, and where that cancels too, in double-double arithmetic.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from phasekit.errors import OrbitKind
+from phasekit.kernels.compile import Array, inline, routine
+from phasekit.kernels.double_double import (
+    TWO_PI,
+    dd_add,
+    dd_cos_sin,
+    dd_multiply,
+    reduce_angle,
+    two_product,
+)
+from phasekit.kernels.equilibria import LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER, UPPER_SADDLE
+
+NOT_COMPUTED = int(OrbitKind.NOT_COMPUTED)
+EQUILIBRIUM = int(OrbitKind.EQUILIBRIUM)
+LIBRATION = int(OrbitKind.LIBRATION)
+ROTATION = int(OrbitKind.ROTATION)
+ASYMPTOTIC = int(OrbitKind.ASYMPTOTIC)
+
+# How the motion is computed: not at all, at rest, as V = 0, as a harmonic oscillation, or in full.
+INVALID, REST, FREE, HARMONIC, ASYMPTOTE, SWING, TURN = range(7)
+
+# Where the orbit lies: inside the lobe on the left or right of the lower saddle, round both
+# lobes, or in a portrait without lobes.
+LEFT, RIGHT, AROUND, SINGLE = range(4)
+
+# One orbit is a flat work array. First the system: coefficients in a unit of time that brings
+# the largest into [1, 4), that unit, angles and V'' of the equilibria. Then the state, how it
+# moves, its reference, the energy above it, and where it lies.
+A, B, C, UNIT, PHI, CURVATURE = 0, 1, 2, 3, 4, 8
+START, TURNS, ANGLE, RATE, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(12, 21)
+# Then the rows of `phasekit.kernels.orbits`.
+ORBIT = 21
+
+# Beyond this speed (against the root of the largest coefficient) V changes no digit.
+FREE_FROM = 1e9
+# Energies below this (against V'' and V''^3) move harmonically to all digits.
+HARMONIC_TO = 1e-30
+# Energy gaps below this are computed in double-double arithmetic.
+DOUBLE_TO = 1e-3
+ROUNDING = 2.0**-53
+LARGEST = 1.7976931348623157e308
+
+
+@inline
+def load(a: float, b: float, c: float, w: Array) -> bool:
+    """Scale a system by a power of four; whether it is valid and has a force."""
+    size = max(abs(a), abs(b), abs(c))
+    if not (size > 0.0 and abs(a) <= LARGEST and abs(b) <= LARGEST and abs(c) <= LARGEST):
+        w[UNIT] = 1.0
+        return False
+    exponent = (np.float64(size).view(np.int64) >> 52) & 0x7FF
+    half = (exponent - 1023) >> 1
+    unit = np.int64((1023 - half) << 52).view(np.float64)
+    w[UNIT] = unit
+    w[A] = a * unit * unit
+    w[B] = b * unit * unit
+    w[C] = c * unit * unit
+    return True
+
+
+@inline
+def load_point(j: int, phi: float, curvature: float, w: Array) -> None:
+    """Take over equilibrium j of the system."""
+    w[PHI + j] = phi
+    w[CURVATURE + j] = curvature * w[UNIT] * w[UNIT]
+
+
+@routine
+def energy_above(j: int, w: Array) -> float:
+    """Energy of the state above equilibrium j, with all digits."""
+    v = w[RATE]
+    phi = w[ANGLE]
+    phi_s = w[PHI + j]
+    sine = math.sin(0.5 * (phi - phi_s))
+    a = w[A]
+    # cos(phi + phi_s) - cos(2 phi_s) as a product
+    bend = w[CURVATURE + j] + a * math.sin(0.5 * (phi + 3.0 * phi_s)) * sine
+    gap = 0.5 * v * v + 2.0 * sine * sine * bend
+    if not abs(gap) < DOUBLE_TO:
+        return gap
+    ch, cl, sh, sl = dd_cos_sin(w[START])
+    vh, vl = potential_dd(a, w[B], w[C], ch, cl, sh, sl)
+    ch, cl, sh, sl = dd_cos_sin(phi_s)
+    uh, ul = potential_dd(a, w[B], w[C], ch, cl, sh, sl)
+    h, low = dd_add(vh, vl, -uh, -ul)
+    kh, kl = two_product(v, v)
+    h, low = dd_add(h, low, 0.5 * kh, 0.5 * kl)
+    return h
+
+
+@inline
+def potential_dd(
+    a: float, b: float, c: float, ch: float, cl: float, sh: float, sl: float
+) -> tuple[float, float]:
+    """V = (a cos/2 - b) cos - c sin as a double-double."""
+    h, low = dd_multiply(ch, cl, 0.5 * a, 0.0)
+    h, low = dd_add(h, low, -b, 0.0)
+    h, low = dd_multiply(h, low, ch, cl)
+    th, tl = dd_multiply(sh, sl, c, 0.0)
+    return dd_add(h, low, -th, -tl)
+
+
+@inline
+def energy_between(j: int, i: int, w: Array) -> float:
+    """V(phi_i) - V(phi_j)."""
+    sine = math.sin(0.5 * (w[PHI + i] - w[PHI + j]))
+    bend = w[CURVATURE + j] + w[A] * math.sin(0.5 * (w[PHI + i] + 3.0 * w[PHI + j])) * sine
+    return 2.0 * sine * sine * bend
+
+
+@routine
+def offset(phi: float, j: int, w: Array) -> float:
+    """Angle from equilibrium j in [0, 2 pi)."""
+    half = 0.5 * (phi - w[PHI + j])
+    angle = 2.0 * math.atan2(math.sin(half), math.cos(half))
+    return angle if angle >= 0.0 else angle + TWO_PI
+
+
+@routine
+def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
+    """Fix the reference of an orbit, its energy above that, where it lies, and how it moves."""
+    w[REFERENCE] = j
+    w[GAP] = gap
+    w[PLACE] = place
+    slope = w[CURVATURE + j]
+    mode = TURN if kind == ROTATION else SWING
+    if gap == 0.0 or (slope > 0.0 and gap < HARMONIC_TO * min(slope, slope * slope * slope)):
+        mode = HARMONIC if slope > 0.0 else REST
+    w[MODE] = ASYMPTOTE if kind == ASYMPTOTIC else mode
+
+
+@inline
+def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
+    """Kind of the orbit through a state, its reference, energy gap and place."""
+    w[MODE] = INVALID
+    if not (abs(phi) <= LARGEST and abs(dphi) <= LARGEST):
+        return NOT_COMPUTED
+    w[START] = phi
+    w[ANGLE], _, w[TURNS] = reduce_angle(phi, 0.0)
+    w[RATE] = dphi * w[UNIT]
+    w[DIRECTION] = -1.0 if dphi < 0.0 else 1.0
+    v = w[RATE]
+    if not valid or not abs(v) < FREE_FROM:
+        w[MODE] = FREE if dphi != 0.0 else REST
+        return ROTATION if dphi != 0.0 else EQUILIBRIUM
+    c = np.float64(math.cos(phi))
+    s = np.float64(math.sin(phi))
+    force = (w[B] - w[A] * c) * s - w[C] * c
+    if v == 0.0 and force == 0.0:
+        w[MODE] = REST
+        return EQUILIBRIUM
+    # What the rounding of the state changes in its energy.
+    slack = 8.0 * ROUNDING * (v * v + abs(force) * max(1.0, abs(phi)))
+    above = energy_above(UPPER_SADDLE, w)
+    if abs(above) <= slack:
+        settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
+        return ASYMPTOTIC
+    if above > 0.0:
+        settle(UPPER_SADDLE, above, SINGLE, ROTATION, w)
+        return ROTATION
+    if w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]:  # a single saddle
+        own = energy_above(LOWER_CENTER, w)
+        if own < -above:
+            settle(LOWER_CENTER, own, SINGLE, LIBRATION, w)
+        else:
+            settle(UPPER_SADDLE, above, SINGLE, LIBRATION, w)
+        return LIBRATION
+    within = energy_above(LOWER_SADDLE, w)
+    if abs(within) <= slack:
+        settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
+        return ASYMPTOTIC
+    if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
+        enclose(within, above, w)
+        return LIBRATION
+    barrier = offset(w[PHI + UPPER_SADDLE], LOWER_SADDLE, w)
+    right = offset(phi, LOWER_SADDLE, w) < barrier
+    lower = (offset(w[PHI + LOWER_CENTER], LOWER_SADDLE, w) < barrier) == right
+    center = LOWER_CENTER if lower else UPPER_CENTER
+    own = energy_above(center, w)
+    place = RIGHT if right else LEFT
+    if own < -within:
+        settle(center, max(own, 0.0), place, LIBRATION, w)
+    else:
+        settle(LOWER_SADDLE, within, place, LIBRATION, w)
+    return LIBRATION
+
+
+@inline
+def enclose(within: float, above: float, w: Array) -> None:
+    """Choose the reference of a libration round more than one equilibrium."""
+    own = within + energy_between(LOWER_CENTER, LOWER_SADDLE, w)
+    if abs(within) < min(-above, own):
+        settle(LOWER_SADDLE, within, AROUND, LIBRATION, w)
+    elif own < -above:
+        settle(LOWER_CENTER, own, AROUND, LIBRATION, w)
+    else:
+        settle(UPPER_SADDLE, above, AROUND, LIBRATION, w)

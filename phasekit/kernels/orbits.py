@@ -1,0 +1,502 @@
+"""One orbit in closed form: its type, period, action and turning points.
+
+All is measured from a reference, the equilibrium whose energy is nearest to the orbit's: E is the
+orbit's energy above it, o = phi - phi_s the angle from it and z = cot(o/2). So nothing cancels
+next to a center or a separatrix. With mu = B/cos(phi_s) = A + C/sin(phi_s) at the reference, S2 =
+(A/2) sin(2 phi_s) and P = mu - A sin(phi_s)^2, motion at the energy E obeys
+
+    phi'^2 = 2 E F1(z) F2(z)/(1 + z^2)^2,  F1,2 = z^2 +- tau z + r1,2,
+
+where r1,2 = (x + E -+ R)/E, R = -2 S2/tau, tau^2 = 4 (mu + x) (A - mu - x)/x^2 and x is a root of
+
+    x^3 + (V'' + 2 E) x^2 + 2 E (2 mu - A) x - 2 E mu (A - mu) = 0.
+
+The roots are the Weierstrass roots of the motion times -4, shifted. From the least real one, x0,
+and the distances y1, y2 of the others from it, the frequency is the arithmetic-geometric mean of
+sqrt(y1) and sqrt(y2). A Moebius map of tan(phi/2) turns the motion into psi' = Delta(psi) of
+`phasekit.kernels.gauss`: for a libration between the zeros of F1
+
+    tan(psi/2)^2 = sqrt(|V'(low)/V'(high)|) sin((high - phi)/2)/sin((phi - low)/2),
+
+for a rotation, between the slowest and the fastest point of its axis of symmetry,
+
+    tan(psi/2) = sqrt(v(fast)/v(slow)) sin((phi - slow)/2)/sin((fast - phi)/2).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from phasekit.kernels.compile import Array, inline, routine
+from phasekit.kernels.double_double import TWO_PI
+from phasekit.kernels.elementary import PI
+from phasekit.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
+from phasekit.kernels.gauss import STEPS, amplitude, halve
+from phasekit.kernels.levels import (
+    ANGLE,
+    AROUND,
+    ASYMPTOTE,
+    CURVATURE,
+    FREE,
+    GAP,
+    HARMONIC,
+    LEFT,
+    MODE,
+    ORBIT,
+    PHI,
+    PLACE,
+    RATE,
+    REFERENCE,
+    REST,
+    RIGHT,
+    SWING,
+    TURN,
+    TURNS,
+    UNIT,
+    A,
+    B,
+    C,
+)
+
+# Rows after those of `phasekit.kernels.levels`. The reference: angle, cosine, sine, V'', mu and
+# A - mu of the system with A >= 0, S2, P. The roots: x0, y1 y2, y1 + y2. The motion: a and b of
+# Delta, the angle half-way between the ends of the Moebius map, the tangent of a quarter of their
+# distance, its ratio; turning points; for a libration tau, r and span of its factors; the number
+# of Gauss steps and their means.
+PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT, Y_SUM = range(ORBIT, ORBIT + 11)
+FIRST, SECOND, SIGMA, U, RATIO, LOW, HIGH, TAU, REST_R, SPAN, LEVELS = range(ORBIT + 11, ORBIT + 22)
+OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 22, ORBIT + 26)
+MEANS = ORBIT + 26
+SIZE = MEANS + 2 * STEPS
+
+# Sines and cosines of the nodes of the trapezoidal rule, up to so many; and the most.
+TABLE = 64
+SINES = np.sin(2.0 * np.pi * np.arange(TABLE) / TABLE)
+COSINES = np.cos(2.0 * np.pi * np.arange(TABLE) / TABLE)
+MOST_NODES = 1 << 15
+
+
+@routine
+def refer(w: Array) -> None:
+    """What the formulas need of the reference."""
+    j = int(w[REFERENCE])
+    a = w[A]
+    b = w[B]
+    c = w[C]
+    x = np.float64(math.cos(w[PHI + j]))
+    y = np.float64(math.sin(w[PHI + j]))
+    # mu and mu - A, each from the quotient that keeps its digits.
+    mu = b / x if abs(x) > 0.3 else a + c / y
+    rest = c / y if abs(y) > 0.3 else mu - a
+    size = abs(a) + abs(mu)
+    if abs(y) < 1e-3 and abs(rest) > 1e-3 * size:
+        y = c / rest
+    if abs(x) < 1e-3 and abs(mu) > 1e-3 * size:
+        x = b / mu
+    w[PHI_S] = w[PHI + j]
+    w[COS] = x
+    w[SIN] = y
+    w[SLOPE] = w[CURVATURE + j]
+    w[M] = mu if a >= 0.0 else rest
+    w[N] = -rest if a >= 0.0 else -mu
+    w[S2] = a * x * y
+    w[P] = mu - a * y * y
+
+
+@routine
+def turn(w: Array) -> None:
+    """A rotation: roots and Moebius map. The reference is the upper saddle, E > 0."""
+    e = w[GAP]
+    k2 = -w[SLOPE]
+    m = max(-w[M], 0.0)
+    n = max(w[N], 0.0)
+    size = abs(w[A])
+    # x0 = -z, from above: all roots are real and z is the largest, so Newton comes down to it.
+    c2 = k2 - 2.0 * e
+    c1 = -2.0 * e * (m + n)
+    c0 = -2.0 * e * m * n
+    z = e + np.sqrt(e * (e + 2.0 * max(m, n)))
+    for _ in range(60):
+        step = (((z + c2) * z + c1) * z + c0) / ((3.0 * z + 2.0 * c2) * z + c1)
+        z -= step
+        if not step > 1e-15 * z:
+            break
+    # The others: mu_1 = -q <= 0 <= mu_2, where q mu_2 = product and q - mu_2 = excess.
+    b2 = w[B] * w[B] if w[A] >= 0.0 else w[C] * w[C]
+    g2 = w[C] * w[C] if w[A] >= 0.0 else w[B] * w[B]
+    low = m + z  # -mu_0
+    high = n + z  # A - mu_0
+    product = size * b2 / low
+    excess = b2 / low + g2 / high - size
+    root = np.sqrt(excess * excess + 4.0 * product)
+    if excess >= 0.0:
+        q = 0.5 * (excess + root)
+        mu2 = product / q if q > 0.0 else 0.0
+    else:
+        mu2 = 0.5 * (root - excess)
+        q = product / mu2
+    x2 = mu2 + m
+    x1 = 2.0 * e * m * n / (z * x2) if x2 > 0.0 else 0.0
+    y1 = x1 + z
+    y2 = x2 + z
+    w[FIRST] = np.sqrt(y1)
+    w[SECOND] = np.sqrt(y2)
+    w[Y_PRODUCT] = y1 * y2
+    w[Y_SUM] = y1 + y2
+    w[X0] = -z
+    # The axis: z^2 + 2 tilt z - (1 + x2/E) = 0.
+    below = size * g2 / (high * (size + q))  # A - mu_2
+    level = 1.0 + x2 / e
+    under = 2.0 * e * mu2 * below
+    tilt = w[S2] * x2 * x2 / under if under > 0.0 else math.inf
+    if abs(tilt) < 1e150:
+        first = -tilt - (
+            np.sqrt(tilt * tilt + level) if tilt >= 0.0 else -np.sqrt(tilt * tilt + level)
+        )
+        second = -level / first
+    else:
+        first = math.inf
+        second = 0.0
+    # The slow point is on the side of the kernel vector of mu_1.
+    slow = first
+    fast = second
+    if abs(tilt) < 1e150 and q > 0.0:
+        quotient = x1 / (q * (size + q))
+        if w[A] >= 0.0:
+            weight = w[COS] * w[COS] * (size + q) + w[SIN] * w[SIN] * q
+        else:
+            weight = w[SIN] * w[SIN] * (size + q) + w[COS] * w[COS] * q
+        weight *= quotient
+        skew = w[S2] * quotient
+        if (first * first) * weight - 2.0 - weight - 2.0 * first * skew < 0.0:
+            slow = second
+            fast = first
+    o_slow = 2.0 * math.atan2(1.0, slow)
+    o_fast = 2.0 * math.atan2(1.0, fast)
+    if o_fast < o_slow:
+        o_fast += TWO_PI
+    w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
+    w[U] = np.float64(math.tan(0.25 * (o_fast - o_slow)))
+    # Ratio of the speeds at both ends: (n1 + n0)^2/(n1^2 - n0^2).
+    n0 = np.sqrt(y1 * y2 / (low * high))
+    if q > 0.0:
+        n1 = np.sqrt(y1 * (y2 - y1) / (q * (size + q)))
+        difference = (mu2 * (size + low + q) + low * q) / (q * (size + q) * low * high)
+        w[RATIO] = (n1 + n0) / (y1 * np.sqrt(difference))
+    else:
+        w[RATIO] = 1.0
+
+
+@routine
+def swing(w: Array) -> None:
+    """A libration: roots, turning points and Moebius map."""
+    e = w[GAP]
+    slope = w[SLOPE]
+    m = w[M]
+    n = w[N]
+    size = abs(w[A])
+    place = int(w[PLACE])
+    c2 = slope + 2.0 * e
+    c1 = 2.0 * e * (m - n)
+    c0 = -2.0 * e * m * n
+    x = least_root(c2, c1, c0, w)
+    g = (3.0 * x + 2.0 * c2) * x + c1
+    total = -c2 - 3.0 * x
+    product = 2.0 * e * m * n / x if x != 0.0 else g
+    others = -c2 - x
+    if abs(x) > 0.1 * abs(slope) and x != 0.0:
+        others = (c1 - product) / x
+    g = max(g, 0.0)
+    root = np.sqrt(g)
+    if total >= 0.0:
+        square = 0.25 * (total + 2.0 * root)
+    else:
+        square = 0.25 * (4.0 * product - others * others) / (2.0 * root - total)
+    w[X0] = x
+    w[Y_PRODUCT] = g
+    w[Y_SUM] = total
+    w[FIRST] = np.sqrt(root)
+    w[SECOND] = np.sqrt(max(square, 0.0))
+    # mu_0 and A - mu_0, from the product of the roots where the sum cancels.
+    b2 = w[B] * w[B] if w[A] >= 0.0 else w[C] * w[C]
+    g2 = w[C] * w[C] if w[A] >= 0.0 else w[B] * w[B]
+    mu0 = m + x
+    if abs(mu0) < 0.1 * (abs(m) + abs(x)):
+        norm = product + m * others + m * m
+        mu0 = size * b2 / norm if norm > 0.0 else 0.0
+    rest = n - x
+    if abs(rest) < 0.1 * (abs(n) + abs(x)):
+        norm = product - n * others + n * n
+        rest = size * g2 / norm if norm > 0.0 else 0.0
+    tau = 2.0 * np.sqrt(max(mu0, 0.0) * max(rest, 0.0)) / abs(x) if x != 0.0 else 0.0
+    twice = 2.0 * e * (x + w[P])
+    square = x * x + twice
+    if square > 0.25 * (x * x + abs(twice)) or tau == 0.0:
+        r = np.sqrt(max(square, 0.0))
+        r = -r if w[S2] > 0.0 else r
+    else:
+        r = -2.0 * w[S2] / tau
+    # r1 r2 = 1 - 2 P/E: the smaller from the larger.
+    top = x + e
+    r1 = (top - r) / e
+    r2 = (top + r) / e
+    both = 1.0 - 2.0 * w[P] / e
+    if abs(r1) > abs(r2):
+        r2 = both / r1
+    elif abs(r2) > 0.0:
+        r1 = both / r2
+    lobe = e < 0.0 and (place == LEFT or place == RIGHT)
+    second = place == RIGHT if lobe else r2 < r1
+    sum_ = tau if second else -tau  # of the zeros
+    own = r2 if second else r1
+    rest_r = r1 if second else r2
+    disc = np.sqrt(max(tau * tau - 4.0 * own, 0.0))
+    # The zero without cancellation first.
+    big = 0.5 * (sum_ + disc) if sum_ >= 0.0 else 0.5 * (sum_ - disc)
+    small = own / big if big != 0.0 else 0.0
+    z_big = max(big, small)
+    z_small = min(big, small)
+    o_first = 2.0 * math.atan2(1.0, z_big)
+    o_second = 2.0 * math.atan2(1.0, z_small)
+    if e > 0.0:  # the orbit encloses the reference
+        o_high = o_first
+        o_low = o_second - TWO_PI
+        half = math.atan2(disc, -(1.0 + own))
+        z_high = z_big
+        z_low = z_small
+    else:
+        o_high = o_second
+        o_low = o_first
+        half = math.atan2(disc, 1.0 + own)
+        z_high = z_small
+        z_low = z_big
+    w[LOW] = w[PHI_S] + o_low
+    w[HIGH] = w[PHI_S] + o_high
+    w[SIGMA] = w[PHI_S] + 0.5 * (o_low + o_high)
+    w[U] = np.float64(math.tan(0.5 * half))
+    # |V'| at both turning points, but for a common factor.
+    force_high = abs(e + x / (1.0 + z_high * z_high))
+    force_low = abs(e + x / (1.0 + z_low * z_low))
+    w[RATIO] = np.sqrt(force_high / force_low)
+    w[TAU] = sum_
+    w[REST_R] = rest_r
+    w[SPAN] = np.sqrt(disc * disc + (1.0 + own) * (1.0 + own))
+
+
+@routine
+def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
+    """Least real root x of the cubic x^3 + c2 x^2 + c1 x + c0 of a libration.
+
+    mu_0 = mu + x lies in (0, A); inside a lobe below mu of the lower saddle, round both lobes
+    above mu of the upper center; and is the only root there.
+    """
+    lower = -w[M]
+    upper = w[N]
+    guess = -w[SLOPE]
+    place = w[PLACE]
+    if place == LEFT or place == RIGHT:
+        upper = min(upper, distance(LOWER_SADDLE, w))
+        if w[GAP] < 0.0:
+            guess = -np.sqrt(-c0 / c2) if c0 * c2 < 0.0 else guess
+    elif place == AROUND and w[PHI + UPPER_CENTER] == w[PHI + UPPER_CENTER]:
+        lower = max(lower, distance(UPPER_CENTER, w))
+    x = min(max(guess, lower), upper)
+    last = False
+    for _ in range(200):
+        value = ((x + c2) * x + c1) * x + c0
+        if value < 0.0:
+            lower = x
+        else:
+            upper = x
+        slope = (3.0 * x + 2.0 * c2) * x + c1
+        step = value / slope if slope > 0.0 else math.inf
+        close = abs(step) < 1e-8 * abs(x)
+        new = x - step
+        if not (lower <= new <= upper):
+            new = x if close else 0.5 * (lower + upper)
+        x = new
+        if last or lower == upper:
+            break
+        last = close
+    return x
+
+
+@inline
+def distance(i: int, w: Array) -> float:
+    """mu_i - mu, from the reference to equilibrium i."""
+    phi = w[PHI + i]
+    if phi == w[PHI_S]:
+        return 0.0
+    x = np.float64(math.cos(phi))
+    y = np.float64(math.sin(phi))
+    if w[A] >= 0.0:
+        return (w[B] / x if abs(x) > abs(y) else w[A] + w[C] / y) - w[M]
+    return (w[C] / y if abs(y) > abs(x) else w[B] / x - w[A]) - w[M]
+
+
+@routine
+def shape(w: Array) -> None:
+    """Work out what the motion is made of, in the orbit's own mode."""
+    mode = w[MODE]
+    if mode == SWING or mode == TURN or mode == ASYMPTOTE:
+        refer(w)
+    if mode == TURN:
+        turn(w)
+    if mode == SWING:
+        swing(w)
+    if mode == TURN or mode == SWING:
+        w[LEVELS] = halve(w[FIRST], w[SECOND], MEANS, w)
+
+
+@inline
+def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
+    """Angle from SIGMA and |angular velocity| at the phase with this sine and cosine."""
+    sn, cn, delta = amplitude(sine, cosine, MEANS, int(w[LEVELS]), w)
+    u = w[U]
+    ratio = w[RATIO]
+    if w[MODE] == SWING:  # squares of cosine and sine of psi/2
+        near = 0.5 * (1.0 + cn) if cn > 0.0 else 0.5 * sn * sn / (1.0 - cn)
+        far = ratio * (0.5 * (1.0 - cn) if cn <= 0.0 else 0.5 * sn * sn / (1.0 + cn))
+        rate = -2.0 * sn
+    else:  # cosine and sine of psi/2
+        near = np.sqrt(0.5 * (1.0 + abs(cn)))
+        far = 0.5 * abs(sn) / near
+        if cn < 0.0:
+            near, far = far, near
+        far = -far if sn < 0.0 else far
+        near, far = far, ratio * near
+        rate = 2.0
+    top = u * (near - far)
+    bottom = near + far
+    rate *= u * ratio * delta / (bottom * bottom + top * top)
+    return 2.0 * math.atan2(top, bottom), rate
+
+
+@routine
+def mean_square(w: Array) -> float:
+    """Mean of phi'^2 over time: the trapezoidal rule, which converges exponentially."""
+    swings = w[MODE] == SWING
+    total = 0.0
+    if not swings:
+        _, v0 = locate(1.0, 0.0, w)
+        _, v1 = locate(-1.0, 0.0, w)
+        _, v2 = locate(0.0, 1.0, w)
+        _, v3 = locate(0.0, -1.0, w)
+        total = v0 * v0 + v1 * v1 + v2 * v2 + v3 * v3
+    else:
+        _, v0 = locate(1.0, 0.0, w)
+        total = 2.0 * v0 * v0
+    nodes = 4
+    mean = total / 4.0
+    while nodes < MOST_NODES:
+        # The nodes half-way; a libration passes each speed twice.
+        stop = nodes // 2 if swings else nodes
+        weight = 2.0 if swings else 1.0
+        for i in range(stop):
+            if nodes < TABLE:
+                k = (2 * i + 1) * (TABLE // (2 * nodes))
+                sine = SINES[k]
+                cosine = COSINES[k]
+            else:
+                angle = PI * (2 * i + 1) / nodes
+                sine = np.float64(math.sin(angle))
+                cosine = np.float64(math.cos(angle))
+            _, v = locate(sine, cosine, w)
+            total += weight * v * v
+        nodes *= 2
+        new = total / nodes
+        # Twice the nodes square the error.
+        if abs(new - mean) <= 2e-9 * new and nodes >= 16:
+            return new
+        mean = new
+    return mean
+
+
+@inline
+def reach(w: Array) -> tuple[float, float]:
+    """Least and greatest angle of a motion on a separatrix, from saddle to saddle or turning point.
+
+    On it k^2 z^2 - 2 S2 z - P >= 0, with the discriminant D = mu (A - mu).
+    """
+    k2 = -w[SLOPE]
+    d = w[M] * w[N]
+    half = 0.5 * (w[ANGLE] - w[PHI_S])
+    x = np.float64(math.cos(half))
+    y = np.float64(math.sin(half))
+    if y < 0.0:
+        x = -x
+        y = -y
+    if k2 == 0.0 and w[S2] != 0.0:
+        right = w[S2] < 0.0
+        z = -0.5 * w[P] / w[S2]
+    elif k2 > 0.0 and d >= 0.0:
+        # On the right of the saddle z is above the middle of both zeros.
+        right = k2 * x > w[S2] * y
+        big = w[S2] + np.sqrt(d) if w[S2] >= 0.0 else w[S2] - np.sqrt(d)
+        if right == (w[S2] >= 0.0):
+            z = big / k2
+        else:
+            z = -w[P] / big if big != 0.0 else 0.0
+    else:
+        return w[PHI_S], w[PHI_S] + TWO_PI
+    turning = 2.0 * math.atan2(1.0, z)
+    if right:
+        return w[PHI_S], w[PHI_S] + turning
+    return w[PHI_S] + turning - TWO_PI, w[PHI_S]
+
+
+@inline
+def rest(w: Array) -> float:
+    """Frequency of small oscillations where the state is a center at rest, else 0."""
+    if w[MODE] != REST or w[UNIT] == 0.0:
+        return 0.0
+    c = np.float64(math.cos(w[ANGLE]))
+    s = np.float64(math.sin(w[ANGLE]))
+    slope = w[B] * c - w[A] * (c - s) * (c + s) + w[C] * s
+    return np.sqrt(slope) if slope > 0.0 else 0.0
+
+
+@routine
+def finish(w: Array) -> None:
+    """Frequency, action and turning points from the shape, in the units that were given."""
+    unit = w[UNIT]
+    mode = w[MODE]
+    j = int(w[REFERENCE])
+    omega = math.nan
+    action = math.nan
+    low = math.nan
+    high = math.nan
+    sigma = w[ANGLE]
+    if mode == SWING or mode == TURN:
+        omega = w[MEANS + int(w[LEVELS])]
+        action = mean_square(w) / omega
+        if mode == SWING:
+            low = w[LOW]
+            high = w[HIGH]
+            sigma = w[SIGMA]
+    elif mode == HARMONIC:
+        omega = np.sqrt(w[CURVATURE + j])
+        action = w[GAP] / omega
+        width = np.sqrt(2.0 * w[GAP]) / omega
+        sigma = w[PHI + j]
+        low = sigma - width
+        high = sigma + width
+    elif mode == FREE:
+        omega = abs(w[RATE])
+        action = omega
+    elif mode == ASYMPTOTE:
+        omega = 0.0
+        low, high = reach(w)
+        sigma = 0.5 * (low + high)
+    elif mode == REST:
+        omega = rest(w)
+        action = 0.0
+        low = w[ANGLE]
+        high = w[ANGLE]
+    turns = w[TURNS] + np.rint((w[ANGLE] - sigma) / TWO_PI)
+    w[OMEGA] = omega / unit
+    w[ACTION] = action / unit
+    w[PHI_MIN] = low + turns * TWO_PI
+    w[PHI_MAX] = high + turns * TWO_PI
