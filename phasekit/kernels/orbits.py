@@ -31,7 +31,6 @@ import numpy as np
 
 from phasekit.kernels.compile import Array, inline, routine
 from phasekit.kernels.double_double import TWO_PI
-from phasekit.kernels.elementary import PI
 from phasekit.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.gauss import STEPS, amplitude, halve
 from phasekit.kernels.levels import (
@@ -69,13 +68,26 @@ PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT, Y_SUM = range(ORBIT, ORBIT +
 FIRST, SECOND, SIGMA, U, RATIO, LOW, HIGH, TAU, REST_R, SPAN, LEVELS = range(ORBIT + 11, ORBIT + 22)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 22, ORBIT + 26)
 MEANS = ORBIT + 26
-SIZE = MEANS + 2 * STEPS
+# Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
+FEWEST, MOST, CHUNK = 16, 8192, 32
+SINE = MEANS + 2 * STEPS
+COSINE = SINE + CHUNK
+DELTA = COSINE + CHUNK
+SIZE = DELTA + CHUNK
 
-# Sines and cosines of the nodes of the trapezoidal rule, up to so many; and the most.
-TABLE = 64
-SINES = np.sin(2.0 * np.pi * np.arange(TABLE) / TABLE)
-COSINES = np.cos(2.0 * np.pi * np.arange(TABLE) / TABLE)
-MOST_NODES = 1 << 15
+
+def _nodes() -> Array:
+    """Phases of the first nodes, then those half-way, and so on to the most."""
+    steps = [np.arange(FEWEST) / FEWEST]
+    nodes = FEWEST
+    while nodes < MOST:
+        steps.append((np.arange(nodes) + 0.5) / nodes)
+        nodes *= 2
+    return 2.0 * np.pi * np.concatenate(steps)
+
+
+SINES = np.sin(_nodes())
+COSINES = np.cos(_nodes())
 
 
 @routine
@@ -374,44 +386,89 @@ def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
     return 2.0 * math.atan2(top, bottom), rate
 
 
+@inline
+def square_speeds(first: int, count: int, w: Array) -> tuple[float, float]:
+    """Sums of phi'^2 over the nodes from ``first`` on: all of them, and every other one.
+
+    One Gauss step at a time for all nodes, in loops that vectorise; see `locate`.
+    """
+    levels = int(w[LEVELS])
+    mean = w[MEANS + levels]
+    for i in range(count):
+        w[SINE + i] = SINES[first + i]
+        w[COSINE + i] = COSINES[first + i]
+        w[DELTA + i] = mean
+    for level in range(levels - 1, -1, -1):
+        a = w[MEANS + level]
+        b = w[MEANS + STEPS + level]
+        mean = w[MEANS + level + 1]
+        for i in range(count):
+            sine = w[SINE + i]
+            cosine = w[COSINE + i]
+            square = sine * sine
+            rest = cosine * cosine
+            inverse = 1.0 / (rest * mean + square * a)
+            w[COSINE + i] = cosine * w[DELTA + i] * inverse
+            w[DELTA + i] = a * (rest * mean + square * b) * inverse
+            w[SINE + i] = sine * a * inverse
+    u = w[U]
+    ratio = w[RATIO]
+    scale = 2.0 * u * ratio
+    if w[MODE] == SWING:
+        for i in range(count):
+            sine = w[SINE + i]
+            cosine = w[COSINE + i]
+            big = 0.5 * (1.0 + abs(cosine))
+            small = 0.25 * sine * sine / big
+            near = big if cosine > 0.0 else small
+            far = ratio * (small if cosine > 0.0 else big)
+            top = u * (near - far)
+            bottom = near + far
+            rate = scale * sine * w[DELTA + i] / (bottom * bottom + top * top)
+            w[DELTA + i] = rate * rate
+    else:
+        for i in range(count):
+            sine = w[SINE + i]
+            cosine = w[COSINE + i]
+            big = np.sqrt(0.5 * (1.0 + abs(cosine)))
+            small = 0.5 * abs(sine) / big
+            half_sine = small if cosine >= 0.0 else big
+            near = half_sine if sine >= 0.0 else -half_sine
+            far = ratio * (big if cosine >= 0.0 else small)
+            top = u * (near - far)
+            bottom = near + far
+            rate = scale * w[DELTA + i] / (bottom * bottom + top * top)
+            w[DELTA + i] = rate * rate
+    even = 0.0
+    odd = 0.0
+    for i in range(0, count, 2):
+        even += w[DELTA + i]
+        odd += w[DELTA + i + 1]
+    return even + odd, even
+
+
 @routine
 def mean_square(w: Array) -> float:
-    """Mean of phi'^2 over time: the trapezoidal rule, which converges exponentially."""
-    swings = w[MODE] == SWING
-    total = 0.0
-    if not swings:
-        _, v0 = locate(1.0, 0.0, w)
-        _, v1 = locate(-1.0, 0.0, w)
-        _, v2 = locate(0.0, 1.0, w)
-        _, v3 = locate(0.0, -1.0, w)
-        total = v0 * v0 + v1 * v1 + v2 * v2 + v3 * v3
-    else:
-        _, v0 = locate(1.0, 0.0, w)
-        total = 2.0 * v0 * v0
-    nodes = 4
-    mean = total / 4.0
-    while nodes < MOST_NODES:
-        # The nodes half-way; a libration passes each speed twice.
-        stop = nodes // 2 if swings else nodes
-        weight = 2.0 if swings else 1.0
-        for i in range(stop):
-            if nodes < TABLE:
-                k = (2 * i + 1) * (TABLE // (2 * nodes))
-                sine = SINES[k]
-                cosine = COSINES[k]
-            else:
-                angle = PI * (2 * i + 1) / nodes
-                sine = np.float64(math.sin(angle))
-                cosine = np.float64(math.cos(angle))
-            _, v = locate(sine, cosine, w)
-            total += weight * v * v
-        nodes *= 2
-        new = total / nodes
-        # Twice the nodes square the error.
-        if abs(new - mean) <= 2e-9 * new and nodes >= 16:
-            return new
+    """Mean of phi'^2 over time: the trapezoidal rule, which converges exponentially.
+
+    A libration passes each speed twice and is at rest at the ends, so half of the nodes do.
+    """
+    weight = 2.0 if w[MODE] == SWING else 1.0
+    both = 2 if w[MODE] == SWING else 1
+    total, even = square_speeds(0, FEWEST // both, w)
+    mean = 2.0 * even
+    new = total
+    nodes = FEWEST
+    # Twice the nodes square the error.
+    while not abs(new - mean) <= 2e-9 * new and nodes < MOST:
         mean = new
-    return mean
+        count = nodes // both
+        for first in range(0, count, CHUNK):
+            part, _ = square_speeds(nodes + first, min(CHUNK, count - first), w)
+            total += part
+        nodes *= 2
+        new = total * (FEWEST / nodes)
+    return weight * new / FEWEST
 
 
 @inline

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.kernels import levels as lv
+from phasekit.kernels import motion as mo
 from phasekit.kernels import orbits as ob
 from phasekit.kernels.compile import Array, Outputs, inline, kernel
 
@@ -64,3 +65,39 @@ def orbits(
         action[k] = w[ob.ACTION]
         phi_min[k] = w[ob.PHI_MIN]
         phi_max[k] = w[ob.PHI_MAX]
+
+
+@kernel
+def flow(
+    a: Array,
+    b: Array,
+    c: Array,
+    phi: Array,
+    curvature: Array,
+    index: Index,
+    phi0: Array,
+    dphi0: Array,
+    state: Index,
+    t: Array,
+    start: int,
+    stop: int,
+    out: Outputs,
+) -> None:
+    """States after times; ``state`` says which state a time belongs to, ``index`` its system."""
+    motion_phi, motion_dphi = out
+    w = np.zeros(mo.MOTION_SIZE)
+    system = np.int64(-1)
+    last = np.int64(-1)
+    valid = False
+    for k in range(start, stop):
+        j = state[k]
+        if j != last:
+            i = index[j]
+            if i != system:
+                valid = load_system(i, a, b, c, phi, curvature, w)
+                system = i
+            lv.classify(phi0[j], dphi0[j], valid, w)
+            ob.shape(w)
+            mo.begin(w)
+            last = j
+        motion_phi[k], motion_dphi[k] = mo.after(t[k], w)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -37,20 +37,19 @@ def solve(
     ``shapes`` gives, for each group of outputs, the trailing shape and dtype of its arrays, and
     ``count`` the place of n_equilibria in the first group. ``threads`` defaults to all cores.
     """
-    if threads is not None and (not isinstance(threads, int) or threads < 1):
-        raise ParameterError(f"threads: got {threads!r}, wants a number of threads >= 1, or None")
+    check_threads(threads)
     arrays = [np.asarray(value, dtype=float) for value in coefficients]
     shape = np.broadcast_shapes(*(array.shape for array in arrays))
     # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
     flat = tuple(np.array(np.broadcast_to(array, shape)).reshape(-1) for array in arrays)
     groups = _allocate(flat[0].size, shapes)
-    _run(kernel, flat, np.empty(0), groups, threads)
+    launch(kernel, (*flat, np.empty(0)), flat[0].size, groups, threads)
     undecided = np.flatnonzero(groups[0][count] == UNDECIDED)
     if undecided.size:
         few = tuple(array[undecided] for array in flat)
         exact = np.array([exact_discriminant(*abc) for abc in zip(*few, strict=True)])
         decided = _allocate(undecided.size, shapes)
-        _run(kernel, few, exact, decided, threads)
+        launch(kernel, (*few, exact), undecided.size, decided, threads)
         for group, part in zip(groups, decided, strict=True):
             for array, values in zip(group, part, strict=True):
                 array[undecided] = values
@@ -68,29 +67,35 @@ def _allocate(size: int, shapes: tuple[Shapes, ...]) -> list[Arrays]:
     return [tuple(np.empty((size, *tail), dtype) for tail, dtype in group) for group in shapes]
 
 
-def _run(
+def launch(
     kernel: Callable[..., None],
-    coefficients: Arrays,
-    exact: npt.NDArray[Any],
-    groups: list[Arrays],
+    arrays: Arrays,
+    size: int,
+    groups: Sequence[Arrays],
     threads: int | None,
 ) -> None:
-    size = coefficients[0].size
+    """Run a kernel over the cells 0 to size: interpreted, compiled, or compiled in threads."""
     spent = _interpreted.get(kernel, 0) + size
     if spent <= INTERPRETED_AT_MOST and hasattr(kernel, "py_func"):
         _interpreted[kernel] = spent
         with np.errstate(all="ignore"):
-            kernel.py_func(*coefficients, exact, 0, size, *groups)
+            kernel.py_func(*arrays, 0, size, *groups)
         return
     workers = (threads or cpus()) if size >= THREADS_FROM else 1
     if workers == 1:
-        kernel(*coefficients, exact, 0, size, *groups)
+        kernel(*arrays, 0, size, *groups)
         return
     edges = [size * part // workers for part in range(workers + 1)]
     with ThreadPoolExecutor(workers) as pool:
         jobs = [
-            pool.submit(kernel, *coefficients, exact, start, stop, *groups)
+            pool.submit(kernel, *arrays, start, stop, *groups)
             for start, stop in zip(edges[:-1], edges[1:], strict=True)
         ]
     for job in jobs:
         job.result()
+
+
+def check_threads(threads: int | None) -> None:
+    """Refuse a number of threads that is none."""
+    if threads is not None and (not isinstance(threads, int) or threads < 1):
+        raise ParameterError(f"threads: got {threads!r}, wants a number of threads >= 1, or None")

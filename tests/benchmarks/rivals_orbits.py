@@ -37,7 +37,7 @@ def curvature(a: Any, b: Any, c: Any, phi: Any) -> Any:
     return b * np.cos(phi) - a * np.cos(2.0 * phi) + c * np.sin(phi)
 
 
-# Fifty digits --------------------------------------------------------------------------------------
+# Fifty digits -----------------------------------------------------------------
 
 
 def exact_period(orbit: Orbit) -> mp.mpf:
@@ -94,7 +94,7 @@ def exact_motion(orbit: Orbit, t: Array, digits: int = 50) -> Array:
         return angles
 
 
-# One orbit -----------------------------------------------------------------------------------------
+# One orbit --------------------------------------------------------------------
 
 
 def motion_by_dop853(orbit: Orbit, t: Array) -> Array:
@@ -112,7 +112,7 @@ def motion_by_dop853(orbit: Orbit, t: Array) -> Array:
 
 
 def heyoka_motion(orbit: Orbit) -> Callable[[Array], Array]:
-    """heyoka's scalar Taylor integrator at its default tolerance, compiled; then time -> angle."""
+    """The scalar Taylor integrator of heyoka, default tolerance, compiled: times -> angles."""
     import heyoka as hy
 
     a, b, c, phi, dphi = orbit
@@ -154,7 +154,7 @@ def motion_by_ellipj(orbit: Orbit, t: Array) -> Array:
     return turn - 2.0 * np.arctan2(0.25 * v1, wp + v2 / 12.0)
 
 
-# Many orbits ---------------------------------------------------------------------------------------
+# Many orbits ------------------------------------------------------------------
 
 
 def invariants(a: Array, b: Array, c: Array, h: Array) -> tuple[Array, Array]:
@@ -262,7 +262,7 @@ def _period_by_dop853(
 
 
 def heyoka_periods(*, rest: bool) -> Callable[[Array, Array, Array, Array, Array], Periods]:
-    """heyoka's batch integrator at its default tolerance, compiled; then orbits -> periods, actions.
+    """The batch integrator of heyoka, default tolerance, compiled: orbits -> periods, actions.
 
     As many orbits as the SIMD registers hold go side by side, the action as a third variable. A
     terminal event ends an orbit; its callback stores the result and puts the next orbit in the same

@@ -1,0 +1,287 @@
+"""Where a state is after any time: closed forms, so no error grows with the number of steps.
+
+Only the phase w t grows. Its frequency w is computed in double-double arithmetic from the cubic
+
+    mu^3 + 2 (h - A) mu^2 + (B^2 + C^2 - A (2 h - A)) mu - A B^2 = 0
+
+of the energy h, whose roots are those of `phasekit.kernels.orbits` plus mu, and the phase is
+reduced in it. On a separatrix z = cot((phi - phi_s)/2) obeys z'' = k^2 z - S2.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from phasekit.kernels.compile import Array, inline, routine
+from phasekit.kernels.double_double import (
+    TWO_PI,
+    TWO_PI_LOW,
+    dd_add,
+    dd_cos_sin,
+    dd_multiply,
+    dd_sqrt,
+    reduce_angle,
+    two_product,
+    two_sum,
+)
+from phasekit.kernels.gauss import phase
+from phasekit.kernels.levels import (
+    ANGLE,
+    ASYMPTOTE,
+    CURVATURE,
+    DIRECTION,
+    FREE,
+    GAP,
+    HARMONIC,
+    INVALID,
+    MODE,
+    PHI,
+    RATE,
+    REFERENCE,
+    REST,
+    START,
+    SWING,
+    TURN,
+    TURNS,
+    UNIT,
+    A,
+    B,
+    C,
+    potential_dd,
+)
+from phasekit.kernels.orbits import (
+    LEVELS,
+    MEANS,
+    PHI_S,
+    RATIO,
+    REST_R,
+    S2,
+    SIGMA,
+    SIZE,
+    SLOPE,
+    SPAN,
+    TAU,
+    X0,
+    Y_PRODUCT,
+    M,
+    N,
+    U,
+    locate,
+)
+
+# Rows after those of an orbit: phase at the start, frequency (high and low part), whole turns from
+# the local angle to the state's; coefficients of exp(kt) and exp(-kt) in z.
+PHASE, OMEGA_HIGH, OMEGA_LOW, BASE, RISE, FALL = range(SIZE, SIZE + 6)
+MOTION_SIZE = SIZE + 6
+
+# Gaps to a saddle below this are known better than the difference of energies from which the
+# double-double frequency starts.
+GAP_FROM = 1e-15
+# Beyond this phase a double does not say where on the orbit the motion is.
+LONGEST = 1e16
+
+
+@routine
+def frequency_dd(w: Array) -> tuple[float, float]:
+    """Frequency of a libration or rotation as a double-double."""
+    a = w[A]
+    b = w[B]
+    c = w[C]
+    ch, cl, sh, sl = dd_cos_sin(w[START])
+    eh, el = potential_dd(a, b, c, ch, cl, sh, sl)
+    ph, pl = two_product(w[RATE], w[RATE])
+    eh, el = dd_add(2.0 * eh, 2.0 * el, ph, pl)  # 2 h
+    c2h, c2l = dd_add(eh, el, -2.0 * a, 0.0)
+    c1h, c1l = dd_add(eh, el, -a, 0.0)
+    c1h, c1l = dd_multiply(c1h, c1l, -a, 0.0)
+    ph, pl = two_product(b, b)
+    c0h, c0l = dd_multiply(ph, pl, -a, 0.0)
+    c1h, c1l = dd_add(c1h, c1l, ph, pl)
+    ph, pl = two_product(c, c)
+    c1h, c1l = dd_add(c1h, c1l, ph, pl)
+    mh, ml = two_sum(w[M] if a >= 0.0 else w[M] + a, w[X0])
+    for _ in range(3):
+        ph, pl = dd_add(mh, ml, c2h, c2l)
+        ph, pl = dd_multiply(ph, pl, mh, ml)
+        ph, pl = dd_add(ph, pl, c1h, c1l)
+        ph, pl = dd_multiply(ph, pl, mh, ml)
+        ph, pl = dd_add(ph, pl, c0h, c0l)
+        mh, ml = dd_add(mh, ml, -ph / w[Y_PRODUCT], 0.0)
+    # y1 y2 is the slope of the cubic, y1 + y2 = -c2 - 3 mu.
+    th, tl = dd_multiply(mh, ml, 3.0, 0.0)
+    sh, sl = dd_add(-c2h, -c2l, -th, -tl)
+    th, tl = dd_add(th, tl, 2.0 * c2h, 2.0 * c2l)
+    th, tl = dd_multiply(th, tl, mh, ml)
+    ph, pl = dd_add(th, tl, c1h, c1l)
+    gh, gl = dd_sqrt(ph, pl)
+    ah, al = dd_add(sh, sl, 2.0 * gh, 2.0 * gl)
+    ah, al = dd_sqrt(0.25 * ah, 0.25 * al)
+    gh, gl = dd_sqrt(gh, gl)
+    for _ in range(12):
+        close = abs(ah - gh) <= 1e-8 * ah
+        th, tl = dd_add(ah, al, gh, gl)
+        ph, pl = dd_multiply(ah, al, gh, gl)
+        ah, al = 0.5 * th, 0.5 * tl
+        gh, gl = dd_sqrt(ph, pl)
+        if close:
+            break
+    th, tl = dd_add(ah, al, gh, gl)
+    return 0.5 * th, 0.5 * tl
+
+
+@inline
+def phase_at(angle: float, rate: float, w: Array) -> float:
+    """Phase in [-pi, pi] of a libration or rotation at an angle, passed with this rate."""
+    half = 0.5 * (angle - w[SIGMA])
+    x = np.float64(math.cos(half))
+    y = np.float64(math.sin(half))
+    if w[MODE] == TURN:
+        far = w[RATIO] * (w[U] * x + y)
+        near = w[U] * x - y
+        square = near * near + far * far
+        return phase(
+            2.0 * near * far / square,
+            (near - far) * (near + far) / square,
+            MEANS,
+            int(w[LEVELS]),
+            w,
+        )
+    if x < 0.0:
+        x = -x
+        y = -y
+    # Sines of half the angles to the turning points, but for a common factor; close to one of
+    # them the rate knows the distance better.
+    high = max(w[U] * x - y, 0.0)
+    low = max(w[U] * x + y, 0.0)
+    offset = angle - w[PHI_S]
+    r = w[REST_R]
+    tilt = w[TAU] * math.sin(offset)
+    rest = 0.5 * ((1.0 + r) + (1.0 - r) * math.cos(offset) + tilt)
+    if abs(rest) > 0.02 * (1.0 + abs(r)):
+        common = (1.0 + w[U] * w[U]) * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
+        if high < 0.05 * low:
+            high = common / low
+        elif low < 0.05 * high:
+            low = common / high
+    low *= w[RATIO]
+    both = low + high
+    sine = 2.0 * np.sqrt(low * high) / both if both > 0.0 else 0.0
+    cosine = (low - high) / both if both > 0.0 else 1.0
+    return phase(sine if rate < 0.0 else -sine, cosine, MEANS, int(w[LEVELS]), w)
+
+
+@routine
+def begin(w: Array) -> None:
+    """Prepare the motion through the state of an orbit whose shape is known."""
+    mode = w[MODE]
+    if mode == SWING or mode == TURN:
+        w[PHASE] = phase_at(w[ANGLE], w[RATE], w)
+        local, _ = locate(math.sin(w[PHASE]), math.cos(w[PHASE]), w)
+        w[BASE] = w[TURNS] + np.rint((w[ANGLE] - (w[SIGMA] + local)) / TWO_PI)
+        w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
+        w[OMEGA_LOW] = 0.0
+        if abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0:
+            w[OMEGA_HIGH], w[OMEGA_LOW] = frequency_dd(w)
+    elif mode == HARMONIC:
+        j = int(w[REFERENCE])
+        w[PHI_S] = w[PHI + j]
+        w[OMEGA_HIGH] = np.sqrt(w[CURVATURE + j])
+        w[BASE] = w[TURNS] + np.rint((w[ANGLE] - w[PHI_S]) / TWO_PI)
+    elif mode == ASYMPTOTE:
+        begin_asymptote(w)
+
+
+@inline
+def begin_asymptote(w: Array) -> None:
+    """Coefficients of z = S2/k^2 + rise exp(kt) + fall exp(-kt); k = 0: z and z' at the start."""
+    half = 0.5 * (w[ANGLE] - w[PHI_S])
+    x = np.float64(math.cos(half))
+    y = np.float64(math.sin(half))
+    if y < 0.0:
+        x = -x
+        y = -y
+    w[BASE] = w[TURNS] + np.rint((w[ANGLE] - w[PHI_S] - 2.0 * math.atan2(y, x)) / TWO_PI)
+    z = x / y
+    rate = -0.5 * w[RATE] / (y * y)
+    k2 = -w[SLOPE]
+    if not y > 1e-150:
+        w[MODE] = REST
+    elif k2 > 0.0:
+        k = np.sqrt(k2)
+        middle = z - w[S2] / k2
+        rise = 0.5 * (middle + rate / k)
+        fall = 0.5 * (middle - rate / k)
+        # Their product is known exactly: what is small comes from what is large.
+        product = 0.25 * w[M] * w[N] / (k2 * k2)
+        if abs(rise) > abs(fall):
+            fall = product / rise
+        else:
+            rise = product / fall if fall != 0.0 else 0.0
+        w[RISE] = rise
+        w[FALL] = fall
+    else:
+        w[RISE] = z
+        w[FALL] = rate
+
+
+@inline
+def after(t: float, w: Array) -> tuple[float, float]:
+    """Angle and angular velocity at the time t."""
+    mode = w[MODE]
+    unit = w[UNIT]
+    if mode == INVALID or not abs(t) < math.inf:
+        return math.nan, math.nan
+    if mode == REST:
+        return w[START], 0.0 * w[RATE]
+    if mode == FREE:
+        return w[START] + w[RATE] / unit * t, w[RATE] / unit
+    time = t / unit
+    if mode == HARMONIC:
+        omega = w[OMEGA_HIGH]
+        x = (w[ANGLE] - w[PHI_S]) - (w[BASE] - w[TURNS]) * TWO_PI
+        v = w[RATE]
+        angle, _, _ = reduce_angle(omega * time, 0.0)
+        sine = math.sin(angle)
+        cosine = math.cos(angle)
+        x, v = x * cosine + v / omega * sine, v * cosine - x * omega * sine
+        return (w[PHI_S] + x) + w[BASE] * TWO_PI, v / unit
+    if mode == ASYMPTOTE:
+        return approach(time, w)
+    # The phase, reduced with all its digits.
+    sense = w[DIRECTION] if mode == TURN else 1.0
+    high = sense * w[OMEGA_HIGH] * time
+    low = 0.0
+    if abs(high) < LONGEST:
+        high, low = two_product(w[OMEGA_HIGH], sense * time)
+        low += w[OMEGA_LOW] * (sense * time)
+        high, low = dd_add(high, low, w[PHASE], 0.0)
+    angle, rest, turns = reduce_angle(high, low)
+    sine = np.float64(math.sin(angle))
+    cosine = np.float64(math.cos(angle))
+    local, rate = locate(sine + rest * cosine, cosine - rest * sine, w)
+    if mode == SWING:
+        return (w[SIGMA] + local) + w[BASE] * TWO_PI, rate / unit
+    turns += w[BASE]
+    return (w[SIGMA] + local + turns * TWO_PI_LOW) + turns * TWO_PI, sense * rate / unit
+
+
+@inline
+def approach(time: float, w: Array) -> tuple[float, float]:
+    """Angle and angular velocity on a separatrix."""
+    k2 = -w[SLOPE]
+    if k2 > 0.0:
+        k = np.sqrt(k2)
+        power = min(max(k * time, -700.0), 700.0)
+        rise = w[RISE] * math.exp(power)
+        fall = w[FALL] * math.exp(-power)
+        z = w[S2] / k2 + rise + fall
+        slope = k * (rise - fall)
+    else:
+        z = w[RISE] + (w[FALL] - 0.5 * w[S2] * time) * time
+        slope = w[FALL] - w[S2] * time
+    # 2 arccot(z), and its derivative without overflow.
+    rate = -2.0 * slope / (1.0 + z * z) if abs(z) < 1e150 else 0.0
+    angle = w[PHI_S] + 2.0 * math.atan2(1.0, z)
+    return angle + w[BASE] * TWO_PI, rate / w[UNIT]
