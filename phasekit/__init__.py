@@ -22,12 +22,16 @@ if TYPE_CHECKING:
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
     from phasekit.errors import Loop as Loop
+    from phasekit.errors import OrbitFamily as OrbitFamily
     from phasekit.errors import OrbitKind as OrbitKind
     from phasekit.errors import ParameterError as ParameterError
     from phasekit.errors import PhasekitError as PhasekitError
     from phasekit.errors import StoreError as StoreError
     from phasekit.errors import Topology as Topology
+    from phasekit.labelled.asymptotics import near_center as near_center
+    from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
     from phasekit.labelled.critical import critical as critical
+    from phasekit.labelled.families import orbit_families as orbit_families
     from phasekit.labelled.guises import ParticleOnCircle as ParticleOnCircle
     from phasekit.labelled.guises import Pendulum as Pendulum
     from phasekit.labelled.guises import Reduced as Reduced
@@ -39,6 +43,11 @@ if TYPE_CHECKING:
     from phasekit.labelled.integral import potential as potential
     from phasekit.labelled.models import Coefficients as Coefficients
     from phasekit.labelled.models import GyroRotorDisk as GyroRotorDisk
+    from phasekit.labelled.motion import flow as flow
+    from phasekit.labelled.motion import separatrix_motion as separatrix_motion
+    from phasekit.labelled.orbits import action_angle as action_angle
+    from phasekit.labelled.orbits import orbits as orbits
+    from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.labelled.quantities import quantities as quantities
@@ -56,13 +65,16 @@ _MODULES = {
         "ConvergenceError",
         "EquilibriumKind",
         "Loop",
+        "OrbitFamily",
         "OrbitKind",
         "ParameterError",
         "PhasekitError",
         "StoreError",
         "Topology",
     ),
+    "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.critical": ("critical",),
+    "phasekit.labelled.families": ("orbit_families",),
     "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "Reduced", "StonerWohlfarth"),
     "phasekit.labelled.integral": (
         "curvature",
@@ -72,6 +84,8 @@ _MODULES = {
         "potential",
     ),
     "phasekit.labelled.models": ("Coefficients", "GyroRotorDisk"),
+    "phasekit.labelled.motion": ("flow", "separatrix_motion"),
+    "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.labelled.quantities": ("quantities",),
     "phasekit.labelled.store": ("open_map",),

@@ -62,3 +62,15 @@ class OrbitKind(IntEnum):
     LIBRATION = 1
     ROTATION = 2
     ASYMPTOTIC = 3
+
+
+class OrbitFamily(IntEnum):
+    """Family of orbits: each has orbits of every action between its limits, one of each."""
+
+    NOT_COMPUTED = -1
+    NONE = 0
+    LOWER_WELL = 1
+    UPPER_WELL = 2
+    OUTER = 3
+    FORWARD = 4
+    BACKWARD = 5

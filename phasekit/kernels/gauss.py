@@ -31,7 +31,7 @@ def halve(a: float, b: float, first: int, w: Array) -> int:
     n = 0
     w[first] = a
     w[first + STEPS] = b
-    while n < STEPS - 1 and abs(a - b) > 2e-16 * a:
+    while n < STEPS - 1 and abs(a - b) > 5e-16 * a:
         a, b = 0.5 * (a + b), np.sqrt(a * b)
         n += 1
         w[first + n] = a

@@ -113,12 +113,42 @@ def potential_dd(
     return dd_add(h, low, -th, -tl)
 
 
+@routine
+def multiplier(j: int, w: Array) -> tuple[float, float, float, float]:
+    """Cosine, sine, mu = B/cos and A - mu = -C/sin of equilibrium j, each with its digits.
+
+    mu and A - mu are those of the equivalent system with A >= 0: both >= 0 at inner equilibria.
+    """
+    a = w[A]
+    b = w[B]
+    c = w[C]
+    x = np.float64(math.cos(w[PHI + j]))
+    y = np.float64(math.sin(w[PHI + j]))
+    # The sum where it does not cancel and the angle is close to the axis, else the quotient.
+    mu = a + c / y if abs(x) < 0.3 else b / x
+    rest = b / x - a if abs(y) < 0.3 else c / y
+    if abs(mu) < 0.01 * abs(a) and abs(x) > 1e-7:
+        mu = b / x
+    if abs(rest) < 0.01 * abs(a) and abs(y) > 1e-7:
+        rest = c / y
+    # Next to an axis the small coefficient knows the angle better than a double does.
+    size = abs(a) + abs(mu)
+    if abs(y) < 1e-3 and abs(rest) > 1e-3 * size:
+        y = c / rest
+    if abs(x) < 1e-3 and abs(mu) > 1e-3 * size:
+        x = b / mu
+    if a >= 0.0:
+        return x, y, mu, -rest
+    return x, y, rest, -mu
+
+
 @inline
 def energy_between(j: int, i: int, w: Array) -> float:
-    """V(phi_i) - V(phi_j)."""
+    """V(phi_i) - V(phi_j) = (mu_j - mu_i) sin((phi_i - phi_j)/2)^2, exactly 0 for equal saddles."""
+    _, _, mu_j, _ = multiplier(j, w)
+    _, _, mu_i, _ = multiplier(i, w)
     sine = math.sin(0.5 * (w[PHI + i] - w[PHI + j]))
-    bend = w[CURVATURE + j] + w[A] * math.sin(0.5 * (w[PHI + i] + 3.0 * w[PHI + j])) * sine
-    return 2.0 * sine * sine * bend
+    return (mu_j - mu_i) * sine * sine
 
 
 @routine
@@ -183,14 +213,10 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
-        enclose(within, above, w)
+        enclose(energy_above(LOWER_CENTER, w), within, above, w)
         return LIBRATION
-    barrier = offset(w[PHI + UPPER_SADDLE], LOWER_SADDLE, w)
-    right = offset(phi, LOWER_SADDLE, w) < barrier
-    lower = (offset(w[PHI + LOWER_CENTER], LOWER_SADDLE, w) < barrier) == right
-    center = LOWER_CENTER if lower else UPPER_CENTER
+    place, center = well(phi, w)
     own = energy_above(center, w)
-    place = RIGHT if right else LEFT
     if own < -within:
         settle(center, max(own, 0.0), place, LIBRATION, w)
     else:
@@ -198,13 +224,83 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     return LIBRATION
 
 
+@routine
+def well(phi: float, w: Array) -> tuple[int, int]:
+    """Which lobe of the figure-eight an angle belongs to, and the center inside."""
+    barrier = offset(w[PHI + UPPER_SADDLE], LOWER_SADDLE, w)
+    right = offset(phi, LOWER_SADDLE, w) < barrier
+    lower = (offset(w[PHI + LOWER_CENTER], LOWER_SADDLE, w) < barrier) == right
+    return RIGHT if right else LEFT, LOWER_CENTER if lower else UPPER_CENTER
+
+
 @inline
-def enclose(within: float, above: float, w: Array) -> None:
-    """Choose the reference of a libration round more than one equilibrium."""
-    own = within + energy_between(LOWER_CENTER, LOWER_SADDLE, w)
+def enclose(own: float, within: float, above: float, w: Array) -> None:
+    """Choose the reference of a libration round more than one equilibrium.
+
+    Its energy is ``own`` above the lower center, ``within`` above the lower saddle.
+    """
     if abs(within) < min(-above, own):
         settle(LOWER_SADDLE, within, AROUND, LIBRATION, w)
     elif own < -above:
         settle(LOWER_CENTER, own, AROUND, LIBRATION, w)
     else:
         settle(UPPER_SADDLE, above, AROUND, LIBRATION, w)
+
+
+@routine
+def classify_level(j: int, gap: float, center: int, slack: float, valid: bool, w: Array) -> int:
+    """Kind of the orbit at an energy above equilibrium j that a center sees, as in `classify`."""
+    w[MODE] = INVALID
+    if not (valid and abs(gap) <= LARGEST):
+        return NOT_COMPUTED
+    gap *= w[UNIT] * w[UNIT]
+    slack *= w[UNIT] * w[UNIT]
+    own = gap if j == center else gap + energy_between(center, j, w)
+    if not own >= -slack:
+        return NOT_COMPUTED
+    w[START] = w[PHI + center]
+    w[ANGLE] = w[PHI + center]
+    w[TURNS] = 0.0
+    w[RATE] = np.sqrt(2.0 * max(own, 0.0))
+    w[DIRECTION] = 1.0
+    if not w[RATE] < FREE_FROM:
+        w[MODE] = FREE
+        return ROTATION
+    if own <= slack:
+        w[MODE] = REST
+        return EQUILIBRIUM
+    above = gap if j == UPPER_SADDLE else gap + energy_between(UPPER_SADDLE, j, w)
+    if abs(above) <= slack:
+        settle(UPPER_SADDLE, 0.0, SINGLE, ASYMPTOTIC, w)
+        return ASYMPTOTIC
+    if above > 0.0:
+        settle(UPPER_SADDLE, above, SINGLE, ROTATION, w)
+        return ROTATION
+    if w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]:
+        if own < -above:
+            settle(center, own, SINGLE, LIBRATION, w)
+        else:
+            settle(UPPER_SADDLE, above, SINGLE, LIBRATION, w)
+        return LIBRATION
+    within = gap if j == LOWER_SADDLE else gap + energy_between(LOWER_SADDLE, j, w)
+    if abs(within) <= slack:
+        settle(LOWER_SADDLE, 0.0, AROUND, ASYMPTOTIC, w)
+        return ASYMPTOTIC
+    if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
+        enclose(gap + energy_between(LOWER_CENTER, j, w), within, above, w)
+    elif own < -within:
+        place, _ = well(w[ANGLE], w)
+        settle(center, own, place, LIBRATION, w)
+    else:
+        place, _ = well(w[ANGLE], w)
+        settle(LOWER_SADDLE, within, place, LIBRATION, w)
+    return LIBRATION
+
+
+@routine
+def neighbor(j: int, right: bool, w: Array) -> int:
+    """The center next to saddle j on one side."""
+    if w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
+        return LOWER_CENTER
+    first = offset(w[PHI + LOWER_CENTER], j, w) < offset(w[PHI + UPPER_CENTER], j, w)
+    return LOWER_CENTER if first == right else UPPER_CENTER

@@ -60,6 +60,7 @@ from phasekit.kernels.orbits import (
     S2,
     SIGMA,
     SIZE,
+    SKEW,
     SLOPE,
     SPAN,
     TAU,
@@ -67,8 +68,10 @@ from phasekit.kernels.orbits import (
     Y_PRODUCT,
     M,
     N,
+    P,
     U,
     locate,
+    refer,
 )
 
 # Rows after those of an orbit: phase at the start, frequency (high and low part), whole turns from
@@ -137,13 +140,15 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     half = 0.5 * (angle - w[SIGMA])
     x = np.float64(math.cos(half))
     y = np.float64(math.sin(half))
+    skew = w[SKEW]
     if w[MODE] == TURN:
-        far = w[RATIO] * (w[U] * x + y)
         near = w[U] * x - y
+        reach = skew * (w[U] * x + y)
+        far = w[U] * x + y + reach
         square = near * near + far * far
         return phase(
             2.0 * near * far / square,
-            (near - far) * (near + far) / square,
+            -(2.0 * y + reach) * (2.0 * w[U] * x + reach) / square,
             MEANS,
             int(w[LEVELS]),
             w,
@@ -159,16 +164,18 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     r = w[REST_R]
     tilt = w[TAU] * math.sin(offset)
     rest = 0.5 * ((1.0 + r) + (1.0 - r) * math.cos(offset) + tilt)
-    if abs(rest) > 0.02 * (1.0 + abs(r)):
+    cosine = 2.0 * y - skew * low
+    if abs(rest) > 0.02 * (1.0 + abs(r)) and min(high, low) < 0.05 * max(high, low):
         common = (1.0 + w[U] * w[U]) * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
-        if high < 0.05 * low:
+        if high < low:
             high = common / low
-        elif low < 0.05 * high:
+        else:
             low = common / high
+        cosine = w[RATIO] * low - high
     low *= w[RATIO]
     both = low + high
     sine = 2.0 * np.sqrt(low * high) / both if both > 0.0 else 0.0
-    cosine = (low - high) / both if both > 0.0 else 1.0
+    cosine = cosine / both if both > 0.0 else 1.0
     return phase(sine if rate < 0.0 else -sine, cosine, MEANS, int(w[LEVELS]), w)
 
 
@@ -285,3 +292,42 @@ def approach(time: float, w: Array) -> tuple[float, float]:
     rate = -2.0 * slope / (1.0 + z * z) if abs(z) < 1e150 else 0.0
     angle = w[PHI_S] + 2.0 * math.atan2(1.0, z)
     return angle + w[BASE] * TWO_PI, rate / w[UNIT]
+
+
+@routine
+def begin_separatrix(j: int, right: bool, w: Array) -> None:
+    """Prepare the motion that leaves saddle j on one side, with t = 0 at its middle.
+
+    That is the turning point of a lobe, the offset pi of a winding loop, and half of the way to
+    the partner of a heteroclinic arc.
+    """
+    w[MODE] = ASYMPTOTE
+    w[REFERENCE] = j
+    refer(w)
+    w[START] = w[PHI_S]
+    w[BASE] = 0.0 if right else -1.0
+    sign = 1.0 if right else -1.0
+    k2 = -w[SLOPE]
+    d = w[M] * w[N]
+    if k2 == 0.0:  # a cusp: z falls at a constant rate
+        w[RISE] = 0.0
+        w[FALL] = -sign * np.sqrt(max(-w[P], 0.0))
+        return
+    middle = w[S2] / k2
+    if d > 0.0:
+        w[RISE] = 0.5 * sign * np.sqrt(d) / k2
+        w[FALL] = w[RISE]
+    elif d < 0.0:
+        # z = middle - c sinh(k (t + t0)) vanishes at t = 0; exp(k t0) from sinh(k t0).
+        c = np.sqrt(-d) / k2
+        sinh = sign * middle / c
+        grow = abs(sinh) + np.sqrt(sinh * sinh + 1.0)
+        grow = grow if sinh >= 0.0 else 1.0 / grow
+        w[RISE] = -0.5 * sign * c * grow
+        w[FALL] = 0.5 * sign * c / grow
+    else:
+        # z = middle + c exp(-k t), with the partner at z = middle.
+        whole = math.atan2(1.0, middle) if right else math.atan2(1.0, middle) - 0.5 * TWO_PI
+        half = 0.5 * whole
+        w[RISE] = 0.0
+        w[FALL] = math.cos(half) / math.sin(half) - middle

@@ -57,6 +57,7 @@ from phasekit.kernels.levels import (
     A,
     B,
     C,
+    multiplier,
 )
 
 # Rows after those of `phasekit.kernels.levels`. The reference: angle, cosine, sine, V'', mu and
@@ -65,9 +66,10 @@ from phasekit.kernels.levels import (
 # distance, its ratio; turning points; for a libration tau, r and span of its factors; the number
 # of Gauss steps and their means.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT, Y_SUM = range(ORBIT, ORBIT + 11)
-FIRST, SECOND, SIGMA, U, RATIO, LOW, HIGH, TAU, REST_R, SPAN, LEVELS = range(ORBIT + 11, ORBIT + 22)
-OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 22, ORBIT + 26)
-MEANS = ORBIT + 26
+FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 11, ORBIT + 19)
+TAU, REST_R, SPAN, LEVELS = range(ORBIT + 19, ORBIT + 23)
+OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 23, ORBIT + 27)
+MEANS = ORBIT + 27
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
 FEWEST, MOST, CHUNK = 16, 8192, 32
 SINE = MEANS + 2 * STEPS
@@ -94,27 +96,20 @@ COSINES = np.cos(_nodes())
 def refer(w: Array) -> None:
     """What the formulas need of the reference."""
     j = int(w[REFERENCE])
-    a = w[A]
-    b = w[B]
-    c = w[C]
-    x = np.float64(math.cos(w[PHI + j]))
-    y = np.float64(math.sin(w[PHI + j]))
-    # mu and mu - A, each from the quotient that keeps its digits.
-    mu = b / x if abs(x) > 0.3 else a + c / y
-    rest = c / y if abs(y) > 0.3 else mu - a
-    size = abs(a) + abs(mu)
-    if abs(y) < 1e-3 and abs(rest) > 1e-3 * size:
-        y = c / rest
-    if abs(x) < 1e-3 and abs(mu) > 1e-3 * size:
-        x = b / mu
+    x, y, w[M], w[N] = multiplier(j, w)
     w[PHI_S] = w[PHI + j]
     w[COS] = x
     w[SIN] = y
     w[SLOPE] = w[CURVATURE + j]
-    w[M] = mu if a >= 0.0 else rest
-    w[N] = -rest if a >= 0.0 else -mu
-    w[S2] = a * x * y
-    w[P] = mu - a * y * y
+    w[S2] = w[A] * x * y
+    w[P] = w[M] * x * x - w[N] * y * y if w[A] >= 0.0 else w[M] * y * y - w[N] * x * x
+
+
+@inline
+def tan_half(y: float, x: float) -> float:
+    """Return tan(angle/2) of the angle atan2(y, x), y > 0."""
+    size = np.sqrt(x * x + y * y)
+    return y / (size + x) if x >= 0.0 else (size - x) / y
 
 
 @routine
@@ -126,12 +121,12 @@ def turn(w: Array) -> None:
     n = max(w[N], 0.0)
     size = abs(w[A])
     # x0 = -z, from above: all roots are real and z is the largest, so Newton comes down to it.
-    c2 = k2 - 2.0 * e
-    c1 = -2.0 * e * (m + n)
-    c0 = -2.0 * e * m * n
+    p2 = k2 - 2.0 * e
+    p1 = -2.0 * e * (m + n)
+    p0 = -2.0 * e * m * n
     z = e + np.sqrt(e * (e + 2.0 * max(m, n)))
     for _ in range(60):
-        step = (((z + c2) * z + c1) * z + c0) / ((3.0 * z + 2.0 * c2) * z + c1)
+        step = (((z + p2) * z + p1) * z + p0) / ((3.0 * z + 2.0 * p2) * z + p1)
         z -= step
         if not step > 1e-15 * z:
             break
@@ -141,7 +136,12 @@ def turn(w: Array) -> None:
     low = m + z  # -mu_0
     high = n + z  # A - mu_0
     product = size * b2 / low
-    excess = b2 / low + g2 / high - size
+    c2 = w[COS] * w[COS] if w[A] >= 0.0 else w[SIN] * w[SIN]
+    s2 = w[SIN] * w[SIN] if w[A] >= 0.0 else w[COS] * w[COS]
+    if z < n:  # from the reference, where b2 = m^2 c2 and g2 = n^2 s2
+        excess = (m - c2 * size) - z * (c2 * m / low + s2 * n / high)
+    else:
+        excess = b2 / low + g2 / high - size
     root = np.sqrt(excess * excess + 4.0 * product)
     if excess >= 0.0:
         q = 0.5 * (excess + root)
@@ -176,11 +176,7 @@ def turn(w: Array) -> None:
     fast = second
     if abs(tilt) < 1e150 and q > 0.0:
         quotient = x1 / (q * (size + q))
-        if w[A] >= 0.0:
-            weight = w[COS] * w[COS] * (size + q) + w[SIN] * w[SIN] * q
-        else:
-            weight = w[SIN] * w[SIN] * (size + q) + w[COS] * w[COS] * q
-        weight *= quotient
+        weight = (c2 * (size + q) + s2 * q) * quotient
         skew = w[S2] * quotient
         if (first * first) * weight - 2.0 - weight - 2.0 * first * skew < 0.0:
             slow = second
@@ -190,15 +186,21 @@ def turn(w: Array) -> None:
     if o_fast < o_slow:
         o_fast += TWO_PI
     w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
-    w[U] = np.float64(math.tan(0.25 * (o_fast - o_slow)))
+    if abs(slow) < math.inf:
+        w[U] = tan_half(abs(slow - fast), (1.0 + slow * fast) * (1.0 if slow > fast else -1.0))
+    else:
+        w[U] = tan_half(1.0, fast)
     # Ratio of the speeds at both ends: (n1 + n0)^2/(n1^2 - n0^2).
     n0 = np.sqrt(y1 * y2 / (low * high))
     if q > 0.0:
-        n1 = np.sqrt(y1 * (y2 - y1) / (q * (size + q)))
+        n1 = np.sqrt(y1 * (mu2 + q) / (q * (size + q)))
         difference = (mu2 * (size + low + q) + low * q) / (q * (size + q) * low * high)
-        w[RATIO] = (n1 + n0) / (y1 * np.sqrt(difference))
+        square = y1 * y1 * difference  # n1^2 - n0^2
+        w[RATIO] = (n1 + n0) / np.sqrt(square)
+        w[SKEW] = 2.0 * n0 * (n1 + n0) / (square * (1.0 + w[RATIO]))
     else:
         w[RATIO] = 1.0
+        w[SKEW] = 0.0
 
 
 @routine
@@ -242,14 +244,16 @@ def swing(w: Array) -> None:
     if abs(rest) < 0.1 * (abs(n) + abs(x)):
         norm = product - n * others + n * n
         rest = size * g2 / norm if norm > 0.0 else 0.0
-    tau = 2.0 * np.sqrt(max(mu0, 0.0) * max(rest, 0.0)) / abs(x) if x != 0.0 else 0.0
+    # tau R = -2 S2 and R^2 = x^2 + 2 E (x + P): the one from the other, where nothing cancels.
     twice = 2.0 * e * (x + w[P])
     square = x * x + twice
-    if square > 0.25 * (x * x + abs(twice)) or tau == 0.0:
-        r = np.sqrt(max(square, 0.0))
-        r = -r if w[S2] > 0.0 else r
+    if square > 0.25 * (x * x + abs(twice)):
+        r = np.sqrt(square)
+        tau = 2.0 * abs(w[S2]) / r
     else:
-        r = -2.0 * w[S2] / tau
+        tau = 2.0 * np.sqrt(max(mu0, 0.0) * max(rest, 0.0)) / abs(x) if x != 0.0 else 0.0
+        r = 2.0 * abs(w[S2]) / tau if tau > 0.0 else np.sqrt(max(square, 0.0))
+    r = -r if w[S2] > 0.0 else r
     # r1 r2 = 1 - 2 P/E: the smaller from the larger.
     top = x + e
     r1 = (top - r) / e
@@ -275,26 +279,27 @@ def swing(w: Array) -> None:
     if e > 0.0:  # the orbit encloses the reference
         o_high = o_first
         o_low = o_second - TWO_PI
-        half = math.atan2(disc, -(1.0 + own))
+        w[U] = tan_half(disc, -(1.0 + own))
         z_high = z_big
         z_low = z_small
     else:
         o_high = o_second
         o_low = o_first
-        half = math.atan2(disc, 1.0 + own)
+        w[U] = tan_half(disc, 1.0 + own)
         z_high = z_small
         z_low = z_big
     w[LOW] = w[PHI_S] + o_low
     w[HIGH] = w[PHI_S] + o_high
     w[SIGMA] = w[PHI_S] + 0.5 * (o_low + o_high)
-    w[U] = np.float64(math.tan(0.5 * half))
-    # |V'| at both turning points, but for a common factor.
-    force_high = abs(e + x / (1.0 + z_high * z_high))
-    force_low = abs(e + x / (1.0 + z_low * z_low))
+    # V' at both turning points, but for a common factor.
+    force_high = e + x / (1.0 + z_high * z_high)
+    force_low = e + x / (1.0 + z_low * z_low)
     w[RATIO] = np.sqrt(force_high / force_low)
+    w[SPAN] = np.sqrt(disc * disc + (1.0 + own) * (1.0 + own))
+    difference = x * (z_high - z_low) * sum_ / (w[SPAN] * w[SPAN])
+    w[SKEW] = difference / (force_low * (1.0 + w[RATIO]))
     w[TAU] = sum_
     w[REST_R] = rest_r
-    w[SPAN] = np.sqrt(disc * disc + (1.0 + own) * (1.0 + own))
 
 
 @routine
@@ -338,14 +343,8 @@ def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
 @inline
 def distance(i: int, w: Array) -> float:
     """mu_i - mu, from the reference to equilibrium i."""
-    phi = w[PHI + i]
-    if phi == w[PHI_S]:
-        return 0.0
-    x = np.float64(math.cos(phi))
-    y = np.float64(math.sin(phi))
-    if w[A] >= 0.0:
-        return (w[B] / x if abs(x) > abs(y) else w[A] + w[C] / y) - w[M]
-    return (w[C] / y if abs(y) > abs(x) else w[B] / x - w[A]) - w[M]
+    _, _, mu, _ = multiplier(i, w)
+    return mu - w[M]
 
 
 @routine
@@ -366,29 +365,35 @@ def shape(w: Array) -> None:
 def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
     """Angle from SIGMA and |angular velocity| at the phase with this sine and cosine."""
     sn, cn, delta = amplitude(sine, cosine, MEANS, int(w[LEVELS]), w)
-    u = w[U]
     ratio = w[RATIO]
-    if w[MODE] == SWING:  # squares of cosine and sine of psi/2
-        near = 0.5 * (1.0 + cn) if cn > 0.0 else 0.5 * sn * sn / (1.0 - cn)
-        far = ratio * (0.5 * (1.0 - cn) if cn <= 0.0 else 0.5 * sn * sn / (1.0 + cn))
+    skew = w[SKEW]
+    if w[MODE] == SWING:  # squares of cosine and sine of psi/2, whose difference is cn
+        big = 0.5 * (1.0 + abs(cn))
+        small = 0.25 * sn * sn / big
+        near = big if cn > 0.0 else small
+        far = small if cn > 0.0 else big
+        top = cn + skew * far
+        bottom = near + ratio * far
         rate = -2.0 * sn
-    else:  # cosine and sine of psi/2
-        near = np.sqrt(0.5 * (1.0 + abs(cn)))
-        far = 0.5 * abs(sn) / near
-        if cn < 0.0:
-            near, far = far, near
-        far = -far if sn < 0.0 else far
-        near, far = far, ratio * near
+    else:  # cosine and sine of psi/2, whose sum and difference have the product cn
+        big = np.sqrt(0.5 * (1.0 + abs(cn)))
+        small = 0.5 * abs(sn) / big
+        near = big if cn >= 0.0 else small
+        far = small if cn >= 0.0 else big
+        both = near + far
+        rest = cn / both  # near - far
+        top = skew * near + rest if sn >= 0.0 else skew * near + both
+        bottom = skew * near + both if sn >= 0.0 else skew * near + rest
+        top = -top
         rate = 2.0
-    top = u * (near - far)
-    bottom = near + far
-    rate *= u * ratio * delta / (bottom * bottom + top * top)
+    top *= w[U]
+    rate *= w[U] * ratio * delta / (bottom * bottom + top * top)
     return 2.0 * math.atan2(top, bottom), rate
 
 
 @inline
-def square_speeds(first: int, count: int, w: Array) -> tuple[float, float]:
-    """Sums of phi'^2 over the nodes from ``first`` on: all of them, and every other one.
+def square_speeds(first: int, count: int, w: Array) -> tuple[float, float, float]:
+    """Sums of phi'^2 over nodes from ``first`` on: all, every other, and every fourth one.
 
     One Gauss step at a time for all nodes, in loops that vectorise; see `locate`.
     """
@@ -413,38 +418,42 @@ def square_speeds(first: int, count: int, w: Array) -> tuple[float, float]:
             w[SINE + i] = sine * a * inverse
     u = w[U]
     ratio = w[RATIO]
+    skew = w[SKEW]
     scale = 2.0 * u * ratio
     if w[MODE] == SWING:
         for i in range(count):
-            sine = w[SINE + i]
-            cosine = w[COSINE + i]
-            big = 0.5 * (1.0 + abs(cosine))
-            small = 0.25 * sine * sine / big
-            near = big if cosine > 0.0 else small
-            far = ratio * (small if cosine > 0.0 else big)
-            top = u * (near - far)
-            bottom = near + far
-            rate = scale * sine * w[DELTA + i] / (bottom * bottom + top * top)
+            sn = w[SINE + i]
+            cn = w[COSINE + i]
+            big = 0.5 * (1.0 + abs(cn))
+            small = 0.25 * sn * sn / big
+            near = big if cn > 0.0 else small
+            far = small if cn > 0.0 else big
+            top = u * (cn + skew * far)
+            bottom = near + ratio * far
+            rate = scale * sn * w[DELTA + i] / (bottom * bottom + top * top)
             w[DELTA + i] = rate * rate
     else:
         for i in range(count):
-            sine = w[SINE + i]
-            cosine = w[COSINE + i]
-            big = np.sqrt(0.5 * (1.0 + abs(cosine)))
-            small = 0.5 * abs(sine) / big
-            half_sine = small if cosine >= 0.0 else big
-            near = half_sine if sine >= 0.0 else -half_sine
-            far = ratio * (big if cosine >= 0.0 else small)
-            top = u * (near - far)
-            bottom = near + far
+            sn = w[SINE + i]
+            cn = w[COSINE + i]
+            big = np.sqrt(0.5 * (1.0 + abs(cn)))
+            small = 0.5 * abs(sn) / big
+            near = big if cn >= 0.0 else small
+            far = small if cn >= 0.0 else big
+            both = near + far
+            rest = cn / both
+            top = u * (skew * near + (rest if sn >= 0.0 else both))
+            bottom = skew * near + (both if sn >= 0.0 else rest)
             rate = scale * w[DELTA + i] / (bottom * bottom + top * top)
             w[DELTA + i] = rate * rate
-    even = 0.0
+    fourth = 0.0
+    second = 0.0
     odd = 0.0
-    for i in range(0, count, 2):
-        even += w[DELTA + i]
-        odd += w[DELTA + i + 1]
-    return even + odd, even
+    for i in range(0, count, 4):
+        fourth += w[DELTA + i]
+        second += w[DELTA + i + 2]
+        odd += w[DELTA + i + 1] + w[DELTA + i + 3]
+    return fourth + second + odd, fourth + second, fourth
 
 
 @routine
@@ -453,22 +462,27 @@ def mean_square(w: Array) -> float:
 
     A libration passes each speed twice and is at rest at the ends, so half of the nodes do.
     """
-    weight = 2.0 if w[MODE] == SWING else 1.0
     both = 2 if w[MODE] == SWING else 1
-    total, even = square_speeds(0, FEWEST // both, w)
-    mean = 2.0 * even
-    new = total
+    total, even, fourth = square_speeds(0, FEWEST // both, w)
+    mean = total
+    last = 2.0 * even
+    change = abs(last - 4.0 * fourth)
     nodes = FEWEST
-    # Twice the nodes square the error.
-    while not abs(new - mean) <= 2e-9 * new and nodes < MOST:
-        mean = new
+    while nodes < MOST:
+        # Errors c r^n: twice the nodes square r^n, which is the ratio of two changes.
+        before = change
+        change = abs(mean - last)
+        ratio = change / before if change < before else 1.0
+        if change <= 1e-11 * mean or change * ratio * ratio <= 1e-18 * mean:
+            break
+        last = mean
         count = nodes // both
         for first in range(0, count, CHUNK):
-            part, _ = square_speeds(nodes + first, min(CHUNK, count - first), w)
+            part, _, _ = square_speeds(nodes + first, min(CHUNK, count - first), w)
             total += part
         nodes *= 2
-        new = total * (FEWEST / nodes)
-    return weight * new / FEWEST
+        mean = total * (FEWEST / nodes)
+    return mean * both / FEWEST
 
 
 @inline

@@ -10,10 +10,13 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.kernels import action_angle as aa
+from phasekit.kernels import equilibria as eq
 from phasekit.kernels import levels as lv
 from phasekit.kernels import motion as mo
 from phasekit.kernels import orbits as ob
 from phasekit.kernels.compile import Array, Outputs, inline, kernel
+from phasekit.kernels.double_double import TWO_PI
 
 Index = npt.NDArray[np.int64]
 
@@ -27,6 +30,29 @@ def load_system(
     for j in range(4):
         lv.load_point(j, phi[i, j], curvature[i, j], w)
     return valid
+
+
+@inline
+def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> None:
+    """Results of cell k."""
+    kind, orbit_energy, period, frequency, action, phi_min, phi_max = out
+    kind[k] = code
+    orbit_energy[k] = energy
+    period[k] = TWO_PI / w[ob.OMEGA]
+    frequency[k] = w[ob.OMEGA]
+    action[k] = w[ob.ACTION]
+    phi_min[k] = w[ob.PHI_MIN]
+    phi_max[k] = w[ob.PHI_MAX]
+
+
+@inline
+def energy_of(i: int, k: int, a: Array, b: Array, c: Array, phi: Array, dphi: Array) -> float:
+    """Energy of state k in system i."""
+    if not abs(phi[k]) < math.inf:
+        return math.nan
+    x = np.float64(math.cos(phi[k]))
+    y = np.float64(math.sin(phi[k]))
+    return 0.5 * dphi[k] * dphi[k] + (0.5 * a[i] * x - b[i]) * x - c[i] * y
 
 
 @kernel
@@ -44,7 +70,6 @@ def orbits(
     out: Outputs,
 ) -> None:
     """Orbits through states."""
-    kind, energy, period, frequency, action, phi_min, phi_max = out
     w = np.zeros(ob.SIZE)
     last = np.int64(-1)
     valid = False
@@ -56,15 +81,51 @@ def orbits(
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
         ob.finish(w)
-        x = np.float64(math.cos(w[lv.ANGLE]))
-        y = np.float64(math.sin(w[lv.ANGLE]))
-        kind[k] = code
-        energy[k] = 0.5 * dphi0[k] * dphi0[k] + (0.5 * a[i] * x - b[i]) * x - c[i] * y
-        period[k] = lv.TWO_PI / w[ob.OMEGA]
-        frequency[k] = w[ob.OMEGA]
-        action[k] = w[ob.ACTION]
-        phi_min[k] = w[ob.PHI_MIN]
-        phi_max[k] = w[ob.PHI_MAX]
+        write_orbit(k, code, energy_of(i, k, a, b, c, phi0, dphi0), w, out)
+
+
+@kernel
+def levels(
+    a: Array,
+    b: Array,
+    c: Array,
+    phi: Array,
+    curvature: Array,
+    energy: Array,
+    index: Index,
+    level: Array,
+    point: Array,
+    side: Array,
+    gaps: bool,
+    start: int,
+    stop: int,
+    out: Outputs,
+) -> None:
+    """Orbits at energies round a center; or at gaps above a saddle, in the well on one side."""
+    w = np.zeros(ob.SIZE)
+    last = np.int64(-1)
+    valid = False
+    for k in range(start, stop):
+        i = index[k]
+        if i != last:
+            valid = load_system(i, a, b, c, phi, curvature, w)
+            last = i
+        if gaps:
+            j = eq.LOWER_SADDLE if point[k] == 0.0 else eq.UPPER_SADDLE
+            center = lv.neighbor(j, side[k] > 0.0, w)
+            gap = level[k]
+            slack = 0.0
+        else:
+            j = eq.LOWER_CENTER if point[k] == 0.0 else eq.UPPER_CENTER
+            center = j
+            gap = level[k] - energy[i, j]
+            slack = 4.0 * lv.ROUNDING * (abs(level[k]) + abs(energy[i, j]))
+        present = valid and phi[i, j] == phi[i, j]
+        code = lv.classify_level(j, gap, center, slack, present, w)
+        ob.shape(w)
+        ob.finish(w)
+        value = gap + energy[i, j] if code != lv.NOT_COMPUTED else math.nan
+        write_orbit(k, code, value, w, out)
 
 
 @kernel
@@ -100,4 +161,107 @@ def flow(
             ob.shape(w)
             mo.begin(w)
             last = j
+        motion_phi[k], motion_dphi[k] = mo.after(t[k], w)
+
+
+@kernel
+def action_angle(
+    a: Array,
+    b: Array,
+    c: Array,
+    phi: Array,
+    curvature: Array,
+    index: Index,
+    phi0: Array,
+    dphi0: Array,
+    start: int,
+    stop: int,
+    out: Outputs,
+    angles: Outputs,
+) -> None:
+    """Orbits through states, with their family, the angle on them and the twist."""
+    family, angle, twist = angles
+    w = np.zeros(ob.SIZE)
+    last = np.int64(-1)
+    valid = False
+    for k in range(start, stop):
+        i = index[k]
+        if i != last:
+            valid = load_system(i, a, b, c, phi, curvature, w)
+            last = i
+        code = lv.classify(phi0[k], dphi0[k], valid, w)
+        ob.shape(w)
+        ob.finish(w)
+        write_orbit(k, code, energy_of(i, k, a, b, c, phi0, dphi0), w, out)
+        family[k] = aa.family(w)
+        angle[k] = aa.angle(w)
+        twist[k] = aa.twist(w)
+
+
+@kernel
+def state_of(
+    a: Array,
+    b: Array,
+    c: Array,
+    phi: Array,
+    curvature: Array,
+    index: Index,
+    family: Array,
+    action: Array,
+    angle: Array,
+    start: int,
+    stop: int,
+    out: Outputs,
+) -> None:
+    """States of given action and angle; a family that has no such orbit is given as NaN."""
+    state_phi, state_dphi = out
+    w = np.zeros(ob.SIZE)
+    last = np.int64(-1)
+    valid = False
+    for k in range(start, stop):
+        i = index[k]
+        if i != last:
+            valid = load_system(i, a, b, c, phi, curvature, w)
+            last = i
+        w[lv.MODE] = lv.INVALID
+        if valid and family[k] == family[k]:
+            aa.find_action(int(family[k]), action[k], w)
+        state_phi[k], state_dphi[k] = aa.state_at(angle[k], w)
+
+
+@kernel
+def separatrix_motion(
+    a: Array,
+    b: Array,
+    c: Array,
+    phi: Array,
+    curvature: Array,
+    index: Index,
+    saddle: Array,
+    side: Array,
+    t: Array,
+    start: int,
+    stop: int,
+    out: Outputs,
+) -> None:
+    """Motion on the separatrix that leaves a saddle on one side; NaN where it is absent."""
+    motion_phi, motion_dphi = out
+    w = np.zeros(mo.MOTION_SIZE)
+    last = np.int64(-1)
+    valid = False
+    for k in range(start, stop):
+        i = index[k]
+        if i != last:
+            valid = load_system(i, a, b, c, phi, curvature, w)
+            last = i
+        j = eq.LOWER_SADDLE if saddle[k] == 0.0 else eq.UPPER_SADDLE
+        if saddle[k] < 0.0 and phi[i, eq.UPPER_CENTER] == phi[i, eq.UPPER_CENTER]:
+            j = eq.LOWER_SADDLE
+        w[lv.MODE] = lv.INVALID
+        if (
+            valid
+            and phi[i, j] == phi[i, j]
+            and not (j == eq.LOWER_SADDLE and curvature[i, j] == 0.0)
+        ):
+            mo.begin_separatrix(j, side[k] > 0.0, w)
         motion_phi[k], motion_dphi[k] = mo.after(t[k], w)

@@ -85,7 +85,8 @@ def evaluate(
     passes: Sequence[Pass],
     *,
     states: Mapping[str, Value] | None = None,
-    state_dim: str | None = None,
+    axis: Mapping[str, str] | None = None,
+    called: Mapping[str, str] | None = None,
     order: Sequence[str] = (),
     progress: bool | None = False,
 ) -> xr.Dataset:
@@ -99,8 +100,10 @@ def evaluate(
         What to compute, and the passes that do it.
     states : mapping of str to Value, optional
         States by the names of the table.
-    state_dim : str, optional
-        Dim of bare state arrays; without it each lies on a dim of its own name.
+    axis : mapping of str to str, optional
+        The dim of a bare state array, where that is not its own name.
+    called : mapping of str to str, optional
+        What messages call a state, where that is not its own name.
     order : sequence of str
         Dims that come first.
     progress : bool or None
@@ -113,8 +116,7 @@ def evaluate(
     """
     states = dict(states or {})
     inputs = {**system.parameters, **states}
-    axis = dict.fromkeys(states, state_dim) if state_dim else {}
-    grid = make_grid(inputs, axis=axis, order=order)
+    grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = {one: leaves(system, one.inputs, passes) for one in passes}
     _refuse_missing(system, needs, inputs)
     if not grid.sizes and any("A" in one.inputs for one in passes):
@@ -133,7 +135,7 @@ def _refuse_missing(
         for name in names:
             if name not in inputs:
                 declared = [parameter.name for parameter in system.declared]
-                way = f"give {name}=" if name in declared or name.startswith("state") else "none"
+                way = f"give {name}=" if name in declared or name in STATES else "none"
                 raise ParameterError(
                     f"{name}: got nothing, wants a value for {' and '.join(one.groups)} of "
                     f"{type(system).__name__}"

@@ -62,6 +62,7 @@ def make_grid(
     values: Mapping[str, Value],
     *,
     axis: Mapping[str, str] | None = None,
+    called: Mapping[str, str] | None = None,
     order: Sequence[str] = (),
 ) -> Grid:
     """Lay out values on named dims.
@@ -72,6 +73,8 @@ def make_grid(
         Inputs by name, as `numeric` keeps them.
     axis : mapping of str to str, optional
         The dim of a bare array, where that is not its own name.
+    called : mapping of str to str, optional
+        What messages call an input, where that is not its own name.
     order : sequence of str
         Dims that come first; the others follow as they appear.
 
@@ -81,12 +84,12 @@ def make_grid(
         If two inputs disagree on a dim's size or coordinate, or a dim has the name of an input
         that does not lie along it.
     """
-    axis = axis or {}
+    axis, called = axis or {}, called or {}
     inputs = {name: _variable(name, value, axis.get(name, name)) for name, value in values.items()}
     owner: dict[str, str] = {}
     found: dict[str, int] = {}
     for name, given in inputs.items():
-        argument = name.removeprefix("state_")
+        argument = called.get(name, name)
         for dim, size in given.sizes.items():
             _check_size(str(dim), size, argument, found, owner)
             if str(dim) in inputs and inputs[str(dim)].dims != (dim,):
@@ -96,7 +99,7 @@ def make_grid(
                 )
     sizes = {dim: found[dim] for dim in order if dim in found}
     sizes.update(found)
-    return Grid(sizes, inputs, _dim_coords(values, inputs))
+    return Grid(sizes, inputs, _dim_coords(values, inputs, called))
 
 
 def _variable(name: str, value: Value, dim: str) -> xr.Variable:
@@ -117,7 +120,7 @@ def _check_size(
 
 
 def _dim_coords(
-    values: Mapping[str, Value], inputs: Mapping[str, xr.Variable]
+    values: Mapping[str, Value], inputs: Mapping[str, xr.Variable], called: Mapping[str, str]
 ) -> dict[str, xr.Variable]:
     """Coordinates of the dims: an axis is its own, others come with the DataArrays."""
     coords: dict[str, xr.Variable] = {}
@@ -127,7 +130,7 @@ def _dim_coords(
     for name, value in values.items():
         if not isinstance(value, xr.DataArray):
             continue
-        argument = name.removeprefix("state_")
+        argument = called.get(name, name)
         for dim in map(str, value.dims):
             if dim not in value.coords:
                 continue

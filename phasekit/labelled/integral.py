@@ -10,14 +10,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
-from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import NumberLike, Value, numeric
-from phasekit.labelled.evaluate import evaluate
-from phasekit.labelled.quantities import plan_passes, select
-from phasekit.labelled.system import as_system
+from phasekit.labelled.arguments import NumberLike
+from phasekit.labelled.quantities import select
+from phasekit.labelled.states import at_states
 
 
 def potential(system: Any, phi: NumberLike) -> xr.Dataset:
@@ -190,18 +187,5 @@ def phase_velocity(system: Any, phi: NumberLike, energy: NumberLike) -> xr.Datas
 
 
 def _at_states(name: str, system: Any, **states: Any) -> xr.Dataset:
-    system = as_system(system)
-    kept: dict[str, Value] = {}
-    length: dict[str, int] = {}
-    for argument, value in states.items():
-        state = kept[f"state_{argument}"] = numeric(argument, value)
-        if isinstance(state, np.ndarray):
-            length[argument] = state.size
-    if len(set(length.values())) > 1:
-        got = " and ".join(f"{n} values of {argument}" for argument, n in length.items())
-        raise ParameterError(
-            f"{', '.join(length)}: got {got}, wants equal lengths, which pair point by point; "
-            "for all combinations give DataArrays with dims of their own"
-        )
-    rows = select(name)
-    return evaluate(system, rows, plan_passes(rows), states=kept, state_dim="point")
+    given = {argument: (f"state_{argument}", value) for argument, value in states.items()}
+    return at_states(system, select(name), given)

@@ -5,7 +5,7 @@ this table. A new quantity is a row in `QUANTITIES` and a line in `PASSES` that 
 function which computes it; nothing else has to change.
 
 In derived units the radian is 1 and left out: angles are in rad, rates in s-1, energies (per unit
-of inertia about the shaft) in s-2, areas of the phase plane in s-1.
+of inertia about the shaft) in s-2, areas of the phase plane and actions in s-1.
 """
 
 from __future__ import annotations
@@ -18,7 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.errors import EquilibriumKind, Loop, ParameterError, Topology
+from phasekit.errors import (
+    EquilibriumKind,
+    Loop,
+    OrbitFamily,
+    OrbitKind,
+    ParameterError,
+    Topology,
+)
 from phasekit.labelled.arguments import bad, unknown
 
 #: Label coordinates: dim -> (labels, long_name).
@@ -30,6 +37,7 @@ LABELS: dict[str, tuple[tuple[str, ...], str]] = {
     "saddle": (("lower", "upper"), "saddle, by its energy"),
     "side": (("left", "right"), "side of the saddle"),
     "fold": (("minus", "plus"), "fold with A < 0, fold with A > 0"),
+    "family": (("lower_well", "upper_well", "outer", "rotation"), "family of orbits"),
 }
 
 #: States, which quantities may need beside the parameters: name -> (units, long_name).
@@ -37,10 +45,22 @@ STATES: dict[str, tuple[str, str]] = {
     "state_phi": ("rad", "angle of the state"),
     "state_dphi": ("s-1", "angular velocity of the state"),
     "state_energy": ("s-2", "energy of the state"),
+    "state_gap": ("s-2", "energy of the state above the saddle"),
+    "state_excess": ("s-2", "energy of the state above the center"),
+    "state_action": ("s-1", "action of the state"),
+    "state_angle": ("rad", "angle variable of the state"),
+    "state_family": ("1", "family of the state's orbit, a code of OrbitFamily"),
+    "time": ("s", "time"),
+    "level": ("1", "place of the orbit in its family, by energy from 0 to 1"),
 }
+
+#: States whose bare arrays make an axis, where those of the others pair on the dim `point`.
+AXES = ("time", "level")
 
 FROM_ENERGY = "[Veljovic2015] (14), corrected coefficients"
 FROM_MOTION = "[Veljovic2015] (12), corrected coefficients"
+ACTION_ANGLE = f"{FROM_ENERGY}; [LandauLifshitz1976] section 50"
+SMALL = f"expansion of {FROM_MOTION}; [LandauLifshitz1976] section 28"
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +202,53 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("lobe_area", "separatrices", _SIDES, "float64", "s-1",
              "area inside the separatrix on one side of the saddle",
              "closed integral of phi' over the lobe at h = h_s", FROM_ENERGY),
+    Quantity("orbit_kind", "orbits", (), "int8", "1", "kind of the orbit",
+             "sign of h - V(phi_s); equilibrium: phi' = 0 and V'(phi) = 0", FROM_ENERGY,
+             OrbitKind),
+    Quantity("orbit_energy", "orbits", (), "float64", "s-2", "energy of the orbit",
+             "h = phi'^2/2 + V(phi)", FROM_ENERGY),
+    Quantity("period", "orbits", (), "float64", "s",
+             "time of one round, infinite on a separatrix",
+             "T = closed integral of dphi/phi' (rotation: over 2 pi)", FROM_ENERGY),
+    Quantity("frequency", "orbits", (), "float64", "s-1", "angular frequency of the orbit",
+             "2 pi/T", FROM_ENERGY),
+    Quantity("action", "orbits", (), "float64", "s-1",
+             "area inside the orbit, or under one turn of a rotation, over 2 pi",
+             "I = (1/2 pi) closed integral of phi' dphi (rotation: over 2 pi)", ACTION_ANGLE),
+    Quantity("phi_min", "orbits", (), "float64", "rad",
+             "least angle of the orbit, NaN for a rotation", "V(phi_min) = h", FROM_ENERGY),
+    Quantity("phi_max", "orbits", (), "float64", "rad",
+             "greatest angle of the orbit, NaN for a rotation", "V(phi_max) = h", FROM_ENERGY),
+    Quantity("orbit_family", "action_angle", (), "int8", "1", "family of the orbit",
+             "by the centers that a libration goes round, or the sign of phi' of a rotation",
+             FROM_ENERGY, OrbitFamily),
+    Quantity("angle", "action_angle", (), "float64", "rad",
+             "angle variable: 0 at phi_max, of a rotation at the lower center",
+             "theta' = 2 pi/T, in [0, 2 pi)", ACTION_ANGLE),
+    Quantity("twist", "action_angle", (), "float64", "1",
+             "change of the frequency with the action", "d(2 pi/T)/dI", ACTION_ANGLE),
+    Quantity("phi_of_angle", "state_of", (), "float64", "rad",
+             "angle at given action and angle variable",
+             "phi after the time theta T/(2 pi) from theta = 0", ACTION_ANGLE),
+    Quantity("dphi_of_angle", "state_of", (), "float64", "s-1",
+             "angular velocity at given action and angle variable",
+             "phi' after the time theta T/(2 pi) from theta = 0", ACTION_ANGLE),
+    Quantity("motion_phi", "motion", (), "float64", "rad", "angle, continuous in time",
+             "phi'' = -V'(phi)", FROM_MOTION),
+    Quantity("motion_dphi", "motion", (), "float64", "s-1", "angular velocity",
+             "phi'' = -V'(phi)", FROM_MOTION),
+    Quantity("near_center_period", "near_center", _BRANCHES, "float64", "s",
+             "period of small oscillations about the center, to first order in the energy",
+             "(2 pi/w) (1 + eps (5 V'''^2/(24 w^6) - V''''/(8 w^4))), w^2 = V''", SMALL),
+    Quantity("near_center_frequency", "near_center", _BRANCHES, "float64", "s-1",
+             "angular frequency of small oscillations, to first order in the energy",
+             "w - eps (5 V'''^2/(24 w^5) - V''''/(8 w^3)), w^2 = V''", SMALL),
+    Quantity("near_separatrix_period", "near_separatrix", _SADDLES, "float64", "s",
+             "period next to the separatrix of the saddle, to leading order in the gap",
+             "(n/k) ln(32 k^6/(|gap| |D|)), heteroclinic: (2/k) ln(8 k^4/(|gap| |A|))",
+             f"expansion of {FROM_ENERGY}"),
+    Quantity("energy_level", "orbit_families", ("family",), "float64", "s-2",
+             "energy of the orbit", "h = phi'^2/2 + V(phi)", FROM_ENERGY),
     Quantity("critical_fold", "critical", ("fold",), "float64", "1",
              "value of the parameter at the fold of equilibria",
              "|B|^(2/3) + |C|^(2/3) = |A|^(2/3)", FROM_MOTION),
@@ -195,7 +262,8 @@ ROWS: dict[str, Quantity] = {row.name: row for row in QUANTITIES}
 _ABC = ("A", "B", "C")
 
 #: Passes over the cells, those that compute more groups first. Groups that need an argument of
-#: their own (critical: the parameter) have none; their functions make one for the call.
+#: their own (critical: the parameter) have none; their functions make one for the call, as do those
+#: that find orbits by something else than a state.
 PASSES: tuple[Pass, ...] = (
     Pass("phasekit.phase.separatrices:phase_space", _ABC, ("equilibria", "separatrices")),
     Pass("phasekit.phase.equilibria:equilibria", _ABC, ("equilibria",)),
@@ -213,6 +281,20 @@ PASSES: tuple[Pass, ...] = (
         (*_ABC, "state_phi", "state_energy"),
         ("phase_velocity",),
     ),
+    Pass(
+        "phasekit.phase.action_angle:orbits_with_angles",
+        (*_ABC, "state_phi", "state_dphi"),
+        ("orbits", "action_angle"),
+    ),
+    Pass("phasekit.phase.orbits:orbits", (*_ABC, "state_phi", "state_dphi"), ("orbits",)),
+    Pass(
+        "phasekit.labelled.orbits:states_of",
+        (*_ABC, "state_action", "state_angle", "state_family"),
+        ("state_of",),
+    ),
+    Pass("phasekit.phase.flow:flow", (*_ABC, "state_phi", "state_dphi", "time"), ("motion",)),
+    Pass("phasekit.phase.asymptotics:near_center", (*_ABC, "state_excess"), ("near_center",)),
+    Pass("phasekit.phase.asymptotics:near_separatrix", (*_ABC, "state_gap"), ("near_separatrix",)),
 )
 
 
@@ -251,6 +333,9 @@ def plan_passes(rows: Iterable[Quantity]) -> tuple[Pass, ...]:
         if missing.issuperset(candidate.groups):
             chosen.append(candidate)
             missing.difference_update(candidate.groups)
+    for group in sorted(missing):  # its passes compute others as well, which are not wanted
+        if pass_of(group, chosen) not in chosen:
+            chosen.append(pass_of(group, chosen))
     return tuple(chosen)
 
 

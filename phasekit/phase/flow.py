@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 from phasekit.errors import ParameterError
 from phasekit.kernels import portrait as kernels
-from phasekit.phase.separatrices import phase_space
 from phasekit.phase.solve import check_threads, launch
 from phasekit.phase.states import flat, systems
 
@@ -90,3 +89,67 @@ def flow(
     launch(kernels.flow, arrays, size, (out,), threads)
     moved = tuple(shape[axis] for axis in order)
     return Motion(*(array.reshape(moved).transpose(np.argsort(order)) for array in out))
+
+
+def separatrix_motion(
+    A: npt.ArrayLike,
+    B: npt.ArrayLike,
+    C: npt.ArrayLike,
+    t: npt.ArrayLike,
+    saddle: npt.ArrayLike = -1,
+    side: npt.ArrayLike = 1,
+    *,
+    threads: int | None = None,
+) -> Motion:
+    """Motion on a separatrix, in elementary functions of time.
+
+    With z = cot((phi - phi_s)/2), z k^2 = S2 +- sqrt(D) cosh kt on a lobe, S2 +- sqrt(-D) sinh kt
+    on a winding loop, and S2 + c exp(-kt) on a heteroclinic arc.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2.
+    t : array_like
+        Times in s: 0 at the turning point of a lobe, where a winding loop is opposite to the
+        saddle, and half-way to the partner on a heteroclinic arc.
+    saddle : array_like of int
+        0 for the lower saddle, 1 for the upper one, -1 for that of the figure-eight where there
+        are two, else the only one.
+    side : array_like of int
+        Side on which the motion leaves the saddle: 0 left, 1 right. All six broadcast.
+    threads : int, optional
+        Number of threads for large arrays; all cores by default.
+
+    Returns
+    -------
+    Motion
+        The angle is continuous from the saddle's. NaN where the saddle is absent.
+
+    Notes
+    -----
+    The homoclinic orbits of [Veljovic2015], section 4.
+
+    Examples
+    --------
+    >>> motion = separatrix_motion(0.0, 1.0, 0.0, 0.0)
+    >>> round(float(motion.motion_phi / np.pi), 9), float(motion.motion_dphi)
+    (2.0, 2.0)
+    """
+    check_threads(threads)
+    for name, value, wanted in (("saddle", saddle, (-1, 0, 1)), ("side", side, (0, 1))):
+        if not np.isin(value, wanted).all():
+            raise ParameterError(f"{name}: got {value!r}, wants one of {wanted}")
+    cells = systems(A, B, C, threads)
+    shape = np.broadcast_shapes(cells.shape, *(np.shape(x) for x in (t, saddle, side)))
+    arrays = (
+        *cells.arrays,
+        cells.index(shape),
+        flat(saddle, shape),
+        flat(side, shape),
+        flat(t, shape),
+    )
+    size = arrays[-1].size
+    out = (np.empty(size), np.empty(size))
+    launch(kernels.separatrix_motion, arrays, size, (out,), threads)
+    return Motion(*(array.reshape(shape) for array in out))

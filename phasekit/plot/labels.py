@@ -19,6 +19,8 @@ SYMBOLS = {
     "psi": r"$\psi$",
     "phi": r"$\varphi$",
     "omega1": r"$\omega_1$",
+    "state_phi": r"$\varphi_0$",
+    "state_dphi": r"$\dot\varphi_0$",
     "Omega_sq": r"$\Omega^2$",
     **{name: f"${name}$" for name in ("A", "B", "C", "a", "e", "g", "m", "r")},
 }
@@ -71,9 +73,29 @@ def wrap(text: str, width: int) -> str:
     return "\n".join(lines).replace(GLUE, " ")
 
 
-def dataset(value: object, argument: str, needs: Iterable[str]) -> xr.Dataset:
+def value(number: xr.DataArray, angles: Angles) -> str:
+    r"""Return one value of a coordinate for print.
+
+    >>> value(xr.DataArray(-0.5, name="lam"), "rad")
+    '$\lambda$ = −0.5'
+    """
+    name = str(number.name)
+    symbol = SYMBOLS.get(name, name.replace("_", " "))
+    if number.dtype.kind not in "iuf":
+        return f"{symbol} {number.item()}".replace("_", " ")
+    shown_value, unit = shown(number, angles)
+    if name == "state_dphi":
+        shown_value, unit = number.values * angle_factor(angles), f"{angle_unit(angles)}/s"
+    text = f"{float(shown_value):.4g}".replace("-", "\N{MINUS SIGN}")
+    between = "" if unit.startswith("°") or not unit else GLUE
+    return f"{symbol} = {text}{between}{unit}"
+
+
+def dataset(
+    value: object, argument: str, needs: Iterable[str], source: str = "pk.equilibria or pk.sweep"
+) -> xr.Dataset:
     """Return `value` if it is a Dataset with the variables that a picture needs."""
-    wants = "a Dataset, such as pk.equilibria or pk.sweep returns"
+    wants = f"a Dataset, such as {source} returns"
     if not isinstance(value, xr.Dataset):
         raise bad(argument, value, wants)
     for name in needs:

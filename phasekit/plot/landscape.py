@@ -15,6 +15,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad
 from phasekit.labelled.system import as_system
 from phasekit.phase.equilibria import Equilibria
+from phasekit.phase.orbits import orbits
 from phasekit.phase.potential import phase_velocity, potential
 from phasekit.phase.separatrices import Separatrices, phase_space
 
@@ -140,6 +141,12 @@ class Landscape:
 
         return min(self.basins(energy), key=distance, default=None)
 
+    def orbit(self, energy: float, arc: Arc, quantity: str) -> float:
+        """Return what the orbit of a level over one of its arcs has, such as its period."""
+        phi = 0.5 * (arc[0] + arc[1])
+        speed = float(self.speed(np.asarray(phi), energy))
+        return float(getattr(orbits(self.A, self.B, self.C, phi, speed), quantity))
+
     def loop(self, arc: Arc, energy: float) -> tuple[FloatArray, FloatArray]:
         """Return phi and phi' >= 0 along the upper half of a level over `arc`."""
         if is_turn(arc):
@@ -198,7 +205,8 @@ class Landscape:
             count = max(2, round(gap / step))
             rise = gap / count
             chosen += [(self.floor + 0.5 * (low + rise * k) ** 2, None) for k in range(1, count)]
-        chosen += [(self.floor + 0.5 * (self.top_speed + step * k) ** 2, None) for k in (1, 2)]
+        above = range(1, max(2, round(1.0 / (3.0 * spacing))) + 1)
+        chosen += [(self.floor + 0.5 * (self.top_speed + step * k) ** 2, None) for k in above]
         return chosen
 
 

@@ -6,13 +6,22 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.labelled.arguments import bad
 from phasekit.plot import strokes, style
-from phasekit.plot.landscape import Landscape, Level
+from phasekit.plot.landscape import Arc, Landscape, Level
 
 FloatArray = NDArray[np.float64]
+
+# What level curves can be colored by, and the words at the color bar.
+COLORED = {
+    "period": "period (s)",
+    "frequency": "frequency (rad/s)",
+    "action": "action (rad$^2$/s)",
+}
 
 
 def phase_portrait(
@@ -20,6 +29,7 @@ def phase_portrait(
     *,
     energies: ArrayLike | None = None,
     orbits: ArrayLike | None = None,
+    color_by: str | None = None,
     angles: style.Angles = "rad",
     legend: bool = True,
     ax: Axes | None = None,
@@ -42,6 +52,9 @@ def phase_portrait(
     orbits : array_like, optional
         Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs; the level
         curve through each is drawn over the others and its start is marked.
+    color_by : {"period", "frequency", "action"}, optional
+        Color the level curves by what their orbits have, on a logarithmic scale with a color bar;
+        gray if left out. The period of a rotation is the time of one turn.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
     legend : bool
@@ -73,12 +86,17 @@ def phase_portrait(
     """
     land = Landscape.of(system)
     factor = style.angle_factor(angles)
-    chosen = levels_of(land, energies)
+    if color_by is not None and color_by not in COLORED:
+        raise bad("color_by", color_by, f"one of {', '.join(COLORED)}")
+    dense = energies is None and color_by is not None
+    chosen = land.levels(1.0 / 12.0) if dense else levels_of(land, energies)
     starts = starts_of(land, orbits)
-    axes = style.axes_for(ax, legend=legend)
+    axes = style.axes_for(ax, legend=legend, width=6.4 if color_by is None else 6.8)
 
-    for level in chosen:
-        strokes.draw_level(axes, land, level, factor)
+    curves = [(level[0], arc) for level in chosen for arc in strokes.level_arcs(land, level)]
+    colors = _colors(axes, land, curves, color_by)
+    for (energy, arc), color in zip(curves, colors, strict=True):
+        strokes.draw_level(axes, land, energy, arc, factor, color)
     handles = strokes.draw_separatrices(axes, land, factor)
     handles += strokes.draw_points(axes, land, factor, on_potential=False)
     handles += [
@@ -94,6 +112,19 @@ def phase_portrait(
     if legend:
         style.legend_below(axes, handles)
     return axes
+
+
+def _colors(
+    ax: Axes, land: Landscape, curves: list[tuple[float, Arc]], color_by: str | None
+) -> list[str | None]:
+    """Return the color of each level curve, and draw the color bar."""
+    values = np.array([land.orbit(energy, arc, color_by) for energy, arc in curves if color_by])
+    norm = style.log_norm(values)
+    if color_by is None or norm is None:
+        return [None] * len(curves)
+    mappable = ScalarMappable(norm, style.LINES)
+    style.log_bar(ax, mappable, COLORED[color_by])
+    return [to_hex(color) for color in mappable.to_rgba(np.minimum(values, norm.vmax))]
 
 
 def _reach(land: Landscape, energies: list[float]) -> float:

@@ -56,16 +56,20 @@ def level_arcs(land: Landscape, level: Level) -> list[Arc]:
     return [] if arc is None else [arc]
 
 
-def draw_level(ax: Axes, land: Landscape, level: Level, factor: float) -> None:
+def draw_level(
+    ax: Axes, land: Landscape, energy: float, arc: Arc, factor: float, color: str | None = None
+) -> None:
     """Draw a level curve, solid where it closes, dotted where it runs round the cylinder."""
-    for arc in level_arcs(land, level):
-        phi, speed = land.loop(arc, level[0])
-        if is_turn(arc):
-            for sign in (1.0, -1.0):
-                ax.plot(phi * factor, sign * speed * factor, zorder=1, **style.ROTATION)
-        else:
-            x, y = round_the_cylinder(*closed(phi, speed))
-            ax.plot(x * factor, y * factor, zorder=1, **style.LEVEL)
+    look = style.ROTATION if is_turn(arc) else style.LEVEL
+    if color is not None:
+        look = {**look, "color": color, "linewidth": look["linewidth"] + 0.7}
+    phi, speed = land.loop(arc, energy)
+    if is_turn(arc):
+        for sign in (1.0, -1.0):
+            ax.plot(phi * factor, sign * speed * factor, zorder=1, **look)
+    else:
+        x, y = round_the_cylinder(*closed(phi, speed))
+        ax.plot(x * factor, y * factor, zorder=1, **look)
 
 
 def draw_separatrices(ax: Axes, land: Landscape, factor: float) -> list[Artist]:

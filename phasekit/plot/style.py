@@ -14,9 +14,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgba
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, LogNorm, to_rgba
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, MultipleLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation
 
 from phasekit.errors import EquilibriumKind, Topology
@@ -120,6 +121,49 @@ EIGHT_KEY: Look = {
 REST: Look = {"color": PURPLE, "linestyle": "-", "linewidth": 3.0, "label": "rest, at every angle"}
 FOLD_CURVE: Look = {"color": BLACK, "linestyle": "-", "linewidth": 2.0, "label": "fold"}
 SIGN_CHANGE: Look = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 1.4, "label": "$A = 0$"}
+# Both wells have the same period at the same energy: the dashes let the lower one show through.
+FAMILIES: Mapping[str, Look] = {
+    "lower_well": {"color": BLUE, "linestyle": "-", "linewidth": 2.4, "label": "lower well"},
+    "upper_well": {
+        "color": ORANGE,
+        "linestyle": (0, (4, 3)),
+        "linewidth": 2.0,
+        "label": "upper well",
+    },
+    "outer": {
+        "color": GREEN,
+        "linestyle": (0, (7, 2, 1.5, 2)),
+        "linewidth": 2.0,
+        "label": "round both wells",
+    },
+    "rotation": {
+        "color": PURPLE,
+        "linestyle": (0, (1.2, 1.2)),
+        "linewidth": 2.2,
+        "label": "rotation",
+    },
+}
+WALLS: Mapping[str, Look] = {
+    "lower": {
+        "color": VERMILLION,
+        "linestyle": (0, (5, 2)),
+        "linewidth": 1.2,
+        "label": "energy of the lower saddle",
+    },
+    "upper": {
+        "color": BLACK,
+        "linestyle": (0, (6, 4)),
+        "linewidth": 1.2,
+        "label": "energy of the upper saddle",
+    },
+    "degenerate": {
+        "color": PURPLE,
+        "linestyle": (0, (4, 1.5, 1, 1.5, 1, 1.5)),
+        "linewidth": 1.2,
+        "label": "energy of the degenerate point",
+    },
+}
+MOTION: Look = {"color": BLUE, "linestyle": "-", "linewidth": 1.8}
 ORBIT_COLORS = (GREEN, PURPLE, SKY, ORANGE, BLUE)
 ORBIT_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (6, 2, 1.5, 2)), (0, (1.5, 1.5)))
 
@@ -148,6 +192,8 @@ KIND_COLORS: Mapping[int, str] = {
     EquilibriumKind.DEGENERATE: BLACK,
 }
 SEQUENTIAL = "cividis"
+# Colors of lines stay clear of the light end, which is lost on white.
+LINES = ListedColormap(plt.colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
 
 
 def new_figure(width: float = 6.4, height: float = 4.8) -> Figure:
@@ -214,6 +260,57 @@ def circle_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
     if angles == "rad":
         axis.set_major_formatter(FuncFormatter(_multiple_of_pi))
     ax.set(**{f"{which}lim": (-np.pi * factor, np.pi * factor)})
+
+
+def unwrapped_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
+    """Put ticks at quarter turns or multiples of them, where an axis spans half a turn or more."""
+    factor = angle_factor(angles)
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    low, high = sorted(ax.get_xlim() if which == "x" else ax.get_ylim())
+    quarters = (high - low) / factor / (np.pi / 2)
+    if quarters < 2.0 or not np.isfinite(quarters):
+        return
+    steps = [1.0, 2.0, *(float(f"{digit}e{power}") for power in range(16) for digit in (4, 8, 20))]
+    step = next((step for step in steps if quarters <= 8.0 * step), quarters / 8.0)
+    axis.set_major_locator(MultipleLocator(step * np.pi / 2 * factor))
+    if angles == "rad":
+        axis.set_major_formatter(FuncFormatter(_multiple_of_pi))
+
+
+def log_norm(values: Any) -> LogNorm | None:
+    """Return a logarithmic norm over the finite values, None where there are none."""
+    finite = np.asarray(values)[np.isfinite(values) & (np.asarray(values) > 0.0)]
+    if not finite.size:
+        return None
+    low, high = float(finite.min()), float(finite.max())
+    if not high > 1.02 * low:
+        low, high = low / 1.1, high * 1.1
+    return LogNorm(low, high)
+
+
+def log_bar(ax: Axes, mappable: ScalarMappable, text: str, extend: str = "neither") -> None:
+    """Draw a color bar with round numbers, also where a norm spans less than a decade."""
+    bar = ax.figure.colorbar(mappable, ax=ax, label=text, extend=extend)
+    low, high = mappable.norm.vmin, mappable.norm.vmax
+    bar.ax.yaxis.set_major_locator(FixedLocator(round_numbers(float(low), float(high))))
+    bar.ax.yaxis.set_minor_locator(NullLocator())
+    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
+
+
+def round_numbers(low: float, high: float) -> list[float]:
+    """Return round numbers from `low` to `high` for a logarithmic scale.
+
+    >>> round_numbers(1.8, 33.0), round_numbers(1.8, 3.3)
+    ([2.0, 5.0, 10.0, 20.0], [2.0, 2.5, 3.0])
+    """
+    if high < 5.0 * low:
+        ticks = list(MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high))
+    else:
+        digits = (1, 2, 5) if high < 5e3 * low else (1,)
+        powers = range(int(np.floor(np.log10(low))), int(np.floor(np.log10(high))) + 1)
+        ticks = [float(f"{digit}e{power}") for power in powers for digit in digits]
+    inside = [float(tick) for tick in ticks if low <= tick <= high]
+    return inside[:: -(-len(inside) // 9)] if inside else [low, high]
 
 
 def letters(ax: Axes, which: Literal["x", "y"]) -> int:

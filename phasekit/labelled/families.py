@@ -1,0 +1,135 @@
+"""Families of orbits, labelled: energies from one separatrix to the next, with their periods."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from phasekit.errors import EquilibriumKind, ParameterError
+from phasekit.labelled.arguments import FloatArray, bad, numeric
+from phasekit.labelled.quantities import ROWS, Pass
+from phasekit.labelled.states import at_states
+from phasekit.labelled.system import as_system
+from phasekit.phase.equilibria import equilibria
+from phasekit.phase.orbits import orbits_at_gap
+
+#: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
+CLUSTER = 4
+
+
+class Families(NamedTuple):
+    """Orbits of each family; the last axis is the family."""
+
+    energy_level: FloatArray
+    period: FloatArray
+    frequency: FloatArray
+    action: FloatArray
+
+
+def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None) -> xr.Dataset:
+    """Periods, frequencies and actions of all orbits, family by family.
+
+    Parameters
+    ----------
+    system : system
+        Any system.
+    n : int, default 200
+        Number of orbits in each family.
+    energy_max : float, optional
+        Energy in s^-2 up to which rotations are taken; by default as far above the highest saddle
+        as the lowest center lies below it.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dims ``family`` (lower_well, upper_well: librations round one center; outer:
+        librations round both; rotation) and ``level``: ``energy_level`` in s^-2, ``period`` in s,
+        ``frequency`` and ``action`` in s^-1. Levels run from 0 to 1, without these ends, with the
+        energy; energies are close to each other next to separatrices. NaN where a family is
+        absent.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    From the energy integral [Veljovic2015] (14); `orbits` explains the quantities.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ds = pk.orbit_families(pk.Coefficients(4.0, 1.0, 0.5), 50)
+    >>> ds.period.dims
+    ('family', 'level')
+    >>> ds.energy_level.sel(family="outer").diff("level").min().item() > 0
+    True
+    """
+    system = as_system(system)
+    if isinstance(n, (bool, np.bool_)) or not isinstance(n, (int, np.integer)) or n < 1:
+        raise bad("n", n, "a number of orbits >= 1")
+    top = None if energy_max is None else numeric("energy_max", energy_max)
+    if top is not None and not isinstance(top, float):
+        raise bad("energy_max", energy_max, "one number")
+    for name, value in system.parameters.items():
+        if isinstance(value, xr.DataArray) and "level" in value.dims:
+            raise ParameterError(
+                f"{name}: got the dim 'level', which the result has; rename it with "
+                ".rename(level=...)"
+            )
+    rows = [
+        replace(ROWS[name], group="orbit_families", dims=("family",)) for name in Families._fields
+    ]
+    function = functools.partial(families, top)
+    one = Pass(function, ("A", "B", "C", "level"), ("orbit_families",))
+    levels = (np.arange(n) + 0.5) / n
+    ds = at_states(system, rows, {"n": ("level", levels)}, (one,))
+    return ds.transpose(..., "family", "level")
+
+
+def families(
+    energy_max: float | None, A: FloatArray, B: FloatArray, C: FloatArray, level: FloatArray
+) -> Families:
+    """Orbits at levels between 0 and 1 of the families lower_well, upper_well, outer, rotation."""
+    points = equilibria(A, B, C)
+    energy = np.where(points.kind == EquilibriumKind.SADDLE, points.energy, np.nan)
+    low, high = energy[..., 1], energy[..., 3]
+    lower, upper = (points.energy[..., j] for j in (0, 2))  # of the centers
+    inner = np.where(np.isnan(low), high, low)  # where the wells end
+    rise = (inner - lower, inner - upper)
+    top = 2.0 * high - lower if energy_max is None else energy_max
+    up, down = level**CLUSTER, (1.0 - level) ** CLUSTER
+    near, far = 2.0 ** (CLUSTER - 1) * up, 2.0 ** (CLUSTER - 1) * down
+    under = level < 0.5  # of an outer orbit: nearer to the lower saddle
+    gaps = (
+        -rise[0] * down,
+        -rise[1] * down,
+        (high - low) * np.where(under, near, -far),
+        (top - high) * up,
+    )
+    present = (rise[0] > 0.0, rise[1] > 0.0, high > low, top > high)
+    first = np.where(np.isnan(low), 1, 0)  # the saddle where the wells end
+    saddles = (first, first, np.where(under, 0, 1), 1)
+    # To the right of the lower saddle: the center that comes before the upper saddle.
+    turn = 2.0 * np.pi
+    way = (points.phi - points.phi[..., 1:2]) % turn
+    right = np.where(way[..., 0] < way[..., 3], 1, 0)
+    sides = (right, 1 - right, 1, 1)
+    gap, saddle, side, there = (
+        np.stack(np.broadcast_arrays(*parts, level), axis=-1)[..., :-1]
+        for parts in (gaps, saddles, sides, present)
+    )
+    gap = np.where(there, gap, np.nan)
+    found = orbits_at_gap(
+        *(np.asarray(x)[..., None] for x in (A, B, C)), gap, saddle.astype(int), side.astype(int)
+    )
+    base = np.where(saddle == 1, high[..., None], low[..., None])
+    absent = np.isnan(found.period)
+    return Families(
+        np.where(absent, np.nan, base + gap), found.period, found.frequency, found.action
+    )

@@ -1,0 +1,104 @@
+"""Motion, labelled: states after any time, and motion on a separatrix.
+
+Array parameters of the system and of the states span the result's dims, times the dim `time`.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import xarray as xr
+
+from phasekit.labelled.arguments import NumberLike
+from phasekit.labelled.orbits import DEFAULT_SADDLE, SADDLES, SIDES, noted
+from phasekit.labelled.quantities import Pass, select
+from phasekit.labelled.states import at_states, one_of
+from phasekit.phase.flow import separatrix_motion as separatrix_motion_of
+
+
+def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.Dataset:
+    """States after times, exact for any time: no integration, so no error that grows with steps.
+
+    Parameters
+    ----------
+    system : system
+        Any system.
+    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+        States at t = 0: angles in rad, angular velocities in s^-1.
+    t : float, 1-D array_like or xarray.DataArray
+        Times in s, of either sign and in any order. A bare array makes the dim ``time``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``motion_phi`` in rad, continuous in time (a rotation runs past pi), and ``motion_dphi``
+        in s^-1.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or bare arrays of states differ in length.
+
+    Notes
+    -----
+    Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import phasekit as pk
+    >>> disk = pk.GyroRotorDisk(beta=18 * pk.deg, e=0.001153, a=0.002, r=0.2, omega1=24 * pk.rpm)
+    >>> pk.flow(disk, [0.1, 0.2, 0.3], 0.0, np.linspace(0.0, 60.0, 601)).motion_phi.dims
+    ('point', 'time')
+    """
+    states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
+    return at_states(system, select("motion"), states)
+
+
+def separatrix_motion(
+    system: Any, t: NumberLike, *, saddle: str | None = None, side: str = "right"
+) -> xr.Dataset:
+    """Motion on the separatrix of a saddle, in elementary functions.
+
+    Parameters
+    ----------
+    system : system
+        Any system.
+    t : float, 1-D array_like or xarray.DataArray
+        Times in s. A bare array makes the dim ``time``.
+    saddle : {"lower", "upper"}, optional
+        The saddle; by default the one of the figure-eight (lower) where there is one, else the
+        only one (upper).
+    side : {"right", "left"}, default "right"
+        The side of the saddle to which the motion leaves it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``motion_phi`` in rad and ``motion_dphi`` in s^-1, NaN where the separatrix is absent.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    Solves [Veljovic2015] (12) at the energy of the saddle. `separatrices` gives the turning
+    points.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ds = pk.separatrix_motion(pk.Coefficients(2.0, 1.0, 0.0), [-40.0, 0.0, 40.0])
+    >>> abs(ds.motion_dphi.values.round(9)).tolist()
+    [0.0, 0.0, 0.0]
+    """
+    number = -1 if saddle is None else one_of("saddle", saddle, SADDLES)
+    function = functools.partial(
+        separatrix_motion_of, saddle=number, side=one_of("side", side, SIDES)
+    )
+    one = Pass(function, ("A", "B", "C", "time"), ("motion",))
+    ds = at_states(system, select("motion"), {"t": ("time", t)}, (one,))
+    return noted(ds, saddle=saddle or DEFAULT_SADDLE, side=side)

@@ -1,0 +1,290 @@
+"""Orbits, labelled: periods, actions and turning points; action and angle, and back to states.
+
+Array parameters of the system span the result's dims. States and levels are scalars, arrays of
+equal shape, which pair on the dim `point`, or DataArrays, which broadcast by the names of their
+dims; they come back as coordinates (state_phi, state_dphi, ...).
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.errors import EquilibriumKind, OrbitFamily, ParameterError
+from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric
+from phasekit.labelled.quantities import LABELS, Pass, select
+from phasekit.labelled.states import at_states, one_of
+from phasekit.phase.action_angle import State
+from phasekit.phase.action_angle import state_of as state_of_codes
+from phasekit.phase.equilibria import equilibria
+from phasekit.phase.orbits import Orbits, orbits_at_energy, orbits_at_gap
+
+CENTERS = ("lower_center", "upper_center")
+SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
+DEFAULT_SADDLE = "lower where there is one, else upper"
+
+#: Families that have orbits of given action.
+FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
+
+
+def orbits(
+    system: Any,
+    phi0: NumberLike | None = None,
+    dphi0: NumberLike | None = None,
+    *,
+    energy: NumberLike | None = None,
+    center: str | None = None,
+    gap: NumberLike | None = None,
+    saddle: str | None = None,
+    side: str = "right",
+) -> xr.Dataset:
+    """Period, action and turning points of orbits: through states, or of given energy.
+
+    Parameters
+    ----------
+    system : system
+        Any system.
+    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+        States on the orbits: angles in rad, angular velocities in s^-1.
+    energy : float, 1-D array_like or xarray.DataArray
+        In place of states: energies in s^-2, as `energy` gives them.
+    center : {"lower_center", "upper_center"}
+        With `energy`: the center round which the orbit goes, by default the lower one. It matters
+        below the energy of the lower saddle, where each center has a well of its own.
+    gap : float, 1-D array_like or xarray.DataArray
+        In place of states: energies above that of a saddle in s^-2, negative below it. Next to a
+        separatrix the gap keeps the digits that the energy has lost.
+    saddle : {"lower", "upper"}
+        With `gap`: the saddle; by default the one of the figure-eight (lower) where there is one,
+        else the only one (upper).
+    side : {"right", "left"}
+        With `gap`: the side of the saddle on which the orbit lies; it matters where the orbit
+        stays on one of them.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``orbit_kind`` (`OrbitKind`), ``orbit_energy`` in s^-2, ``period`` in s (infinite on a
+        separatrix; that of small oscillations at a center), ``frequency`` and ``action`` in
+        s^-1, ``phi_min`` and ``phi_max`` in rad (unwrapped; NaN for a rotation). Cells without an
+        orbit, below the center or at an absent saddle, are not_computed and NaN.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, none or several of state, energy and gap are given, or bare
+        arrays differ in length.
+
+    Notes
+    -----
+    From the energy integral [Veljovic2015] (14), in closed form. The action is the area inside
+    the orbit over 2 pi, of a rotation that under one turn ([LandauLifshitz1976] section 50);
+    ``d(orbit_energy)/d(action) = frequency``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> orbit = pk.orbits(pk.Pendulum(length=0.5, g=10.0), 0.5, 0.0)
+    >>> pk.OrbitKind(orbit.orbit_kind.item()).name, round(orbit.period.item(), 6)
+    ('LIBRATION', 1.427235)
+    >>> near = pk.orbits(pk.Coefficients(2.0, 1.0, 0.0), gap=[-1e-20, -1e-40])
+    >>> near.period.values.round(3).tolist()
+    [49.517, 95.569]
+    """
+    _refuse_mixed(
+        {"phi0": phi0, "dphi0": dphi0, "energy": energy, "gap": gap},
+        center=center,
+        saddle=saddle,
+        side=side,
+    )
+    rows = select("orbits")
+    if energy is not None:
+        center = CENTERS[0] if center is None else center
+        function: Any = functools.partial(
+            orbits_at_energy, center=one_of("center", center, CENTERS)
+        )
+        one = Pass(function, ("A", "B", "C", "state_energy"), ("orbits",))
+        ds = at_states(system, rows, {"energy": ("state_energy", energy)}, (one,))
+        return noted(ds, center=center)
+    if gap is not None:
+        number = None if saddle is None else one_of("saddle", saddle, SADDLES)
+        function = functools.partial(_at_gap, number, one_of("side", side, SIDES))
+        one = Pass(function, ("A", "B", "C", "state_gap"), ("orbits",))
+        ds = at_states(system, rows, {"gap": ("state_gap", gap)}, (one,))
+        return noted(ds, saddle=saddle or DEFAULT_SADDLE, side=side)
+    states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
+    return at_states(system, rows, states)
+
+
+def _refuse_mixed(
+    forms: dict[str, Any], *, center: str | None, saddle: str | None, side: str
+) -> None:
+    """Refuse calls that give no orbit, several, or arguments that belong to another form."""
+    given = [name for name, value in forms.items() if value is not None]
+    if not given:
+        raise ParameterError(
+            "phi0: got nothing, wants a state, as in pk.orbits(system, phi0, dphi0), or in its "
+            "place energy= or gap="
+        )
+    if len(given) > 1 and given[-1] in ("energy", "gap"):
+        raise ParameterError(
+            f"{given[-1]}: got it besides {' and '.join(given[:-1])}, wants one of state (phi0, "
+            "dphi0), energy and gap"
+        )
+    belongs = {"center": (center, "energy"), "saddle": (saddle, "gap")}
+    if one_of("side", side, SIDES) != SIDES.index("right"):
+        belongs["side"] = (side, "gap")
+    for name, (value, form) in belongs.items():
+        if value is not None and form not in given:
+            raise bad(name, value, f"it with {form}= alone", f"leave it out, or give {form}=")
+
+
+def _at_gap(
+    saddle: int | None, side: int, A: FloatArray, B: FloatArray, C: FloatArray, gap: FloatArray
+) -> Orbits:
+    chosen: Any = saddle
+    if saddle is None:
+        lower = equilibria(A, B, C).kind[..., 1] == EquilibriumKind.SADDLE
+        chosen = np.where(lower, 0, 1)
+    return orbits_at_gap(A, B, C, gap, chosen, side)
+
+
+def noted(ds: xr.Dataset, **attrs: str) -> xr.Dataset:
+    """Write down, on each variable, the arguments that are neither parameters nor states."""
+    for variable in ds.data_vars.values():
+        variable.attrs.update(attrs)
+    return ds
+
+
+def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
+    """Action and angle variable of states, and how the frequency changes with the action.
+
+    Parameters
+    ----------
+    system : system
+        Any system.
+    phi, dphi : float, 1-D array_like or xarray.DataArray
+        States: angles in rad, angular velocities in s^-1.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``orbit_family`` (`OrbitFamily`), ``action`` and ``frequency`` in s^-1, ``angle`` in rad,
+        in [0, 2 pi), and ``twist``: d(frequency)/d(action). The angle grows evenly in time, at
+        ``frequency``; it is 0 where a libration is at its greatest phi, or a rotation at the lower
+        center.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or bare arrays differ in length.
+
+    Notes
+    -----
+    The canonical variables of [LandauLifshitz1976] section 50 for [Veljovic2015] (14). `state_of`
+    leads back.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> system = pk.Coefficients(2.0, 1.0, 0.3)
+    >>> state = pk.action_angle(system, 0.5, 0.1)
+    >>> pk.OrbitFamily(state.orbit_family.item()).name
+    'LOWER_WELL'
+    >>> back = pk.state_of(system, state.action, state.angle, state.orbit_family)
+    >>> round(back.phi_of_angle.item(), 12), round(back.dphi_of_angle.item(), 12)
+    (0.5, 0.1)
+    """
+    rows = select(["orbit_family", "action", "angle", "frequency", "twist"])
+    return at_states(system, rows, {"phi": ("state_phi", phi), "dphi": ("state_dphi", dphi)})
+
+
+def state_of(
+    system: Any,
+    action: NumberLike,
+    angle: NumberLike,
+    family: str | NumberLike | Sequence[str],
+) -> xr.Dataset:
+    """States of given action and angle variable.
+
+    Parameters
+    ----------
+    system : system
+        Any system.
+    action : float, 1-D array_like or xarray.DataArray
+        Actions in s^-1.
+    angle : float, 1-D array_like or xarray.DataArray
+        Angle variables in rad.
+    family : str, OrbitFamily, or array_like or xarray.DataArray of either
+        The family of the orbit, by name ("lower_well", "upper_well", "outer", "forward",
+        "backward") or code: actions repeat from family to family.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``phi_of_angle`` in rad and ``dphi_of_angle`` in s^-1; NaN where the family has no orbit
+        of that action.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or bare arrays differ in length.
+
+    Notes
+    -----
+    The inverse of `action_angle`.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> state = pk.state_of(pk.Coefficients(2.0, 1.0, 0.0), 0.1, [0.0, 3.0], "lower_well")
+    >>> state.phi_of_angle.dims
+    ('point',)
+    """
+    states = {
+        "action": ("state_action", action),
+        "angle": ("state_angle", angle),
+        "family": ("state_family", _codes(family)),
+    }
+    return at_states(system, select("state_of"), states)
+
+
+def _codes(family: Any) -> Any:
+    """Return families as codes, whether they came as names or as codes."""
+    wants = f"one of {', '.join(FAMILIES)}"
+    data = (
+        family.values if isinstance(family, xr.DataArray) and family.dtype.kind in "OTU" else family
+    )
+    if isinstance(data, (str, list, tuple, np.ndarray)):
+        array = np.asarray(data, dtype=object)
+        if array.size and all(isinstance(name, str) for name in array.flat):
+            wrong = [name for name in array.flat if name not in FAMILIES]
+            if wrong:
+                raise bad("family", wrong[0], wants)
+            codes = np.array([FAMILIES[name] for name in array.flat]).reshape(array.shape)
+            return family.copy(data=codes) if isinstance(family, xr.DataArray) else codes
+    kept = numeric("family", family)
+    if isinstance(kept, float) and kept not in FAMILIES.values():
+        raise ParameterError(f"family: got {describe(family)}, wants {wants}, or its code")
+    return kept
+
+
+def states_of(
+    A: FloatArray,
+    B: FloatArray,
+    C: FloatArray,
+    action: FloatArray,
+    angle: FloatArray,
+    family: npt.ArrayLike,
+) -> State:
+    """States by action and angle, with codes of families that are kept as floats.
+
+    What is no code gives NaN.
+    """
+    codes = np.where(np.isin(family, list(FAMILIES.values())), family, OrbitFamily.NONE)
+    return state_of_codes(A, B, C, action, angle, codes.astype(np.int8))

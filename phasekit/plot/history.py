@@ -1,0 +1,151 @@
+"""Motions over time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+
+from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import bad, unknown
+from phasekit.plot import labels, strokes, style
+
+TIME = "time"
+SYMBOLS = {"motion_phi": r"$\varphi$", "motion_dphi": r"$\dot\varphi$"}
+# Beyond this number the looks of orbits begin again.
+MOST = len(style.ORBIT_COLORS) * len(style.ORBIT_DASHES)
+
+
+def time_history(
+    dataset: xr.Dataset,
+    variable: str = "motion_phi",
+    *,
+    angles: style.Angles = "rad",
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    r"""Draw one motion or several over time.
+
+    Angles are continuous in time: they are not wrapped when the motion turns over.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        What `flow` or `separatrix_motion` returns for times along the dim ``time``. Along other
+        dims there are several motions, of which each gets a line.
+    variable : str
+        The quantity to draw: motion_phi, motion_dphi, or any other number along ``time``.
+    angles : {"rad", "deg"}
+        Unit in which angles and angular velocities are shown.
+    legend : bool
+        Whether to name the motions under the axes, if there are several.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out. A given figure without layout engine gets the
+        constrained one, unless `legend` is False.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or there are more motions than can be told apart.
+
+    Notes
+    -----
+    The motions are those of [Veljovic2015] eq. (12), in closed form.
+
+    Examples
+    --------
+    Angle over angular velocity, of two motions:
+
+    >>> import matplotlib.pyplot as plt
+    >>> import numpy as np
+    >>> import phasekit as pk
+    >>> system = pk.Coefficients(4.0, 1.0, 0.5)
+    >>> ds = pk.flow(system, [0.6, 1.9], 0.0, np.linspace(0.0, 20.0, 401))
+    >>> figure, (over, under) = plt.subplots(2, sharex=True)
+    >>> ax = pk.plot.time_history(ds, legend=False, ax=over)
+    >>> ax = pk.plot.time_history(ds, "motion_dphi", ax=under)
+    >>> ax.get_ylabel()
+    '$\\dot\\varphi$ (rad/s)'
+    """
+    factor = style.angle_factor(angles)
+    ds = labels.dataset(dataset, "dataset", (), "pk.flow")
+    offered = _drawable(ds)
+    if not offered:
+        raise ParameterError(
+            "dataset: got a Dataset without numbers along the dim 'time', wants motions over "
+            "time, for example pk.flow(system, 0.5, 0.0, np.linspace(0.0, 10.0, 201))"
+        )
+    if variable not in offered:
+        raise unknown("variable", variable, offered)
+    times = ds[TIME]
+    labels.monotone(times, "time")
+    motions = _motions(ds[variable], str(times.dims[0]))
+    axes = style.axes_for(ax, legend=legend and len(motions) > 1)
+
+    stretch = factor if variable in SYMBOLS or ds[variable].attrs.get("units") == "rad" else 1.0
+    handles: list[Artist] = []
+    for number, motion in enumerate(motions):
+        look = strokes.orbit_look(number) if len(motions) > 1 else style.MOTION
+        handles += axes.plot(
+            times.values, motion.values * stretch, label=_name(motion, angles), **look
+        )
+    if ds[variable].attrs.get("units") == "rad":
+        style.unwrapped_axis(axes, "y", angles)
+    axes.set_xlim(*sorted((float(times[0]), float(times[-1]))))
+    axes.set_xlabel("$t$ (s)")
+    axes.set_ylabel(_label(ds[variable], angles, style.letters(axes, "y")))
+    if legend and len(motions) > 1:
+        style.legend_below(axes, handles)
+    return axes
+
+
+def _drawable(ds: xr.Dataset) -> list[str]:
+    """Return the quantities that are numbers along time."""
+    return [
+        str(name)
+        for name, values in ds.data_vars.items()
+        if TIME in values.coords and values[TIME].ndim == 1 and values.dtype.kind == "f"
+    ]
+
+
+def _motions(values: xr.DataArray, along: str) -> list[xr.DataArray]:
+    """Return the motions one by one."""
+    dims = [dim for dim in values.dims if dim != along]
+    count = int(np.prod([values.sizes[dim] for dim in dims], dtype=int))
+    if not 0 < count <= MOST:
+        size = ", ".join(f"{dim}: {values.sizes[dim]}" for dim in dims)
+        raise ParameterError(
+            f"dataset: got {count} motions ({size}), wants from 1 to {MOST}; "
+            f"select some first, for example ds.isel({dims[0]}=slice(None, None, 5))"
+        )
+    # A coordinate that is the same for all motions tells none of them.
+    same = [
+        name
+        for name, coord in values.coords.items()
+        if coord.ndim == 0 or along in coord.dims or (coord.values == coord.values.flat[0]).all()
+    ]
+    values = values.drop_vars(same)
+    cells = np.ndindex(*(values.sizes[dim] for dim in dims))
+    return [values.isel(dict(zip(dims, cell, strict=True))) for cell in cells]
+
+
+def _name(motion: xr.DataArray, angles: style.Angles) -> str:
+    """Return what tells this motion from the others."""
+    return ", ".join(
+        labels.value(coord, angles) for coord in motion.coords.values() if not coord.ndim
+    )
+
+
+def _label(values: xr.DataArray, angles: style.Angles, width: int) -> str:
+    name = str(values.name)
+    if name not in SYMBOLS:
+        return labels.label(values, angles, width)
+    unit = style.angle_unit(angles)
+    return f"{SYMBOLS[name]} ({unit if name == 'motion_phi' else unit + '/s'})"

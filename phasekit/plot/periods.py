@@ -1,0 +1,214 @@
+"""Periods and frequencies of all orbits of one system."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from phasekit.errors import EquilibriumKind
+from phasekit.labelled.arguments import FloatArray, bad
+from phasekit.labelled.families import orbit_families
+from phasekit.labelled.phase_space import equilibria, separatrices
+from phasekit.plot import style
+from phasekit.plot.landscape import scalar_coefficients
+
+# Where a family begins: the row of its center among the equilibria.
+CENTERS = {"lower_well": 0, "upper_well": 2}
+
+
+def period_energy(
+    system: Any,
+    n: int = 200,
+    *,
+    energy_max: float | None = None,
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    r"""Draw the period of all orbits against their energy.
+
+    Each family of orbits has a curve: those in the lower and in the upper well, those round both,
+    and the rotations, whose period is the time of one turn. The curves leave the centers at the
+    period of small oscillations and rise without bound at the energies of the saddles, like a
+    logarithm.
+
+    Parameters
+    ----------
+    system
+        A system whose parameters are scalars.
+    n : int
+        Number of orbits in each family.
+    energy_max : float, optional
+        Greatest energy (s^-2); left out, rotations are followed some way above the saddles.
+    legend : bool
+        Whether to explain lines and markers under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out. A given figure without layout engine gets the
+        constrained one, unless `legend` is False.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    The energy is that of [Veljovic2015] eq. (14). Where there are two wells, their orbits of one
+    energy have the same period, however different the wells are: the curves of both lie on one
+    line.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ax = pk.plot.period_energy(pk.Reduced(lam=0.4, psi=0.1))
+    >>> ax.get_xlabel()
+    'energy $h$ (s$^{-2}$)'
+    """
+    families, points, loops = _families(system, n, energy_max)
+    axes = style.axes_for(ax, legend=legend)
+
+    natural, bottom = points.natural_frequency.values, points.energy.values
+    handles = _draw_families(axes, families, "energy_level", "period", bottom, 2 * np.pi / natural)
+    handles += _draw_walls(axes, points, loops)
+    handles += _draw_centers(axes, bottom, 2.0 * np.pi / natural)
+
+    energies = families.energy_level
+    low = min(float(energies.min()), *bottom[np.isfinite(natural)])
+    high = float(energies.max())
+    axes.set_xlim(low - 0.04 * (high - low), high)
+    # A family too narrow to be seen must not take the height.
+    seen = energies.max("level") - energies.min("level") > 0.02 * (high - low)
+    middle = families.period.median("level").where(seen).values
+    axes.set_ylim(0.0, float(np.nanmax([*(1.8 * middle), *(4.0 * np.pi / natural)])))
+    axes.set_xlabel("energy $h$ (s$^{-2}$)")
+    axes.set_ylabel("period $T$ (s)")
+    if legend:
+        style.legend_below(axes, handles)
+    return axes
+
+
+def frequency_action(
+    system: Any,
+    n: int = 200,
+    *,
+    energy_max: float | None = None,
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    r"""Draw the frequency of all orbits against their action.
+
+    Each family of orbits has a curve. Those of the wells leave the axis of zero action at the
+    natural frequency of the center; on a separatrix the frequency is zero. The action is the area
+    inside an orbit over :math:`2\pi`, of a rotation the area under one turn.
+
+    Parameters
+    ----------
+    system
+        A system whose parameters are scalars.
+    n : int
+        Number of orbits in each family.
+    energy_max : float, optional
+        Greatest energy (s^-2); left out, rotations are followed some way above the saddles.
+    legend : bool
+        Whether to explain lines and markers under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out. A given figure without layout engine gets the
+        constrained one, unless `legend` is False.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    The frequency is the derivative of the energy with respect to the action; the slope of the
+    curve is the twist.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ax = pk.plot.frequency_action(pk.Pendulum(length=1.0))
+    >>> ax.get_ylabel()
+    'frequency $\\omega$ (rad/s)'
+    """
+    families, points, _ = _families(system, n, energy_max)
+    natural = points.natural_frequency.values
+    axes = style.axes_for(ax, legend=legend)
+
+    rest = np.zeros(natural.shape)
+    handles = _draw_families(axes, families, "action", "frequency", rest, natural)
+    handles += _draw_centers(axes, rest, natural)
+    axes.set_xlim(0.0, 1.03 * float(families.action.max()))
+    axes.set_ylim(0.0, 1.05 * float(np.nanmax([float(families.frequency.max()), *natural])))
+    axes.set_xlabel("action $J$ (rad$^2$/s)")
+    axes.set_ylabel(r"frequency $\omega$ (rad/s)")
+    if legend:
+        style.legend_below(axes, handles)
+    return axes
+
+
+def _families(
+    system: Any, n: int, energy_max: float | None
+) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
+    """Return the families of orbits of one system, its equilibria and its separatrices."""
+    if not any(scalar_coefficients(system)):
+        raise bad("system", system, "a system with a force, for without one nothing oscillates")
+    families = orbit_families(system, n, energy_max=energy_max)
+    return families, equilibria(system), separatrices(system)
+
+
+def _draw_families(
+    ax: Axes, families: xr.Dataset, x: str, y: str, start: FloatArray, small: FloatArray
+) -> list[Artist]:
+    """Draw the curves of the families that there are, from the centers (start, small) on."""
+    handles: list[Artist] = []
+    for family, look in style.FAMILIES.items():
+        one = families.sel(family=family)
+        across, up = one[x].values, one[y].values
+        there = np.isfinite(up)
+        if not there.any():
+            continue
+        across, up = across[there], up[there]
+        first = CENTERS.get(family)
+        if y == "frequency":
+            # Next to a separatrix the frequency falls to zero at one action, as far as can be seen.
+            ends = across[:1] if first is None else across[:0]
+            across = np.concatenate([ends, across, across[-1:] if family != "rotation" else []])
+            up = np.concatenate([0.0 * ends, up, [0.0] if family != "rotation" else []])
+        if first is not None:
+            across, up = np.append(start[first], across), np.append(small[first], up)
+        handles += ax.plot(across, up, zorder=2, **look)
+    return handles
+
+
+def _draw_walls(ax: Axes, points: xr.Dataset, loops: xr.Dataset) -> list[Artist]:
+    """Draw the energies at which periods are infinite."""
+    handles: list[Artist] = []
+    walls = {label: float(loops.saddle_energy.sel(saddle=label)) for label in ("lower", "upper")}
+    merged = points.kind.values == int(EquilibriumKind.DEGENERATE)
+    walls |= {"degenerate": float(energy) for energy in points.energy.values[merged]}
+    for name, energy in walls.items():
+        if np.isfinite(energy):
+            handles.append(ax.axvline(energy, zorder=1, **style.WALLS[name]))
+    return handles
+
+
+def _draw_centers(ax: Axes, x: FloatArray, y: FloatArray) -> list[Artist]:
+    """Mark the small oscillations; they may lie on the edge, which must not cut the markers."""
+    there = np.isfinite(y)
+    look = {**style.POINTS[EquilibriumKind.CENTER], "label": "small oscillations"}
+    ax.plot(x[there], y[there], linestyle="none", zorder=5, clip_on=False, **look)
+    return [Line2D([], [], linestyle="none", **look)] if there.any() else []
