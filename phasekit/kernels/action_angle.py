@@ -169,14 +169,15 @@ def find_action(code: int, action: float, w: Array) -> None:
     center = UPPER_CENTER if code == UPPER_WELL else LOWER_CENTER
     base = center
     upper = 0.5 * action * action
-    unit2 = w[UNIT] * w[UNIT]
     if code == OUTER:
         base = LOWER_SADDLE
-        upper = energy_between(LOWER_SADDLE, UPPER_SADDLE, w) / unit2
+        upper = energy_between(LOWER_SADDLE, UPPER_SADDLE, w) / w[UNIT] / w[UNIT]
     elif code == FORWARD or code == BACKWARD:
         base = UPPER_SADDLE
     else:
-        upper = energy_between(center, UPPER_SADDLE if single else LOWER_SADDLE, w) / unit2
+        upper = (
+            energy_between(center, UPPER_SADDLE if single else LOWER_SADDLE, w) / w[UNIT] / w[UNIT]
+        )
     lower = 0.0
     gap = 0.5 * upper
     last = False

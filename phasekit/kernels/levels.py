@@ -57,9 +57,12 @@ LARGEST = 1.7976931348623157e308
 @inline
 def load(a: float, b: float, c: float, w: Array) -> bool:
     """Scale a system by a power of four; whether it is valid and has a force."""
-    size = max(abs(a), abs(b), abs(c))
+    size = abs(a) + abs(b) + abs(c)  # NaN if any is
+    if size > LARGEST:
+        size = max(abs(a), abs(b), abs(c))
     if not (size > 0.0 and abs(a) <= LARGEST and abs(b) <= LARGEST and abs(c) <= LARGEST):
         w[UNIT] = 1.0
+        w[A] = size  # 0 without force
         return False
     exponent = (np.float64(size).view(np.int64) >> 52) & 0x7FF
     half = (exponent - 1023) >> 1
@@ -176,7 +179,7 @@ def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
 def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     """Kind of the orbit through a state, its reference, energy gap and place."""
     w[MODE] = INVALID
-    if not (abs(phi) <= LARGEST and abs(dphi) <= LARGEST):
+    if not (abs(phi) <= LARGEST and abs(dphi) <= LARGEST and (valid or w[A] == 0.0)):
         return NOT_COMPUTED
     w[START] = phi
     w[ANGLE], _, w[TURNS] = reduce_angle(phi, 0.0)
@@ -253,8 +256,8 @@ def classify_level(j: int, gap: float, center: int, slack: float, valid: bool, w
     w[MODE] = INVALID
     if not (valid and abs(gap) <= LARGEST):
         return NOT_COMPUTED
-    gap *= w[UNIT] * w[UNIT]
-    slack *= w[UNIT] * w[UNIT]
+    gap = gap * w[UNIT] * w[UNIT]
+    slack = slack * w[UNIT] * w[UNIT]
     own = gap if j == center else gap + energy_between(center, j, w)
     if not own >= -slack:
         return NOT_COMPUTED

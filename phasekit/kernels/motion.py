@@ -165,7 +165,7 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     tilt = w[TAU] * math.sin(offset)
     rest = 0.5 * ((1.0 + r) + (1.0 - r) * math.cos(offset) + tilt)
     cosine = 2.0 * y - skew * low
-    if abs(rest) > 0.02 * (1.0 + abs(r)) and min(high, low) < 0.05 * max(high, low):
+    if min(high, low) * (1.0 + abs(r)) < abs(rest) * (w[U] * x + abs(y)):
         common = (1.0 + w[U] * w[U]) * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
         if high < low:
             high = common / low

@@ -71,7 +71,7 @@ TAU, REST_R, SPAN, LEVELS = range(ORBIT + 19, ORBIT + 23)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 23, ORBIT + 27)
 MEANS = ORBIT + 27
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
-FEWEST, MOST, CHUNK = 16, 8192, 32
+FEWEST, MOST, CHUNK = 16, 1024, 32
 SINE = MEANS + 2 * STEPS
 COSINE = SINE + CHUNK
 DELTA = COSINE + CHUNK
@@ -90,6 +90,14 @@ def _nodes() -> Array:
 
 SINES = np.sin(_nodes())
 COSINES = np.cos(_nodes())
+
+# Double exponential quadrature over a length of 1: distances of the nodes from the ends, their
+# weights, and the weight of the middle.
+STEP = 1.0 / 64.0
+STEPS_OUT = STEP * np.arange(1, 212)
+ENDS = 1.0 / (1.0 + np.exp(np.pi * np.sinh(STEPS_OUT)))
+WEIGHTS = STEP * np.pi * np.cosh(STEPS_OUT) * ENDS * (1.0 - ENDS)
+WEIGHT_MIDDLE = 0.25 * STEP * np.pi
 
 
 @routine
@@ -220,7 +228,7 @@ def swing(w: Array) -> None:
     total = -c2 - 3.0 * x
     product = 2.0 * e * m * n / x if x != 0.0 else g
     others = -c2 - x
-    if abs(x) > 0.1 * abs(slope) and x != 0.0:
+    if abs(others) < 0.1 * abs(x):
         others = (c1 - product) / x
     g = max(g, 0.0)
     root = np.sqrt(g)
@@ -457,10 +465,12 @@ def square_speeds(first: int, count: int, w: Array) -> tuple[float, float, float
 
 
 @routine
-def mean_square(w: Array) -> float:
-    """Mean of phi'^2 over time: the trapezoidal rule, which converges exponentially.
+def action(w: Array) -> float:
+    """Action: the mean of phi'^2 over time, divided by the frequency.
 
-    A libration passes each speed twice and is at rest at the ends, so half of the nodes do.
+    The trapezoidal rule over the phase converges exponentially. A libration passes each speed
+    twice and is at rest at the ends, so half of the nodes do. Where the motion lingers for very
+    long, next to saddles that are nearly degenerate, the area is integrated in phi instead.
     """
     both = 2 if w[MODE] == SWING else 1
     total, even, fourth = square_speeds(0, FEWEST // both, w)
@@ -468,13 +478,15 @@ def mean_square(w: Array) -> float:
     last = 2.0 * even
     change = abs(last - 4.0 * fourth)
     nodes = FEWEST
-    while nodes < MOST:
+    while True:
         # Errors c r^n: twice the nodes square r^n, which is the ratio of two changes.
         before = change
         change = abs(mean - last)
         ratio = change / before if change < before else 1.0
-        if change <= 1e-11 * mean or change * ratio * ratio <= 1e-18 * mean:
-            break
+        if change <= 1e-11 * mean or change * ratio <= 1e-17 * mean:
+            return mean * both / FEWEST / w[MEANS + int(w[LEVELS])]
+        if nodes >= MOST:
+            return area(w) / TWO_PI
         last = mean
         count = nodes // both
         for first in range(0, count, CHUNK):
@@ -482,7 +494,52 @@ def mean_square(w: Array) -> float:
             total += part
         nodes *= 2
         mean = total * (FEWEST / nodes)
-    return mean * both / FEWEST
+
+
+@inline
+def area(w: Array) -> float:
+    """Area under one round of the orbit, by double exponential quadrature between equilibria."""
+    phi_s = w[PHI_S]
+    if w[MODE] == SWING:
+        first = w[LOW] - phi_s
+        last = w[HIGH] - phi_s
+    else:
+        first = 0.0
+        last = TWO_PI
+    total = 0.0
+    start = first
+    while start < last:
+        # The next equilibrium on the way, the reference exactly at a multiple of 2 pi.
+        stop = last
+        for j in range(4):
+            other = w[PHI + j] - phi_s
+            for turn_ in range(-2, 3):
+                place = other + turn_ * TWO_PI if other != 0.0 else turn_ * TWO_PI
+                if start < place < stop:
+                    stop = place
+        shift = TWO_PI * np.rint(start / TWO_PI if start % TWO_PI == 0.0 else stop / TWO_PI)
+        total += integrate(start - shift, stop - shift, w)
+        start = stop
+    return 2.0 * total if w[MODE] == SWING else total
+
+
+@inline
+def integrate(start: float, stop: float, w: Array) -> float:
+    """Integral of |phi'| between two angles from the reference, either of which may be it."""
+    length = stop - start
+    total = 0.0
+    for i in range(ENDS.size):
+        reach = length * ENDS[i]
+        total += WEIGHTS[i] * (speed(start + reach, w) + speed(stop - reach, w))
+    return length * (total + WEIGHT_MIDDLE * speed(0.5 * (start + stop), w))
+
+
+@inline
+def speed(o: float, w: Array) -> float:
+    """|phi'| at an angle from the reference, without cancellation next to it."""
+    sine = math.sin(0.5 * o)
+    bend = w[SLOPE] + w[A] * math.sin(0.5 * o + 2.0 * w[PHI_S]) * sine
+    return np.sqrt(2.0 * max(w[GAP] - 2.0 * sine * sine * bend, 0.0))
 
 
 @inline
@@ -536,38 +593,38 @@ def finish(w: Array) -> None:
     mode = w[MODE]
     j = int(w[REFERENCE])
     omega = math.nan
-    action = math.nan
+    area_ = math.nan
     low = math.nan
     high = math.nan
     sigma = w[ANGLE]
     if mode == SWING or mode == TURN:
         omega = w[MEANS + int(w[LEVELS])]
-        action = mean_square(w) / omega
+        area_ = action(w)
         if mode == SWING:
             low = w[LOW]
             high = w[HIGH]
             sigma = w[SIGMA]
     elif mode == HARMONIC:
         omega = np.sqrt(w[CURVATURE + j])
-        action = w[GAP] / omega
+        area_ = w[GAP] / omega
         width = np.sqrt(2.0 * w[GAP]) / omega
         sigma = w[PHI + j]
         low = sigma - width
         high = sigma + width
     elif mode == FREE:
         omega = abs(w[RATE])
-        action = omega
+        area_ = omega
     elif mode == ASYMPTOTE:
         omega = 0.0
         low, high = reach(w)
         sigma = 0.5 * (low + high)
     elif mode == REST:
         omega = rest(w)
-        action = 0.0
+        area_ = 0.0
         low = w[ANGLE]
         high = w[ANGLE]
     turns = w[TURNS] + np.rint((w[ANGLE] - sigma) / TWO_PI)
     w[OMEGA] = omega / unit
-    w[ACTION] = action / unit
+    w[ACTION] = area_ / unit
     w[PHI_MIN] = low + turns * TWO_PI
     w[PHI_MAX] = high + turns * TWO_PI
