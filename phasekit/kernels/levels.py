@@ -51,6 +51,8 @@ HARMONIC_TO = 1e-30
 # Energy gaps below this are computed in double-double arithmetic.
 DOUBLE_TO = 1e-3
 ROUNDING = 2.0**-53
+# What double-double arithmetic leaves of a gap that is none.
+NOISE = 2e-31
 LARGEST = 1.7976931348623157e308
 
 
@@ -196,7 +198,7 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
         w[MODE] = REST
         return EQUILIBRIUM
     # What the rounding of the state changes in its energy.
-    slack = 8.0 * ROUNDING * (v * v + abs(force) * max(1.0, abs(phi)))
+    slack = 8.0 * ROUNDING * (v * v + abs(force) * max(1.0, abs(phi))) + NOISE
     above = energy_above(UPPER_SADDLE, w)
     if abs(above) <= slack:
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)

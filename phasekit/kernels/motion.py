@@ -164,7 +164,7 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     r = w[REST_R]
     tilt = w[TAU] * math.sin(offset)
     rest = 0.5 * ((1.0 + r) + (1.0 - r) * math.cos(offset) + tilt)
-    cosine = 2.0 * y - skew * low
+    cosine = 2.0 * y - skew * low if skew < 0.5 else w[RATIO] * low - high
     if min(high, low) * (1.0 + abs(r)) < abs(rest) * (w[U] * x + abs(y)):
         common = (1.0 + w[U] * w[U]) * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
         if high < low:

@@ -132,8 +132,15 @@ def turn(w: Array) -> None:
     p2 = k2 - 2.0 * e
     p1 = -2.0 * e * (m + n)
     p0 = -2.0 * e * m * n
+    c2 = w[COS] * w[COS] if w[A] >= 0.0 else w[SIN] * w[SIN]
+    s2 = w[SIN] * w[SIN] if w[A] >= 0.0 else w[COS] * w[COS]
+    # 2 E = z^2 (c2/(m + z) + s2/(n + z)), so z is below what either term gives alone.
     z = e + np.sqrt(e * (e + 2.0 * max(m, n)))
-    for _ in range(60):
+    if c2 > 0.0:
+        z = min(z, (e + np.sqrt(e * (e + 2.0 * m * c2))) / c2)
+    if s2 > 0.0:
+        z = min(z, (e + np.sqrt(e * (e + 2.0 * n * s2))) / s2)
+    for _ in range(100):
         step = (((z + p2) * z + p1) * z + p0) / ((3.0 * z + 2.0 * p2) * z + p1)
         z -= step
         if not step > 1e-15 * z:
@@ -144,8 +151,6 @@ def turn(w: Array) -> None:
     low = m + z  # -mu_0
     high = n + z  # A - mu_0
     product = size * b2 / low
-    c2 = w[COS] * w[COS] if w[A] >= 0.0 else w[SIN] * w[SIN]
-    s2 = w[SIN] * w[SIN] if w[A] >= 0.0 else w[COS] * w[COS]
     if z < n:  # from the reference, where b2 = m^2 c2 and g2 = n^2 s2
         excess = (m - c2 * size) - z * (c2 * m / low + s2 * n / high)
     else:
@@ -252,10 +257,14 @@ def swing(w: Array) -> None:
     if abs(rest) < 0.1 * (abs(n) + abs(x)):
         norm = product - n * others + n * n
         rest = size * g2 / norm if norm > 0.0 else 0.0
-    # tau R = -2 S2 and R^2 = x^2 + 2 E (x + P): the one from the other, where nothing cancels.
+    # tau R = -2 S2, R^2 = x^2 + 2 E (x + P), tau^2 = 2 (x + V'')/E = 4 mu_0 (A - mu_0)/x^2: each
+    # where nothing cancels.
     twice = 2.0 * e * (x + w[P])
     square = x * x + twice
-    if square > 0.25 * (x * x + abs(twice)):
+    if abs(x + slope) > 0.25 * (abs(x) + abs(slope)):
+        tau = np.sqrt(max(2.0 * (x + slope) / e, 0.0))
+        r = 2.0 * abs(w[S2]) / tau if tau > 0.0 else np.sqrt(max(square, 0.0))
+    elif square > 0.25 * (x * x + abs(twice)):
         r = np.sqrt(square)
         tau = 2.0 * abs(w[S2]) / r
     else:
@@ -324,7 +333,9 @@ def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
     if place == LEFT or place == RIGHT:
         upper = min(upper, distance(LOWER_SADDLE, w))
         if w[GAP] < 0.0:
-            guess = -np.sqrt(-c0 / c2) if c0 * c2 < 0.0 else guess
+            root = np.sqrt(max(c1 * c1 - 4.0 * c2 * c0, 0.0))
+            small = -2.0 * c0 / (c1 + root) if c1 > 0.0 else 0.5 * (root - c1) / c2
+            guess = small if small <= 0.0 else guess
     elif place == AROUND and w[PHI + UPPER_CENTER] == w[PHI + UPPER_CENTER]:
         lower = max(lower, distance(UPPER_CENTER, w))
     x = min(max(guess, lower), upper)
@@ -380,7 +391,7 @@ def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
         small = 0.25 * sn * sn / big
         near = big if cn > 0.0 else small
         far = small if cn > 0.0 else big
-        top = cn + skew * far
+        top = cn + skew * far if skew < 0.5 else near - ratio * far
         bottom = near + ratio * far
         rate = -2.0 * sn
     else:  # cosine and sine of psi/2, whose sum and difference have the product cn
@@ -436,7 +447,7 @@ def square_speeds(first: int, count: int, w: Array) -> tuple[float, float, float
             small = 0.25 * sn * sn / big
             near = big if cn > 0.0 else small
             far = small if cn > 0.0 else big
-            top = u * (cn + skew * far)
+            top = u * (cn + skew * far if skew < 0.5 else near - ratio * far)
             bottom = near + ratio * far
             rate = scale * sn * w[DELTA + i] / (bottom * bottom + top * top)
             w[DELTA + i] = rate * rate
