@@ -39,7 +39,9 @@ numpydoc_xref_param_type = False
 # The pictures of the studies are made here, so that none can be out of date.
 _here = Path(__file__).parent
 (_here / "auto_studies").mkdir(exist_ok=True)
-for _study in sorted(_here.parent.glob("studies/*_figure_*.py")):
+for _study in sorted(_here.parent.glob("studies/*.py")):
+    if "__main__" not in _study.read_text(encoding="utf-8"):
+        continue  # what the studies have in common
     _picture = _here / "auto_studies" / f"{_study.stem}.png"
     _command = [sys.executable, str(_study), str(_picture)]
     subprocess.run(_command, check=True, stdout=subprocess.DEVNULL)

@@ -8,11 +8,8 @@ below picks one member of it; a = 2 mm is the paper's.
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
-import matplotlib.pyplot as plt
 import numpy as np
+import picture
 from matplotlib.figure import Figure
 
 import phasekit as pk
@@ -33,7 +30,4 @@ def threshold(disk: pk.GyroRotorDisk, phi: float) -> float:
 def save(figure: Figure, given: str) -> None:
     """Write what is assumed under the picture, and save it: by default in the working folder."""
     figure.supxlabel(f"{ASSUMED}.\nFrom the paper: a = 2 mm; {given}.", fontsize="small")
-    path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(Path(sys.argv[0]).stem + ".png")
-    figure.savefig(path, dpi=150)
-    plt.close(figure)
-    print(f"wrote {path}")
+    picture.save(figure)

@@ -103,6 +103,8 @@ def angle(w: Array) -> float:
     elif mode == FREE:
         origin = w[PHI + LOWER_CENTER]
         theta = w[DIRECTION] * (w[ANGLE] - (origin if origin == origin else 0.0))
+    if theta != theta:
+        return theta
     theta, _, _ = reduce_angle(theta, 0.0)
     theta = theta + TWO_PI if theta < 0.0 else theta
     return theta if theta < TWO_PI else 0.0
@@ -119,7 +121,11 @@ def twist(w: Array) -> float:
     j = int(w[REFERENCE])
     if mode == HARMONIC:
         # omega = omega_0 (1 + amplitude^2 (V''''/(16 V'') - 5 V'''^2/(48 V''^2)))
-        x, y, m, n = multiplier(j, w)
+        row = multiplier(j, w)
+        x = w[row]
+        y = w[row + 1]
+        m = w[row + 2]
+        n = w[row + 3]
         slope = w[CURVATURE + j]
         third = 3.0 * w[A] * x * y
         fourth = 4.0 * w[A] * (x - y) * (x + y) - (

@@ -37,19 +37,19 @@ INVALID, REST, FREE, HARMONIC, ASYMPTOTE, SWING, TURN = range(7)
 LEFT, RIGHT, AROUND, SINGLE = range(4)
 
 # One orbit is a flat work array. First the system: coefficients in a unit of time that brings
-# the largest into [1, 4), that unit, angles and V'' of the equilibria. Then the state, how it
-# moves, its reference, the energy above it, and where it lies.
-A, B, C, UNIT, PHI, CURVATURE = 0, 1, 2, 3, 4, 8
-START, TURNS, ANGLE, RATE, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(12, 21)
+# the largest into [1, 4), that unit; angles, energies, V'' and multipliers of the equilibria. Then
+# the state and its energy, how it moves, its reference, the energy above it, and where it lies.
+A, B, C, UNIT, PHI, VALUE, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12, 16
+START, TURNS, ANGLE, RATE, ENERGY, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(32, 42)
 # Then the rows of `phasekit.kernels.orbits`.
-ORBIT = 21
+ORBIT = 42
 
 # Beyond this speed (against the root of the largest coefficient) V changes no digit.
 FREE_FROM = 1e9
 # Energies below this (against V'' and V''^3) move harmonically to all digits.
 HARMONIC_TO = 1e-30
-# Energy gaps below this are computed in double-double arithmetic.
-DOUBLE_TO = 1e-3
+# Energies above an equilibrium below this are computed in double-double arithmetic.
+DOUBLE_TO = 2e-3
 ROUNDING = 2.0**-53
 # What double-double arithmetic leaves of a gap that is none.
 NOISE = 2e-31
@@ -77,28 +77,25 @@ def load(a: float, b: float, c: float, w: Array) -> bool:
 
 
 @inline
-def load_point(j: int, phi: float, curvature: float, w: Array) -> None:
+def load_point(j: int, phi: float, energy: float, curvature: float, w: Array) -> None:
     """Take over equilibrium j of the system."""
     w[PHI + j] = phi
+    w[VALUE + j] = energy * w[UNIT] * w[UNIT]
     w[CURVATURE + j] = curvature * w[UNIT] * w[UNIT]
+    w[MULTIPLIER + 4 * j] = math.nan
 
 
 @routine
 def energy_above(j: int, w: Array) -> float:
-    """Energy of the state above equilibrium j, with all digits."""
-    v = w[RATE]
-    phi = w[ANGLE]
-    phi_s = w[PHI + j]
-    sine = math.sin(0.5 * (phi - phi_s))
-    a = w[A]
-    # cos(phi + phi_s) - cos(2 phi_s) as a product
-    bend = w[CURVATURE + j] + a * math.sin(0.5 * (phi + 3.0 * phi_s)) * sine
-    gap = 0.5 * v * v + 2.0 * sine * sine * bend
+    """Energy of the state above equilibrium j; where it is small, with all digits."""
+    gap = w[ENERGY] - w[VALUE + j]
     if not abs(gap) < DOUBLE_TO:
         return gap
+    a = w[A]
+    v = w[RATE]
     ch, cl, sh, sl = dd_cos_sin(w[START])
     vh, vl = potential_dd(a, w[B], w[C], ch, cl, sh, sl)
-    ch, cl, sh, sl = dd_cos_sin(phi_s)
+    ch, cl, sh, sl = dd_cos_sin(w[PHI + j])
     uh, ul = potential_dd(a, w[B], w[C], ch, cl, sh, sl)
     h, low = dd_add(vh, vl, -uh, -ul)
     kh, kl = two_product(v, v)
@@ -119,11 +116,15 @@ def potential_dd(
 
 
 @routine
-def multiplier(j: int, w: Array) -> tuple[float, float, float, float]:
-    """Cosine, sine, mu = B/cos and A - mu = -C/sin of equilibrium j, each with its digits.
+def multiplier(j: int, w: Array) -> int:
+    """Row of cosine, sine, mu = B/cos and A - mu = -C/sin of equilibrium j, each with its digits.
 
     mu and A - mu are those of the equivalent system with A >= 0: both >= 0 at inner equilibria.
+    They are worked out when they are first needed.
     """
+    row = MULTIPLIER + 4 * j
+    if w[row] == w[row]:
+        return row
     a = w[A]
     b = w[B]
     c = w[C]
@@ -142,16 +143,18 @@ def multiplier(j: int, w: Array) -> tuple[float, float, float, float]:
         y = c / rest
     if abs(x) < 1e-3 and abs(mu) > 1e-3 * size:
         x = b / mu
-    if a >= 0.0:
-        return x, y, mu, -rest
-    return x, y, rest, -mu
+    w[row] = x
+    w[row + 1] = y
+    w[row + 2] = mu if a >= 0.0 else rest
+    w[row + 3] = -rest if a >= 0.0 else -mu
+    return row
 
 
 @inline
 def energy_between(j: int, i: int, w: Array) -> float:
     """V(phi_i) - V(phi_j) = (mu_j - mu_i) sin((phi_i - phi_j)/2)^2, exactly 0 for equal saddles."""
-    _, _, mu_j, _ = multiplier(j, w)
-    _, _, mu_i, _ = multiplier(i, w)
+    mu_j = w[multiplier(j, w) + 2]
+    mu_i = w[multiplier(i, w) + 2]
     sine = math.sin(0.5 * (w[PHI + i] - w[PHI + j]))
     return (mu_j - mu_i) * sine * sine
 
@@ -181,6 +184,7 @@ def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
 def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     """Kind of the orbit through a state, its reference, energy gap and place."""
     w[MODE] = INVALID
+    w[ENERGY] = math.nan
     if not (abs(phi) <= LARGEST and abs(dphi) <= LARGEST and (valid or w[A] == 0.0)):
         return NOT_COMPUTED
     w[START] = phi
@@ -188,11 +192,13 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     w[RATE] = dphi * w[UNIT]
     w[DIRECTION] = -1.0 if dphi < 0.0 else 1.0
     v = w[RATE]
+    c = np.float64(math.cos(phi))
+    s = np.float64(math.sin(phi))
+    w[ENERGY] = 0.5 * v * v
     if not valid or not abs(v) < FREE_FROM:
         w[MODE] = FREE if dphi != 0.0 else REST
         return ROTATION if dphi != 0.0 else EQUILIBRIUM
-    c = np.float64(math.cos(phi))
-    s = np.float64(math.sin(phi))
+    w[ENERGY] += (0.5 * w[A] * c - w[B]) * c - w[C] * s
     force = (w[B] - w[A] * c) * s - w[C] * c
     if v == 0.0 and force == 0.0:
         w[MODE] = REST

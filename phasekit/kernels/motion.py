@@ -26,6 +26,7 @@ from phasekit.kernels.double_double import (
     two_product,
     two_sum,
 )
+from phasekit.kernels.elementary import PI
 from phasekit.kernels.gauss import phase
 from phasekit.kernels.levels import (
     ANGLE,
@@ -74,10 +75,10 @@ from phasekit.kernels.orbits import (
     refer,
 )
 
-# Rows after those of an orbit: phase at the start, frequency (high and low part), whole turns from
-# the local angle to the state's; coefficients of exp(kt) and exp(-kt) in z.
-PHASE, OMEGA_HIGH, OMEGA_LOW, BASE, RISE, FALL = range(SIZE, SIZE + 6)
-MOTION_SIZE = SIZE + 6
+# Rows after those of an orbit: phase at the start and frequency (high and low parts), whole turns
+# from the local angle to the state's; coefficients of exp(kt) and exp(-kt) in z.
+PHASE, PHASE_LOW, OMEGA_HIGH, OMEGA_LOW, BASE, RISE, FALL = range(SIZE, SIZE + 7)
+MOTION_SIZE = SIZE + 7
 
 # Gaps to a saddle below this are known better than the difference of energies from which the
 # double-double frequency starts.
@@ -185,6 +186,8 @@ def begin(w: Array) -> None:
     mode = w[MODE]
     if mode == SWING or mode == TURN:
         w[PHASE] = phase_at(w[ANGLE], w[RATE], w)
+        # The lower turning point is at the phase pi, not at the double next to it.
+        w[PHASE_LOW] = 0.5 * TWO_PI_LOW * np.sign(w[PHASE]) if abs(w[PHASE]) == PI else 0.0
         local, _ = locate(math.sin(w[PHASE]), math.cos(w[PHASE]), w)
         w[BASE] = w[TURNS] + np.rint((w[ANGLE] - (w[SIGMA] + local)) / TWO_PI)
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
@@ -263,7 +266,7 @@ def after(t: float, w: Array) -> tuple[float, float]:
     if abs(high) < LONGEST:
         high, low = two_product(w[OMEGA_HIGH], sense * time)
         low += w[OMEGA_LOW] * (sense * time)
-        high, low = dd_add(high, low, w[PHASE], 0.0)
+        high, low = dd_add(high, low, w[PHASE], w[PHASE_LOW])
     angle, rest, turns = reduce_angle(high, low)
     sine = np.float64(math.sin(angle))
     cosine = np.float64(math.cos(angle))

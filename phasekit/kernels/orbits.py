@@ -31,6 +31,7 @@ import numpy as np
 
 from phasekit.kernels.compile import Array, inline, routine
 from phasekit.kernels.double_double import TWO_PI
+from phasekit.kernels.elementary import angle_half
 from phasekit.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.gauss import STEPS, amplitude, halve
 from phasekit.kernels.levels import (
@@ -71,7 +72,7 @@ TAU, REST_R, SPAN, LEVELS = range(ORBIT + 19, ORBIT + 23)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 23, ORBIT + 27)
 MEANS = ORBIT + 27
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
-FEWEST, MOST, CHUNK = 16, 1024, 32
+FEWEST, MOST, CHUNK = 32, 1024, 32
 SINE = MEANS + 2 * STEPS
 COSINE = SINE + CHUNK
 DELTA = COSINE + CHUNK
@@ -104,7 +105,11 @@ WEIGHT_MIDDLE = 0.25 * STEP * np.pi
 def refer(w: Array) -> None:
     """What the formulas need of the reference."""
     j = int(w[REFERENCE])
-    x, y, w[M], w[N] = multiplier(j, w)
+    row = multiplier(j, w)
+    x = w[row]
+    y = w[row + 1]
+    w[M] = w[row + 2]
+    w[N] = w[row + 3]
     w[PHI_S] = w[PHI + j]
     w[COS] = x
     w[SIN] = y
@@ -194,8 +199,8 @@ def turn(w: Array) -> None:
         if (first * first) * weight - 2.0 - weight - 2.0 * first * skew < 0.0:
             slow = second
             fast = first
-    o_slow = 2.0 * math.atan2(1.0, slow)
-    o_fast = 2.0 * math.atan2(1.0, fast)
+    o_slow = 2.0 * angle_half(1.0, slow)
+    o_fast = 2.0 * angle_half(1.0, fast)
     if o_fast < o_slow:
         o_fast += TWO_PI
     w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
@@ -291,8 +296,8 @@ def swing(w: Array) -> None:
     small = own / big if big != 0.0 else 0.0
     z_big = max(big, small)
     z_small = min(big, small)
-    o_first = 2.0 * math.atan2(1.0, z_big)
-    o_second = 2.0 * math.atan2(1.0, z_small)
+    o_first = 2.0 * angle_half(1.0, z_big)
+    o_second = 2.0 * angle_half(1.0, z_small)
     if e > 0.0:  # the orbit encloses the reference
         o_high = o_first
         o_low = o_second - TWO_PI
@@ -362,8 +367,7 @@ def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
 @inline
 def distance(i: int, w: Array) -> float:
     """mu_i - mu, from the reference to equilibrium i."""
-    _, _, mu, _ = multiplier(i, w)
-    return mu - w[M]
+    return w[multiplier(i, w) + 2] - w[M]
 
 
 @routine

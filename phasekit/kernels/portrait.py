@@ -23,12 +23,12 @@ Index = npt.NDArray[np.int64]
 
 @inline
 def load_system(
-    i: int, a: Array, b: Array, c: Array, phi: Array, curvature: Array, w: Array
+    i: int, a: Array, b: Array, c: Array, phi: Array, energy: Array, curvature: Array, w: Array
 ) -> bool:
     """System i with its equilibria; whether it has a force."""
     valid = lv.load(a[i], b[i], c[i], w)
     for j in range(4):
-        lv.load_point(j, phi[i, j], curvature[i, j], w)
+        lv.load_point(j, phi[i, j], energy[i, j], curvature[i, j], w)
     return valid
 
 
@@ -45,22 +45,13 @@ def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> Non
     phi_max[k] = w[ob.PHI_MAX]
 
 
-@inline
-def energy_of(i: int, k: int, a: Array, b: Array, c: Array, phi: Array, dphi: Array) -> float:
-    """Energy of state k in system i."""
-    if not abs(phi[k]) < math.inf:
-        return math.nan
-    x = np.float64(math.cos(phi[k]))
-    y = np.float64(math.sin(phi[k]))
-    return 0.5 * dphi[k] * dphi[k] + (0.5 * a[i] * x - b[i]) * x - c[i] * y
-
-
 @kernel
 def orbits(
     a: Array,
     b: Array,
     c: Array,
     phi: Array,
+    energy: Array,
     curvature: Array,
     index: Index,
     phi0: Array,
@@ -76,12 +67,12 @@ def orbits(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, a, b, c, phi, energy, curvature, w)
             last = i
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, energy_of(i, k, a, b, c, phi0, dphi0), w, out)
+        write_orbit(k, code, w[lv.ENERGY] / w[lv.UNIT] / w[lv.UNIT], w, out)
 
 
 @kernel
@@ -90,8 +81,8 @@ def levels(
     b: Array,
     c: Array,
     phi: Array,
-    curvature: Array,
     energy: Array,
+    curvature: Array,
     index: Index,
     level: Array,
     point: Array,
@@ -108,7 +99,7 @@ def levels(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, a, b, c, phi, energy, curvature, w)
             last = i
         if gaps:
             j = eq.LOWER_SADDLE if point[k] == 0.0 else eq.UPPER_SADDLE
@@ -134,6 +125,7 @@ def flow(
     b: Array,
     c: Array,
     phi: Array,
+    energy: Array,
     curvature: Array,
     index: Index,
     phi0: Array,
@@ -155,7 +147,7 @@ def flow(
         if j != last:
             i = index[j]
             if i != system:
-                valid = load_system(i, a, b, c, phi, curvature, w)
+                valid = load_system(i, a, b, c, phi, energy, curvature, w)
                 system = i
             lv.classify(phi0[j], dphi0[j], valid, w)
             ob.shape(w)
@@ -170,6 +162,7 @@ def action_angle(
     b: Array,
     c: Array,
     phi: Array,
+    energy: Array,
     curvature: Array,
     index: Index,
     phi0: Array,
@@ -187,12 +180,12 @@ def action_angle(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, a, b, c, phi, energy, curvature, w)
             last = i
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, energy_of(i, k, a, b, c, phi0, dphi0), w, out)
+        write_orbit(k, code, w[lv.ENERGY] / w[lv.UNIT] / w[lv.UNIT], w, out)
         family[k] = aa.family(w)
         angle[k] = aa.angle(w)
         twist[k] = aa.twist(w)
@@ -204,6 +197,7 @@ def state_of(
     b: Array,
     c: Array,
     phi: Array,
+    energy: Array,
     curvature: Array,
     index: Index,
     family: Array,
@@ -221,7 +215,7 @@ def state_of(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, a, b, c, phi, energy, curvature, w)
             last = i
         w[lv.MODE] = lv.INVALID
         if valid and family[k] == family[k]:
@@ -235,6 +229,7 @@ def separatrix_motion(
     b: Array,
     c: Array,
     phi: Array,
+    energy: Array,
     curvature: Array,
     index: Index,
     saddle: Array,
@@ -252,7 +247,7 @@ def separatrix_motion(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, curvature, w)
+            valid = load_system(i, a, b, c, phi, energy, curvature, w)
             last = i
         j = eq.LOWER_SADDLE if saddle[k] == 0.0 else eq.UPPER_SADDLE
         if saddle[k] < 0.0 and phi[i, eq.UPPER_CENTER] == phi[i, eq.UPPER_CENTER]:

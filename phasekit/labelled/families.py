@@ -97,9 +97,8 @@ def families(
 ) -> Families:
     """Orbits at levels between 0 and 1 of the families lower_well, upper_well, outer, rotation."""
     points = equilibria(A, B, C)
-    energy = np.where(points.kind == EquilibriumKind.SADDLE, points.energy, np.nan)
-    low, high = energy[..., 1], energy[..., 3]
-    lower, upper = (points.energy[..., j] for j in (0, 2))  # of the centers
+    lower, low, upper, high = np.moveaxis(points.energy, -1, 0)  # center, saddle, center, saddle
+    low = np.where(points.kind[..., 1] == EquilibriumKind.SADDLE, low, np.nan)  # but for a fold
     inner = np.where(np.isnan(low), high, low)  # where the wells end
     rise = (inner - lower, inner - upper)
     top = 2.0 * high - lower if energy_max is None else energy_max
@@ -116,8 +115,7 @@ def families(
     first = np.where(np.isnan(low), 1, 0)  # the saddle where the wells end
     saddles = (first, first, np.where(under, 0, 1), 1)
     # To the right of the lower saddle: the center that comes before the upper saddle.
-    turn = 2.0 * np.pi
-    way = (points.phi - points.phi[..., 1:2]) % turn
+    way = (points.phi - points.phi[..., 1:2]) % (2.0 * np.pi)
     right = np.where(way[..., 0] < way[..., 3], 1, 0)
     sides = (right, 1 - right, 1, 1)
     gap, saddle, side, there = (
@@ -125,9 +123,8 @@ def families(
         for parts in (gaps, saddles, sides, present)
     )
     gap = np.where(there, gap, np.nan)
-    found = orbits_at_gap(
-        *(np.asarray(x)[..., None] for x in (A, B, C)), gap, saddle.astype(int), side.astype(int)
-    )
+    a, b, c = (np.asarray(x)[..., None] for x in (A, B, C))
+    found = orbits_at_gap(a, b, c, gap, saddle.astype(int), side.astype(int))
     base = np.where(saddle == 1, high[..., None], low[..., None])
     absent = np.isnan(found.period)
     return Families(

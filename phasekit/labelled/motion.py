@@ -66,7 +66,9 @@ def separatrix_motion(
     system : system
         Any system.
     t : float, 1-D array_like or xarray.DataArray
-        Times in s. A bare array makes the dim ``time``.
+        Times in s: 0 at the turning point of a lobe, where a winding separatrix is opposite to
+        the saddle, and half-way to the partner between two saddles of equal energy. A bare array
+        makes the dim ``time``.
     saddle : {"lower", "upper"}, optional
         The saddle; by default the one of the figure-eight (lower) where there is one, else the
         only one (upper).
@@ -76,7 +78,8 @@ def separatrix_motion(
     Returns
     -------
     xarray.Dataset
-        ``motion_phi`` in rad and ``motion_dphi`` in s^-1, NaN where the separatrix is absent.
+        ``motion_phi`` in rad, continuous from the saddle's angle, and ``motion_dphi`` in s^-1; NaN
+        where the saddle is absent.
 
     Raises
     ------
@@ -85,8 +88,7 @@ def separatrix_motion(
 
     Notes
     -----
-    Solves [Veljovic2015] (12) at the energy of the saddle. `separatrices` gives the turning
-    points.
+    The homoclinic orbits of [Veljovic2015], section 4. `separatrices` gives the turning points.
 
     Examples
     --------

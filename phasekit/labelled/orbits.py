@@ -12,14 +12,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
 from phasekit.errors import EquilibriumKind, OrbitFamily, ParameterError
 from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric
 from phasekit.labelled.quantities import LABELS, Pass, select
 from phasekit.labelled.states import at_states, one_of
-from phasekit.phase.action_angle import State
 from phasekit.phase.action_angle import state_of as state_of_codes
 from phasekit.phase.equilibria import equilibria
 from phasekit.phase.orbits import Orbits, orbits_at_energy, orbits_at_gap
@@ -280,11 +278,12 @@ def states_of(
     C: FloatArray,
     action: FloatArray,
     angle: FloatArray,
-    family: npt.ArrayLike,
-) -> State:
-    """States by action and angle, with codes of families that are kept as floats.
+    family: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """States by action and angle, for codes of families that are kept as floats.
 
-    What is no code gives NaN.
+    What is no such code gives NaN.
     """
     codes = np.where(np.isin(family, list(FAMILIES.values())), family, OrbitFamily.NONE)
-    return state_of_codes(A, B, C, action, angle, codes.astype(np.int8))
+    phi, dphi = state_of_codes(A, B, C, action, angle, codes.astype(np.int8))
+    return phi, dphi

@@ -35,7 +35,9 @@ def sweep(
         A `GyroRotorDisk`, `Reduced`, `Coefficients` or any other system.
     axes : mapping of str to array_like, optional
         Values of the swept parameters: 1-D lists, arrays or ranges, each a dim of the map, in
-        the order given; or DataArrays, which broadcast by the names of their dims.
+        the order given; or DataArrays, which broadcast by the names of their dims. Likewise the
+        states that the quantities need (``state_phi``, ``state_dphi``, ``time``, ...), which may
+        be single numbers as well.
     of : str or iterable of str, default ("equilibria", "separatrices")
         Quantities, or groups of them; `quantities` lists them.
     store : path, optional

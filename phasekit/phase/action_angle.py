@@ -11,7 +11,7 @@ from phasekit.errors import OrbitFamily, ParameterError, Topology
 from phasekit.kernels import portrait as kernels
 from phasekit.phase.orbits import Orbits, allocate
 from phasekit.phase.separatrices import separatrices
-from phasekit.phase.solve import check_threads, launch
+from phasekit.phase.solve import Arrays, check_threads, launch
 from phasekit.phase.states import Systems, flat, systems
 
 Array = npt.NDArray[np.float64]
@@ -74,10 +74,10 @@ def orbits_with_angles(
     check_threads(threads)
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi), np.shape(dphi))
-    arrays = (*cells.arrays, cells.index(shape), flat(phi, shape), flat(dphi, shape))
+    arrays = (*cells.arrays, cells.numbers(shape), flat(phi, shape), flat(dphi, shape))
     out = allocate(shape)
     size = out[0].size
-    angles = (np.empty(size, np.int8), np.empty(size), np.empty(size))
+    angles: Arrays = (np.empty(size, np.int8), np.empty(size), np.empty(size))
     launch(kernels.action_angle, arrays, size, (out, angles), threads)
     return (
         Orbits(*(array.reshape(shape) for array in out)),
@@ -162,7 +162,7 @@ def state_of(
         raise ParameterError(f"family: got {family!r}, wants values of OrbitFamily")
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, *(np.shape(x) for x in (action, angle, family)))
-    index = cells.index(shape)
+    index = cells.numbers(shape)
     member = flat(family, shape)
     value = flat(action, shape)
     least, most = (limit[index, member.astype(int) + 1] for limit in _limits(cells))

@@ -78,7 +78,7 @@ def flow(
     order = sorted(range(len(shape)), key=lambda axis: spread[axis] == 1)
     arrays = (
         *cells.arrays,
-        cells.index(states),
+        cells.numbers(states),
         flat(phi0, states),
         flat(dphi0, states),
         np.array(np.broadcast_to(number, shape).transpose(order)).reshape(-1),
@@ -144,7 +144,7 @@ def separatrix_motion(
     shape = np.broadcast_shapes(cells.shape, *(np.shape(x) for x in (t, saddle, side)))
     arrays = (
         *cells.arrays,
-        cells.index(shape),
+        cells.numbers(shape),
         flat(saddle, shape),
         flat(side, shape),
         flat(t, shape),

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from phasekit.errors import ParameterError
 from phasekit.kernels import portrait as kernels
-from phasekit.phase.solve import check_threads, launch
+from phasekit.phase.solve import Arrays, check_threads, launch
 from phasekit.phase.states import flat, systems
 
 Array = npt.NDArray[np.float64]
@@ -83,7 +83,7 @@ def orbits(
     check_threads(threads)
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
-    arrays = (*cells.arrays, cells.index(shape), flat(phi0, shape), flat(dphi0, shape))
+    arrays = (*cells.arrays, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
     out = allocate(shape)
     launch(kernels.orbits, arrays, out[0].size, (out,), threads)
     return Orbits(*(array.reshape(shape) for array in out))
@@ -187,8 +187,7 @@ def _at_levels(
     shape = np.broadcast_shapes(cells.shape, np.shape(level), np.shape(point), np.shape(side))
     arrays = (
         *cells.arrays,
-        cells.points.energy,
-        cells.index(shape),
+        cells.numbers(shape),
         flat(level, shape),
         flat(point, shape),
         flat(side, shape),
@@ -199,7 +198,7 @@ def _at_levels(
     return Orbits(*(array.reshape(shape) for array in out))
 
 
-def allocate(shape: tuple[int, ...]) -> tuple[npt.NDArray[np.int8] | Array, ...]:
+def allocate(shape: tuple[int, ...]) -> Arrays:
     """Room for the orbits of all cells of a shape."""
     size = int(np.prod(shape, dtype=int))
     return (np.empty(size, np.int8), *(np.empty(size) for _ in range(6)))

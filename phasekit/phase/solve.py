@@ -69,7 +69,7 @@ def _allocate(size: int, shapes: tuple[Shapes, ...]) -> list[Arrays]:
 
 def launch(
     kernel: Callable[..., None],
-    arrays: Arrays,
+    arrays: tuple[Any, ...],
     size: int,
     groups: Sequence[Arrays],
     threads: int | None,

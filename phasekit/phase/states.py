@@ -26,14 +26,15 @@ class Systems(NamedTuple):
     shape: tuple[int, ...]
 
     @property
-    def arrays(self) -> tuple[Array, Array, Array, Array, Array]:
-        """What kernels take: coefficients, angles and V'' of the equilibria."""
-        return self.A, self.B, self.C, self.points.phi, self.points.curvature
+    def arrays(self) -> tuple[Array, ...]:
+        """What kernels take: coefficients; angles, energies and V'' of the equilibria."""
+        points = self.points
+        return self.A, self.B, self.C, points.phi, points.energy, points.curvature
 
-    def index(self, shape: tuple[int, ...]) -> Index:
+    def numbers(self, shape: tuple[int, ...]) -> Index:
         """Number of the system of each cell of a shape."""
-        numbers = np.arange(self.A.size).reshape(self.shape)
-        return np.array(np.broadcast_to(numbers, shape)).reshape(-1)
+        own = np.arange(self.A.size).reshape(self.shape)
+        return np.array(np.broadcast_to(own, shape)).reshape(-1)
 
 
 def systems(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, threads: int | None) -> Systems:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import unknown
 from phasekit.plot import labels, strokes, style
 
 TIME = "time"
@@ -86,16 +84,14 @@ def time_history(
         raise unknown("variable", variable, offered)
     times = ds[TIME]
     labels.monotone(times, "time")
-    motions = _motions(ds[variable], str(times.dims[0]))
+    motions = _motions(ds[variable], str(times.dims[0]), angles)
     axes = style.axes_for(ax, legend=legend and len(motions) > 1)
 
     stretch = factor if variable in SYMBOLS or ds[variable].attrs.get("units") == "rad" else 1.0
     handles: list[Artist] = []
-    for number, motion in enumerate(motions):
+    for number, (name, motion) in enumerate(motions.items()):
         look = strokes.orbit_look(number) if len(motions) > 1 else style.MOTION
-        handles += axes.plot(
-            times.values, motion.values * stretch, label=_name(motion, angles), **look
-        )
+        handles += axes.plot(times.values, motion.values * stretch, label=name, **look)
     if ds[variable].attrs.get("units") == "rad":
         style.unwrapped_axis(axes, "y", angles)
     axes.set_xlim(*sorted((float(times[0]), float(times[-1]))))
@@ -115,9 +111,9 @@ def _drawable(ds: xr.Dataset) -> list[str]:
     ]
 
 
-def _motions(values: xr.DataArray, along: str) -> list[xr.DataArray]:
-    """Return the motions one by one."""
-    dims = [dim for dim in values.dims if dim != along]
+def _motions(values: xr.DataArray, along: str, angles: style.Angles) -> dict[str, xr.DataArray]:
+    """Return the motions one by one, under what tells each from the others."""
+    dims = [str(dim) for dim in values.dims if dim != along]
     count = int(np.prod([values.sizes[dim] for dim in dims], dtype=int))
     if not 0 < count <= MOST:
         size = ", ".join(f"{dim}: {values.sizes[dim]}" for dim in dims)
@@ -125,22 +121,26 @@ def _motions(values: xr.DataArray, along: str) -> list[xr.DataArray]:
             f"dataset: got {count} motions ({size}), wants from 1 to {MOST}; "
             f"select some first, for example ds.isel({dims[0]}=slice(None, None, 5))"
         )
-    # A coordinate that is the same for all motions tells none of them.
-    same = [
-        name
-        for name, coord in values.coords.items()
-        if coord.ndim == 0 or along in coord.dims or (coord.values == coord.values.flat[0]).all()
+    cells = [
+        dict(zip(dims, cell, strict=True))
+        for cell in np.ndindex(*(values.sizes[dim] for dim in dims))
     ]
-    values = values.drop_vars(same)
-    cells = np.ndindex(*(values.sizes[dim] for dim in dims))
-    return [values.isel(dict(zip(dims, cell, strict=True))) for cell in cells]
-
-
-def _name(motion: xr.DataArray, angles: style.Angles) -> str:
-    """Return what tells this motion from the others."""
-    return ", ".join(
-        labels.value(coord, angles) for coord in motion.coords.values() if not coord.ndim
-    )
+    # A coordinate that is the same for all motions tells none of them.
+    telling = [
+        coord
+        for coord in values.coords.values()
+        if along not in coord.dims and (coord.values != coord.values.flat[0]).any()
+    ]
+    names = [
+        ", ".join(
+            labels.value(coord.isel({dim: cell[str(dim)] for dim in coord.dims}), angles)
+            for coord in telling
+        )
+        for cell in cells
+    ]
+    if len(set(names)) < count:
+        names = [", ".join(f"{dim} {place}" for dim, place in cell.items()) for cell in cells]
+    return {name: values.isel(cell) for name, cell in zip(names, cells, strict=True)}
 
 
 def _label(values: xr.DataArray, angles: style.Angles, width: int) -> str:

@@ -76,8 +76,8 @@ def wrap(text: str, width: int) -> str:
 def value(number: xr.DataArray, angles: Angles) -> str:
     r"""Return one value of a coordinate for print.
 
-    >>> value(xr.DataArray(-0.5, name="lam"), "rad")
-    '$\lambda$ = −0.5'
+    >>> value(xr.DataArray(0.5, name="beta", attrs={"units": "rad"}), "rad")
+    '$\\beta$ = 0.5\xa0rad'
     """
     name = str(number.name)
     symbol = SYMBOLS.get(name, name.replace("_", " "))

@@ -76,7 +76,9 @@ def period_energy(
     axes = style.axes_for(ax, legend=legend)
 
     natural, bottom = points.natural_frequency.values, points.energy.values
-    handles = _draw_families(axes, families, "energy_level", "period", bottom, 2 * np.pi / natural)
+    handles = _draw_families(
+        axes, families, points, "energy_level", "period", (bottom, 2.0 * np.pi / natural)
+    )
     handles += _draw_walls(axes, points, loops)
     handles += _draw_centers(axes, bottom, 2.0 * np.pi / natural)
 
@@ -149,7 +151,7 @@ def frequency_action(
     axes = style.axes_for(ax, legend=legend)
 
     rest = np.zeros(natural.shape)
-    handles = _draw_families(axes, families, "action", "frequency", rest, natural)
+    handles = _draw_families(axes, families, points, "action", "frequency", (rest, natural))
     handles += _draw_centers(axes, rest, natural)
     axes.set_xlim(0.0, 1.03 * float(families.action.max()))
     axes.set_ylim(0.0, 1.05 * float(np.nanmax([float(families.frequency.max()), *natural])))
@@ -171,38 +173,61 @@ def _families(
 
 
 def _draw_families(
-    ax: Axes, families: xr.Dataset, x: str, y: str, start: FloatArray, small: FloatArray
+    ax: Axes,
+    families: xr.Dataset,
+    points: xr.Dataset,
+    x: str,
+    y: str,
+    ends: tuple[FloatArray, FloatArray],
 ) -> list[Artist]:
-    """Draw the curves of the families that there are, from the centers (start, small) on."""
+    """Draw the curves of the families that there are, from the centers (x, y) on."""
     handles: list[Artist] = []
     for family, look in style.FAMILIES.items():
-        one = families.sel(family=family)
-        across, up = one[x].values, one[y].values
-        there = np.isfinite(up)
-        if not there.any():
+        one = families.sel(family=family).dropna("level")
+        if not one.level.size:
             continue
-        across, up = across[there], up[there]
-        first = CENTERS.get(family)
-        if y == "frequency":
-            # Next to a separatrix the frequency falls to zero at one action, as far as can be seen.
-            ends = across[:1] if first is None else across[:0]
-            across = np.concatenate([ends, across, across[-1:] if family != "rotation" else []])
-            up = np.concatenate([0.0 * ends, up, [0.0] if family != "rotation" else []])
-        if first is not None:
-            across, up = np.append(start[first], across), np.append(small[first], up)
-        handles += ax.plot(across, up, zorder=2, **look)
+        energy, across, up = (one[name].values for name in ("energy_level", x, y))
+        # At a separatrix: infinitely long, so higher than anything shown.
+        limit = 0.0 if y == "frequency" else 100.0 * float(up.max())
+        for level in _degenerate(points):
+            if energy[0] < level < energy[-1]:
+                place = int(np.searchsorted(energy, level))
+                across = np.insert(across, place, np.interp(level, energy, across))
+                up = np.insert(up, place, limit)
+        # The last orbits are so close to it that nothing can be seen between.
+        before, after = family not in CENTERS, family != "rotation"
+        across = np.concatenate([across[:before], across, across[len(across) - after :]])
+        up = np.concatenate([[limit] * before, up, [limit] * after])
+        if family in CENTERS:
+            across, up = (
+                np.append(end[CENTERS[family]], values)
+                for end, values in zip(ends, (across, up), strict=True)
+            )
+        (line,) = ax.plot(across, up, zorder=2, **look)
+        handles.append(line)
+    if len(handles) == 2:  # a well and the rotations
+        handles[0].set_label("oscillation")
     return handles
+
+
+def _degenerate(points: xr.Dataset) -> list[float]:
+    """Return the energies of degenerate points."""
+    merged = points.kind.values == int(EquilibriumKind.DEGENERATE)
+    return [float(energy) for energy in points.energy.values[merged]]
 
 
 def _draw_walls(ax: Axes, points: xr.Dataset, loops: xr.Dataset) -> list[Artist]:
     """Draw the energies at which periods are infinite."""
-    handles: list[Artist] = []
-    walls = {label: float(loops.saddle_energy.sel(saddle=label)) for label in ("lower", "upper")}
-    merged = points.kind.values == int(EquilibriumKind.DEGENERATE)
-    walls |= {"degenerate": float(energy) for energy in points.energy.values[merged]}
-    for name, energy in walls.items():
-        if np.isfinite(energy):
-            handles.append(ax.axvline(energy, zorder=1, **style.WALLS[name]))
+    walls = [
+        (saddle, float(loops.saddle_energy.sel(saddle=saddle))) for saddle in ("lower", "upper")
+    ]
+    walls = [wall for wall in walls if np.isfinite(wall[1])]
+    handles: list[Artist] = [
+        ax.axvline(energy, zorder=1, **style.WALLS[name])
+        for name, energy in [*walls, *(("degenerate", energy) for energy in _degenerate(points))]
+    ]
+    if len(walls) == 1:
+        handles[0].set_label("energy of the saddle")
     return handles
 
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
@@ -54,7 +53,8 @@ def phase_portrait(
         curve through each is drawn over the others and its start is marked.
     color_by : {"period", "frequency", "action"}, optional
         Color the level curves by what their orbits have, on a logarithmic scale with a color bar;
-        gray if left out. The period of a rotation is the time of one turn.
+        gray if left out. The period of a rotation is the time of one turn. Levels that are not
+        given lie twice as close.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
     legend : bool
@@ -86,7 +86,7 @@ def phase_portrait(
     """
     land = Landscape.of(system)
     factor = style.angle_factor(angles)
-    if color_by is not None and color_by not in COLORED:
+    if color_by is not None and color_by not in tuple(COLORED):
         raise bad("color_by", color_by, f"one of {', '.join(COLORED)}")
     dense = energies is None and color_by is not None
     chosen = land.levels(1.0 / 12.0) if dense else levels_of(land, energies)
@@ -119,12 +119,11 @@ def _colors(
 ) -> list[str | None]:
     """Return the color of each level curve, and draw the color bar."""
     values = np.array([land.orbit(energy, arc, color_by) for energy, arc in curves if color_by])
-    norm = style.log_norm(values)
-    if color_by is None or norm is None:
+    limits = style.log_limits(values)
+    if color_by is None or limits is None:
         return [None] * len(curves)
-    mappable = ScalarMappable(norm, style.LINES)
-    style.log_bar(ax, mappable, COLORED[color_by])
-    return [to_hex(color) for color in mappable.to_rgba(np.minimum(values, norm.vmax))]
+    mappable = style.log_bar(ax, limits, COLORED[color_by])
+    return [to_hex(color) for color in mappable.to_rgba(np.minimum(values, limits[1]))]
 
 
 def _reach(land: Landscape, energies: list[float]) -> float:

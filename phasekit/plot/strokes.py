@@ -62,7 +62,8 @@ def draw_level(
     """Draw a level curve, solid where it closes, dotted where it runs round the cylinder."""
     look = style.ROTATION if is_turn(arc) else style.LEVEL
     if color is not None:
-        look = {**look, "color": color, "linewidth": look["linewidth"] + 0.7}
+        width = look["linewidth"] + 0.7
+        look = {**look, "color": color, "linewidth": width, "solid_capstyle": "round"}
     phi, speed = land.loop(arc, energy)
     if is_turn(arc):
         for sign in (1.0, -1.0):

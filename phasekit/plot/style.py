@@ -277,24 +277,23 @@ def unwrapped_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
         axis.set_major_formatter(FuncFormatter(_multiple_of_pi))
 
 
-def log_norm(values: Any) -> LogNorm | None:
-    """Return a logarithmic norm over the finite values, None where there are none."""
+def log_limits(values: Any) -> tuple[float, float] | None:
+    """Return the least and the greatest of the finite values > 0, None where there are none."""
     finite = np.asarray(values)[np.isfinite(values) & (np.asarray(values) > 0.0)]
     if not finite.size:
         return None
     low, high = float(finite.min()), float(finite.max())
-    if not high > 1.02 * low:
-        low, high = low / 1.1, high * 1.1
-    return LogNorm(low, high)
+    return (low, high) if high > 1.02 * low else (low / 1.1, high * 1.1)
 
 
-def log_bar(ax: Axes, mappable: ScalarMappable, text: str, extend: str = "neither") -> None:
-    """Draw a color bar with round numbers, also where a norm spans less than a decade."""
-    bar = ax.figure.colorbar(mappable, ax=ax, label=text, extend=extend)
-    low, high = mappable.norm.vmin, mappable.norm.vmax
-    bar.ax.yaxis.set_major_locator(FixedLocator(round_numbers(float(low), float(high))))
+def log_bar(ax: Axes, limits: tuple[float, float], text: str) -> ScalarMappable:
+    """Draw a color bar with round numbers, also where a logarithmic scale spans little."""
+    mappable = ScalarMappable(LogNorm(*limits), LINES)
+    bar = ax.figure.colorbar(mappable, ax=ax, label=text)
+    bar.ax.yaxis.set_major_locator(FixedLocator(round_numbers(*limits)))
     bar.ax.yaxis.set_minor_locator(NullLocator())
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
+    return mappable
 
 
 def round_numbers(low: float, high: float) -> list[float]:

@@ -341,3 +341,62 @@ def test_a_potential_beyond_the_doubles_is_refused():
         pk.plot.phase_portrait(pk.Coefficients(1e308, 1e308, 0.0))
     ax = pk.plot.phase_portrait(pk.Coefficients(1e306, 1e305, 0.0), energies=1e307)
     assert np.isfinite(ax.get_ylim()).all()
+
+
+def test_levels_are_colored_by_the_period_of_their_orbits():
+    ax = pk.plot.phase_portrait(EIGHT, color_by="period")
+    (bar,) = [other for other in ax.figure.axes if other is not ax]
+    assert bar.get_ylabel() == "period (s)"
+    low, high = bar.get_ylim()
+    levels = [line for line in ax.lines if line.get_zorder() == 1]
+    assert len(levels) > 15
+    period = []
+    for line in levels:
+        phi, dphi = line.get_data()
+        place = np.nanargmax(abs(dphi))
+        period.append(pk.orbits(EIGHT, phi[place], dphi[place]).period.item())
+        shade = np.log(period[-1] / low) / np.log(high / low)
+        np.testing.assert_allclose(to_rgba(line.get_color()), style.LINES(shade), atol=0.02)
+    np.testing.assert_allclose((low, high), (min(period), max(period)), rtol=1e-6)
+
+
+@pytest.mark.parametrize("quantity", ["period", "frequency", "action"])
+@pytest.mark.parametrize("name", [*SYSTEMS, "forceless"])
+def test_colors_for_every_system(quantity, name):
+    system = SYSTEMS.get(name, FORCELESS)
+    ax = pk.plot.phase_portrait(system, color_by=quantity, orbits=(0.3, 0.1))
+    ax.figure.canvas.draw()
+    (bar,) = [other for other in ax.figure.axes if other is not ax]
+    assert quantity in bar.get_ylabel()
+    assert 2 <= len(bar.get_yticks()) <= 9
+    assert not looks_like(ax, style.LEVEL)
+    box, picture = bar.get_tightbbox(), ax.figure.bbox
+    assert box.x1 <= picture.x1
+    assert ax.get_legend().get_window_extent().y0 >= picture.y0
+
+
+def test_gray_is_the_look_without_colors():
+    ax = pk.plot.phase_portrait(EIGHT)
+    assert looks_like(ax, style.LEVEL)
+    assert ax.figure.axes == [ax]
+    assert len(pk.plot.phase_portrait(EIGHT, color_by="period").lines) > len(ax.lines)
+
+
+def test_given_levels_are_colored_too(ax):
+    pk.plot.phase_portrait(EIGHT, energies=[6.0], color_by="frequency", ax=ax)
+    (up, down) = [line for line in ax.lines if line.get_zorder() == 1]
+    assert up.get_color() == down.get_color()
+    assert pk.plot.phase_portrait(EIGHT, energies=[], color_by="period").figure.axes[1:] == []
+
+
+def test_a_level_of_infinite_period_has_the_last_color():
+    energy_of_saddle = pk.separatrices(WINDING).saddle_energy.sel(saddle="upper").item()
+    ax = pk.plot.phase_portrait(WINDING, energies=[0.0, energy_of_saddle], color_by="period")
+    ax.figure.canvas.draw()
+
+
+@pytest.mark.parametrize("wrong", ["colour", "phi_min", 1, ["period"]])
+def test_a_wrong_color_is_named(wrong):
+    with pytest.raises(pk.ParameterError, match="^color_by: got .*period, frequency, action"):
+        pk.plot.phase_portrait(EIGHT, color_by=wrong)
+    assert not plt.get_fignums()
