@@ -272,7 +272,7 @@ def after(t: float, w: Array) -> tuple[float, float]:
     cosine = np.float64(math.cos(angle))
     local, rate = locate(sine + rest * cosine, cosine - rest * sine, w)
     if mode == SWING:
-        return (w[SIGMA] + local) + w[BASE] * TWO_PI, rate / unit
+        return (w[SIGMA] + local) + w[BASE] * TWO_PI, rate / unit + 0.0  # not -0
     turns += w[BASE]
     return (w[SIGMA] + local + turns * TWO_PI_LOW) + turns * TWO_PI, sense * rate / unit
 

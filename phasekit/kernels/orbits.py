@@ -140,13 +140,14 @@ def turn(w: Array) -> None:
     c2 = w[COS] * w[COS] if w[A] >= 0.0 else w[SIN] * w[SIN]
     s2 = w[SIN] * w[SIN] if w[A] >= 0.0 else w[COS] * w[COS]
     # 2 E = z^2 (c2/(m + z) + s2/(n + z)), so z is below what either term gives alone.
-    z = e + np.sqrt(e * (e + 2.0 * max(m, n)))
+    z = e + np.sqrt(e) * np.sqrt(e + 2.0 * max(m, n))
     if c2 > 0.0:
-        z = min(z, (e + np.sqrt(e * (e + 2.0 * m * c2))) / c2)
+        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * m * c2)) / c2)
     if s2 > 0.0:
-        z = min(z, (e + np.sqrt(e * (e + 2.0 * n * s2))) / s2)
+        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * n * s2)) / s2)
     for _ in range(100):
-        step = (((z + p2) * z + p1) * z + p0) / ((3.0 * z + 2.0 * p2) * z + p1)
+        q1 = p1 / z  # so that nothing underflows
+        step = z * ((z + p2) + q1 + p0 / z / z) / (3.0 * z + 2.0 * p2 + q1)
         z -= step
         if not step > 1e-15 * z:
             break
@@ -188,7 +189,7 @@ def turn(w: Array) -> None:
         second = -level / first
     else:
         first = math.inf
-        second = 0.0
+        second = mu2 * below / (w[S2] * x2) if abs(w[S2]) > 0.0 else 0.0
     # The slow point is on the side of the kernel vector of mu_1.
     slow = first
     fast = second
@@ -213,9 +214,9 @@ def turn(w: Array) -> None:
     if q > 0.0:
         n1 = np.sqrt(y1 * (mu2 + q) / (q * (size + q)))
         difference = (mu2 * (size + low + q) + low * q) / (q * (size + q) * low * high)
-        square = y1 * y1 * difference  # n1^2 - n0^2
-        w[RATIO] = (n1 + n0) / np.sqrt(square)
-        w[SKEW] = 2.0 * n0 * (n1 + n0) / (square * (1.0 + w[RATIO]))
+        # n1^2 - n0^2 = y1^2 difference
+        w[RATIO] = (n1 + n0) / (y1 * np.sqrt(difference))
+        w[SKEW] = 2.0 * n0 / (n1 + n0) * w[RATIO] * w[RATIO] / (1.0 + w[RATIO])
     else:
         w[RATIO] = 1.0
         w[SKEW] = 0.0
@@ -266,14 +267,14 @@ def swing(w: Array) -> None:
     # where nothing cancels.
     twice = 2.0 * e * (x + w[P])
     square = x * x + twice
-    if abs(x + slope) > 0.25 * (abs(x) + abs(slope)):
-        tau = np.sqrt(max(2.0 * (x + slope) / e, 0.0))
-        r = 2.0 * abs(w[S2]) / tau if tau > 0.0 else np.sqrt(max(square, 0.0))
-    elif square > 0.25 * (x * x + abs(twice)):
+    if square > 0.25 * (x * x + abs(twice)):
         r = np.sqrt(square)
         tau = 2.0 * abs(w[S2]) / r
     else:
-        tau = 2.0 * np.sqrt(max(mu0, 0.0) * max(rest, 0.0)) / abs(x) if x != 0.0 else 0.0
+        if abs(x + slope) > 0.25 * (abs(x) + abs(slope)):
+            tau = np.sqrt(max(2.0 * (x + slope) / e, 0.0))
+        else:
+            tau = 2.0 * np.sqrt(max(mu0, 0.0) * max(rest, 0.0)) / abs(x) if x != 0.0 else 0.0
         r = 2.0 * abs(w[S2]) / tau if tau > 0.0 else np.sqrt(max(square, 0.0))
     r = -r if w[S2] > 0.0 else r
     # r1 r2 = 1 - 2 P/E: the smaller from the larger.
