@@ -39,17 +39,19 @@ LEFT, RIGHT, AROUND, SINGLE = range(4)
 # One orbit is a flat work array. First the system: coefficients in a unit of time that brings
 # the largest into [1, 4), that unit; angles, energies, V'' and multipliers of the equilibria. Then
 # the state and its energy, how it moves, its reference, the energy above it, and where it lies.
+# Last, the energy above an equilibrium up to which it is computed in double-double arithmetic.
 A, B, C, UNIT, PHI, VALUE, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12, 16
 START, TURNS, ANGLE, RATE, ENERGY, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(32, 42)
+DOUBLE_TO = 42
 # Then the rows of `phasekit.kernels.orbits`.
-ORBIT = 42
+ORBIT = 43
 
 # Beyond this speed (against the root of the largest coefficient) V changes no digit.
 FREE_FROM = 1e9
 # Energies below this (against V'' and V''^3) move harmonically to all digits.
 HARMONIC_TO = 1e-30
-# Energies above an equilibrium below this are computed in double-double arithmetic.
-DOUBLE_TO = 2e-3
+# For one orbit among many, and for a motion, where every digit counts.
+SOME, ALL = 2e-3, math.inf
 ROUNDING = 2.0**-53
 # What double-double arithmetic leaves of a gap that is none.
 NOISE = 2e-31
@@ -89,7 +91,7 @@ def load_point(j: int, phi: float, energy: float, curvature: float, w: Array) ->
 def energy_above(j: int, w: Array) -> float:
     """Energy of the state above equilibrium j; where it is small, with all digits."""
     gap = w[ENERGY] - w[VALUE + j]
-    if not abs(gap) < DOUBLE_TO:
+    if not abs(gap) < w[DOUBLE_TO]:
         return gap
     a = w[A]
     v = w[RATE]

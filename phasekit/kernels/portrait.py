@@ -62,6 +62,7 @@ def orbits(
 ) -> None:
     """Orbits through states."""
     w = np.zeros(ob.SIZE)
+    w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
     valid = False
     for k in range(start, stop):
@@ -94,6 +95,7 @@ def levels(
 ) -> None:
     """Orbits at energies round a center; or at gaps above a saddle, in the well on one side."""
     w = np.zeros(ob.SIZE)
+    w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
     valid = False
     for k in range(start, stop):
@@ -139,6 +141,7 @@ def flow(
     """States after times; ``state`` says which state a time belongs to, ``index`` its system."""
     motion_phi, motion_dphi = out
     w = np.zeros(mo.MOTION_SIZE)
+    w[lv.DOUBLE_TO] = lv.ALL
     system = np.int64(-1)
     last = np.int64(-1)
     valid = False
@@ -175,6 +178,7 @@ def action_angle(
     """Orbits through states, with their family, the angle on them and the twist."""
     family, angle, twist = angles
     w = np.zeros(ob.SIZE)
+    w[lv.DOUBLE_TO] = lv.ALL
     last = np.int64(-1)
     valid = False
     for k in range(start, stop):
@@ -210,6 +214,7 @@ def state_of(
     """States of given action and angle; a family that has no such orbit is given as NaN."""
     state_phi, state_dphi = out
     w = np.zeros(ob.SIZE)
+    w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
     valid = False
     for k in range(start, stop):
@@ -242,6 +247,7 @@ def separatrix_motion(
     """Motion on the separatrix that leaves a saddle on one side; NaN where it is absent."""
     motion_phi, motion_dphi = out
     w = np.zeros(mo.MOTION_SIZE)
+    w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
     valid = False
     for k in range(start, stop):
