@@ -37,22 +37,24 @@ INVALID, REST, FREE, HARMONIC, ASYMPTOTE, SWING, TURN = range(7)
 LEFT, RIGHT, AROUND, SINGLE = range(4)
 
 # One orbit is a flat work array. First the system: coefficients in a unit of time that brings
-# the largest into [1, 4), that unit; angles, energies, V'' and multipliers of the equilibria. Then
+# the largest into [1, 4), that unit; angles, V'' and multipliers of the equilibria. Then
 # the state and its energy, how it moves, its reference, the energy above it, and where it lies.
 # Last, the energy above an equilibrium up to which it is computed in double-double arithmetic.
-A, B, C, UNIT, PHI, VALUE, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12, 16
-START, TURNS, ANGLE, RATE, ENERGY, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(32, 42)
-DOUBLE_TO = 42
+A, B, C, UNIT, PHI, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12
+START, TURNS, ANGLE, RATE, ENERGY, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(28, 38)
+DOUBLE_TO = 38
 # Then the rows of `phasekit.kernels.orbits`.
-ORBIT = 43
+ORBIT = 39
 
 # Beyond this speed (against the root of the largest coefficient) V changes no digit.
 FREE_FROM = 1e9
 # Energies below this (against V'' and V''^3) move harmonically to all digits.
 HARMONIC_TO = 1e-30
 # For one orbit among many, and for a motion, where every digit counts.
-SOME, ALL = 2e-3, math.inf
+SOME, ALL = 1e-3, math.inf
 ROUNDING = 2.0**-53
+# Energies above a degenerate equilibrium below this are raised to it, lest they underflow.
+LEAST = 1e-290
 # What double-double arithmetic leaves of a gap that is none.
 NOISE = 2e-31
 LARGEST = 1.7976931348623157e308
@@ -79,22 +81,28 @@ def load(a: float, b: float, c: float, w: Array) -> bool:
 
 
 @inline
-def load_point(j: int, phi: float, energy: float, curvature: float, w: Array) -> None:
+def load_point(j: int, phi: float, curvature: float, w: Array) -> None:
     """Take over equilibrium j of the system."""
     w[PHI + j] = phi
-    w[VALUE + j] = energy * w[UNIT] * w[UNIT]
     w[CURVATURE + j] = curvature * w[UNIT] * w[UNIT]
+    if abs(curvature) > LARGEST:  # overflow: twice the largest coefficient
+        x = math.cos(phi)
+        y = math.sin(phi)
+        w[CURVATURE + j] = w[B] * x - w[A] * (x - y) * (x + y) + w[C] * y
     w[MULTIPLIER + 4 * j] = math.nan
 
 
 @routine
 def energy_above(j: int, w: Array) -> float:
     """Energy of the state above equilibrium j; where it is small, with all digits."""
-    gap = w[ENERGY] - w[VALUE + j]
-    if not abs(gap) < w[DOUBLE_TO]:
-        return gap
     a = w[A]
     v = w[RATE]
+    # V(phi) - V(phi_s) as a product, which is accurate next to the equilibrium.
+    sine = math.sin(0.5 * (w[ANGLE] - w[PHI + j]))
+    bend = w[CURVATURE + j] + a * math.sin(0.5 * (w[ANGLE] + 3.0 * w[PHI + j])) * sine
+    gap = 0.5 * v * v + 2.0 * sine * sine * bend
+    if not abs(gap) < w[DOUBLE_TO]:
+        return gap
     ch, cl, sh, sl = dd_cos_sin(w[START])
     vh, vl = potential_dd(a, w[B], w[C], ch, cl, sh, sl)
     ch, cl, sh, sl = dd_cos_sin(w[PHI + j])
@@ -132,12 +140,12 @@ def multiplier(j: int, w: Array) -> int:
     c = w[C]
     x = np.float64(math.cos(w[PHI + j]))
     y = np.float64(math.sin(w[PHI + j]))
-    # The sum where it does not cancel and the angle is close to the axis, else the quotient.
-    mu = a + c / y if abs(x) < 0.3 else b / x
-    rest = b / x - a if abs(y) < 0.3 else c / y
-    if abs(mu) < 0.01 * abs(a) and abs(x) > 1e-7:
+    # The quotient, or through the other one, whichever rounding harms less.
+    mu = b / x if abs(x) > abs(y) else a + c / y
+    rest = c / y if abs(y) >= abs(x) else b / x - a
+    if abs(mu) < abs(a * x):
         mu = b / x
-    if abs(rest) < 0.01 * abs(a) and abs(y) > 1e-7:
+    if abs(rest) < abs(a * y):
         rest = c / y
     # Next to an axis the small coefficient knows the angle better than a double does.
     size = abs(a) + abs(mu)
@@ -173,6 +181,8 @@ def offset(phi: float, j: int, w: Array) -> float:
 def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
     """Fix the reference of an orbit, its energy above that, where it lies, and how it moves."""
     w[REFERENCE] = j
+    if w[CURVATURE + j] == 0.0 and abs(gap) < LEAST:
+        gap = LEAST if gap > 0.0 else -LEAST
     w[GAP] = gap
     w[PLACE] = place
     slope = w[CURVATURE + j]

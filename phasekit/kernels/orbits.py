@@ -267,7 +267,7 @@ def swing(w: Array) -> None:
     # where nothing cancels.
     twice = 2.0 * e * (x + w[P])
     square = x * x + twice
-    if square > 0.25 * (x * x + abs(twice)):
+    if square > 0.25 * (x * x + 2.0 * abs(e) * (abs(x) + abs(w[P]))):
         r = np.sqrt(square)
         tau = 2.0 * abs(w[S2]) / r
     else:

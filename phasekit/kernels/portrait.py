@@ -23,12 +23,12 @@ Index = npt.NDArray[np.int64]
 
 @inline
 def load_system(
-    i: int, a: Array, b: Array, c: Array, phi: Array, energy: Array, curvature: Array, w: Array
+    i: int, a: Array, b: Array, c: Array, phi: Array, curvature: Array, w: Array
 ) -> bool:
     """System i with its equilibria; whether it has a force."""
     valid = lv.load(a[i], b[i], c[i], w)
     for j in range(4):
-        lv.load_point(j, phi[i, j], energy[i, j], curvature[i, j], w)
+        lv.load_point(j, phi[i, j], curvature[i, j], w)
     return valid
 
 
@@ -51,7 +51,6 @@ def orbits(
     b: Array,
     c: Array,
     phi: Array,
-    energy: Array,
     curvature: Array,
     index: Index,
     phi0: Array,
@@ -68,7 +67,7 @@ def orbits(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, energy, curvature, w)
+            valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
@@ -82,8 +81,8 @@ def levels(
     b: Array,
     c: Array,
     phi: Array,
-    energy: Array,
     curvature: Array,
+    energy: Array,
     index: Index,
     level: Array,
     point: Array,
@@ -101,7 +100,7 @@ def levels(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, energy, curvature, w)
+            valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         if gaps:
             j = eq.LOWER_SADDLE if point[k] == 0.0 else eq.UPPER_SADDLE
@@ -127,7 +126,6 @@ def flow(
     b: Array,
     c: Array,
     phi: Array,
-    energy: Array,
     curvature: Array,
     index: Index,
     phi0: Array,
@@ -150,7 +148,7 @@ def flow(
         if j != last:
             i = index[j]
             if i != system:
-                valid = load_system(i, a, b, c, phi, energy, curvature, w)
+                valid = load_system(i, a, b, c, phi, curvature, w)
                 system = i
             lv.classify(phi0[j], dphi0[j], valid, w)
             ob.shape(w)
@@ -165,7 +163,6 @@ def action_angle(
     b: Array,
     c: Array,
     phi: Array,
-    energy: Array,
     curvature: Array,
     index: Index,
     phi0: Array,
@@ -184,7 +181,7 @@ def action_angle(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, energy, curvature, w)
+            valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
@@ -201,7 +198,6 @@ def state_of(
     b: Array,
     c: Array,
     phi: Array,
-    energy: Array,
     curvature: Array,
     index: Index,
     family: Array,
@@ -220,7 +216,7 @@ def state_of(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, energy, curvature, w)
+            valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         w[lv.MODE] = lv.INVALID
         if valid and family[k] == family[k]:
@@ -234,7 +230,6 @@ def separatrix_motion(
     b: Array,
     c: Array,
     phi: Array,
-    energy: Array,
     curvature: Array,
     index: Index,
     saddle: Array,
@@ -253,7 +248,7 @@ def separatrix_motion(
     for k in range(start, stop):
         i = index[k]
         if i != last:
-            valid = load_system(i, a, b, c, phi, energy, curvature, w)
+            valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         j = eq.LOWER_SADDLE if saddle[k] == 0.0 else eq.UPPER_SADDLE
         if saddle[k] < 0.0 and phi[i, eq.UPPER_CENTER] == phi[i, eq.UPPER_CENTER]:

@@ -187,6 +187,7 @@ def _at_levels(
     shape = np.broadcast_shapes(cells.shape, np.shape(level), np.shape(point), np.shape(side))
     arrays = (
         *cells.arrays,
+        cells.points.energy,
         cells.numbers(shape),
         flat(level, shape),
         flat(point, shape),

@@ -27,9 +27,8 @@ class Systems(NamedTuple):
 
     @property
     def arrays(self) -> tuple[Array, ...]:
-        """What kernels take: coefficients; angles, energies and V'' of the equilibria."""
-        points = self.points
-        return self.A, self.B, self.C, points.phi, points.energy, points.curvature
+        """What kernels take: coefficients, angles and V'' of the equilibria."""
+        return self.A, self.B, self.C, self.points.phi, self.points.curvature
 
     def numbers(self, shape: tuple[int, ...]) -> Index:
         """Number of the system of each cell of a shape."""

@@ -254,7 +254,7 @@ def test_many_orbits(many):
 
 
 def test_turning_points_are_at_the_energy(many):
-    """h = V at both ends."""
+    """Both ends are where V = h."""
     A, B, C, phi0, v0, size = many
     got = orbits(A, B, C, phi0, v0)
     for end in (got.phi_min, got.phi_max):
