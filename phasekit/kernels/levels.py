@@ -181,6 +181,8 @@ def offset(phi: float, j: int, w: Array) -> float:
 def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
     """Fix the reference of an orbit, its energy above that, where it lies, and how it moves."""
     w[REFERENCE] = j
+    if j == LOWER_CENTER or j == UPPER_CENTER:
+        gap = max(gap, 0.0)
     if w[CURVATURE + j] == 0.0 and abs(gap) < LEAST:
         gap = LEAST if gap > 0.0 else -LEAST
     w[GAP] = gap
@@ -241,7 +243,7 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     place, center = well(phi, w)
     own = energy_above(center, w)
     if own < -within:
-        settle(center, max(own, 0.0), place, LIBRATION, w)
+        settle(center, own, place, LIBRATION, w)
     else:
         settle(LOWER_SADDLE, within, place, LIBRATION, w)
     return LIBRATION

@@ -67,6 +67,8 @@ from phasekit.kernels.orbits import (
     TAU,
     X0,
     Y_PRODUCT,
+    Z_HIGH,
+    Z_LOW,
     M,
     N,
     P,
@@ -80,9 +82,10 @@ from phasekit.kernels.orbits import (
 PHASE, PHASE_LOW, OMEGA_HIGH, OMEGA_LOW, BASE, RISE, FALL = range(SIZE, SIZE + 7)
 MOTION_SIZE = SIZE + 7
 
-# Gaps to a saddle below this are known better than the difference of energies from which the
-# double-double frequency starts.
+# Gaps to a saddle and products y1 y2 below these are known better than what follows from the energy
+# in double-double arithmetic.
 GAP_FROM = 1e-15
+PRODUCT_FROM = 3e-8
 # Beyond this phase a double does not say where on the orbit the motion is.
 LONGEST = 1e16
 
@@ -157,17 +160,30 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     if x < 0.0:
         x = -x
         y = -y
-    # Sines of half the angles to the turning points, but for a common factor; close to one of
-    # them the rate knows the distance better.
-    high = max(w[U] * x - y, 0.0)
-    low = max(w[U] * x + y, 0.0)
-    offset = angle - w[PHI_S]
+    # Sines of half the angles to the turning points, but for a common factor: next to the
+    # reference from the offset from it.
+    half = 0.5 * (angle - w[PHI_S])
+    c = np.float64(math.cos(half))
+    s = np.float64(math.sin(half))
+    if abs(s) > 0.05:
+        high = max(w[U] * x - y, 0.0)
+        low = max(w[U] * x + y, 0.0)
+        cosine = 2.0 * y - skew * low if skew < 0.5 else w[RATIO] * low - high
+        size = w[U] * x + abs(y)
+        square = 1.0 + w[U] * w[U]
+    else:
+        high = abs(c - w[Z_HIGH] * s) / np.sqrt(1.0 + w[Z_HIGH] * w[Z_HIGH])
+        low = abs(c - w[Z_LOW] * s) / np.sqrt(1.0 + w[Z_LOW] * w[Z_LOW])
+        cosine = w[RATIO] * low - high
+        size = 1.0
+        square = 1.0
+    # Close to a turning point the rate knows the distance better, through the other factor.
     r = w[REST_R]
-    tilt = w[TAU] * math.sin(offset)
-    rest = 0.5 * ((1.0 + r) + (1.0 - r) * math.cos(offset) + tilt)
-    cosine = 2.0 * y - skew * low if skew < 0.5 else w[RATIO] * low - high
-    if min(high, low) * (1.0 + abs(r)) < abs(rest) * (w[U] * x + abs(y)):
-        common = (1.0 + w[U] * w[U]) * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
+    tilt = w[TAU] * s * c
+    rest = c * c + tilt + r * s * s
+    slack = c * c + abs(tilt) + abs(r) * s * s + abs(w[TAU] * c) + 2.0 * abs(r * s)
+    if min(high, low) * slack < abs(rest) * size:
+        common = square * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
         if high < low:
             high = common / low
         else:
@@ -192,7 +208,7 @@ def begin(w: Array) -> None:
         w[BASE] = w[TURNS] + np.rint((w[ANGLE] - (w[SIGMA] + local)) / TWO_PI)
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
         w[OMEGA_LOW] = 0.0
-        if abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0:
+        if w[Y_PRODUCT] > PRODUCT_FROM and (abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0):
             w[OMEGA_HIGH], w[OMEGA_LOW] = frequency_dd(w)
     elif mode == HARMONIC:
         j = int(w[REFERENCE])

@@ -68,9 +68,9 @@ from phasekit.kernels.levels import (
 # of Gauss steps and their means.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT, Y_SUM = range(ORBIT, ORBIT + 11)
 FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 11, ORBIT + 19)
-TAU, REST_R, SPAN, LEVELS = range(ORBIT + 19, ORBIT + 23)
-OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 23, ORBIT + 27)
-MEANS = ORBIT + 27
+TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 19, ORBIT + 25)
+OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 25, ORBIT + 29)
+MEANS = ORBIT + 29
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
 FEWEST, MOST, CHUNK = 32, 1024, 32
 SINE = MEANS + 2 * STEPS
@@ -267,7 +267,7 @@ def swing(w: Array) -> None:
     # where nothing cancels.
     twice = 2.0 * e * (x + w[P])
     square = x * x + twice
-    if square > 0.25 * (x * x + 2.0 * abs(e) * (abs(x) + abs(w[P]))):
+    if square > 0.02 * (x * x + 2.0 * abs(e) * (abs(x) + abs(w[P]))):
         r = np.sqrt(square)
         tau = 2.0 * abs(w[S2]) / r
     else:
@@ -301,7 +301,7 @@ def swing(w: Array) -> None:
     o_second = 2.0 * angle_half(1.0, z_small)
     if e > 0.0:  # the orbit encloses the reference
         o_high = o_first
-        o_low = o_second - TWO_PI
+        o_low = -2.0 * angle_half(1.0, -z_small)
         w[U] = tan_half(disc, -(1.0 + own))
         z_high = z_big
         z_low = z_small
@@ -322,6 +322,8 @@ def swing(w: Array) -> None:
     difference = x * (z_high - z_low) * sum_ / (w[SPAN] * w[SPAN])
     w[SKEW] = difference / (force_low * (1.0 + w[RATIO]))
     w[TAU] = sum_
+    w[Z_HIGH] = z_high
+    w[Z_LOW] = z_low
     w[REST_R] = rest_r
 
 
@@ -356,8 +358,10 @@ def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
         step = value / slope if slope > 0.0 else math.inf
         close = abs(step) < 1e-8 * abs(x)
         new = x - step
-        if not (lower <= new <= upper):
-            new = x if close else 0.5 * (lower + upper)
+        if new < lower:
+            new = lower if x != lower else 0.5 * (lower + upper)
+        elif new > upper:
+            new = upper if x != upper else 0.5 * (lower + upper)
         x = new
         if last or lower == upper:
             break

@@ -94,7 +94,7 @@ def check(A, B, C, phi0, v0, relative=RELATIVE, want=None):
         close = abs(end - exact) <= 16 * UNIT * max(1, abs(exact))
         level = abs(oracle.potential(A, B, C, end) - want.energy)
         steep = abs(oracle.gradient(A, B, C, end))
-        good = level <= 4 * slack(*context) + 8 * UNIT * max(1, abs(exact)) * steep
+        good = level <= 8 * slack(*context) + 16 * UNIT * max(1, abs(exact)) * steep
         assert close or good, (*context, "turning", float(x), float(exact))
     return got
 
@@ -306,8 +306,8 @@ def test_pendulum(B):
         assert np.all(got.orbit_kind == OrbitKind.LIBRATION)
         assert np.allclose(got.period, periods, rtol=2e-15, atol=0)
         assert np.allclose(got.action, actions, rtol=4e-15, atol=0)
-        assert np.allclose(got.phi_max, phi0, rtol=4e-16, atol=0)
-        assert np.allclose(got.phi_min, -phi0, rtol=4e-16, atol=0)
+        assert np.allclose(got.phi_max, phi0, rtol=4e-16, atol=1e-15)
+        assert np.allclose(got.phi_min, -phi0, rtol=4e-16, atol=1e-15)
     m = np.sin(phi0[2:] / 2) ** 2  # SciPy's own functions
     K = ellipkm1(np.cos(phi0[2:] / 2) ** 2)
     assert np.allclose(got.period[2:], 4 * K / np.sqrt(B), rtol=2e-15, atol=0)
