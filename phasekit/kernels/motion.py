@@ -150,18 +150,14 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         reach = skew * (w[U] * x + y)
         far = w[U] * x + y + reach
         square = near * near + far * far
-        return phase(
-            2.0 * near * far / square,
-            -(2.0 * y + reach) * (2.0 * w[U] * x + reach) / square,
-            MEANS,
-            int(w[LEVELS]),
-            w,
-        )
+        sine = 2.0 * near * far / square
+        cosine = -(2.0 * y + reach) * (2.0 * w[U] * x + reach) / square
+        return phase(sine, cosine, MEANS, int(w[LEVELS]), w)
     if x < 0.0:
         x = -x
         y = -y
     # Sines of half the angles to the turning points, but for a common factor: next to the
-    # reference from the offset from it.
+    # reference from the offset from it, which has more digits there.
     half = 0.5 * (angle - w[PHI_S])
     c = np.float64(math.cos(half))
     s = np.float64(math.sin(half))

@@ -51,6 +51,7 @@ from phasekit.kernels.levels import (
     REFERENCE,
     REST,
     RIGHT,
+    START,
     SWING,
     TURN,
     TURNS,
@@ -209,12 +210,12 @@ def turn(w: Array) -> None:
         w[U] = tan_half(abs(slow - fast), (1.0 + slow * fast) * (1.0 if slow > fast else -1.0))
     else:
         w[U] = tan_half(1.0, fast)
-    # Ratio of the speeds at both ends: (n1 + n0)^2/(n1^2 - n0^2).
-    n0 = np.sqrt(y1 * y2 / (low * high))
+    # Ratio of the speeds at both ends: (n1 + n0)/sqrt(n1^2 - n0^2), times sqrt(q) throughout, with
+    # n0^2 = y1 y2/(low high) and n1^2 = y1 (y2 - y1)/(q (size + q)).
     if q > 0.0:
-        n1 = np.sqrt(y1 * (mu2 + q) / (q * (size + q)))
-        difference = (mu2 * (size + low + q) + low * q) / (q * (size + q) * low * high)
-        # n1^2 - n0^2 = y1^2 difference
+        n0 = np.sqrt(q) * np.sqrt(y1 * y2 / (low * high))
+        n1 = np.sqrt(y1 * (mu2 + q) / (size + q))
+        difference = (mu2 * (size + low + q) + low * q) / ((size + q) * low * high)
         w[RATIO] = (n1 + n0) / (y1 * np.sqrt(difference))
         w[SKEW] = 2.0 * n0 / (n1 + n0) * w[RATIO] * w[RATIO] / (1.0 + w[RATIO])
     else:
@@ -339,13 +340,13 @@ def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
     guess = -w[SLOPE]
     place = w[PLACE]
     if place == LEFT or place == RIGHT:
-        upper = min(upper, distance(LOWER_SADDLE, w))
+        upper = min(upper, distance(LOWER_SADDLE, 1.0, w))
         if w[GAP] < 0.0:
             root = np.sqrt(max(c1 * c1 - 4.0 * c2 * c0, 0.0))
             small = -2.0 * c0 / (c1 + root) if c1 > 0.0 else 0.5 * (root - c1) / c2
             guess = small if small <= 0.0 else guess
     elif place == AROUND and w[PHI + UPPER_CENTER] == w[PHI + UPPER_CENTER]:
-        lower = max(lower, distance(UPPER_CENTER, w))
+        lower = max(lower, distance(UPPER_CENTER, -1.0, w))
     x = min(max(guess, lower), upper)
     last = False
     for _ in range(200):
@@ -370,9 +371,10 @@ def least_root(c2: float, c1: float, c0: float, w: Array) -> float:
 
 
 @inline
-def distance(i: int, w: Array) -> float:
-    """mu_i - mu, from the reference to equilibrium i."""
-    return w[multiplier(i, w) + 2] - w[M]
+def distance(i: int, sign: float, w: Array) -> float:
+    """mu_i - mu, from the reference to equilibrium i, and its rounding in the direction of sign."""
+    mu = w[multiplier(i, w) + 2]
+    return mu - w[M] + sign * 1e-15 * abs(w[M]) if mu != w[M] else 0.0
 
 
 @routine
@@ -646,5 +648,9 @@ def finish(w: Array) -> None:
     turns = w[TURNS] + np.rint((w[ANGLE] - sigma) / TWO_PI)
     w[OMEGA] = omega / unit
     w[ACTION] = area_ / unit
-    w[PHI_MIN] = low + turns * TWO_PI
-    w[PHI_MAX] = high + turns * TWO_PI
+    # The state is on its orbit.
+    w[PHI_MIN] = min(low + turns * TWO_PI, w[START])
+    w[PHI_MAX] = max(high + turns * TWO_PI, w[START])
+    if low != low:
+        w[PHI_MIN] = math.nan
+        w[PHI_MAX] = math.nan
