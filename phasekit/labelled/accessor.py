@@ -73,6 +73,14 @@ class MapPlots:
         """Draw the potential of the one selected cell over its portrait; returns both Axes."""
         return _plot("potential_well")(self._cell(), **options)
 
+    def period_energy(self, **options: Any) -> Any:
+        """Draw period against energy for the one selected cell; returns the Axes."""
+        return _plot("period_energy")(self._cell(), **options)
+
+    def frequency_action(self, **options: Any) -> Any:
+        """Draw frequency against action for the one selected cell; returns the Axes."""
+        return _plot("frequency_action")(self._cell(), **options)
+
     def bifurcation_diagram(self, **options: Any) -> Any:
         """Draw the equilibria against a swept parameter; returns the Axes."""
         return _plot("bifurcation_diagram")(self._ds, **options)

@@ -73,7 +73,8 @@ def test_an_invalid_cell_has_no_system():
 def drawn(monkeypatch):
     calls = []
     module = types.ModuleType("phasekit.plot")
-    for name in ("phase_portrait", "potential_well", "bifurcation_diagram", "parameter_map"):
+    names = ("phase_portrait", "potential_well", "period_energy", "frequency_action")
+    for name in (*names, "bifurcation_diagram", "parameter_map"):
         setattr(module, name, lambda *a, _name=name, **k: calls.append((_name, a, k)) or _name)
     monkeypatch.setitem(sys.modules, "phasekit.plot", module)
     return calls
@@ -84,6 +85,8 @@ def test_plots_are_asked_of_the_floor_above(drawn):
     assert cell.phasekit.plot.phase_portrait(angles="deg") == "phase_portrait"
     assert drawn[-1] == ("phase_portrait", (cell.phasekit.system(),), {"angles": "deg"})
     assert cell.phasekit.plot.potential_well() == "potential_well"
+    assert cell.phasekit.plot.period_energy() == "period_energy"
+    assert cell.phasekit.plot.frequency_action() == "frequency_action"
     MAP.phasekit.plot.parameter_map("topology", x="a")
     assert drawn[-1][0] == "parameter_map"
     assert drawn[-1][1][0] is MAP
