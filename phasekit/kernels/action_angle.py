@@ -41,7 +41,8 @@ from phasekit.kernels.levels import (
     well,
 )
 from phasekit.kernels.motion import phase_at
-from phasekit.kernels.orbits import (
+from phasekit.kernels.orbits import finish
+from phasekit.kernels.shape import (
     ACTION,
     FIRST,
     OMEGA,
@@ -52,7 +53,6 @@ from phasekit.kernels.orbits import (
     Y_PRODUCT,
     M,
     N,
-    finish,
     locate,
     shape,
 )

@@ -43,7 +43,7 @@ LEFT, RIGHT, AROUND, SINGLE = range(4)
 A, B, C, UNIT, PHI, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12
 START, TURNS, ANGLE, RATE, ENERGY, DIRECTION, MODE, REFERENCE, GAP, PLACE = range(28, 38)
 DOUBLE_TO = 38
-# Then the rows of `phasekit.kernels.orbits`.
+# Then the rows of `phasekit.kernels.shape`.
 ORBIT = 39
 
 # Beyond this speed (against the root of the largest coefficient) V changes no digit.

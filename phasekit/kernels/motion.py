@@ -4,7 +4,7 @@ Only the phase w t grows. Its frequency w is computed in double-double arithmeti
 
     mu^3 + 2 (h - A) mu^2 + (B^2 + C^2 - A (2 h - A)) mu - A B^2 = 0
 
-of the energy h, whose roots are those of `phasekit.kernels.orbits` plus mu, and the phase is
+of the energy h, whose roots are those of `phasekit.kernels.shape` plus mu, and the phase is
 reduced in it. On a separatrix z = cot((phi - phi_s)/2) obeys z'' = k^2 z - S2.
 """
 
@@ -14,6 +14,7 @@ import math
 
 import numpy as np
 
+from phasekit.kernels.action import SIZE
 from phasekit.kernels.compile import Array, inline, routine
 from phasekit.kernels.double_double import (
     TWO_PI,
@@ -52,7 +53,7 @@ from phasekit.kernels.levels import (
     C,
     potential_dd,
 )
-from phasekit.kernels.orbits import (
+from phasekit.kernels.shape import (
     LEVELS,
     MEANS,
     PHI_S,
@@ -60,7 +61,6 @@ from phasekit.kernels.orbits import (
     REST_R,
     S2,
     SIGMA,
-    SIZE,
     SKEW,
     SLOPE,
     SPAN,
