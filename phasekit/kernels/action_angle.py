@@ -21,6 +21,7 @@ from phasekit.kernels.levels import (
     CURVATURE,
     DIRECTION,
     FREE,
+    FREE_FROM,
     GAP,
     HARMONIC,
     INVALID,
@@ -184,6 +185,12 @@ def find_action(code: int, action: float, w: Array) -> None:
         upper = (
             energy_between(center, UPPER_SADDLE if single else LOWER_SADDLE, w) / w[UNIT] / w[UNIT]
         )
+    if base == UPPER_SADDLE and not action * w[UNIT] < FREE_FROM:
+        w[MODE] = FREE
+        w[ANGLE] = w[PHI + LOWER_CENTER]
+        w[RATE] = action * w[UNIT]
+        w[DIRECTION] = -1.0 if code == BACKWARD else 1.0
+        return
     lower = 0.0
     gap = 0.5 * upper
     last = False
@@ -234,4 +241,4 @@ def state_at(theta: float, w: Array) -> tuple[float, float]:
         return math.nan, math.nan
     local, rate = locate(np.float64(math.sin(theta)), np.float64(math.cos(theta)), w)
     phi, _, _ = reduce_angle(w[SIGMA] + local, 0.0)
-    return phi, (w[DIRECTION] if mode == TURN else 1.0) * rate / unit
+    return phi, (w[DIRECTION] if mode == TURN else 1.0) * rate / unit + 0.0  # not -0

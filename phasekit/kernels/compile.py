@@ -4,9 +4,9 @@
 GIL; its ``py_func`` is the same code interpreted, which gives the same bits and is the faster way
 to a first result. ``inline`` marks the arithmetic inside: an ordinary function in Python, always
 inlined when compiled, so that a loop over it vectorises. ``routine`` marks what is only called,
-not inlined. ``compose`` marks what only strings such
-functions together. Division by zero gives inf or NaN, as in NumPy. Fast-math stays off: the
-exact steps need IEEE arithmetic, and a result must not depend on how a loop was vectorised.
+not inlined. ``compose`` marks what only strings such functions together. Division by zero gives
+inf or NaN, as in NumPy. Fast-math stays off: the exact steps need IEEE arithmetic, and a result
+must not depend on how a loop was vectorised.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ import numpy as np
 
 from phasekit.kernels.compile import Array, inline
 
-# Ratios down to 1e-300 take eleven steps.
+# Ratios down to 1e-300 take thirteen steps.
 STEPS = 16
 
 

@@ -37,7 +37,7 @@ INVALID, REST, FREE, HARMONIC, ASYMPTOTE, SWING, TURN = range(7)
 LEFT, RIGHT, AROUND, SINGLE = range(4)
 
 # One orbit is a flat work array. First the system: coefficients in a unit of time that brings
-# the largest into [1, 4), that unit; angles, V'' and multipliers of the equilibria. Then
+# the sum of their sizes into [1, 4), that unit; angles, V'' and multipliers of the equilibria. Then
 # the state and its energy, how it moves, its reference, the energy above it, and where it lies.
 # Last, the energy above an equilibrium up to which it is computed in double-double arithmetic.
 A, B, C, UNIT, PHI, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12
@@ -53,8 +53,9 @@ HARMONIC_TO = 1e-30
 # For one orbit among many, and for a motion, where every digit counts.
 SOME, ALL = 1e-3, math.inf
 ROUNDING = 2.0**-53
-# Energies above a degenerate equilibrium below this are raised to it, lest they underflow.
-LEAST = 1e-290
+# Smaller energies above an equilibrium, degenerate or not, are raised to these, lest they
+# underflow.
+LEAST, TINIEST = 1e-290, 1e-307
 # What double-double arithmetic leaves of a gap that is none.
 NOISE = 2e-31
 LARGEST = 1.7976931348623157e308
@@ -183,8 +184,9 @@ def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
     w[REFERENCE] = j
     if j == LOWER_CENTER or j == UPPER_CENTER:
         gap = max(gap, 0.0)
-    if w[CURVATURE + j] == 0.0 and abs(gap) < LEAST:
-        gap = LEAST if gap > 0.0 else -LEAST
+    least = LEAST if w[CURVATURE + j] == 0.0 else TINIEST
+    if gap != 0.0 and abs(gap) < least:
+        gap = least if gap > 0.0 else -least
     w[GAP] = gap
     w[PLACE] = place
     slope = w[CURVATURE + j]

@@ -192,6 +192,19 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     return phase(sine if rate < 0.0 else -sine, cosine, MEANS, int(w[LEVELS]), w)
 
 
+@inline
+def at_phase(high: float, low: float, w: Array) -> tuple[float, float, float]:
+    """Whole turns in a phase, and the local angle and the angular velocity at the rest of it."""
+    angle, rest, turns = reduce_angle(high, low)
+    sine = np.float64(math.sin(angle))
+    cosine = np.float64(math.cos(angle))
+    sine += rest * cosine
+    if sine == 0.0 and angle < 0.0:
+        sine = -1e-300  # half a turn back, not ahead
+    local, rate = locate(sine, cosine - rest * sine, w)
+    return turns, local, rate
+
+
 @routine
 def begin(w: Array) -> None:
     """Prepare the motion through the state of an orbit whose shape is known."""
@@ -200,8 +213,10 @@ def begin(w: Array) -> None:
         w[PHASE] = phase_at(w[ANGLE], w[RATE], w)
         # The lower turning point is at the phase pi, not at the double next to it.
         w[PHASE_LOW] = 0.5 * TWO_PI_LOW * np.sign(w[PHASE]) if abs(w[PHASE]) == PI else 0.0
-        local, _ = locate(math.sin(w[PHASE]), math.cos(w[PHASE]), w)
+        turns, local, _ = at_phase(w[PHASE], w[PHASE_LOW], w)
         w[BASE] = w[TURNS] + np.rint((w[ANGLE] - (w[SIGMA] + local)) / TWO_PI)
+        if mode == TURN:
+            w[BASE] -= turns
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
         w[OMEGA_LOW] = 0.0
         if w[Y_PRODUCT] > PRODUCT_FROM and (abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0):
@@ -279,10 +294,7 @@ def after(t: float, w: Array) -> tuple[float, float]:
         high, low = two_product(w[OMEGA_HIGH], sense * time)
         low += w[OMEGA_LOW] * (sense * time)
         high, low = dd_add(high, low, w[PHASE], w[PHASE_LOW])
-    angle, rest, turns = reduce_angle(high, low)
-    sine = np.float64(math.sin(angle))
-    cosine = np.float64(math.cos(angle))
-    local, rate = locate(sine + rest * cosine, cosine - rest * sine, w)
+    turns, local, rate = at_phase(high, low, w)
     if mode == SWING:
         return (w[SIGMA] + local) + w[BASE] * TWO_PI, rate / unit + 0.0  # not -0
     turns += w[BASE]
@@ -306,7 +318,7 @@ def approach(time: float, w: Array) -> tuple[float, float]:
     # 2 arccot(z), and its derivative without overflow.
     rate = -2.0 * slope / (1.0 + z * z) if abs(z) < 1e150 else 0.0
     angle = w[PHI_S] + 2.0 * math.atan2(1.0, z)
-    return angle + w[BASE] * TWO_PI, rate / w[UNIT]
+    return angle + w[BASE] * TWO_PI, rate / w[UNIT] + 0.0  # not -0
 
 
 @routine

@@ -113,6 +113,8 @@ def levels(
             gap = level[k] - energy[i, j]
             slack = 4.0 * lv.ROUNDING * (abs(level[k]) + abs(energy[i, j]))
         present = valid and phi[i, j] == phi[i, j]
+        if gaps and j == eq.LOWER_SADDLE and curvature[i, j] == 0.0:
+            present = False  # a fold's pair is no saddle
         code = lv.classify_level(j, gap, center, slack, present, w)
         ob.shape(w)
         ob.finish(w)
@@ -175,7 +177,7 @@ def action_angle(
     """Orbits through states, with their family, the angle on them and the twist."""
     family, angle, twist = angles
     w = np.zeros(ob.SIZE)
-    w[lv.DOUBLE_TO] = lv.ALL
+    w[lv.DOUBLE_TO] = lv.SOME
     last = np.int64(-1)
     valid = False
     for k in range(start, stop):

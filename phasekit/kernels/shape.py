@@ -18,7 +18,7 @@ sqrt(y1) and sqrt(y2). A Moebius map of tan(phi/2) turns the motion into psi' = 
 
     tan(psi/2)^2 = sqrt(|V'(low)/V'(high)|) sin((high - phi)/2)/sin((phi - low)/2),
 
-for a rotation, between the slowest and the fastest point of its axis of symmetry,
+for a rotation, between the slower and the faster of the two points on its axis of symmetry,
 
     tan(psi/2) = sqrt(v(fast)/v(slow)) sin((phi - slow)/2)/sin((fast - phi)/2).
 """
@@ -57,10 +57,11 @@ from phasekit.kernels.levels import (
 # Rows after those of `phasekit.kernels.levels`. The reference: angle, cosine, sine, V'', mu and
 # A - mu of the system with A >= 0, S2, P. The roots: x0, y1 y2, y1 + y2. The motion: a and b of
 # Delta, the angle half-way between the ends of the Moebius map, the tangent of a quarter of their
-# distance, its ratio, and 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the
-# factors of a libration: sum of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of
-# its own, and its zeros at both turning points. The number of Gauss steps. What `orbits` makes of
-# all that. Last, the means of the Gauss steps, and room for the nodes of `action`.
+# distance, its ratio (libration: sqrt(V'(high)/V'(low)), rotation: sqrt(v(fast)/v(slow))), and
+# 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the factors of a libration: sum
+# of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of its own, and its zeros at
+# both turning points. The number of Gauss steps. What `phasekit.kernels.orbits` makes of all
+# that. Last, the means of the Gauss steps, and room for the nodes of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
 FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 10, ORBIT + 18)
 TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 18, ORBIT + 24)

@@ -70,8 +70,8 @@ def separatrix_motion(
         the saddle, and half-way to the partner between two saddles of equal energy. A bare array
         makes the dim ``time``.
     saddle : {"lower", "upper"}, optional
-        The saddle; by default the one of the figure-eight (lower) where there is one, else the
-        only one (upper).
+        The saddle; by default the lower one where there are two (that of a figure-eight), else
+        the only one (upper).
     side : {"right", "left"}, default "right"
         The side of the saddle to which the motion leaves it.
 

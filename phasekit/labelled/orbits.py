@@ -58,8 +58,8 @@ def orbits(
         In place of states: energies above that of a saddle in s^-2, negative below it. Next to a
         separatrix the gap keeps the digits that the energy has lost.
     saddle : {"lower", "upper"}
-        With `gap`: the saddle; by default the one of the figure-eight (lower) where there is one,
-        else the only one (upper).
+        With `gap`: the saddle; by default the lower one where there are two (that of a
+        figure-eight), else the only one (upper).
     side : {"right", "left"}
         With `gap`: the side of the saddle on which the orbit lies; it matters where the orbit
         stays on one of them.
@@ -69,8 +69,11 @@ def orbits(
     xarray.Dataset
         ``orbit_kind`` (`OrbitKind`), ``orbit_energy`` in s^-2, ``period`` in s (infinite on a
         separatrix; that of small oscillations at a center), ``frequency`` and ``action`` in
-        s^-1, ``phi_min`` and ``phi_max`` in rad (unwrapped; NaN for a rotation). Cells without an
-        orbit, below the center or at an absent saddle, are not_computed and NaN.
+        s^-1 (the action is NaN on a separatrix), ``phi_min`` and ``phi_max`` in rad (unwrapped;
+        NaN for a rotation). Cells without an orbit, below the center or at an absent saddle, are
+        not_computed and NaN. A state is an equilibrium if it is at rest and V' = 0 there in
+        floating point, and asymptotic if its energy is a saddle's within the rounding of the
+        state; so the double next to a center is a libration of almost no action.
 
     Raises
     ------

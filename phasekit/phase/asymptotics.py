@@ -64,7 +64,8 @@ def near_center(
     with np.errstate(all="ignore"):
         s2, c2, p = _bends(A, B, C, points)
         w2 = np.where(center, points.curvature, np.nan)
-        shift = energy[..., None] * (1.875 * s2 * s2 / w2**3 - (4.0 * c2 - p) / (8.0 * w2**2))
+        bend = 1.875 * (s2 / w2) ** 2 - (4.0 * c2 - p) / (8.0 * w2)
+        shift = energy[..., None] / w2 * bend
         omega = np.sqrt(w2)
         return NearCenter(2.0 * np.pi / omega * (1.0 + shift), omega * (1.0 - shift))
 
@@ -101,13 +102,16 @@ def near_separatrix(
         s2, _, p = (value[..., pick] for value in _bends(A, B, C, points))
         k = loops.saddle_exponent
         gap = gap[..., None]
-        d = s2 * s2 + p * k * k
+        d = (s2 / k**2) ** 2 + p / k**2
         inside = gap < 0.0
         lobes = np.stack([np.ones(A.shape, bool), np.zeros(A.shape, bool)], axis=-1)
         passes = np.where(inside == lobes, 1.0, 2.0)
-        period = passes / k * np.log(32.0 * k**6 / np.abs(gap * d))
+        k2 = k * k
+        # Quotients of like sizes, so that nothing overflows.
+        size = np.log(k2 / np.abs(gap))
+        period = passes / k * (np.log(32.0 / np.abs(d)) + size)
         cycle = (loops.topology == Topology.HETEROCLINIC)[..., None]
-        equal = 2.0 / k * np.log(8.0 * k**4 / np.abs(gap * A[..., None]))
+        equal = 2.0 / k * (np.log(8.0 * k2 / np.abs(A[..., None])) + size)
         return NearSeparatrix(np.where(cycle, equal, period))
 
 

@@ -114,8 +114,8 @@ def separatrix_motion(
         Times in s: 0 at the turning point of a lobe, where a winding loop is opposite to the
         saddle, and half-way to the partner on a heteroclinic arc.
     saddle : array_like of int
-        0 for the lower saddle, 1 for the upper one, -1 for that of the figure-eight where there
-        are two, else the only one.
+        0 for the lower saddle, 1 for the upper one, -1 for the lower one where there are two,
+        else the only one.
     side : array_like of int
         Side on which the motion leaves the saddle: 0 left, 1 right. All six broadcast.
     threads : int, optional

@@ -184,7 +184,8 @@ def test_invalid_cells_leave_the_others_untouched(parameter, bad):
             continue
         both = critical_disk(parameter, **{**disk, name: np.array([disk[name], bad])})
         for got, want in zip(both, alone, strict=True):
-            assert np.array_equal(got[0], want, equal_nan=True), name
+            # NumPy's loops over arrays and its scalars may differ in the last bit.
+            assert np.allclose(got[0], want, rtol=4e-16, atol=0, equal_nan=True), name
             # beta_star does not depend on a, omega1 and g; whatever is there must be a number
             assert np.isnan(got[1]) or np.isfinite(got[1]), name
         assert np.isnan(both[0][1]), name

@@ -539,3 +539,17 @@ def test_states_that_a_sweep_lacks_are_named():
         pk.sweep(C, A=[1.0], of="energy_level")
     assert "energy_level" not in pk.quantities()
     assert set(STATES) >= {"time", "level", "state_family"}
+
+
+def test_orbits_and_angles_agree_to_the_bit():
+    """A quantity does not depend on what else is asked for."""
+    rng = np.random.default_rng(5)
+    phi, dphi = rng.uniform(-3, 3, 200), rng.normal(size=200)
+    xr.merge([pk.orbits(C, phi, dphi), pk.action_angle(C, phi, dphi)], compat="identical")
+
+
+def test_gap_of_a_fold_has_no_saddle():
+    fold = pk.Coefficients(125.0, 27.0, 64.0)
+    ds = pk.orbits(fold, gap=-1.0, saddle="lower")
+    assert ds.orbit_kind == pk.OrbitKind.NOT_COMPUTED
+    assert np.isnan(ds.period)
