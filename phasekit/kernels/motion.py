@@ -200,7 +200,7 @@ def at_phase(high: float, low: float, w: Array) -> tuple[float, float, float]:
     cosine = np.float64(math.cos(angle))
     sine += rest * cosine
     if sine == 0.0 and angle < 0.0:
-        sine = -1e-300  # half a turn back, not ahead
+        sine = np.float64(-1e-300)  # half a turn back, not ahead
     local, rate = locate(sine, cosine - rest * sine, w)
     return turns, local, rate
 
