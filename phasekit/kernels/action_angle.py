@@ -185,9 +185,10 @@ def find_action(code: int, action: float, w: Array) -> None:
         upper = (
             energy_between(center, UPPER_SADDLE if single else LOWER_SADDLE, w) / w[UNIT] / w[UNIT]
         )
-    if base == UPPER_SADDLE and not action * w[UNIT] < FREE_FROM:
+    origin = w[PHI + LOWER_CENTER]
+    if base == UPPER_SADDLE and not (origin == origin and action * w[UNIT] < FREE_FROM):
         w[MODE] = FREE
-        w[ANGLE] = w[PHI + LOWER_CENTER]
+        w[ANGLE] = origin if origin == origin else 0.0  # without force
         w[RATE] = action * w[UNIT]
         w[DIRECTION] = -1.0 if code == BACKWARD else 1.0
         return

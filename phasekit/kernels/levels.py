@@ -70,6 +70,8 @@ def load(a: float, b: float, c: float, w: Array) -> bool:
     if not (size > 0.0 and abs(a) <= LARGEST and abs(b) <= LARGEST and abs(c) <= LARGEST):
         w[UNIT] = 1.0
         w[A] = size  # 0 without force
+        w[B] = 0.0
+        w[C] = 0.0
         return False
     exponent = (np.float64(size).view(np.int64) >> 52) & 0x7FF
     half = (exponent - 1023) >> 1

@@ -271,7 +271,7 @@ def after(t: float, w: Array) -> tuple[float, float]:
     if mode == INVALID or not abs(t) < math.inf:
         return math.nan, math.nan
     if mode == REST:
-        return w[START], 0.0 * w[RATE]
+        return w[START], 0.0
     if mode == FREE:
         return w[START] + w[RATE] / unit * t, w[RATE] / unit
     time = t / unit

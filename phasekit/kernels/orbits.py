@@ -87,9 +87,7 @@ def reach(w: Array) -> tuple[float, float]:
 
 @inline
 def rest(w: Array) -> float:
-    """Frequency of small oscillations where the state is a center at rest, else 0."""
-    if w[MODE] != REST or w[UNIT] == 0.0:
-        return 0.0
+    """Frequency of small oscillations about a state at rest that is a center, else 0."""
     c = np.float64(math.cos(w[ANGLE]))
     s = np.float64(math.sin(w[ANGLE]))
     slope = w[B] * c - w[A] * (c - s) * (c + s) + w[C] * s

@@ -221,7 +221,7 @@ def state_of(
             valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         w[lv.MODE] = lv.INVALID
-        if valid and family[k] == family[k]:
+        if (valid or w[lv.A] == 0.0) and family[k] == family[k]:
             aa.find_action(int(family[k]), action[k], w)
         state_phi[k], state_dphi[k] = aa.state_at(angle[k], w)
 

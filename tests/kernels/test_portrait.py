@@ -7,7 +7,7 @@ import pytest
 from properties.strategies import systems
 
 from phasekit.phase import solve
-from phasekit.phase.action_angle import orbits_with_angles
+from phasekit.phase.action_angle import action_angle, orbits_with_angles, state_of
 from phasekit.phase.flow import flow
 from phasekit.phase.orbits import orbits, orbits_at_energy, orbits_at_gap
 
@@ -57,3 +57,23 @@ def test_a_cell_does_not_depend_on_its_neighbors(states):
             alone = (*orbits(*cell), *flow(*cell, t[i]))
             for one, other in zip(whole, alone, strict=True):
                 assert np.array_equal(one[i], other, equal_nan=one.dtype.kind == "f"), cell
+
+
+def test_nothing_is_left_of_the_system_before():
+    """Without force a state at rest stays, whatever system its neighbor in the array has."""
+    A, B, C = np.array([[1.0, 0.0, -2.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.3, 0.0, 0.5, 0.0]])
+    got = orbits(A, B, C, 0.3, 0.0)
+    assert np.isinf(got.period[[1, 3]]).all()
+    assert (got.frequency[[1, 3]] == 0).all()
+    moved = flow(A, B, C, 0.3, 0.0, 2.0)
+    assert (moved.motion_phi[[1, 3]] == 0.3).all()
+
+
+def test_rotations_without_force_have_an_action_and_an_angle():
+    """The speed is the action, and the angle is phi."""
+    there = action_angle(0.0, 0.0, 0.0, [0.3, 0.3], [2.0, -2.0])
+    assert there.action == pytest.approx(2.0)
+    assert there.angle == pytest.approx([0.3, 2 * np.pi - 0.3])
+    back = state_of(0.0, 0.0, 0.0, there.action, there.angle, there.orbit_family)
+    assert back.phi == pytest.approx(0.3)
+    assert back.dphi == pytest.approx([2.0, -2.0])
