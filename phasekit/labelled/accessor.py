@@ -13,6 +13,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import NumberLike
 from phasekit.labelled.schema import model_name
 from phasekit.labelled.system import MODELS, Model
 
@@ -52,6 +53,102 @@ class PhasekitAccessor:
                 f"ds: got a map of the model {name!r}, wants one of {', '.join(MODELS)}"
             )
         return MODELS[name].from_dataset(self._ds)
+
+    def rotators(
+        self,
+        on: str = "equilibria",
+        *,
+        phi0: NumberLike | None = None,
+        dphi0: NumberLike | None = None,
+        **parameters: NumberLike,
+    ) -> xr.Dataset:
+        """Vector rotators on the equilibria, separatrices or orbits of this map of disks.
+
+        Parameters
+        ----------
+        on : {"equilibria", "separatrix", "orbit"}
+            Where: at every equilibrium, over the loops of the separatrices, or over the orbits
+            through given states.
+        phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+            With ``on="orbit"``: states, angles in rad and angular velocities in s^-1.
+        **parameters
+            Parameters that replace those of the map.
+
+        Returns
+        -------
+        xarray.Dataset
+            At equilibria ``rotator`` and ``rotator_intensity``. Else, for each rotator,
+            ``peak_intensity``, ``mean_intensity`` and ``rms_intensity`` over the curve in s^-2, and
+            ``intensity_peak_phi``, ``intensity_peak_dphi``, where the peak lies: on (``saddle``,
+            ``side``) as `bearing_forces` explains. Lazy where the map is.
+
+        Raises
+        ------
+        ParameterError
+            If the map is not one of disks, or an argument is unusable.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> disk = pk.GyroRotorDisk(beta=0.3, e=0.1, a=0.05, r=0.1, omega1=10.0)
+        >>> ds = pk.sweep(disk, beta=[0.1, 0.2])
+        >>> ds.phasekit.rotators(on="equilibria").rotator.dims
+        ('beta', 'equilibrium', 'rotator_name', 'carrier_axis')
+        """
+        return self._on_map("rotators", on, phi0, dphi0, parameters)
+
+    def bearing_forces(
+        self,
+        on: str = "equilibria",
+        *,
+        phi0: NumberLike | None = None,
+        dphi0: NumberLike | None = None,
+        **parameters: NumberLike,
+    ) -> xr.Dataset:
+        """Bearing forces on the equilibria, separatrices or orbits of this map of disks.
+
+        Parameters
+        ----------
+        on : {"equilibria", "separatrix", "orbit"}
+            Where: at every equilibrium, over the loops of the separatrices, or over the orbits
+            through given states.
+        phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+            With ``on="orbit"``: states, angles in rad and angular velocities in s^-1.
+        **parameters
+            Parameters that replace those of the map, or that it lacks: ``m``, ``half_span``.
+
+        Returns
+        -------
+        xarray.Dataset
+            At equilibria ``force`` and its parts as in `phasekit.bearing_forces`. Else, for each
+            ``bearing``, ``peak_force``, ``mean_force`` and ``rms_force`` over the curve in N, and
+            ``peak_phi``, ``peak_dphi``, where the peak lies. On separatrices these have the dims
+            ``saddle`` and ``side``: the lobe on that side of the saddle, there and back; the
+            winding loop that leaves to that side; or the arc to the partner saddle, there and back.
+            Means are over the angle there (over time both are the saddle's own value), and over
+            time on orbits. Lazy where the map is.
+
+        Raises
+        ------
+        ParameterError
+            If the map is not one of disks with mass and bearings, or an argument is unusable.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4)
+        >>> ds = pk.sweep(disk, beta=[0.5, 0.7])
+        >>> loads = ds.phasekit.bearing_forces(on="separatrix", m=2.0, half_span=0.2)
+        >>> loads.peak_force.dims
+        ('beta', 'saddle', 'side', 'bearing')
+        """
+        return self._on_map("forces", on, phi0, dphi0, parameters)
+
+    def _on_map(self, what: str, on: str, phi0: Any, dphi0: Any, parameters: Any) -> xr.Dataset:
+        from phasekit.labelled.machine import on_map
+
+        system = self.system().replace(**parameters)
+        return on_map(self._ds, system, what, on, phi0, dphi0)
 
     @property
     def plot(self) -> MapPlots:

@@ -168,6 +168,12 @@ class Model:
         return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
+    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
+        """Values of a parameter, NaN where they leave its domain."""
+        valid = next(p for p in cls.declared if p.name == name).valid(value)
+        return value if valid.all() else np.where(valid, value, np.nan)
+
+    @classmethod
     def valid_coefficients(
         cls, parameters: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
