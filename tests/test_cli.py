@@ -160,6 +160,89 @@ def test_sweep(tmp_path, capsys):
     assert "topology" not in ds
 
 
+def test_sweep_goes_on_and_extends(tmp_path, capsys):
+    (tmp_path / "map.toml").write_text(RECIPE)
+    assert main(["sweep", "map.toml"]) == 0
+    (tmp_path / "map.toml").write_text(
+        RECIPE.replace('["equilibria"]', '["equilibria", "topology"]').replace("0.024", "0.024, 1")
+    )
+    assert main(["sweep", "map.toml"]) == 0
+    assert "beta 4 x a 4 cells, 9 quantities" in capsys.readouterr().out
+    whole = pk.open_map("map.zarr").load()
+    assert main(["sweep", "map.toml", "--store", "whole.zarr"]) == 0
+    assert pk.open_map("whole.zarr").load().identical(whole)
+    (tmp_path / "map.toml").write_text(RECIPE.replace("50 mm", "51 mm"))
+    assert "e is 0.05, in the call 0.051" in refused(capsys, "sweep", "map.toml")
+
+
+def test_sweep_with_every_key(tmp_path, capsys):
+    keys = 'chunks = { beta = 2 }\nworkers = 1\ndtype = { period = "float32" }\n[parameters]'
+    recipe = RECIPE.replace("[parameters]", f'{keys}\nstate_phi = "10 deg"').replace(
+        '["equilibria"]', '["orbits", "n_equilibria"]'
+    )
+    (tmp_path / "map.toml").write_text(recipe + 'state_dphi = ["0 rpm", "60 rpm"]\n')
+    assert main(["sweep", "map.toml"]) == 0
+    assert "beta 4 x a 3 x state_dphi 2" in capsys.readouterr().out
+    ds = pk.open_map("map.zarr", chunks={})
+    assert ds.period.dtype == np.float32
+    assert ds.action.chunks[0] == (2, 2)
+    assert ds.period.dims == ("beta", "a", "state_dphi")
+    assert ds.n_equilibria.dims == ("beta", "a")
+    np.testing.assert_array_equal(ds.state_dphi, [0.0, 60 * pk.rpm])
+    assert ds.state_phi.item() == 10 * pk.deg
+
+
+def test_sweep_says_beforehand_what_it_takes(tmp_path, capsys, monkeypatch):
+    (tmp_path / "map.toml").write_text(RECIPE.replace("count = 4", "count = 10000"))
+    assert main(["sweep", "map.toml", "--estimate", "--workers", "2"]) == 0
+    out = capsys.readouterr().out
+    assert "left: 30,000 cells in 1 tiles, about" in out
+    assert "MB before compression) and less than 1 s on 1 process" in out
+    assert "the disk has" in out
+    assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
+    monkeypatch.setattr("phasekit.labelled.place.Place.free_bytes", lambda self: 1000)
+    assert "the map will not fit: it takes about" in refused(capsys, "sweep", "map.toml")
+    assert main(["sweep", "map.toml", "--force"]) == 0
+    assert main(["sweep", "map.toml", "--estimate"]) == 0
+    assert "nothing is left to compute" in capsys.readouterr().out
+
+
+def test_info(tmp_path, capsys):
+    (tmp_path / "map.toml").write_text(RECIPE)
+    for store in ("map.zarr", "map.nc"):
+        assert main(["sweep", "map.toml", "--store", store]) == 0
+        capsys.readouterr()
+        assert main(["info", store]) == 0
+        lines = capsys.readouterr().out.splitlines()
+        assert lines[0].startswith(f"{store}: map of GyroRotorDisk, made by phasekit")
+        assert lines[1] == "fixed: e = 0.05, g = 9.80665, omega1 = 31.4159, r = 0.2"
+        assert lines[2:4] == [
+            "axis beta: 4 values, 0 to 1.5708 rad",
+            "axis a: 3 values, 0 to 0.024 m",
+        ]
+        assert "  n_equilibria       int8     beta x a" in lines
+        assert ("1 of 1 tiles are done, 100 %" in "".join(lines)) == (store == "map.zarr")
+        assert "on the disk" in lines[-1]
+    assert "does not exist" in refused(capsys, "info", "none.zarr")
+    (tmp_path / "folder").mkdir()
+    assert "cannot be read" in refused(capsys, "info", "folder")
+
+
+def test_info_of_a_map_that_is_not_finished(tmp_path, capsys):
+    store = tmp_path / "map.zarr"
+    disk = pk.GyroRotorDisk(beta=0.3, e=0.05, a=0.0, r=0.2, omega1=3.0)
+    pk.sweep(disk, beta=np.linspace(0.1, 1.5, 90), store=store, chunks=30, of="orbits",
+             axes={"state_phi": [0.1], "state_dphi": 0.2})  # fmt: skip
+    for index in (0, 2):
+        (store / "sweep" / "part0" / f"c.0.{index}").unlink()
+    plan = store / "sweep" / "zarr.json"
+    plan.write_text(plan.read_text().replace('"complete": true', '"complete": false'))
+    assert main(["info", str(store)]) == 0
+    out = capsys.readouterr().out
+    assert "1 of 3 tiles are done, 33.3 %" in out
+    assert "left: 60 cells, about" in out
+
+
 def test_sweep_never_overwrites_unasked(tmp_path, capsys):
     (tmp_path / "map.toml").write_text(RECIPE)
     (tmp_path / "map.zarr").mkdir()

@@ -135,8 +135,10 @@ def say_invalid(ds: xr.Dataset) -> None:
     """Say how many cells of a map hold nothing, if any."""
     if "n_equilibria" not in ds:
         return
+    from phasekit.labelled.tiling import tiles
+
     counts = ds["n_equilibria"]
-    invalid = int((counts == -1).sum())
+    invalid = sum(int((counts[tile].values == -1).sum()) for tile in tiles(counts.shape, 1 << 24))
     if invalid:
         say(
             f"{invalid} of {counts.size} cells are empty, for their parameters are not legal; "

@@ -1,10 +1,13 @@
-"""``phasekit sweep FILE.toml``: make a map and store it.
+"""``phasekit sweep FILE.toml``: make a map and store it, or go on with one.
 
-The file holds the model, what is fixed, what is swept and what is computed::
+The file holds the model, what is fixed, what is swept, what is computed, and where it is put::
 
     model = "GyroRotorDisk"
     store = "map.zarr"
     of = ["equilibria", "separatrices"]
+    chunks = { beta = 91 }
+    workers = 4
+    dtype = "float32"
 
     [parameters]
     e = "50 mm"
@@ -31,37 +34,100 @@ from phasekit.cli import Parser, common
 from phasekit.cli.values import between, number
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.arguments import unknown
+from phasekit.labelled.quantities import STATES
 from phasekit.labelled.system import Model
 
-KEYS = ("model", "store", "of", "parameters", "axes")
+KEYS = (
+    "model", "store", "of", "chunks", "workers", "scheduler", "dtype", "parameters", "axes",
+)  # fmt: skip
 RANGE_KEYS = ("from", "to", "count", "spacing")
+
+#: Cells from which on a sweep says beforehand how large it will be and how long it will take.
+MANY_CELLS = 1_000_000
 
 
 def run(argv: Sequence[str]) -> None:
     """Make the map that a TOML file describes."""
-    parser = Parser(prog="phasekit sweep", description="Make a map from a TOML file.")
+    parser = Parser(
+        prog="phasekit sweep",
+        description="Make a map from a TOML file. A map that the same file began is continued; "
+        "one with fewer quantities or shorter axes is extended.",
+    )
     parser.add_argument("file", metavar="FILE.toml", help="what to map; see docs/command_line.md")
     parser.add_argument("--store", help="where to write the map, instead of the file's store")
+    parser.add_argument("--workers", type=int, help="number of processes (as many as cores)")
+    parser.add_argument("--scheduler", help="address of a dask scheduler, tcp://host:8786")
+    parser.add_argument(
+        "--estimate", action="store_true", help="say how large and how long, and do nothing"
+    )
+    parser.add_argument("--force", action="store_true", help="begin even if the disk is too small")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing map")
     options = parser.parse_args(argv)
     recipe = read_recipe(common.path_called("FILE.toml", options.file))
-    store = options.store if options.store is not None else recipe.get("store")
+    for key in ("store", "workers", "scheduler"):
+        if getattr(options, key) is not None:
+            recipe[key] = getattr(options, key)
+    store = recipe.get("store")
     if not isinstance(store, str) or not store:
         raise ParameterError(
             f"store: got {store!r}, wants a name that ends in .zarr or .nc, in the file "
             "or as --store"
         )
-    if common.path_called("store", store).exists() and not options.overwrite:
-        raise StoreError(f"store: {store} exists; choose another name or pass --overwrite")
+    if "://" not in store:
+        path = common.path_called("store", store)
+        if path.suffix == ".nc" and path.exists() and not options.overwrite:
+            raise StoreError(f"store: {store} exists; choose another name or pass --overwrite")
     system, axes = read_system(recipe)
-    from phasekit import sweep
+    _sweep(recipe, system, axes, options)
 
-    of = recipe.get("of", ("equilibria", "separatrices"))
-    ds = sweep(system, axes, of=of, store=store, overwrite=options.overwrite)
-    sizes = " x ".join(f"{name} {ds.sizes[name]}" for name in axes)
-    common.say(f"{type(system).__name__}: {sizes} cells, {len(ds.data_vars)} quantities")
+
+def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], options: Any) -> None:
+    from phasekit import sweep
+    from phasekit.labelled.sweep import plan_sweep
+
+    store = recipe["store"]
+    what = {"of": recipe.get("of", ("equilibria", "separatrices")), "store": store}
+    if "dtype" in recipe:
+        what["dtype"] = recipe["dtype"]
+    if "chunks" in recipe:
+        what["chunks"] = recipe["chunks"]
+    sizes = " x ".join(f"{name} {np.size(values)}" for name, values in axes.items())
+    title = f"{type(system).__name__}: {sizes} cells"
+    if options.estimate or not store.endswith(".nc"):
+        job = plan_sweep(system, axes, overwrite=options.overwrite, **what)
+        if options.estimate or job.cells > MANY_CELLS:
+            common.say(title)
+            _say_estimate(job, recipe.get("workers"))
+        if options.estimate:
+            return
+    ds = sweep(
+        system,
+        axes,
+        **what,
+        workers=recipe.get("workers"),
+        client=recipe.get("scheduler"),
+        overwrite=options.overwrite,
+        force=options.force,
+    )
+    common.say(f"{title}, {len(ds.data_vars)} quantities")
     common.say_invalid(ds)
     common.say(f"wrote {store}; open it with phasekit.open_map({store!r})")
+
+
+def _say_estimate(job: Any, workers: Any) -> None:
+    from phasekit.kernels.launch import cpus
+    from phasekit.labelled.memory import human
+
+    if not job.count:
+        common.say("nothing is left to compute")
+        return
+    number = workers if isinstance(workers, int) and workers > 0 else cpus()
+    common.say(
+        f"left: {job.cells:,} cells in {job.count:,} tiles, {job.estimate().describe(number)}"
+    )
+    free = job.place.free_bytes()
+    if free is not None:
+        common.say(f"the disk has {human(free)} left")
 
 
 def read_recipe(path: Path) -> dict[str, Any]:
@@ -86,7 +152,8 @@ def read_recipe(path: Path) -> dict[str, Any]:
 def read_system(recipe: Mapping[str, Any]) -> tuple[Model, dict[str, Any]]:
     """Return the system of a recipe and its axes, in their order."""
     model = common.model_called(recipe.get("model", "GyroRotorDisk"))
-    units = {parameter.name: parameter.units for parameter in model.declared}
+    declared = {parameter.name: parameter.units for parameter in model.declared}
+    units = {**declared, **{name: state[0] for name, state in STATES.items()}}
     for table in ("parameters", "axes"):
         for name in recipe[table]:
             if name not in units:
@@ -96,12 +163,15 @@ def read_system(recipe: Mapping[str, Any]) -> tuple[Model, dict[str, Any]]:
             raise ParameterError(f"{name}: got it in parameters and in axes, wants it once")
     if not recipe["axes"]:
         raise ParameterError(
-            f"axes: got none, wants at least one of {', '.join(units)}, "
+            f"axes: got none, wants at least one of {', '.join(declared)}, "
             "such as beta = { from = 0, to = 1.5, count = 100 }"
         )
     fixed = {name: number(name, text, units[name]) for name, text in recipe["parameters"].items()}
     axes = {name: _axis(name, value, units[name]) for name, value in recipe["axes"].items()}
-    return model(**fixed, **axes), axes
+    given = {name: value for name, value in {**fixed, **axes}.items() if name in declared}
+    # Fixed states are numbers among the axes.
+    states = {name: value for name, value in fixed.items() if name in STATES}
+    return model(**given), {**axes, **states}
 
 
 def _axis(name: str, value: Any, units: str) -> Any:

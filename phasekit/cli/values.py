@@ -29,6 +29,7 @@ UNITS: Mapping[str, Mapping[str, Decimal]] = {
     },
     "s-2": {"1/s2": Decimal(1), "s-2": Decimal(1)},
     "m s-2": {"m/s2": Decimal(1), "m s-2": Decimal(1)},
+    "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "min": Decimal(60)},
     "1": {},
 }
 #: Most values that a range may have.

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -21,12 +23,24 @@ _interpreted: dict[Callable[..., None], int] = {}
 
 Arrays = tuple[npt.NDArray[Any], ...]
 
+_default_threads: ContextVar[int | None] = ContextVar("default_threads", default=None)
+
 
 def cpus() -> int:
     """Number of cores that this process may use, not that the machine has."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """Let kernels called in this context run in one thread, unless they are told a number."""
+    token = _default_threads.set(1)
+    try:
+        yield
+    finally:
+        _default_threads.reset(token)
 
 
 def launch(
@@ -48,7 +62,7 @@ def launch(
         with np.errstate(all="ignore"):
             kernel.py_func(*arrays, 0, size, *groups)
         return
-    workers = (threads or cpus()) if size * weight >= THREADS_FROM else 1
+    workers = (threads or _default_threads.get() or cpus()) if size * weight >= THREADS_FROM else 1
     if workers == 1:
         kernel(*arrays, 0, size, *groups)
         return

@@ -64,6 +64,55 @@ class Cells:
             self.computed.update(one.call(*arrays))
 
 
+@dataclass(frozen=True)
+class Box:
+    """What is computed on the same dims, and so tile by tile together."""
+
+    dims: tuple[str, ...]
+    passes: tuple[Pass, ...]
+    rows: tuple[Quantity, ...]
+    names: tuple[str, ...]  # of the inputs
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What is computed where: a system, its cells, and the passes over them."""
+
+    system: Model
+    grid: Grid
+    rows: tuple[Quantity, ...]
+    needs: Mapping[Pass, Sequence[str]]  # the inputs on which each pass depends, in the end
+
+    @property
+    def model(self) -> type[Model]:
+        """The system's class."""
+        return type(self.system)
+
+    @property
+    def dims(self) -> dict[str, tuple[str, ...]]:
+        """The dims of each group."""
+        return {
+            group: self.grid.dims_of(need)
+            for one, need in self.needs.items()
+            for group in one.groups
+        }
+
+    def boxes(self) -> list[Box]:
+        """Return the passes by the dims on which they run."""
+        dims = self.dims
+        found = []
+        for used in dict.fromkeys(dims.values()):
+            passes = tuple(one for one in self.needs if dims[one.groups[0]] == used)
+            names = dict.fromkeys(name for one in passes for name in self.needs[one])
+            rows = tuple(row for row in self.rows if dims[row.group] == used)
+            found.append(Box(used, passes, rows, tuple(names)))
+        return found
+
+    def arrays(self, box: Box) -> dict[str, FloatArray]:
+        """Return the inputs of a box, each with an axis for each of its dims."""
+        return {name: self.grid.aligned(name, box.dims) for name in box.names}
+
+
 def leaves(system: Model, names: Iterable[str], passes: Sequence[Pass]) -> list[str]:
     """Return the parameters and states on which inputs of passes depend, in the end."""
     found: dict[str, None] = {}
@@ -114,18 +163,30 @@ def evaluate(
     ParameterError
         If an input is missing, dims disagree, or the result would not fit into memory.
     """
-    states = dict(states or {})
-    inputs = {**system.parameters, **states}
+    layout = lay_out(system, rows, passes, states=states, axis=axis, called=called, order=order)
+    data = _lazy(layout) if layout.grid.lazy else _eager(layout, progress)
+    return assemble(layout, data)
+
+
+def lay_out(
+    system: Model,
+    rows: Sequence[Quantity],
+    passes: Sequence[Pass],
+    *,
+    states: Mapping[str, Value] | None = None,
+    axis: Mapping[str, str] | None = None,
+    called: Mapping[str, str] | None = None,
+    order: Sequence[str] = (),
+) -> Layout:
+    """Say what is computed where, and refuse what cannot be; arguments as in `evaluate`."""
+    inputs = {**system.parameters, **(states or {})}
     grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = {one: leaves(system, one.inputs, passes) for one in passes}
     _refuse_missing(system, needs, inputs)
     if not grid.sizes and any("A" in one.inputs for one in passes):
         system.coefficients()  # scalars that are invalid raise, where cells of arrays become NaN
-    dims = {group: grid.dims_of(need) for one, need in needs.items() for group in one.groups}
     _refuse_taken(grid, rows)
-    compute = _lazy if grid.lazy else functools.partial(_eager, progress=progress)
-    data = compute(type(system), grid, rows, needs, dims)
-    return _assemble(system, grid, rows, data)
+    return Layout(system, grid, tuple(rows), needs)
 
 
 def _refuse_missing(
@@ -159,67 +220,56 @@ def _refuse_taken(grid: Grid, rows: Sequence[Quantity]) -> None:
 # ------------------------------------------------------------------------------ in memory
 
 
-def _eager(
-    model: type[Model],
-    grid: Grid,
-    rows: Sequence[Quantity],
-    needs: Mapping[Pass, Sequence[str]],
-    dims: Mapping[str, tuple[str, ...]],
-    progress: bool | None,
-) -> dict[str, xr.Variable]:
-    cells = {group: prod(grid.sizes[d] for d in used) for group, used in dims.items()}
-    refuse_too_large({row.name: cells[row.group] * row.cell_bytes for row in rows}, grid.sizes)
-    out = {
-        row.name: np.empty(
-            tuple(grid.sizes[d] for d in dims[row.group]) + row.label_shape, dtype=row.dtype
-        )
-        for row in rows
-    }
+def _eager(layout: Layout, progress: bool | None) -> dict[str, xr.Variable]:
+    sizes = layout.grid.sizes
+    refuse_too_large(
+        {
+            row.name: prod(sizes[dim] for dim in box.dims) * row.cell_bytes
+            for box in layout.boxes()
+            for row in box.rows
+        },
+        sizes,
+    )
+    out: dict[str, xr.Variable] = {}
     tasks: list[tuple[Callable[[], None], int]] = []
-    for used in dict.fromkeys(dims.values()):  # passes on the same dims share their tiles
-        passes = tuple(one for one in needs if dims[one.groups[0]] == used)
-        names = dict.fromkeys(name for one in passes for name in needs[one])
-        arrays = {name: grid.aligned(name, used) for name in names}
-        results = {row.name: out[row.name] for row in rows if dims[row.group] == used}
-        shape = tuple(grid.sizes[dim] for dim in used)
+    for box in layout.boxes():
+        shape = tuple(sizes[dim] for dim in box.dims)
+        results = {row.name: np.empty(shape + row.label_shape, dtype=row.dtype) for row in box.rows}
+        arrays = layout.arrays(box)
         for tile in tiles(shape):
-            task = functools.partial(_fill, model, passes, arrays, results, tile)
+            task = functools.partial(fill, layout.model, box.passes, arrays, results, tile)
             tasks.append((task, prod(part.stop - part.start for part in tile)))
+        for row in box.rows:
+            out[row.name] = variable((*box.dims, *row.dims), results[row.name], row.attrs)
     run_tasks(tasks, progress)
-    return {
-        row.name: variable((*dims[row.group], *row.dims), out[row.name], row.attrs) for row in rows
-    }
+    return {row.name: out[row.name] for row in layout.rows}
 
 
-def _fill(
+def fill(
     model: type[Model],
-    passes: tuple[Pass, ...],
+    passes: Sequence[Pass],
     arrays: Mapping[str, FloatArray],
     results: Mapping[str, Any],
     tile: tuple[slice, ...],
 ) -> None:
     """Compute one tile straight into its part of the results."""
-    cells = Cells(model, passes, {name: cut(array, tile) for name, array in arrays.items()})
+    cells = Cells(model, tuple(passes), {name: cut(array, tile) for name, array in arrays.items()})
     for one in passes:
         cells.run(one)
-    for name, result in results.items():
-        result[tile] = cells.computed[name]
+    with np.errstate(over="ignore"):  # where a result is kept in single precision
+        for name, result in results.items():
+            result[tile] = cells.computed[name]
 
 
 # ------------------------------------------------------------------------------ lazily
 
 
-def _lazy(
-    model: type[Model],
-    grid: Grid,
-    rows: Sequence[Quantity],
-    needs: Mapping[Pass, Sequence[str]],
-    dims: Mapping[str, tuple[str, ...]],
-) -> dict[str, xr.Variable]:
+def _lazy(layout: Layout) -> dict[str, xr.Variable]:
     out: dict[str, xr.Variable] = {}
-    for one, names in needs.items():
-        wanted = [row for row in rows if row.group in one.groups]
-        block = functools.partial(_block, model, one, tuple(names), wanted)
+    grid, dims = layout.grid, layout.dims
+    for one, names in layout.needs.items():
+        wanted = [row for row in layout.rows if row.group in one.groups]
+        block = functools.partial(_block, layout.model, one, tuple(names), wanted)
         sizes = {dim: len(LABELS[dim][0]) for row in wanted for dim in row.dims}
         with warnings.catch_warnings():
             # Axes make an outer product: many more chunks than each of them has is what is meant.
@@ -237,7 +287,7 @@ def _lazy(
         ):
             out[row.name] = result.transpose(*dims[row.group], *row.dims)
             out[row.name].attrs = row.attrs
-    return {row.name: out[row.name] for row in rows}
+    return {row.name: out[row.name] for row in layout.rows}
 
 
 def _block(
@@ -261,18 +311,17 @@ def _block(
 # ------------------------------------------------------------------------------ labels
 
 
-def _assemble(
-    system: Model, grid: Grid, rows: Sequence[Quantity], data: Mapping[str, xr.Variable]
-) -> xr.Dataset:
+def assemble(layout: Layout, data: Mapping[str, xr.Variable]) -> xr.Dataset:
+    """Put results and coordinates together."""
     coords: dict[str, xr.Variable] = {}
-    for dim in grid.sizes:
-        if dim in grid.coords:
-            coords[dim] = _with_attrs(system, dim, grid.coords[dim])
-    coords.update(label_coords(dim for row in rows for dim in row.dims))
-    for name, given in grid.inputs.items():
+    for dim in layout.grid.sizes:
+        if dim in layout.grid.coords:
+            coords[dim] = _with_attrs(layout.system, dim, layout.grid.coords[dim])
+    coords.update(label_coords(dim for row in layout.rows for dim in row.dims))
+    for name, given in layout.grid.inputs.items():
         if name not in coords:
-            coords[name] = _with_attrs(system, name, given)
-    return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(system))
+            coords[name] = _with_attrs(layout.system, name, given)
+    return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(layout.system))
 
 
 def _with_attrs(system: Model, name: str, given: xr.Variable) -> xr.Variable:

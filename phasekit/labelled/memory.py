@@ -68,14 +68,15 @@ def refuse_too_large(bytes_of: Mapping[str, int], sizes: Mapping[str, int]) -> N
     axes = " x ".join(f"{dim} {size}" for dim, size in sizes.items())
     largest = ", ".join(sorted(bytes_of, key=bytes_of.__getitem__, reverse=True)[:3])
     raise ParameterError(
-        f"axes: got {axes} = {prod(sizes.values()):.3g} cells, {_human(needed)} of results, wants "
-        f"at most {_human(int(SHARE * available))}, {SHARE:.0%} of the memory that is free; take "
-        f"coarser axes, name fewer quantities in of= (largest: {largest}), sweep it in parts, or "
-        f"pass chunked DataArrays as axes, which stay lazy and can be written with .to_zarr"
+        f"axes: got {axes} = {prod(sizes.values()):.3g} cells, {human(needed)} of results, wants "
+        f"at most {human(int(SHARE * available))}, {SHARE:.0%} of the memory that is free; take "
+        f"coarser axes, name fewer quantities in of= (largest: {largest}), or put a sweep "
+        f"into a store (store='map.zarr'); chunked DataArrays as axes stay lazy"
     )
 
 
-def _human(size: int) -> str:
+def human(size: int) -> str:
+    """Write a number of bytes: 1.5 GB."""
     value = float(size)
     for unit in ("B", "kB", "MB", "GB", "TB"):
         if value < 1000.0:

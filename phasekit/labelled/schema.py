@@ -121,7 +121,9 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
         if dim in ds.coords and ds[dim].dtype != LABEL_DTYPE
     }
     known = [name for name in ROWS if name in ds.data_vars]
-    ds = ds.assign_coords(coords)[known + [name for name in ds.data_vars if name not in known]]
+    ordered = ds[known + [name for name in ds.data_vars if name not in known]]
+    # With those on which no variable depends, which a selection drops.
+    ds = ordered.assign_coords({**ds.coords, **coords})
     for name in ds.data_vars:
         flags = ROWS[str(name)].flags if str(name) in ROWS else None
         if flags is not None and "flag_values" in ds[name].attrs:

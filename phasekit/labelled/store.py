@@ -1,9 +1,8 @@
-"""Stored maps: written whole under a temporary name and renamed, read back as they were."""
+"""Stored maps: netCDF files written whole, and maps read back as they were."""
 
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import tempfile
 from collections.abc import Iterator
@@ -14,25 +13,24 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.arguments import bad, flag
+from phasekit.labelled.arguments import bad
+from phasekit.labelled.arrays import reason
+from phasekit.labelled.partial import with_computed
+from phasekit.labelled.place import NETCDF, ZARR, Place, place_of
 from phasekit.labelled.schema import MODEL, model_name, restore
 
-ZARR, NETCDF = ".zarr", ".nc"
 
+class NetcdfTarget:
+    """A netCDF file for a map; everything that can be refused is refused before it is made."""
 
-class StoreTarget:
-    """A place for a map; everything that can be refused is refused before the map is made."""
-
-    def __init__(self, store: str | PathLike[str], *, overwrite: bool = False) -> None:
-        flag("overwrite", overwrite)
-        self.path = _path(store)
+    def __init__(self, place: Place, *, overwrite: bool = False) -> None:
+        self.path = Path(place.name)
         self.overwrite = overwrite
         if not self.path.parent.is_dir():
             raise StoreError(f"store: the folder {self.path.parent} does not exist; make it first")
         if not os.access(self.path.parent, os.W_OK):
             raise StoreError(f"store: the folder {self.path.parent} cannot be written to")
-        if self.path.suffix == NETCDF:
-            _need_h5netcdf()
+        _need_h5netcdf()
         self._refuse_existing()
 
     def _refuse_existing(self) -> None:
@@ -54,39 +52,31 @@ class StoreTarget:
         try:
             with tempfile.TemporaryDirectory(prefix=f".{self.path.name}.", dir=folder) as scratch:
                 fresh = Path(scratch) / self.path.name
-                if self.path.suffix == ZARR:
-                    ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
-                else:
-                    ds.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
+                ds.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
                 self._refuse_existing()  # it may have appeared while the map was computed
-                if self.path.is_dir():
-                    _replace_folder(fresh, self.path, Path(scratch) / "replaced")
-                else:
-                    fresh.replace(self.path)
+                fresh.replace(self.path)
         except OSError as error:
             if isinstance(error, StoreError):
                 raise
             raise StoreError(f"store: {self.path} was not written: {error}") from error
 
 
-def _replace_folder(fresh: Path, path: Path, aside: Path) -> None:
-    """Put a folder in the place of another, which a rename alone does not do."""
-    path.rename(aside)
-    try:
-        fresh.rename(path)
-    except OSError:
-        aside.rename(path)
-        raise
+def target_of(store: Any) -> Place:
+    """Return the place for a map, which is a name that ends in .zarr or .nc, a URL or a store."""
+    place = place_of(store)
+    if place.path is not None and place.path.suffix not in (ZARR, NETCDF):
+        raise bad("store", os.fspath(store), "a path that ends in .zarr or .nc")
+    return place
 
 
-def open_map(store: str | PathLike[str], *, chunks: Any = None) -> xr.Dataset:
+def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Dataset:
     """Open a stored map as it was when it was written, dtypes and attributes included.
 
     Parameters
     ----------
-    store : path
-        A Zarr store (a folder) or a netCDF file (``.nc``) that phasekit wrote, or that holds a
-        Dataset of phasekit.
+    store : path, URL or zarr store
+        A Zarr store (a folder, or what fsspec or zarr know) or a netCDF file (``.nc``) that
+        phasekit wrote, or that holds a Dataset of phasekit.
     chunks : optional
         Chunks of dask arrays, as in `xarray.open_dataset`. Default: no dask; values are read
         when they are used.
@@ -95,6 +85,9 @@ def open_map(store: str | PathLike[str], *, chunks: Any = None) -> xr.Dataset:
     -------
     xarray.Dataset
         The map; `xarray.Dataset.load` reads it whole, `xarray.Dataset.close` closes the file.
+        A map that `sweep` has not finished, or is writing now, has a variable ``computed`` on its
+        dims: whether all quantities of a cell are there. Where they are not, floats are NaN and
+        codes not_computed; cells that are done after the map was opened may hold their values.
 
     Raises
     ------
@@ -111,54 +104,38 @@ def open_map(store: str | PathLike[str], *, chunks: Any = None) -> xr.Dataset:
     ...     pk.open_map(f"{folder}/map.zarr").identical(ds)
     True
     """
-    path = _path(store, suffix=False)
-    if not path.exists():
-        raise StoreError(f"store: {path} does not exist")
-    with _as_store_error(path):
-        if path.is_dir():
-            ds = xr.open_zarr(path, consolidated=False, chunks=chunks)
-        else:
+    place = place_of(store)
+    if place.path is not None and not place.path.exists():
+        raise StoreError(f"store: {place.name} does not exist")
+    with _as_store_error(place.name):
+        if place.path is not None and not place.path.is_dir():
             _need_h5netcdf()
-            ds = xr.open_dataset(path, engine="h5netcdf", chunks=chunks)
+            ds = xr.open_dataset(place.path, engine="h5netcdf", chunks=chunks)
+        else:
+            source = place.open(read_only=True)
+            ds = xr.open_zarr(source, consolidated=False, chunks=chunks)
+            ds = with_computed(ds, source, place.name, chunks)
         model_name(ds)
         return restore(ds)
 
 
 @contextlib.contextmanager
-def _as_store_error(path: Path) -> Iterator[None]:
+def _as_store_error(name: str) -> Iterator[None]:
     try:
         yield
     except ParameterError as error:
-        raise StoreError(f"store: {path} is not a map of phasekit: {error}") from error
-    except (OSError, ValueError, KeyError) as error:
-        if isinstance(error, StoreError):
-            raise
-        raise StoreError(f"store: {path} cannot be read: {error}") from error
-
-
-def _path(store: Any, *, suffix: bool = True) -> Path:
-    if not isinstance(store, (str, PathLike)) or not os.fspath(store):
-        raise bad("store", store, "a path that ends in .zarr or .nc")
-    try:
-        path = Path(store).expanduser()
-    except RuntimeError as error:  # no such user
-        raise bad("store", os.fspath(store), f"a path that can exist: {error}") from None
-    if "\0" in os.fspath(store):
-        raise bad("store", os.fspath(store), "a path without null bytes")
-    if "://" in os.fspath(store):
-        raise StoreError(f"store: {os.fspath(store)} is a URL; maps are written to local paths")
-    if suffix and path.suffix not in (ZARR, NETCDF):
-        raise bad("store", os.fspath(store), "a path that ends in .zarr or .nc")
-    return path
+        raise StoreError(f"store: {name} is not a map of phasekit: {error}") from error
+    except StoreError:
+        raise
+    except Exception as error:  # whatever is made of files that are not what they were
+        raise StoreError(f"store: {name} cannot be read: {reason(error)}") from error
 
 
 def _is_map_file(path: Path) -> bool:
-    """Whether overwriting may remove it: a store that says which model of phasekit made it."""
+    """Whether overwriting may remove it: a file that says which model of phasekit made it."""
     if path.is_symlink():
         return False
     try:
-        if path.suffix == ZARR:
-            return MODEL in json.loads((path / "zarr.json").read_bytes())["attributes"]
         import h5netcdf
 
         with h5netcdf.File(path, "r") as file:

@@ -1,8 +1,9 @@
-"""Maps: quantities over a grid of parameters, in memory, as one labelled Dataset."""
+"""Maps: quantities over a grid of parameters as one labelled Dataset, in memory or stored."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from os import PathLike
 from typing import Any
 
@@ -11,9 +12,18 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
-from phasekit.labelled.evaluate import evaluate, leaves
-from phasekit.labelled.quantities import STATES, plan_passes, select
-from phasekit.labelled.store import StoreTarget
+from phasekit.labelled.evaluate import Layout, evaluate, lay_out, leaves
+from phasekit.labelled.job import Job, plan_job
+from phasekit.labelled.memory import refuse_too_large
+from phasekit.labelled.options import (
+    check_chunks,
+    check_dtypes,
+    check_workers,
+    refuse_without_store,
+)
+from phasekit.labelled.quantities import STATES, Pass, Quantity, plan_passes, select
+from phasekit.labelled.store import NetcdfTarget, open_map, target_of
+from phasekit.labelled.stored import sweep_into
 from phasekit.labelled.system import Model, as_system
 
 
@@ -22,9 +32,14 @@ def sweep(
     axes: Mapping[str, Any] | None = None,
     *,
     of: str | Iterable[str] = ("equilibria", "separatrices"),
-    store: str | PathLike[str] | None = None,
+    store: str | PathLike[str] | Any | None = None,
+    chunks: int | Mapping[str, int] | None = None,
+    workers: int | None = None,
+    client: Any = None,
     progress: bool | None = None,
     overwrite: bool = False,
+    force: bool = False,
+    dtype: str | Mapping[str, str] | None = None,
     **axes_by_name: Any,
 ) -> xr.Dataset:
     """Map quantities over one or more parameters of a system.
@@ -40,12 +55,29 @@ def sweep(
         be single numbers as well.
     of : str or iterable of str, default ("equilibria", "separatrices")
         Quantities, or groups of them; `quantities` lists them.
-    store : path, optional
-        Write the map there as well: a name that ends in ``.zarr`` (Zarr v3) or ``.nc`` (netCDF).
+    store : path, URL or zarr store, optional
+        Put the map there: a name that ends in ``.zarr``, a URL that fsspec knows, or a store of
+        zarr (Zarr v3), tile by tile, so that it need not fit into memory; or a name that ends in
+        ``.nc`` (netCDF), in one go. A Zarr store that the same call began is continued, and one
+        that has fewer quantities or shorter axes is extended; what it holds is not computed anew.
+    chunks : int or mapping of str to int, optional
+        Cells of a tile along each dim of the map, or along those named; -1: all. The tiles are
+        the chunks of the store. Default: about a million cells, or 128 MB.
+    workers : int, optional
+        Number of processes; 1: this one. Default: as many as there are cores, this one for maps
+        that take seconds.
+    client : dask.distributed.Client or str, optional
+        Compute on the workers of a dask cluster, given by its client or its scheduler's address;
+        all of them must reach the store by the same name.
     progress : bool, optional
         Show a progress bar. Default: if it takes longer than a second, in a terminal.
     overwrite : bool, default False
         Replace a map that is already at `store`.
+    force : bool, default False
+        Begin also if the map will not fit on the disk.
+    dtype : str or mapping of str to str, optional
+        ``"float32"`` to store numbers in single precision, or the dtypes of quantities by name.
+        They are computed in double precision.
     **axes_by_name
         Axes by keyword in place of `axes`.
 
@@ -55,13 +87,15 @@ def sweep(
         The quantities with units, equations and sources. Swept parameters are dimension
         coordinates, fixed ones scalar coordinates; ``ds.phasekit.system()`` rebuilds the system
         of any selection. Cells whose parameters are not valid hold NaN, and -1 in n_equilibria.
+        With a Zarr store it is opened from there, as `open_map` does.
 
     Raises
     ------
     ParameterError
         If an axis or a quantity is unknown or unusable, or the map would not fit into memory.
     StoreError
-        If `store` exists and overwrite is not set, or cannot be written.
+        If `store` holds something else and overwrite is not set, it cannot be written, the disk
+        is too small, or a tile fails. Tiles that are done are kept: the same call goes on.
 
     Examples
     --------
@@ -75,28 +109,78 @@ def sweep(
     0.01
     """
     flag("overwrite", overwrite)
+    flag("force", force)
     if progress is not None:
         flag("progress", progress)
+    place = None if store is None else target_of(store)
+    if place is not None and not place.is_netcdf:
+        layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
+        sweep_into(
+            place,
+            layout,
+            chunks=check_chunks(chunks, layout.grid.sizes),
+            dtypes=dtypes,
+            workers=check_workers(workers, client),
+            client=client,
+            progress=progress,
+            overwrite=overwrite,
+            force=force,
+        )
+        return open_map(store)
+    refuse_without_store(chunks=chunks, workers=workers, client=client, force=force)
+    swept, rows, passes, states, order = _read(system, axes, of, axes_by_name)
+    dtypes = check_dtypes(dtype, rows)
+    rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
+    target = None if place is None else NetcdfTarget(place, overwrite=overwrite)
+    ds = evaluate(swept, rows, passes, states=states, order=order, progress=progress)
+    if target is not None:
+        target.write(ds)
+    return ds
+
+
+def plan_sweep(
+    system: Any,
+    axes: Mapping[str, Any] | None,
+    *,
+    of: Any,
+    store: Any,
+    chunks: Any = None,
+    dtype: Any = None,
+    overwrite: bool = False,
+) -> Job:
+    """Return what `sweep` with a Zarr store would have to do; nothing is computed or written."""
+    layout, dtypes = _lay_out(system, axes, of, dtype, {})
+    tiles = check_chunks(chunks, layout.grid.sizes)
+    return plan_job(target_of(store), layout, chunks=tiles, dtypes=dtypes, overwrite=overwrite)
+
+
+def _lay_out(
+    system: Any,
+    axes: Mapping[str, Any] | None,
+    of: Any,
+    dtype: Any,
+    by_name: Mapping[str, Any],
+) -> tuple[Layout, dict[str, str]]:
+    swept, rows, passes, states, order = _read(system, axes, of, by_name)
+    dtypes = check_dtypes(dtype, rows)
+    # A stored map needs its axes whole, however it is cut.
+    swept = swept.replace(**_loaded(swept.parameters))
+    return lay_out(swept, rows, passes, states=_loaded(states), order=order), dtypes
+
+
+def _read(
+    system: Any, axes: Mapping[str, Any] | None, of: Any, by_name: Mapping[str, Any]
+) -> tuple[Model, tuple[Quantity, ...], tuple[Pass, ...], dict[str, Value], list[str]]:
+    """Return the system with its axes, what to compute and how, the states, the order of dims."""
     system = as_system(system)
     rows = select(of)
     passes = plan_passes(rows)
     needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
-    states = [name for name in STATES if name in needed]
-    kept = _axes(system, axes, axes_by_name, states)
-    target = StoreTarget(store, overwrite=overwrite) if store is not None else None
-    parameters = {name: value for name, value in kept.items() if name not in STATES}
+    kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
+    states = {name: value for name, value in kept.items() if name in STATES}
     order = list(dict.fromkeys(dim for name, value in kept.items() for dim in _dims(name, value)))
-    ds = evaluate(
-        system.replace(**parameters),
-        rows,
-        passes,
-        states={name: value for name, value in kept.items() if name in STATES},
-        order=order,
-        progress=progress,
-    )
-    if target is not None:
-        target.write(ds)
-    return ds
+    parameters = {name: value for name, value in kept.items() if name not in STATES}
+    return system.replace(**parameters), rows, passes, states, order
 
 
 def _axes(
@@ -144,3 +228,15 @@ def _dims(name: str, value: Value) -> tuple[str, ...]:
     if isinstance(value, xr.DataArray):
         return tuple(map(str, value.dims))
     return (name,) if isinstance(value, np.ndarray) else ()
+
+
+def _loaded(values: Mapping[str, Value]) -> dict[str, Value]:
+    """Read chunked axes into memory: a stored map needs them whole, however it is cut."""
+    lazy = {
+        name: value
+        for name, value in values.items()
+        if isinstance(value, xr.DataArray) and value.chunks is not None
+    }
+    for name, value in lazy.items():
+        refuse_too_large({name: value.nbytes}, {str(dim): n for dim, n in value.sizes.items()})
+    return {**values, **{name: numeric(name, value.load()) for name, value in lazy.items()}}

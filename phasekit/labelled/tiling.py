@@ -50,7 +50,7 @@ def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | 
         return
     from phasekit.kernels.launch import cpus  # here, because it loads the kernels
 
-    with _bar(sum(cells for _, cells in tasks), progress) as bar:
+    with progress_bar(sum(cells for _, cells in tasks), progress) as bar:
         pool = ThreadPoolExecutor(max_workers=max(1, min(cpus(), len(tasks))))
         try:
             futures = {pool.submit(task): cells for task, cells in tasks}
@@ -72,10 +72,16 @@ class _NoBar:
         pass
 
 
-def _bar(cells: int, progress: bool | None) -> Any:
+def progress_bar(cells: int, progress: bool | None, done: int = 0) -> Any:
+    """Return a bar that counts cells, with their rate and the time left; quiet unless asked for.
+
+    None shows it in a terminal alone, and if it takes longer than a second.
+    """
     if progress is False or (progress is None and not sys.stderr.isatty()):
         return _NoBar()
     from tqdm import tqdm
 
     delay = 1.0 if progress is None else 0.0
-    return tqdm(total=cells, unit="cell", unit_scale=True, delay=delay, desc="phasekit")
+    return tqdm(
+        total=cells, initial=done, unit="cell", unit_scale=True, delay=delay, desc="phasekit"
+    )

@@ -1,0 +1,22 @@
+"""``phasekit info STORE``: what a stored map is, how complete, and how large."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phasekit.cli import Parser, common
+
+
+def run(argv: Sequence[str]) -> None:
+    """Describe a stored map."""
+    parser = Parser(
+        prog="phasekit info",
+        description="Say what a stored map is, how complete, how large, and what is left to do.",
+    )
+    parser.add_argument("store", metavar="STORE", help="a map: a folder, a file or a URL")
+    options = parser.parse_args(argv)
+    if "://" not in options.store:
+        common.path_called("STORE", options.store)
+    from phasekit.labelled.info import map_info
+
+    common.say(str(map_info(options.store)))

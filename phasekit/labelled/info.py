@@ -1,0 +1,130 @@
+"""What a stored map is, how complete, and how large."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.labelled.arrays import done_tiles, read_plan, zarr_group
+from phasekit.labelled.estimate import Estimate
+from phasekit.labelled.evaluate import lay_out
+from phasekit.labelled.job import Job, Left
+from phasekit.labelled.memory import human
+from phasekit.labelled.partial import COMPUTED
+from phasekit.labelled.place import Place, place_of
+from phasekit.labelled.plan import Plan
+from phasekit.labelled.quantities import STATES, plan_passes
+from phasekit.labelled.schema import SCHEMA
+from phasekit.labelled.store import open_map
+from phasekit.labelled.system import MODELS
+
+
+@dataclass(frozen=True)
+class MapInfo:
+    """A stored map in numbers; printed, in lines."""
+
+    name: str
+    ds: xr.Dataset
+    plan: Plan | None  # None for maps that were written in one go
+    done: dict[str, tuple[int, int]]  # tiles that are done and all tiles, by part
+    size: int | None  # bytes on the disk
+    left: Estimate | None  # None where nothing is left
+
+    @property
+    def complete(self) -> bool:
+        """Whether all is computed."""
+        return COMPUTED not in self.ds
+
+    def __str__(self) -> str:
+        """Write it in lines."""
+        return "\n".join(self._lines())
+
+    def _lines(self) -> list[str]:
+        from phasekit.kernels.launch import cpus
+
+        ds = self.ds
+        model = str(ds.attrs["phasekit_model"])
+        made = f"phasekit {ds.attrs.get('phasekit_version', '?')}, schema {ds.attrs[SCHEMA]}"
+        lines = [f"{self.name}: map of {model}, made by {made}"]
+        inputs = (
+            {p.name for p in MODELS[model].declared} | set(STATES) if model in MODELS else set()
+        )
+        fixed = [
+            f"{n} = {c.item():.6g}" for n, c in ds.coords.items() if n in inputs and not c.dims
+        ]
+        if fixed:
+            lines.append(f"fixed: {', '.join(sorted(fixed))}")
+        for name, coord in ds.coords.items():
+            if name in inputs and coord.dims:
+                lines.append(f"axis {_axis(str(name), coord)}")
+        lines.append("quantities:")
+        width = max((len(str(name)) for name in ds.data_vars), default=0)
+        for name, variable in ds.data_vars.items():
+            if name != COMPUTED:
+                dims = " x ".join(map(str, variable.dims)) or "one value"
+                lines.append(f"  {name!s:<{width}}  {variable.dtype.name:<8} {dims}")
+        for part in self.plan.parts if self.plan else ():
+            done, tiles = self.done[part.name]
+            chunks = " x ".join(f"{d} {n}" for d, n in zip(part.dims, part.chunks, strict=True))
+            share = f"{done} of {tiles} tiles are done, {100 * done / tiles:.3g} %"
+            names = list(part.quantities)
+            shown = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if names[3:] else "")
+            lines.append(f"chunks of {chunks or 'one cell'} ({shown}): {share}")
+        raw = sum(v.nbytes for n, v in ds.data_vars.items() if n != COMPUTED)
+        size = "" if self.size is None else f"{human(self.size)} on the disk, "
+        lines.append(f"size: {size}{human(raw)} before compression when complete")
+        if self.left is not None:
+            lines.append(f"left: {self.left.cells:,} cells, {self.left.describe(cpus())}")
+        return lines
+
+
+def map_info(store: Any) -> MapInfo:
+    """Return what a stored map is; cells that are left are estimated from samples.
+
+    Raises
+    ------
+    StoreError
+        If there is no map.
+    """
+    place = place_of(store)
+    with open_map(store) as ds:
+        size = place.size() if not place.is_netcdf else None
+        if place.path is not None and place.path.is_file():
+            size = place.path.stat().st_size
+            return MapInfo(place.name, ds, None, {}, size, None)
+        plan = read_plan(zarr_group(place.open(read_only=True)))
+        if plan is None:
+            return MapInfo(place.name, ds, None, {}, size, None)
+        done, left = {}, []
+        for part in plan.parts:
+            tiles = prod(part.grid(plan.sizes))
+            marks = np.True_ if part.complete else done_tiles(place, plan, plan, part)
+            indices = np.argwhere(~marks) if not part.complete else np.empty((0, len(part.dims)))
+            done[part.name] = tiles - len(indices), tiles
+            if len(indices):
+                left.append(Left(part, indices, plan.sizes))
+        estimate = _job(place, ds, plan, left).estimate() if left else None
+        return MapInfo(place.name, ds, plan, done, size, estimate)
+
+
+def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:
+    """Return the job that would finish a map: all that it takes is in the store."""
+    system = MODELS[plan.model].from_dataset(ds)
+    rows = [row for one in left for row in one.part.rows]
+    states = {name: ds[name] for name in STATES if name in ds.coords}
+    values = {name: float(x) if not x.dims else x.load() for name, x in states.items()}
+    layout = lay_out(system, rows, plan_passes(rows), states=values, order=list(plan.sizes))
+    return Job(place, layout, plan, plan, tuple(left))
+
+
+def _axis(name: str, coord: xr.DataArray) -> str:
+    values = coord.values
+    units = coord.attrs.get("units", "1")
+    unit = "" if units == "1" else f" {units}"
+    dims = "" if coord.dims == (name,) else f" along {' x '.join(map(str, coord.dims))}"
+    low, high = (f"{value:.6g}" for value in (values.flat[0], values.flat[-1]))
+    return f"{name}: {values.size} values{dims}, {low} to {high}{unit}"

@@ -1,0 +1,80 @@
+"""The parts of a stored map: quantities on the same dims, and how they are cut into tiles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from math import prod
+
+from phasekit.labelled.evaluate import Box
+from phasekit.labelled.quantities import ROWS, Pass, Quantity, plan_passes
+
+#: Cells of a tile, where its results stay below `MOST_BYTES`. Small maps are cut as well, so that
+#: there is work for several processes, but not into tiles below `FEWEST_CELLS`.
+MOST_CELLS = 1 << 20
+FEWEST_CELLS = 1 << 16
+FEWEST_TILES = 16
+MOST_BYTES = 1 << 27
+
+
+@dataclass(frozen=True)
+class Part:
+    """Quantities that are computed together, tile by tile."""
+
+    name: str
+    dims: tuple[str, ...]
+    chunks: tuple[int, ...]
+    quantities: dict[str, str]  # name -> dtype
+    complete: bool = False
+
+    @property
+    def rows(self) -> tuple[Quantity, ...]:
+        """The rows of the table, with the dtypes that are stored."""
+        return tuple(replace(ROWS[name], dtype=dtype) for name, dtype in self.quantities.items())
+
+    @property
+    def passes(self) -> tuple[Pass, ...]:
+        """The passes that compute it."""
+        return plan_passes(self.rows)
+
+    @property
+    def cell_bytes(self) -> int:
+        """Bytes of a cell, uncompressed."""
+        return sum(row.cell_bytes for row in self.rows)
+
+    def grid(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
+        """Return the number of tiles along each dim."""
+        return tuple(-(-sizes[dim] // n) for dim, n in zip(self.dims, self.chunks, strict=True))
+
+    def cells(self, sizes: Mapping[str, int]) -> int:
+        """Return the number of cells."""
+        return prod(sizes[dim] for dim in self.dims)
+
+    def region(self, index: Iterable[int], sizes: Mapping[str, int]) -> tuple[slice, ...]:
+        """Return where a tile lies."""
+        return tuple(
+            slice(i * n, min((i + 1) * n, sizes[dim]))
+            for i, n, dim in zip(index, self.chunks, self.dims, strict=True)
+        )
+
+
+def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str, int]) -> Part:
+    """Cut the dims that the call leaves open into tiles that are about as long in each."""
+    quantities = {row.name: row.dtype for row in box.rows}
+    whole = prod(sizes[dim] for dim in box.dims)
+    cells = min(
+        MOST_CELLS,
+        MOST_BYTES // sum(row.cell_bytes for row in box.rows),
+        max(FEWEST_CELLS, whole // FEWEST_TILES),
+    )
+    found = {
+        dim: sizes[dim] if chunks[dim] == -1 else chunks[dim] for dim in box.dims if dim in chunks
+    }
+    room = max(cells // prod(found.values()), 1)
+    open_dims = sorted((dim for dim in box.dims if dim not in found), key=lambda dim: sizes[dim])
+    for place, dim in enumerate(open_dims):  # the shortest first: what it leaves, others take
+        step = max(int(room ** (1.0 / (len(open_dims) - place)) + 1e-9), 1)
+        pieces = -(-sizes[dim] // step)
+        found[dim] = -(-sizes[dim] // pieces)
+        room = max(room // found[dim], 1)
+    return Part(name, box.dims, tuple(found[dim] for dim in box.dims), quantities)

@@ -1,0 +1,135 @@
+"""Sweeps into a store: what is there already, what is left, and who computes it.
+
+The order of what is written makes an interrupted sweep one that can go on: the plan before the
+arrays, the data of a tile before its mark, the marks before the plan says that a part is complete.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+from phasekit.errors import StoreError
+from phasekit.labelled import workers as run
+from phasekit.labelled.arrays import prepare, write_plan
+from phasekit.labelled.estimate import SAMPLE_CELLS, refuse_too_large_for
+from phasekit.labelled.evaluate import Layout
+from phasekit.labelled.job import Job, plan_job
+from phasekit.labelled.place import Place
+from phasekit.labelled.tiling import progress_bar
+
+#: Seconds of work for which worker processes are not worth their start.
+FEW_SECONDS = 4.0
+
+
+def sweep_into(
+    place: Place,
+    layout: Layout,
+    *,
+    chunks: Mapping[str, int],
+    dtypes: Mapping[str, str],
+    workers: int | None = None,
+    client: Any = None,
+    progress: bool | None = None,
+    overwrite: bool = False,
+    force: bool = False,
+) -> None:
+    """Compute what a store does not hold yet.
+
+    Raises
+    ------
+    StoreError
+        If the store holds something else, cannot be written, is too small, or a tile fails.
+    """
+    place.refuse_unwritable()
+    with place.locked():
+        job = plan_job(place, layout, chunks=chunks, dtypes=dtypes, overwrite=overwrite)
+        with contextlib.ExitStack() as stack:
+            if client is not None:
+                client = stack.enter_context(run.connected(client))
+            processes = _weigh(job, workers, client, force)
+            with _written(place):
+                if job.old is None:
+                    place.clear()
+                if job.plan != job.old:
+                    prepare(place, job.old, job.plan, layout)
+                _compute(job, processes, client, progress)
+                _finish(job)
+
+
+def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
+    """Refuse what will not fit or cannot run, and return how many processes the work is worth."""
+    from phasekit.kernels.launch import cpus
+
+    most = 1 if client is not None else min(workers or cpus(), job.count)
+    if most > 1 or client is not None:
+        here = run.keeps_here(next(job.tiles())) if job.count else None
+        if not job.place.shared:
+            here = f"{job.place.name} lies in the memory of this process"
+        if here is not None:
+            if workers is not None or client is not None:
+                raise StoreError(
+                    f"store: the map cannot be computed in other processes: {here}; or pass "
+                    "workers=1"
+                )
+            most = 1
+    freed = (job.place.size() or 0) if job.old is None and not job.place.empty else 0
+    free = job.place.free_bytes()
+    most_bytes = sum(share.raw + share.overhead for share in job.shares(0))
+    tight = not force and free is not None and most_bytes > free + freed
+    if not tight and (most <= 1 or job.cells <= SAMPLE_CELLS):
+        return 1 if workers is None else most
+    # Kernels that are not compiled yet are compiled here, before many processes do so.
+    needed = job.estimate()
+    if not force:
+        refuse_too_large_for(job.place, needed, freed)
+    return 1 if workers is None and needed.seconds < FEW_SECONDS else most
+
+
+def _compute(job: Job, processes: int, client: Any, progress: bool | None) -> None:
+    """Compute the tiles that are left."""
+    if not job.count:
+        return
+    tiles = job.tiles()
+    if client is not None:
+        results = run.on_cluster(tiles, client)
+    elif processes > 1:
+        results = run.in_processes(tiles, processes)
+    else:
+        results = run.in_this_process(tiles)
+    total = sum(left.part.cells(job.plan.sizes) for left in job.left)
+    finished = 0
+    with progress_bar(total, progress, total - job.cells) as bar, contextlib.closing(results):
+        try:
+            for tile in results:
+                finished += 1
+                bar.update(tile.cells)
+        except StoreError as error:
+            raise StoreError(
+                f"store: {job.place.name}: {error}; {job.count - finished} of {job.count} tiles "
+                "are left; what is done is kept, and the same call goes on from there"
+            ) from error
+
+
+def _finish(job: Job) -> None:
+    """Say that what was computed is complete, after removing what killed processes left."""
+    complete = {left.part.name for left in job.left}
+    if complete:
+        job.place.sweep_leftovers()
+        parts = tuple(
+            replace(part, complete=part.complete or part.name in complete)
+            for part in job.plan.parts
+        )
+        write_plan(job.place, replace(job.plan, parts=parts))
+
+
+@contextlib.contextmanager
+def _written(place: Place) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if isinstance(error, StoreError):
+            raise
+        raise StoreError(f"store: {place.name} cannot be written: {error}") from error
