@@ -38,9 +38,11 @@ STEP = 1.0 / 5.0
 REACH = 17  # nodes of the first level on either side of the middle: 1e-19 of the arc from its end
 LEVELS = 7
 TOLERANCE = 1e-8  # of mean square and mean, from level to level
-SAMPLES = 4 * REACH + 1  # nodes of the first two levels, in their order along the arc
-CANDIDATES = 2  # highest samples that are refined to peaks
-REFINEMENTS = 18
+SAMPLED = 3  # levels that are searched for peaks
+SAMPLES = REACH * 2**SAMPLED + 1  # their nodes, in order along the arc
+CANDIDATES = 5  # highest samples that are refined to peaks
+WORTH = 0.8  # of the highest peak so far: lower samples are not refined
+REFINEMENTS = 24
 APART = 0.02  # of the arc: nearer local maxima are one
 BRANCHES, MEASURES = 2, 2
 
@@ -228,7 +230,7 @@ def raise_peak(
                             apart = False
                     if apart:
                         branch, at, highest = b, q, value
-        if branch < 0 or highest < 0.7 * best[0]:
+        if branch < 0 or highest < WORTH * best[0]:
             return
         taken[n] = 2 * branch + distance[at]
         left = distance[at - 1] if at > 0 else 0.0
@@ -274,12 +276,13 @@ def over_arc(
                     value = values[0] if measure == 0 else values[1]
                     new[measure, 0] += weight[q] * value
                     new[measure, 1] += weight[q] * value * value
-                    if level < 2:
-                        at = 2 * q if level == 0 else 2 * (q - first) + 1
+                    if level < SAMPLED:
+                        stride = 2 ** (SAMPLED - 1 - level)
+                        at = (q if level == 0 else 2 * (q - first) + 1) * stride
                         samples[b, measure, at] = value
                         places[at] = place(distance[q])
         first += count
-        settled = level > 0
+        settled = level >= SAMPLED - 1
         for measure in range(MEASURES):
             for power in range(2):
                 change = abs(new[measure, power] / scale[1] - old[measure, power])

@@ -93,6 +93,12 @@ def separatrix_forces(
     threads : int, optional
         Number of threads for large arrays; all cores by default.
 
+    Notes
+    -----
+    The highest of 137 samples of an arc are refined. Two maxima of almost the same height within a
+    tenth of a radian may be taken for one: in 10^4 random disks the peak was then too low by less
+    than 10^-5.
+
     Examples
     --------
     >>> from phasekit.phase.separatrices import separatrices
