@@ -392,7 +392,7 @@ _DISK = ("beta", "e", "a", "r", "omega1", "g")
 _HEAVY = ("beta", "e", "a", "r", "omega1", "m", "g")
 _BORNE = (*_HEAVY, "half_span")
 _STATE = ("state_phi", "state_dphi")
-_LOOPS = ("saddle_phi", "turning_offset", "loop")
+_LOOPS = ("saddle_phi", "saddle_exponent", "turning_offset", "loop")
 
 #: Passes over the cells, those that compute more groups first. Groups that need an argument of
 #: their own (critical: the parameter) have none; their functions make one for the call, as do those

@@ -65,6 +65,7 @@ def at_states(
     """Run a kernel over states that broadcast against bodies; ``tails`` are the outputs' axes."""
     table, own = body
     arrays = [np.asarray(state, dtype=float) for state in states]
+    arrays = [np.where(np.isfinite(array), array, np.nan) for array in arrays]
     shape = np.broadcast_shapes(own, *(array.shape for array in arrays))
     index = np.broadcast_to(np.arange(table.shape[1]).reshape(own), shape)
     # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
