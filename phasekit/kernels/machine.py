@@ -75,11 +75,13 @@ def put(
     """Write d along a base vector and q along that vector turned, both of the same length."""
     rotator, intensity = out[0], out[1]
     unit = max(abs(base[0]), abs(base[1]), abs(base[2]))  # squares would vanish below 1e-154
-    x, y, z = base[0] / unit, base[1] / unit, base[2] / unit
-    size = unit * math.sqrt(x * x + y * y + z * z)
+    size = NAN
+    if unit > 0.0:
+        x, y, z = base[0] / unit, base[1] / unit, base[2] / unit
+        size = unit * math.sqrt(x * x + y * y + z * z)
     known = size > 0.0
-    du = d / size if known else NAN
-    qv = q / size if known else NAN
+    du = d / size
+    qv = q / size
     rotator[i, row, 0] = 0.0 + du * base[0] + qv * turned[0]
     rotator[i, row, 1] = 0.0 + du * base[1] + qv * turned[1]
     rotator[i, row, 2] = 0.0 + du * base[2] + qv * turned[2]
@@ -211,7 +213,7 @@ def bearings(
             u, v = half_u + sign * couple_u, half_v + sign * couple_v
             n = along_n2 if j == 0 else abs(0.0 * along_n2)
             hold = 0.5 * table[WEIGHT, k] * (1.0 + sign * along / span)
-            none = abs(0.0 * hold)  # NaN where there is no body
+            none = abs(0.0 * hold * s)  # NaN where there is no body or state
             if carrier:  # u01, v01, n1
                 v01, n1 = c * u - s * v, s * u + c * v
                 kinetic[i, j, 0], kinetic[i, j, 1], kinetic[i, j, 2] = n, v01, n1
@@ -277,11 +279,15 @@ def fixed_bearings(
         lever = 1.0 / span[i]
         kin_u, kin_v = lever * l_v01, -lever * l_u01
         stat_u, stat_v = -lever * heavy * along, -lever * heavy * reach
-        none = abs(0.0 * stat_u)  # NaN where there is no body
+        none = abs(0.0 * stat_u * s)  # NaN where there is no body, bearing or state
         kinetic[i, 1, 0], kinetic[i, 1, 1], kinetic[i, 1, 2] = kin_u, kin_v, none
         weight[i, 1, 0], weight[i, 1, 1], weight[i, 1, 2] = stat_u, stat_v, none
         force[i, 1, 0], force[i, 1, 1], force[i, 1, 2] = kin_u + stat_u, kin_v + stat_v, none
-        kinetic[i, 0, 0], kinetic[i, 0, 1], kinetic[i, 0, 2] = f_u01 - kin_u, f_v01 - kin_v, f_n1
-        weight[i, 0, 0], weight[i, 0, 1], weight[i, 0, 2] = -stat_u, -stat_v, heavy
+        kinetic[i, 0, 0], kinetic[i, 0, 1], kinetic[i, 0, 2] = (
+            f_u01 - kin_u,
+            f_v01 - kin_v,
+            f_n1 + none,
+        )
+        weight[i, 0, 0], weight[i, 0, 1], weight[i, 0, 2] = -stat_u, -stat_v, heavy + none
         for j in range(3):
             force[i, 0, j] = kinetic[i, 0, j] + weight[i, 0, j]
