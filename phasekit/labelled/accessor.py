@@ -126,7 +126,7 @@ class PhasekitAccessor:
             ``saddle`` and ``side``: the lobe on that side of the saddle, there and back; the
             winding loop that leaves to that side; or the arc to the partner saddle, there and back.
             Means are over the angle there (over time both are the saddle's own value), and over
-            time on orbits. Lazy where the map is.
+            time on orbits; all is NaN for an orbit that tends to a saddle. Lazy where the map is.
 
         Raises
         ------

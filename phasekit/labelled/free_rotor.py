@@ -274,8 +274,7 @@ class FreeGyroRotor:
 
         Notes
         -----
-        Bearing forces along a motion: ``pk.bearing_forces(disk.replace(omega1=ds.motion_omega1),
-        ds, ddphi=ds.ddphi, domega1=ds.domega1)``.
+        Bearing forces along a motion: ``pk.bearing_forces(disk, ds)``.
 
         Examples
         --------

@@ -2,12 +2,12 @@
 
 from phasekit.plot.bearing_loads import bearing_forces
 from phasekit.plot.diagram import bifurcation_diagram
-from phasekit.plot.force_polygon import force_polygon
 from phasekit.plot.history import time_history
-from phasekit.plot.hodograph import hodograph
+from phasekit.plot.hodographs import hodograph
 from phasekit.plot.load_map import bearing_load_map
 from phasekit.plot.maps import parameter_map
 from phasekit.plot.periods import frequency_action, period_energy
+from phasekit.plot.polygon import force_polygon
 from phasekit.plot.portrait import phase_portrait
 from phasekit.plot.well import potential_well
 

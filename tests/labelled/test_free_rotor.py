@@ -131,12 +131,13 @@ def test_bearing_forces_along_a_motion():
     """What the drive gives to the disk is its torque without what turns the support itself."""
     disk = DISK.replace(half_span=0.2)
     motion = FreeGyroRotor(disk, 0.02).simulate(*ROTATION, np.linspace(0, 1, 21), torque1=0.3)
-    forces = pk.bearing_forces(
-        disk.replace(omega1=motion.motion_omega1), motion, domega1=motion.domega1
-    )
+    forces = pk.bearing_forces(disk, motion)
     want = motion.torque1 - 0.02 * motion.domega1
     assert forces.force.dims == ("time", "bearing", "disk_axis")
     assert np.allclose(forces.drive_torque, want, rtol=0, atol=1e-11)
+    for name in ("ddphi", "domega1"):
+        with pytest.raises(pk.ParameterError, match=f"^{name}: got 1.0, wants nothing beside"):
+            pk.bearing_forces(disk, motion, **{name: 1.0})
 
 
 # Reduction

@@ -126,6 +126,14 @@ def hodograph(
     return axes
 
 
+def _stroke(ax: Axes, u: FloatArray, v: FloatArray, **look: Any) -> list[Any]:
+    """Draw a curve; one that is a point, as of R01, as a dot on axes that reach to the origin."""
+    if u.size == 0 or np.ptp(u) != 0.0 or np.ptp(v) != 0.0:
+        return ax.plot(u, v, **look)
+    ax.update_datalim([(0.0, 0.0)])
+    return ax.plot(u, v, marker="o", **look)
+
+
 def _plane_of(rotator: str, plane: Sequence[str] | None) -> Plane | None:
     if plane is None:
         return PLANES[rotator]
@@ -178,7 +186,7 @@ def _draw_levels(
         for arc in strokes.level_arcs(land, level):
             look = style.ROTATION if is_turn(arc) else style.LEVEL
             for u, v in tip.branches(*land.loop(arc, level[0]), is_turn(arc)):
-                ax.plot(u, v, zorder=1, **look)
+                _stroke(ax, u, v, zorder=1, **look)
     handles = _draw_separatrices(ax, tip) if energies is None and orbits is None else []
     for number, start in enumerate(starts):
         handles += _draw_orbit(ax, tip, start, number, factor)
@@ -202,7 +210,7 @@ def _draw_separatrices(ax: Axes, tip: _Tip) -> list[Artist]:
         halves = [land.winding(saddle)] if winding else [land.lobe(saddle, s) for s in (0, 1)]
         for phi, speed in halves:
             for u, v in tip.branches(phi, speed, winding):
-                (handles[loop],) = ax.plot(u, v, zorder=3, **looks[loop])
+                (handles[loop],) = _stroke(ax, u, v, zorder=3, **looks[loop])
     return list(handles.values())
 
 
@@ -219,7 +227,7 @@ def _draw_orbit(
         else:
             curves = tip.branches(phi, speed, False)
         for u, v in curves:
-            ax.plot(u, v, zorder=4, **look)
+            _stroke(ax, u, v, zorder=4, **look)
     u, v = tip(np.array([start[0]]), np.array([start[1]]))
     name = strokes.start_name(start, factor)
     (handle,) = ax.plot(u, v, zorder=6, label=name, **strokes.START, **look)
@@ -271,5 +279,5 @@ def _draw_motions(ax: Axes, curves: dict[str, tuple[FloatArray, FloatArray]]) ->
     handles: list[Artist] = []
     for number, (name, (u, v)) in enumerate(curves.items()):
         look = strokes.orbit_look(number) if len(curves) > 1 else style.MOTION
-        handles += ax.plot(u, v, label=name, **look)
+        handles += _stroke(ax, u, v, label=name, **look)
     return handles if len(curves) > 1 else []
