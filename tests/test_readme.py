@@ -35,7 +35,7 @@ def test_each_of_the_two_commands_is_one_line_that_does_everything(readme):
     assert len(commands) == 2
     demo, tests = commands
     assert demo.endswith("phasekit demo")
-    assert tests.endswith("pytest")
+    assert tests.endswith("pytest -n auto")
     assert all("pip install" in command for command in commands)
 
 

@@ -38,16 +38,20 @@ STEP = 1.0 / 5.0
 REACH = 17  # nodes of the first level on either side of the middle: 1e-19 of the arc from its end
 LEVELS = 7
 TOLERANCE = 1e-8  # of mean square and mean, from level to level
-SAMPLES = 4 * REACH + 1  # nodes of the first two levels, in their order along the arc
-CANDIDATES = 2  # highest samples that are refined to peaks
-REFINEMENTS = 18
+SAMPLED = 3  # levels that are searched for peaks
+SAMPLES = REACH * 2**SAMPLED + 1  # their nodes, in order along the arc
+CANDIDATES = 5  # highest samples that are refined to peaks
+WORTH = 0.8  # of the highest peak so far: lower samples are not refined
+REFINEMENTS = 24
 APART = 0.02  # of the arc: nearer local maxima are one
 BRANCHES, MEASURES = 2, 2
 
 # Rows of the description of an arc.
-FIRST, DELTA, TURNS, SIGN = 0, 1, 2, 3  # angle, signed length, whether it ends by turning, of phi'
-AT_FIRST, AT_LAST = 4, 5  # phi'^2 at the ends
-ARC = 6
+FIRST, DELTA, SIGN, WINDS = 0, 1, 2, 3  # angle, signed length, sign of phi', whether it winds
+BEYOND, STEEP = 4, 5  # if not: what `square_speed_between` needs;
+AT_FIRST, AT_LAST = 6, 7  # if so: phi'^2 at the ends, which are saddles,
+SIN_FIRST, COS_FIRST, SIN_LAST, COS_LAST = 8, 9, 10, 11  # sines and cosines there
+ARC = 12
 
 
 def _nodes() -> tuple[Array, Array]:
@@ -87,18 +91,23 @@ def square_speed_from_saddle(x: float, s: float, c: float, a: float, b: float, c
 
 
 @inline
-def square_speed_from_turning(x: float, s: float, c: float, a: float, b: float, cc: float) -> float:
-    """phi'^2 at the offset x from a turning point with sine s and cosine c."""
-    sin2, cos2 = math.sin(0.5 * x), math.cos(0.5 * x)
-    sm, cm = s * cos2 + c * sin2, c * cos2 - s * sin2
-    return -4.0 * sin2 * (b * sm - cc * cm - a * sm * cm * cos2)
+def square_speed_between(x: float, rest: float, beyond: float, k: float) -> float:
+    """phi'^2 at the offset x from a saddle, on the way to where it turns or to a partner saddle.
+
+    That end lies ``rest`` further on, the turning point on the other side of the saddle (the
+    partner again) ``beyond`` further on; k is -V'' of the saddle over the
+    product of the sines of half their offsets.
+    """
+    rise = math.sin(0.5 * x)
+    fall = math.sin(0.5 * rest) * math.sin(0.5 * beyond)
+    return 4.0 * k * rise * rise * fall
 
 
 @inline
-def measures(k: int, phi: float, dphi: float, rotators: bool, table: Array) -> tuple[float, float]:
+def measures(
+    k: int, s: float, c: float, dphi: float, ddphi: float, rotators: bool, table: Array
+) -> tuple[float, float]:
     """Forces at A2 and B2, or intensities of R022 and R012."""
-    s, c = math.sin(phi), math.cos(phi)
-    ddphi = acceleration(k, s, c, 0.0, table)
     if rotators:
         q = dphi * dphi
         return math.sqrt(ddphi * ddphi + q * q), 2.0 * abs(table[OMEGA, k] * dphi)
@@ -125,7 +134,10 @@ def at_states(
 ) -> None:
     """The two measures at states of the free motion."""
     for i in range(start, stop):
-        out[0][i, 0], out[0][i, 1] = measures(index[i], phi[i], dphi[i], rotators, table)
+        k = index[i]
+        s, c = math.sin(phi[i]), math.cos(phi[i])
+        ddphi = acceleration(k, s, c, 0.0, table)
+        out[0][i, 0], out[0][i, 1] = measures(k, s, c, dphi[i], ddphi, rotators, table)
 
 
 @inline
@@ -135,15 +147,17 @@ def state(k: int, arc: Array, distance: float, table: Array) -> tuple[float, flo
     It is negative where the last end is the nearer one.
     """
     from_first = distance > 0.0
-    end = arc[FIRST] if from_first else arc[FIRST] + arc[DELTA]
     x = arc[DELTA] * distance
-    s, c = math.sin(end), math.cos(end)
-    a, b, cc = table[A, k], table[B, k], table[C, k]
-    if from_first or arc[TURNS] == 0.0:
-        square = square_speed_from_saddle(x, s, c, a, b, cc)
+    if arc[WINDS] != 0.0:
+        s = arc[SIN_FIRST] if from_first else arc[SIN_LAST]
+        c = arc[COS_FIRST] if from_first else arc[COS_LAST]
+        square = square_speed_from_saddle(x, s, c, table[A, k], table[B, k], table[C, k])
         square += arc[AT_FIRST] if from_first else arc[AT_LAST]
     else:
-        square = square_speed_from_turning(x, s, c, a, b, cc)
+        rest = arc[DELTA] - x if from_first else -x
+        along = x if from_first else arc[DELTA] + x
+        square = square_speed_between(along, rest, arc[BEYOND] + rest, arc[STEEP])
+    end = arc[FIRST] if from_first else arc[FIRST] + arc[DELTA]
     return end + x, arc[SIGN] * math.sqrt(max(square, 0.0))
 
 
@@ -183,7 +197,9 @@ def refine(
                 new = x[1] + 0.4 * d2 if d2 > d1 else x[1] - 0.4 * d1
         phi, dphi = state(k, arc, new if new < 0.5 else new - 1.0, table)
         dphi = -dphi if branch == 1 else dphi
-        both = measures(k, phi, dphi, rotators, table)
+        s, c = math.sin(phi), math.cos(phi)
+        ddphi = acceleration(k, s, c, 0.0, table)
+        both = measures(k, s, c, dphi, ddphi, rotators, table)
         value = both[0] if measure == 0 else both[1]
         at = n
         if n >= 3 and value > y[1]:
@@ -228,7 +244,7 @@ def raise_peak(
                             apart = False
                     if apart:
                         branch, at, highest = b, q, value
-        if branch < 0 or highest < 0.7 * best[0]:
+        if branch < 0 or highest < WORTH * best[0]:
             return
         taken[n] = 2 * branch + distance[at]
         left = distance[at - 1] if at > 0 else 0.0
@@ -259,31 +275,37 @@ def over_arc(
     Levels of nodes are added until the sums no longer change.
     """
     samples[:] = -1.0
-    old, new, scale = np.zeros((MEASURES, 2)), np.zeros((MEASURES, 2)), np.zeros(2)
-    first = 0
+    old, new = np.zeros((MEASURES, 2)), np.zeros((MEASURES, 2))
+    first, scale = 0, 0.0
+    last = arc[FIRST] + arc[DELTA]
+    arc[SIN_FIRST], arc[COS_FIRST] = math.sin(arc[FIRST]), math.cos(arc[FIRST])
+    arc[SIN_LAST], arc[COS_LAST] = math.sin(last), math.cos(last)
     for level in range(LEVELS):
         count = 2 * REACH + 1 if level == 0 else REACH * 2**level
-        scale[1] *= 0.5
+        scale *= 0.5
         new *= 0.5
         for q in range(first, first + count):
             phi, dphi = state(k, arc, distance[q], table)
-            scale[1] += weight[q]
+            s, c = math.sin(phi), math.cos(phi)
+            ddphi = acceleration(k, s, c, 0.0, table)
+            scale += weight[q]
             for b in range(branches):
-                values = measures(k, phi, -dphi if b == 1 else dphi, rotators, table)
+                values = measures(k, s, c, -dphi if b == 1 else dphi, ddphi, rotators, table)
                 for measure in range(MEASURES):
                     value = values[0] if measure == 0 else values[1]
                     new[measure, 0] += weight[q] * value
                     new[measure, 1] += weight[q] * value * value
-                    if level < 2:
-                        at = 2 * q if level == 0 else 2 * (q - first) + 1
+                    if level < SAMPLED:
+                        stride = 2 ** (SAMPLED - 1 - level)
+                        at = (q if level == 0 else 2 * (q - first) + 1) * stride
                         samples[b, measure, at] = value
                         places[at] = place(distance[q])
         first += count
-        settled = level > 0
+        settled = level >= SAMPLED - 1
         for measure in range(MEASURES):
             for power in range(2):
-                change = abs(new[measure, power] / scale[1] - old[measure, power])
-                old[measure, power] = new[measure, power] / scale[1]
+                change = abs(new[measure, power] / scale - old[measure, power])
+                old[measure, power] = new[measure, power] / scale
                 settled = settled and change <= TOLERANCE * old[measure, power]
         if settled:
             break
@@ -297,6 +319,7 @@ def separatrices(
     table: Array,
     index: Index,
     saddle_phi: Array,
+    saddle_exponent: Array,
     turning_offset: Array,
     loop: Codes,
     distance: Array,
@@ -329,7 +352,11 @@ def separatrices(
                     sums[:] = 0.0
                     arc[:] = 0.0
                     arc[FIRST], arc[DELTA] = near, delta
-                    arc[TURNS] = 1.0 if code == LOBES else 0.0
+                    arc[WINDS] = 1.0 if winding else 0.0
+                    other = turning_offset[i, j, 1 - side] if code == LOBES else delta
+                    ends = math.sin(0.5 * delta) * math.sin(0.5 * other)
+                    arc[BEYOND] = other - delta
+                    arc[STEEP] = saddle_exponent[i, j] * saddle_exponent[i, j] / ends
                     arc[SIGN] = 1.0 if delta > 0.0 else -1.0
                     passes = saddle_phi[i, 1 - j] - near
                     arcs = 1

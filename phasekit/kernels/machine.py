@@ -74,10 +74,14 @@ def put(
 ) -> None:
     """Write d along a base vector and q along that vector turned, both of the same length."""
     rotator, intensity = out[0], out[1]
-    size = math.sqrt(base[0] * base[0] + base[1] * base[1] + base[2] * base[2])
+    unit = max(abs(base[0]), abs(base[1]), abs(base[2]))  # squares would vanish below 1e-154
+    size = NAN
+    if unit > 0.0:
+        x, y, z = base[0] / unit, base[1] / unit, base[2] / unit
+        size = unit * math.sqrt(x * x + y * y + z * z)
     known = size > 0.0
-    du = d / size if known else NAN
-    qv = q / size if known else NAN
+    du = d / size
+    qv = q / size
     rotator[i, row, 0] = 0.0 + du * base[0] + qv * turned[0]
     rotator[i, row, 1] = 0.0 + du * base[1] + qv * turned[1]
     rotator[i, row, 2] = 0.0 + du * base[2] + qv * turned[2]
@@ -134,7 +138,7 @@ def rotators(
         gamma[i] = math.atan2(q2, d2)
         gamma_rate[i] = turn_rate(w2, d2, jerk(k, s, c, w2, d1, table)) if free else NAN
         hodograph_u[i] = d2
-        hodograph_v[i] = q2
+        hodograph_v[i] = q2 + 0.0 * w1  # NaN where there is no body
 
 
 @inline
@@ -207,16 +211,18 @@ def bearings(
         for j in range(2):
             sign = 1.0 - 2.0 * j  # A2 at +half_span, B2 at -half_span
             u, v = half_u + sign * couple_u, half_v + sign * couple_v
-            n = along_n2 if j == 0 else 0.0
+            n = along_n2 if j == 0 else abs(0.0 * along_n2)
             hold = 0.5 * table[WEIGHT, k] * (1.0 + sign * along / span)
+            none = abs(0.0 * hold * s)  # NaN where there is no body or state
             if carrier:  # u01, v01, n1
                 v01, n1 = c * u - s * v, s * u + c * v
                 kinetic[i, j, 0], kinetic[i, j, 1], kinetic[i, j, 2] = n, v01, n1
-                weight[i, j, 0], weight[i, j, 1], weight[i, j, 2] = 0.0, 0.0, hold
+                weight[i, j, 0], weight[i, j, 1], weight[i, j, 2] = none, none, hold
                 force[i, j, 0], force[i, j, 1], force[i, j, 2] = n, v01, n1 + hold
             else:  # u2, v2, n2
                 kinetic[i, j, 0], kinetic[i, j, 1], kinetic[i, j, 2] = u, v, n
-                weight[i, j, 0], weight[i, j, 1], weight[i, j, 2] = hold * s, hold * c, 0.0
+                weight[i, j, 0], weight[i, j, 1] = hold * s, hold * c
+                weight[i, j, 2] = none
                 force[i, j, 0], force[i, j, 1] = u + hold * s, v + hold * c
                 force[i, j, 2] = n
             total_u, total_v = u + hold * s, v + hold * c
@@ -273,10 +279,15 @@ def fixed_bearings(
         lever = 1.0 / span[i]
         kin_u, kin_v = lever * l_v01, -lever * l_u01
         stat_u, stat_v = -lever * heavy * along, -lever * heavy * reach
-        kinetic[i, 1, 0], kinetic[i, 1, 1], kinetic[i, 1, 2] = kin_u, kin_v, 0.0
-        weight[i, 1, 0], weight[i, 1, 1], weight[i, 1, 2] = stat_u, stat_v, 0.0
-        force[i, 1, 0], force[i, 1, 1], force[i, 1, 2] = kin_u + stat_u, kin_v + stat_v, 0.0
-        kinetic[i, 0, 0], kinetic[i, 0, 1], kinetic[i, 0, 2] = f_u01 - kin_u, f_v01 - kin_v, f_n1
-        weight[i, 0, 0], weight[i, 0, 1], weight[i, 0, 2] = -stat_u, -stat_v, heavy
+        none = abs(0.0 * stat_u * s)  # NaN where there is no body, bearing or state
+        kinetic[i, 1, 0], kinetic[i, 1, 1], kinetic[i, 1, 2] = kin_u, kin_v, none
+        weight[i, 1, 0], weight[i, 1, 1], weight[i, 1, 2] = stat_u, stat_v, none
+        force[i, 1, 0], force[i, 1, 1], force[i, 1, 2] = kin_u + stat_u, kin_v + stat_v, none
+        kinetic[i, 0, 0], kinetic[i, 0, 1], kinetic[i, 0, 2] = (
+            f_u01 - kin_u,
+            f_v01 - kin_v,
+            f_n1 + none,
+        )
+        weight[i, 0, 0], weight[i, 0, 1], weight[i, 0, 2] = -stat_u, -stat_v, heavy + none
         for j in range(3):
             force[i, 0, j] = kinetic[i, 0, j] + weight[i, 0, j]

@@ -126,7 +126,7 @@ class PhasekitAccessor:
             ``saddle`` and ``side``: the lobe on that side of the saddle, there and back; the
             winding loop that leaves to that side; or the arc to the partner saddle, there and back.
             Means are over the angle there (over time both are the saddle's own value), and over
-            time on orbits. Lazy where the map is.
+            time on orbits; all is NaN for an orbit that tends to a saddle. Lazy where the map is.
 
         Raises
         ------
@@ -185,6 +185,26 @@ class MapPlots:
     def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
         return _plot("parameter_map")(self._ds, variable, **options)
+
+    def hodograph(self, rotator: str = "R022", **options: Any) -> Any:
+        """Draw a rotator's hodograph for the one selected cell, or of motions; returns the Axes."""
+        return _plot("hodograph")(self._cell_or_motion(), rotator, **options)
+
+    def bearing_forces(self, **options: Any) -> Any:
+        """Draw bearing forces for the one selected cell, or of one motion; returns the Axes."""
+        return _plot("bearing_forces")(self._cell_or_motion(), **options)
+
+    def force_polygon(self, phi: float, dphi: float, **options: Any) -> Any:
+        """Draw the force polygon of the one selected cell in a state; returns the Axes."""
+        return _plot("force_polygon")(self._cell(), phi, dphi, **options)
+
+    def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
+        """Draw the load on the separatrices over two swept parameters; returns the Axes."""
+        return _plot("bearing_load_map")(self._ds, variable, **options)
+
+    def _cell_or_motion(self) -> Model | xr.Dataset:
+        along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
+        return self._ds if along and "time" in self._ds.dims else self._cell()
 
     def _cell(self) -> Model:
         system = PhasekitAccessor(self._ds).system()

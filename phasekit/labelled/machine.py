@@ -45,7 +45,7 @@ def rotators(
     phi, dphi : float, 1-D array_like or xarray.DataArray
         States: angles in rad, angular velocities in s^-1. Or, in place of both, a motion: a Dataset
         with ``motion_phi`` and ``motion_dphi`` as `flow`, `separatrix_motion` and
-        `FreeGyroRotor.simulate` give it.
+        `FreeGyroRotor.simulate` give it; one of the latter has its own omega1, domega1 and ddphi.
     ddphi : float, 1-D array_like or xarray.DataArray, optional
         Angular accelerations in s^-2, where a motor turns the disk; by default those of the
         equation of motion.
@@ -115,8 +115,8 @@ def bearing_forces(
     xarray.Dataset
         In N on (``bearing``, axis): ``force``, its parts ``force_kinetic`` and ``force_weight``;
         ``force_magnitude`` on ``bearing``; ``force_axial``. ``deviation_couple`` in N m, the size
-        of half_span [n2, F_A2 - F_B2] of the kinetic parts; ``drive_torque`` in N m, what keeps
-        the support at its speed. ``force_component`` on (``bearing``, ``component``): the
+        of half_span [n2, F_A2 - F_B2] of the kinetic parts; ``drive_torque`` in N m, what moves a
+        massless support as it moves. ``force_component`` on (``bearing``, ``component``): the
         kinetic part for constant omega1 along the papers' w1 = n1, w2 = sin(phi) u2 - cos(phi) v2
         and w3 = -v01, and along the rotator R022 (F_24 times the rotator's intensity).
 
@@ -128,7 +128,8 @@ def bearing_forces(
     Notes
     -----
     [HedrihVeljovic2013] (19)-(28) and the components F_21 to F_24, corrected. Without ``ddphi``
-    the shaft turns freely in its bearings.
+    the shaft turns freely in its bearings. Forces at the equilibria of a disk, and their peaks over
+    its separatrices and orbits: ``pk.separatrices(disk).phasekit.bearing_forces(on=...)``.
 
     Examples
     --------
@@ -162,8 +163,9 @@ def fixed_bearing_forces(
 ) -> xr.Dataset:
     """Forces of the fixed shaft's bearings on the rotor: kinetic and weight parts.
 
-    The bearing A1 at O1 is spherical, B1 at O1 + rho_b1 n1 cylindrical; the carrier itself has no
-    mass. The papers' kinetic pressures on the bearings are ``fixed_force_kinetic`` reversed.
+    The rotor is disk and carrier here; the carrier itself has no mass. The bearing A1 at O1 is
+    spherical, B1 at O1 + rho_b1 n1 cylindrical. The papers' kinetic pressures on the bearings are
+    ``fixed_force_kinetic`` reversed.
 
     Parameters
     ----------
@@ -226,6 +228,9 @@ def _states(
                 )
         phi, dphi = motion.motion_phi, motion.motion_dphi
         if "motion_omega1" in motion:  # the support is not driven evenly
+            if ddphi is not None or not _is_zero(domega1):
+                name, value = ("domega1", domega1) if ddphi is None else ("ddphi", ddphi)
+                raise bad(name, value, "nothing beside a motion that has its own")
             system = system.replace(omega1=motion.motion_omega1)
             domega1, ddphi = motion.domega1, motion.ddphi
     elif dphi is None:
@@ -233,9 +238,13 @@ def _states(
     states = {"phi": ("state_phi", phi), "dphi": ("state_dphi", dphi)}
     if ddphi is not None:
         states["ddphi"] = ("state_ddphi", ddphi)
-    if not (isinstance(domega1, (int, float)) and domega1 == 0):
+    if not _is_zero(domega1):
         states["domega1"] = ("domega1", domega1)
     return system, states
+
+
+def _is_zero(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and value == 0
 
 
 def _at(
@@ -287,6 +296,11 @@ def on_map(
     if curve != "orbit" and not (phi0 is None and dphi0 is None):
         name = "phi0" if phi0 is not None else "dphi0"
         raise bad(name, phi0 if phi0 is not None else dphi0, "nothing, except with on='orbit'")
+    if not isinstance(system, GyroRotorDisk):
+        raise bad("ds", f"a map of {type(system).__name__}", "a map of GyroRotorDisk")
+    for name in ("m", "half_span") if what == "forces" else ():
+        if name not in system.parameters:
+            raise bad(name, None, f"a value, which the map lacks: bearing_forces(..., {name}=...)")
     group = f"{'equilibrium' if curve == 'equilibria' else curve}_{what}"
     rows = select(group)
     states = {}

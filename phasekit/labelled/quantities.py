@@ -304,7 +304,7 @@ QUANTITIES: tuple[Quantity, ...] = (
              "couple of the kinetic reactions of both bearings", "|l [n2, F_A2 - F_B2]|",
              "[HedrihVeljovic2013] figure 9, corrected"),
     Quantity("drive_torque", "bearing_forces", (), "float64", "N m",
-             "torque on the carrier about n1 that keeps it at its speed", "(n1, dL_O1/dt)",
+             "torque about n1 that moves a massless carrier as it moves", "(n1, dL_O1/dt)",
              "[HedrihVeljovic2013] (2), with the torque that it omits"),
     Quantity("force_component", "bearing_forces", ("bearing", "component"), "float64", "N",
              "component of the kinetic reaction on the rotor, for constant omega1",
@@ -392,7 +392,7 @@ _DISK = ("beta", "e", "a", "r", "omega1", "g")
 _HEAVY = ("beta", "e", "a", "r", "omega1", "m", "g")
 _BORNE = (*_HEAVY, "half_span")
 _STATE = ("state_phi", "state_dphi")
-_LOOPS = ("saddle_phi", "turning_offset", "loop")
+_LOOPS = ("saddle_phi", "saddle_exponent", "turning_offset", "loop")
 
 #: Passes over the cells, those that compute more groups first. Groups that need an argument of
 #: their own (critical: the parameter) have none; their functions make one for the call, as do those

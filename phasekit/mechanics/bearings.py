@@ -104,7 +104,7 @@ def bearing_forces(
     """
     free = ddphi is None
     body = machine_table(beta, e, a, r, omega1, g, m, half_span)
-    states = (phi, dphi, np.nan if ddphi is None else ddphi, domega1)
+    states = (phi, dphi, 0.0 if ddphi is None else ddphi, domega1)
     tails = ((2, 3), (2, 3), (2, 3), (2,), (), (), (), (2, 4))
     flags = (free, carrier)
     return BearingForces(*at_states(kernels.bearings, body, states, flags, tails, threads))
@@ -157,7 +157,7 @@ def fixed_bearing_forces(
     body = machine_table(beta, e, a, r, omega1, g, m)
     with np.errstate(all="ignore"):
         span = np.where(np.asarray(rho_b1, dtype=float) == 0.0, np.nan, rho_b1)
-    states = (phi, dphi, np.nan if ddphi is None else ddphi, domega1, span)
+    states = (phi, dphi, 0.0 if ddphi is None else ddphi, domega1, span)
     tails = ((2, 3), (2, 3), (2, 3))
     flags = (free,)
     return FixedBearingForces(

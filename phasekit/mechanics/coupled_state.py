@@ -287,8 +287,8 @@ class CoupledRotationState(Frozen):
         """Forces of the bearings of the shaft n2 on the body, in N.
 
         The bearing A2, at ``s_A n2`` from O2, is spherical; B2, at ``s_B n2``, holds no force
-        along n2. A force-free turn of the body about n2 needs `free_acceleration`; otherwise a
-        couple `self_torque` acts as well. With ``G = (0, 0, 0)``: the kinetic parts.
+        along n2. A body that turns freely about n2 has the acceleration `free_acceleration`; with
+        any other a couple `self_torque` acts as well. With ``G = (0, 0, 0)``: the kinetic parts.
 
         Parameters
         ----------

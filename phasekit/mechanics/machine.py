@@ -62,9 +62,13 @@ def at_states(
     tails: tuple[tuple[int, ...], ...],
     threads: int | None,
 ) -> Arrays:
-    """Run a kernel over states that broadcast against bodies; ``tails`` are the outputs' axes."""
+    """Run a kernel over states that broadcast against bodies; ``tails`` are the outputs' axes.
+
+    All results are NaN in a state of which any number is not finite.
+    """
     table, own = body
     arrays = [np.asarray(state, dtype=float) for state in states]
+    arrays = [np.where(np.isfinite(array), array, np.nan) for array in arrays]
     shape = np.broadcast_shapes(own, *(array.shape for array in arrays))
     index = np.broadcast_to(np.arange(table.shape[1]).reshape(own), shape)
     # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
@@ -72,4 +76,8 @@ def at_states(
     out = tuple(np.empty((flat[0].size, *tail)) for tail in tails)
     inputs: tuple[Any, ...] = (table, *flat, *flags)
     launch(kernel, inputs, flat[0].size, (out,), threads)
+    unknown = np.any([np.isnan(state) for state in flat[1:]], axis=0)
+    if unknown.any():
+        for array in out:
+            array[unknown] = np.nan
     return tuple(array.reshape(shape + tail) for array, tail in zip(out, tails, strict=True))

@@ -332,6 +332,28 @@ class RigidBody(Frozen):
         n, turning, slip = self._turning(n, angular_velocity, axis_velocity)
         return cross(turning, apply(self.inertia, n)) + apply(self.inertia, slip)
 
+    def deviation_moment_rate(
+        self,
+        n: npt.ArrayLike,
+        angular_velocity: npt.ArrayLike,
+        axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Rate of change of D_n while the body turns about the pole, in kg m^2/s.
+
+        That of ``D_n = J_n - n (n, J_n)``; arguments as of `linear_moment_rate`.
+
+        Examples
+        --------
+        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]])
+        >>> body.deviation_moment_rate([0, 0, 1], [0, 0, 5]).tolist()
+        [0.0, -30.0, 0.0]
+        """
+        rate = self.inertia_moment_rate(n, angular_velocity, axis_velocity)
+        axis, moment = self._axis(n), self.inertia_moment(n)
+        turning = cross(vectors("axis_velocity", axis_velocity), axis)
+        along = dot(turning, moment) + dot(axis, rate)
+        return rate - times(dot(axis, moment), turning) - times(along, axis)
+
     def shifted(self, vector: npt.ArrayLike) -> Self:
         """Return the body with another pole, at `vector` from this one, in m.
 

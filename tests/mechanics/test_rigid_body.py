@@ -89,6 +89,10 @@ def test_moments_and_rates_are_those_of_particles(rng):
             close(
                 body.inertia_moment_rate(axis, omega, turn), particles.now(particles.d(motion.J(n)))
             )
+            close(
+                body.deviation_moment_rate(axis, omega, turn),
+                particles.now(particles.d(motion.D(n))),
+            )
 
 
 def test_axial_moment_is_the_sum_of_squared_distances(rng):
@@ -191,6 +195,7 @@ def test_batches_equal_loops(rng):
         "deviatoric_moment": (n,),
         "linear_moment_rate": (n, omega, axis),
         "inertia_moment_rate": (n, omega, axis),
+        "deviation_moment_rate": (n, omega, axis),
     }
     moved = body.shifted(omega)
     assert moved.shape == (2, 3)
