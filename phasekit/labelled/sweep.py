@@ -12,7 +12,7 @@ import xarray as xr
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labelled.evaluate import evaluate, leaves
-from phasekit.labelled.quantities import STATES, plan_passes, select
+from phasekit.labelled.quantities import STATES, select
 from phasekit.labelled.store import StoreTarget
 from phasekit.labelled.system import Model, as_system
 
@@ -79,7 +79,7 @@ def sweep(
         flag("progress", progress)
     system = as_system(system)
     rows = select(of)
-    passes = plan_passes(rows)
+    passes = system.methods.passes(rows)
     needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
     states = [name for name in STATES if name in needed]
     kept = _axes(system, axes, axes_by_name, states)

@@ -2,13 +2,17 @@
 
 from phasekit.plot.diagram import bifurcation_diagram
 from phasekit.plot.history import time_history
+from phasekit.plot.loci import bifurcation_set
 from phasekit.plot.maps import parameter_map
 from phasekit.plot.periods import frequency_action, period_energy
 from phasekit.plot.portrait import phase_portrait
+from phasekit.plot.surface import branch_surface
 from phasekit.plot.well import potential_well
 
 __all__ = [
     "bifurcation_diagram",
+    "bifurcation_set",
+    "branch_surface",
     "frequency_action",
     "parameter_map",
     "period_energy",
