@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
     from phasekit.labelled.critical import critical as critical
     from phasekit.labelled.families import orbit_families as orbit_families
+    from phasekit.labelled.free_rotor import FreeGyroRotor as FreeGyroRotor
     from phasekit.labelled.guises import ParticleOnCircle as ParticleOnCircle
     from phasekit.labelled.guises import Pendulum as Pendulum
     from phasekit.labelled.guises import Reduced as Reduced
@@ -41,6 +42,9 @@ if TYPE_CHECKING:
     from phasekit.labelled.integral import gradient as gradient
     from phasekit.labelled.integral import phase_velocity as phase_velocity
     from phasekit.labelled.integral import potential as potential
+    from phasekit.labelled.machine import bearing_forces as bearing_forces
+    from phasekit.labelled.machine import fixed_bearing_forces as fixed_bearing_forces
+    from phasekit.labelled.machine import rotators as rotators
     from phasekit.labelled.models import Coefficients as Coefficients
     from phasekit.labelled.models import GyroRotorDisk as GyroRotorDisk
     from phasekit.labelled.motion import flow as flow
@@ -53,6 +57,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.quantities import quantities as quantities
     from phasekit.labelled.store import open_map as open_map
     from phasekit.labelled.sweep import sweep as sweep
+    from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
+    from phasekit.mechanics.rigid_body import RigidBody as RigidBody
 
 __version__ = "0.1.0"
 
@@ -75,6 +81,7 @@ _MODULES = {
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.critical": ("critical",),
     "phasekit.labelled.families": ("orbit_families",),
+    "phasekit.labelled.free_rotor": ("FreeGyroRotor",),
     "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "Reduced", "StonerWohlfarth"),
     "phasekit.labelled.integral": (
         "curvature",
@@ -83,6 +90,7 @@ _MODULES = {
         "phase_velocity",
         "potential",
     ),
+    "phasekit.labelled.machine": ("bearing_forces", "fixed_bearing_forces", "rotators"),
     "phasekit.labelled.models": ("Coefficients", "GyroRotorDisk"),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
@@ -90,6 +98,8 @@ _MODULES = {
     "phasekit.labelled.quantities": ("quantities",),
     "phasekit.labelled.store": ("open_map",),
     "phasekit.labelled.sweep": ("sweep",),
+    "phasekit.mechanics.coupled_rotation": ("CoupledRotation",),
+    "phasekit.mechanics.rigid_body": ("RigidBody",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import subprocess
@@ -10,43 +11,51 @@ from pathlib import Path
 
 import pytest
 
-SCRIPTS = sorted((Path(__file__).parents[1] / "studies").glob("*.py"))
-STUDIES = [path for path in SCRIPTS if "__main__" in path.read_text(encoding="utf-8")]
+FOLDER = Path(__file__).parents[1] / "studies"
+STUDIES = [
+    path for path in sorted(FOLDER.glob("*.py")) if "__main__" in path.read_text(encoding="utf-8")
+]
 
 
-def run(script: Path, folder: Path) -> str:
-    """Run a study as a user would, warnings being errors; its output."""
-    done = subprocess.run(
-        [sys.executable, "-W", "error", str(script)],
-        cwd=folder,
-        env={**os.environ, "MPLBACKEND": "Agg"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """Run a study by its name as a user would, warnings being errors; its folder and output."""
+
+    @functools.cache
+    def once(name: str) -> tuple[Path, str]:
+        folder = tmp_path_factory.mktemp(name)
+        done = subprocess.run(
+            [sys.executable, "-W", "error", str(FOLDER / f"{name}.py")],
+            cwd=folder,
+            env={**os.environ, "MPLBACKEND": "Agg"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return folder, done.stdout
+
+    return once
 
 
-@pytest.mark.parametrize("script", STUDIES, ids=lambda path: path.stem)
-def test_study_runs_and_writes_its_picture(script, tmp_path):
-    assert script.stem in run(script, tmp_path)
-    picture = tmp_path / f"{script.stem}.png"
-    assert picture.read_bytes().startswith(b"\x89PNG")
+@pytest.mark.parametrize("name", [path.stem for path in STUDIES])
+def test_study_runs_and_writes_its_picture(run, name):
+    folder, text = run(name)
+    assert name in text
+    assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_thresholds_of_progressive_motion_are_those_of_the_paper(tmp_path):
+def test_thresholds_of_progressive_motion_are_those_of_the_paper(run):
     """[Veljovic2015], section 4: 1.54 1/s at beta = pi/3 and 2.53 1/s at beta = 0.01 pi."""
-    script = next(path for path in STUDIES if path.stem.endswith("figure_6"))
-    speeds = re.findall(r"beta = (\S+)\s+pi: progressive motion above (\S+)", run(script, tmp_path))
+    _, text = run("veljovic2015_figure_6")
+    speeds = re.findall(r"beta = (\S+)\s+pi: progressive motion above (\S+)", text)
     assert dict(speeds)["1/3"] == "1.5401"
     assert dict(speeds)["0.01"] == "2.5296"
 
 
-def test_the_two_wells_have_one_period_and_different_actions(tmp_path):
+def test_the_two_wells_have_one_period_and_different_actions(run):
     """The actions differ by 2 |C|/sqrt(A), whatever the energy."""
-    script = next(path for path in STUDIES if path.stem == "equal_periods_of_two_wells")
-    text = run(script, tmp_path)
+    _, text = run("equal_periods_of_two_wells")
     lower, upper = re.findall(r"period (\S+) s, action (\S+) ", text)
     assert float(lower[0]) == pytest.approx(float(upper[0]), rel=1e-12)
     assert float(lower[1]) > 3.0 * float(upper[1])
@@ -54,13 +63,42 @@ def test_the_two_wells_have_one_period_and_different_actions(tmp_path):
     assert apart == formula
 
 
-def test_backbone_curves_end_at_the_saddle_or_at_the_top(tmp_path):
-    script = next(path for path in STUDIES if path.stem == "backbone_curves")
-    text = run(script, tmp_path)
+def test_backbone_curves_end_at_the_saddle_or_at_the_top(run):
+    _, text = run("backbone_curves")
     assert "fold at beta = 1.151233 rad = 0.3664 pi" in text
     ends = re.findall(r"beta = (\S+)\s+pi, (\S+): .* amplitude of (\S+) deg", text)
     assert [end for beta, _, end in ends if beta in ("0.38", "0.42", "1/2")] == ["180.0"] * 3
     assert len([center for _, center, _ in ends if center == "upper_center"]) == 5
+
+
+def test_the_least_bearing_load_and_the_fold(run):
+    _, text = run("least_bearing_load")
+    (inside,) = re.findall(r"at most (\S+) of the peak load on it", text)
+    assert 0.99 < float(inside) < 1.00001
+    best = re.findall(r"e = +(\S+) mm: least .* at beta = +(\S+) deg", text)
+    assert [float(beta) for _, beta in best] == [90.0, 84.0, 80.0, 80.0, 78.0, 2.0]
+    folds = re.findall(
+        r"fold at beta = (\S+) deg: .* center (\S+) N.* most (\S+) N "
+        r".* (\S+) N before, (\S+) N after",
+        text,
+    )
+    assert [beta for beta, *_ in folds] == ["49.55", "75.09"]
+    for _, rest, swing, before, after in folds:
+        assert before == after  # the worst swing does not feel the fold
+        assert float(rest) < float(swing) < float(before)
+
+
+@pytest.mark.parametrize(
+    ("figure", "same"), [("2011_figure_8", "a = 0 mm"), ("2013_figure_5", None)]
+)
+def test_printed_and_correct_curves_differ_except_where_the_printed_formula_holds(
+    run, figure, same
+):
+    """(6.12) lacks psi, which is zero for a = 0."""
+    _, text = run(f"hedrih_veljovic{figure}")
+    found = re.findall(r", (\w+ = \S+ \S+): at most (\S+), as printed (\S+)", text)
+    assert len(found) == 4
+    assert [name for name, right, printed in found if right == printed] == ([same] if same else [])
 
 
 def test_the_docs_show_every_study():

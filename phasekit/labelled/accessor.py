@@ -13,6 +13,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import NumberLike
 from phasekit.labelled.schema import model_name
 from phasekit.labelled.system import MODELS, Model
 
@@ -53,6 +54,102 @@ class PhasekitAccessor:
             )
         return MODELS[name].from_dataset(self._ds)
 
+    def rotators(
+        self,
+        on: str = "equilibria",
+        *,
+        phi0: NumberLike | None = None,
+        dphi0: NumberLike | None = None,
+        **parameters: NumberLike,
+    ) -> xr.Dataset:
+        """Vector rotators on the equilibria, separatrices or orbits of this map of disks.
+
+        Parameters
+        ----------
+        on : {"equilibria", "separatrix", "orbit"}
+            Where: at every equilibrium, over the loops of the separatrices, or over the orbits
+            through given states.
+        phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+            With ``on="orbit"``: states, angles in rad and angular velocities in s^-1.
+        **parameters
+            Parameters that replace those of the map.
+
+        Returns
+        -------
+        xarray.Dataset
+            At equilibria ``rotator`` and ``rotator_intensity``. Else, for each rotator,
+            ``peak_intensity``, ``mean_intensity`` and ``rms_intensity`` over the curve in s^-2, and
+            ``intensity_peak_phi``, ``intensity_peak_dphi``, where the peak lies: on (``saddle``,
+            ``side``) as `bearing_forces` explains. Lazy where the map is.
+
+        Raises
+        ------
+        ParameterError
+            If the map is not one of disks, or an argument is unusable.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> disk = pk.GyroRotorDisk(beta=0.3, e=0.1, a=0.05, r=0.1, omega1=10.0)
+        >>> ds = pk.sweep(disk, beta=[0.1, 0.2])
+        >>> ds.phasekit.rotators(on="equilibria").rotator.dims
+        ('beta', 'equilibrium', 'rotator_name', 'carrier_axis')
+        """
+        return self._on_map("rotators", on, phi0, dphi0, parameters)
+
+    def bearing_forces(
+        self,
+        on: str = "equilibria",
+        *,
+        phi0: NumberLike | None = None,
+        dphi0: NumberLike | None = None,
+        **parameters: NumberLike,
+    ) -> xr.Dataset:
+        """Bearing forces on the equilibria, separatrices or orbits of this map of disks.
+
+        Parameters
+        ----------
+        on : {"equilibria", "separatrix", "orbit"}
+            Where: at every equilibrium, over the loops of the separatrices, or over the orbits
+            through given states.
+        phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+            With ``on="orbit"``: states, angles in rad and angular velocities in s^-1.
+        **parameters
+            Parameters that replace those of the map, or that it lacks: ``m``, ``half_span``.
+
+        Returns
+        -------
+        xarray.Dataset
+            At equilibria ``force`` and its parts as in `phasekit.bearing_forces`. Else, for each
+            ``bearing``, ``peak_force``, ``mean_force`` and ``rms_force`` over the curve in N, and
+            ``peak_phi``, ``peak_dphi``, where the peak lies. On separatrices these have the dims
+            ``saddle`` and ``side``: the lobe on that side of the saddle, there and back; the
+            winding loop that leaves to that side; or the arc to the partner saddle, there and back.
+            Means are over the angle there (over time both are the saddle's own value), and over
+            time on orbits. Lazy where the map is.
+
+        Raises
+        ------
+        ParameterError
+            If the map is not one of disks with mass and bearings, or an argument is unusable.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4)
+        >>> ds = pk.sweep(disk, beta=[0.5, 0.7])
+        >>> loads = ds.phasekit.bearing_forces(on="separatrix", m=2.0, half_span=0.2)
+        >>> loads.peak_force.dims
+        ('beta', 'saddle', 'side', 'bearing')
+        """
+        return self._on_map("forces", on, phi0, dphi0, parameters)
+
+    def _on_map(self, what: str, on: str, phi0: Any, dphi0: Any, parameters: Any) -> xr.Dataset:
+        from phasekit.labelled.machine import on_map
+
+        system = self.system().replace(**parameters)
+        return on_map(self._ds, system, what, on, phi0, dphi0)
+
     @property
     def plot(self) -> MapPlots:
         """Pictures of this map: see `MapPlots`."""
@@ -88,6 +185,26 @@ class MapPlots:
     def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
         return _plot("parameter_map")(self._ds, variable, **options)
+
+    def hodograph(self, rotator: str = "R022", **options: Any) -> Any:
+        """Draw a rotator's hodograph for the one selected cell, or of motions; returns the Axes."""
+        return _plot("hodograph")(self._cell_or_motion(), rotator, **options)
+
+    def bearing_forces(self, **options: Any) -> Any:
+        """Draw bearing forces for the one selected cell, or of one motion; returns the Axes."""
+        return _plot("bearing_forces")(self._cell_or_motion(), **options)
+
+    def force_polygon(self, phi: float, dphi: float, **options: Any) -> Any:
+        """Draw the force polygon of the one selected cell in a state; returns the Axes."""
+        return _plot("force_polygon")(self._cell(), phi, dphi, **options)
+
+    def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
+        """Draw the load on the separatrices over two swept parameters; returns the Axes."""
+        return _plot("bearing_load_map")(self._ds, variable, **options)
+
+    def _cell_or_motion(self) -> Model | xr.Dataset:
+        along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
+        return self._ds if along and "time" in self._ds.dims else self._cell()
 
     def _cell(self) -> Model:
         system = PhasekitAccessor(self._ds).system()

@@ -47,7 +47,7 @@ class Cells:
                 state = self.inputs[name]
                 self.computed[name] = np.where(np.isfinite(state), state, np.nan)
             elif name in self.inputs:
-                return self.inputs[name]
+                self.computed[name] = self.model.in_domain(name, self.inputs[name])
             else:
                 self.run(pass_of(ROWS[name].group, self.passes))
         return self.computed[name]
@@ -134,11 +134,14 @@ def _refuse_missing(
         for name in names:
             if name not in inputs:
                 declared = [parameter.name for parameter in system.declared]
-                way = f"give {name}=" if name in declared or name in STATES else "none"
+                way = ", which has no such parameter"
+                if name in declared:
+                    way = f"; use system.replace({name}=...)"
+                elif name in STATES:
+                    way = f"; give {name}="
                 raise ParameterError(
                     f"{name}: got nothing, wants a value for {' and '.join(one.groups)} of "
-                    f"{type(system).__name__}"
-                    + (f"; {way}" if way != "none" else ", which has no such parameter")
+                    f"{type(system).__name__}{way}"
                 )
 
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any, TypeAlias
 
@@ -40,6 +40,15 @@ LABELS: dict[str, Labels] = {
     "saddle": (("lower", "upper"), "saddle, by its energy"),
     "side": (("left", "right"), "side of the saddle"),
     "fold": (("minus", "plus"), "fold with A < 0, fold with A > 0"),
+    "rotator_name": (
+        ("R01", "R011", "R022", "R012", "R1", "R2", "R12", "R12c"),
+        "vector rotator",
+    ),
+    "carrier_axis": (("u01", "v01", "n1"), "axis of the carrier: along n2, [n1, n2], n1"),
+    "disk_axis": (("u2", "v2", "n2"), "axis turning with the disk: tangential, radial, along n2"),
+    "bearing": (("A2", "B2"), "bearing of the shaft: spherical at +half_span, cylindrical"),
+    "fixed_bearing": (("A1", "B1"), "bearing of the fixed shaft: spherical at O1, cylindrical"),
+    "component": (("F21", "F22", "F23", "F24"), "component along n1, w2, -v01, and R022"),
     "family": (("lower_well", "upper_well", "outer", "rotation"), "family of orbits"),
 }
 
@@ -47,6 +56,9 @@ LABELS: dict[str, Labels] = {
 STATES: dict[str, tuple[str, str]] = {
     "state_phi": ("rad", "angle of the state"),
     "state_dphi": ("s-1", "angular velocity of the state"),
+    "state_ddphi": ("s-2", "angular acceleration of the state"),
+    "domega1": ("s-2", "angular acceleration of the support"),
+    "rho_b1": ("m", "place of the bearing B1 on the fixed shaft, from O1"),
     "state_energy": ("s-2", "energy of the state"),
     "state_gap": ("s-2", "energy of the state above the saddle"),
     "state_excess": ("s-2", "energy of the state above the center"),
@@ -63,6 +75,9 @@ AXES = ("time", "level")
 FROM_ENERGY = "[Veljovic2015] (14), corrected coefficients"
 FROM_MOTION = "[Veljovic2015] (12), corrected coefficients"
 ACTION_ANGLE = f"{FROM_ENERGY}; [LandauLifshitz1976] section 50"
+ROTATORS_OF = "[HedrihVeljovic2011] (5.1), (6.6), corrected"
+PRESSURES = "[HedrihVeljovic2013] (22)-(28), corrected"
+FIXED_PRESSURES = "[HedrihVeljovic2013] (8), (9), corrected"
 SMALL = f"expansion of {FROM_MOTION}; [LandauLifshitz1976] section 28"
 
 
@@ -117,7 +132,7 @@ class Pass:
 
     `inputs` are coefficients (A, B, C), parameters, states, or quantities of other groups; those
     come with their label axes last. The function returns one result a group, each a NamedTuple
-    whose fields are named as the quantities; a lone result may be a bare array or tuple.
+    whose fields are named as the quantities, or arrays in the order of the group's rows.
     """
 
     function: str | Callable[..., Any]  # "module:name", imported when it is first needed
@@ -134,10 +149,10 @@ class Pass:
         results = result if len(self.groups) > 1 else (result,)
         named: dict[str, Any] = {}
         for group, part in zip(self.groups, results, strict=True):
-            if hasattr(part, "_asdict"):
+            names = [row.name for row in ROWS.values() if row.group == group]
+            if names[0] in getattr(part, "_fields", ()):
                 named.update(part._asdict())
             else:
-                names = [row.name for row in ROWS.values() if row.group == group]
                 named.update(zip(names, part if isinstance(part, tuple) else (part,), strict=True))
         return named
 
@@ -145,6 +160,9 @@ class Pass:
 _BRANCHES = ("equilibrium",)
 _SADDLES = ("saddle",)
 _SIDES = ("saddle", "side")
+_ROTATOR = ("rotator_name", "carrier_axis")
+_FORCE = ("bearing", "disk_axis")
+_FIXED = ("fixed_bearing", "carrier_axis")
 
 # fmt: off
 QUANTITIES: tuple[Quantity, ...] = (
@@ -258,6 +276,59 @@ QUANTITIES: tuple[Quantity, ...] = (
              f"expansion of {FROM_ENERGY}"),
     Quantity("energy_level", "orbit_families", ("family",), "float64", "s-2",
              "energy of the orbit", "h = phi'^2/2 + V(phi)", FROM_ENERGY),
+    Quantity("rotator", "rotators", _ROTATOR, "float64", "s-2",
+             "vector rotator, in the carrier frame",
+             "R = omega' u + omega^2 [n, u], u = b/|b|; of a coupling: 2 omega1 omega2 b/|b|",
+             ROTATORS_OF),
+    Quantity("rotator_intensity", "rotators", ("rotator_name",), "float64", "s-2",
+             "intensity of the vector rotator", "sqrt(omega'^2 + omega^4), |2 omega1 omega2|",
+             "[HedrihVeljovic2011] (4.2), (4.5), (4.7)"),
+    Quantity("gamma2", "rotators", (), "float64", "rad",
+             "angle of the rotator R022 from its base vector, about n2", "atan2(phi'^2, phi'')",
+             "[HedrihVeljovic2011] (4.3)"),
+    Quantity("gamma2_rate", "rotators", (), "float64", "s-1",
+             "angular velocity of the rotator R022 against the disk",
+             "phi' (2 phi''^2 - phi' phi''')/(phi''^2 + phi'^4)",
+             "[HedrihVeljovic2011] (4.9), (6.12), corrected"),
+    Quantity("hodograph_u", "rotators", (), "float64", "s-2",
+             "tangential coordinate of the rotator R022", "phi''", "[HedrihVeljovic2011] (6.11)"),
+    Quantity("hodograph_v", "rotators", (), "float64", "s-2",
+             "radial coordinate of the rotator R022", "phi'^2",
+             "[HedrihVeljovic2011] (6.11), corrected"),
+    Quantity("force", "bearing_forces", _FORCE, "float64", "N",
+             "reaction of the bearing on the rotor", "F = F_kinetic + F_weight", PRESSURES),
+    Quantity("force_kinetic", "bearing_forces", _FORCE, "float64", "N",
+             "kinetic part of the reaction on the rotor, the kinetic pressure on the bearing "
+             "reversed", "Newton-Euler with phi'' of the motion and without the weight", PRESSURES),
+    Quantity("force_weight", "bearing_forces", _FORCE, "float64", "N",
+             "weight part of the reaction on the rotor", "(m g/2) (1 +- (e/l) cos(beta)) n1",
+             "[HedrihVeljovic2013] (28), corrected"),
+    Quantity("force_magnitude", "bearing_forces", ("bearing",), "float64", "N",
+             "size of the force in the bearing", "|F|", PRESSURES),
+    Quantity("force_axial", "bearing_forces", (), "float64", "N",
+             "reaction of the bearing A2 on the rotor along n2",
+             "-m (omega1^2 e cos(beta) + 2 omega1 phi' e sin(beta) cos(phi) + "
+             "omega1' (a + e sin(beta) sin(phi)))", "[HedrihVeljovic2013] (19), corrected"),
+    Quantity("deviation_couple", "bearing_forces", (), "float64", "N m",
+             "couple of the kinetic reactions of both bearings", "|l [n2, F_A2 - F_B2]|",
+             "[HedrihVeljovic2013] figure 9, corrected"),
+    Quantity("drive_torque", "bearing_forces", (), "float64", "N m",
+             "torque on the carrier about n1 that keeps it at its speed", "(n1, dL_O1/dt)",
+             "[HedrihVeljovic2013] (2), with the torque that it omits"),
+    Quantity("force_component", "bearing_forces", ("bearing", "component"), "float64", "N",
+             "component of the kinetic reaction on the rotor, for constant omega1",
+             "F_21 n1 + F_22 w2 - F_23 v01 + F_24 R022/|R022|",
+             "[HedrihVeljovic2013] after (28), corrected"),
+    Quantity("fixed_force", "fixed_bearing_forces", _FIXED, "float64", "N",
+             "reaction of the fixed shaft's bearing on the rotor", "F = F_kinetic + F_weight",
+             FIXED_PRESSURES),
+    Quantity("fixed_force_kinetic", "fixed_bearing_forces", _FIXED, "float64", "N",
+             "kinetic part of the fixed shaft's reaction on the rotor, the kinetic pressure on "
+             "the bearing reversed", "Newton-Euler with phi'' of the motion and without the weight",
+             FIXED_PRESSURES),
+    Quantity("fixed_force_weight", "fixed_bearing_forces", _FIXED, "float64", "N",
+             "weight part of the fixed shaft's reaction on the rotor", "Newton-Euler at rest",
+             FIXED_PRESSURES),
     Quantity("critical_fold", "critical", ("fold",), "float64", "1",
              "value of the parameter at the fold of equilibria",
              "|B|^(2/3) + |C|^(2/3) = |A|^(2/3)", FROM_MOTION),
@@ -266,9 +337,71 @@ QUANTITIES: tuple[Quantity, ...] = (
 )
 # fmt: on
 
+
+def _at_equilibria(group: str, names: Iterable[str], into: str) -> tuple[Quantity, ...]:
+    """Rows of a group that is computed at every equilibrium."""
+    return tuple(
+        replace(
+            row,
+            name=f"equilibrium_{row.name}",
+            group=into,
+            dims=(*_BRANCHES, *row.dims),
+            long_name=f"{row.long_name}, at the equilibrium",
+        )
+        for row in QUANTITIES
+        if row.group == group and row.name in names
+    )
+
+
+def _loads(
+    group: str, dims: tuple[str, ...], units: str, of: str, name: str, source: str
+) -> tuple[Quantity, ...]:
+    """Rows of what is found along a curve: peak, mean, rms, and the place of the peak."""
+    curve = group.partition("_")[0]
+    prefix, over = ("orbit_", "time") if curve == "orbit" else ("", "angle")
+    place = "peak" if name == "force" else f"{name}_peak"
+    rows = (
+        (f"peak_{name}", units, f"greatest {of}", f"maximum over the {curve}"),
+        (f"mean_{name}", units, f"mean {of}", f"mean over the {over}"),
+        (f"rms_{name}", units, f"rms {of}", f"root mean square over the {over}"),
+        (f"{place}_phi", "rad", f"angle of the greatest {of}", "phi of the maximum"),
+        (f"{place}_dphi", "s-1", f"angular velocity at the greatest {of}", "phi' of the maximum"),
+    )
+    return tuple(
+        Quantity(prefix + row, group, dims, "float64", unit, f"{text} on the {curve}", rule, source)
+        for row, unit, text, rule in rows
+    )
+
+
+#: What bearing forces at rest consist of, in the order of `equilibrium_forces`.
+_AT_REST = (
+    "force",
+    "force_kinetic",
+    "force_weight",
+    "force_magnitude",
+    "force_axial",
+    "deviation_couple",
+)
+_FORCE_LOADS = ("N", "force in the bearing", "force", PRESSURES)
+_ROTATOR_LOADS = ("s-2", "intensity of the rotator", "intensity", ROTATORS_OF)
+
+QUANTITIES += (
+    *_at_equilibria("rotators", ("rotator", "rotator_intensity"), "equilibrium_rotators"),
+    *_at_equilibria("bearing_forces", _AT_REST, "equilibrium_forces"),
+    *_loads("separatrix_rotators", (*_SIDES, "rotator_name"), *_ROTATOR_LOADS),
+    *_loads("separatrix_forces", (*_SIDES, "bearing"), *_FORCE_LOADS),
+    *_loads("orbit_rotators", ("rotator_name",), *_ROTATOR_LOADS),
+    *_loads("orbit_forces", ("bearing",), *_FORCE_LOADS),
+)
+
 ROWS: dict[str, Quantity] = {row.name: row for row in QUANTITIES}
 
 _ABC = ("A", "B", "C")
+_DISK = ("beta", "e", "a", "r", "omega1", "g")
+_HEAVY = ("beta", "e", "a", "r", "omega1", "m", "g")
+_BORNE = (*_HEAVY, "half_span")
+_STATE = ("state_phi", "state_dphi")
+_LOOPS = ("saddle_phi", "saddle_exponent", "turning_offset", "loop")
 
 #: Passes over the cells, those that compute more groups first. Groups that need an argument of
 #: their own (critical: the parameter) have none; their functions make one for the call, as do those
@@ -304,6 +437,19 @@ PASSES: tuple[Pass, ...] = (
     Pass("phasekit.phase.flow:flow", (*_ABC, "state_phi", "state_dphi", "time"), ("motion",)),
     Pass("phasekit.phase.asymptotics:near_center", (*_ABC, "state_excess"), ("near_center",)),
     Pass("phasekit.phase.asymptotics:near_separatrix", (*_ABC, "state_gap"), ("near_separatrix",)),
+    Pass("phasekit.mechanics.rotators:rotators", (*_DISK, *_STATE), ("rotators",)),
+    Pass("phasekit.mechanics.bearings:bearing_forces", (*_BORNE, *_STATE), ("bearing_forces",)),
+    Pass(
+        "phasekit.mechanics.bearings:fixed_bearing_forces",
+        (*_HEAVY, "rho_b1", *_STATE),
+        ("fixed_bearing_forces",),
+    ),
+    Pass("phasekit.phase.loads:equilibrium_rotators", (*_DISK, "phi"), ("equilibrium_rotators",)),
+    Pass("phasekit.phase.loads:equilibrium_forces", (*_BORNE, "phi"), ("equilibrium_forces",)),
+    Pass("phasekit.phase.loads:separatrix_rotators", (*_DISK, *_LOOPS), ("separatrix_rotators",)),
+    Pass("phasekit.phase.loads:separatrix_forces", (*_BORNE, *_LOOPS), ("separatrix_forces",)),
+    Pass("phasekit.phase.loads:orbit_rotators", (*_DISK, *_STATE), ("orbit_rotators",)),
+    Pass("phasekit.phase.loads:orbit_forces", (*_BORNE, *_STATE), ("orbit_forces",)),
 )
 
 

@@ -195,6 +195,14 @@ class Model:
         return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
+    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
+        """Values of a parameter, NaN where they leave its domain."""
+        for parameter in cls.declared:
+            if parameter.name == name and not (valid := parameter.valid(value)).all():
+                return np.where(valid, value, np.nan)
+        return value
+
+    @classmethod
     def valid_coefficients(
         cls, parameters: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:

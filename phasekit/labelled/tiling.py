@@ -48,7 +48,7 @@ def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | 
         for task, _ in tasks:
             task()
         return
-    from phasekit.phase.solve import cpus  # here, because it loads the kernels
+    from phasekit.kernels.launch import cpus  # here, because it loads the kernels
 
     with _bar(sum(cells for _, cells in tasks), progress) as bar:
         pool = ThreadPoolExecutor(max_workers=max(1, min(cpus(), len(tasks))))

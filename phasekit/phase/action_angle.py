@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from phasekit.errors import OrbitFamily, ParameterError, Topology
 from phasekit.kernels import portrait as kernels
+from phasekit.kernels.launch import Arrays, launch
 from phasekit.phase.orbits import Orbits, allocate
 from phasekit.phase.separatrices import separatrices
-from phasekit.phase.solve import Arrays, check_threads, launch
 from phasekit.phase.states import Systems, flat, systems
 
 Array = npt.NDArray[np.float64]
@@ -71,7 +71,6 @@ def orbits_with_angles(
     >>> float(angles.angle)
     0.0
     """
-    check_threads(threads)
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi), np.shape(dphi))
     arrays = (*cells.arrays, cells.numbers(shape), flat(phi, shape), flat(dphi, shape))
@@ -156,7 +155,6 @@ def state_of(
     >>> round(float(back.phi), 9), round(float(back.dphi), 9)
     (0.5, 0.1)
     """
-    check_threads(threads)
     codes = [member.value for member in OrbitFamily]
     if not np.isin(family, codes).all():
         raise ParameterError(f"family: got {family!r}, wants values of OrbitFamily")

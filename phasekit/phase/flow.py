@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from phasekit.errors import ParameterError
 from phasekit.kernels import portrait as kernels
-from phasekit.phase.solve import check_threads, launch
+from phasekit.kernels.launch import launch
 from phasekit.phase.states import flat, systems
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +68,6 @@ def flow(
     >>> round(float(back.motion_phi), 9)
     0.5
     """
-    check_threads(threads)
     cells = systems(A, B, C, threads)
     states = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
     shape = np.broadcast_shapes(states, np.shape(t))
@@ -136,7 +135,6 @@ def separatrix_motion(
     >>> round(float(motion.motion_phi / np.pi), 9), float(motion.motion_dphi)
     (2.0, 2.0)
     """
-    check_threads(threads)
     for name, value, wanted in (("saddle", saddle, (-1, 0, 1)), ("side", side, (0, 1))):
         if not np.isin(value, wanted).all():
             raise ParameterError(f"{name}: got {value!r}, wants one of {wanted}")

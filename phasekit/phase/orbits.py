@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from phasekit.errors import ParameterError
 from phasekit.kernels import portrait as kernels
-from phasekit.phase.solve import Arrays, check_threads, launch
+from phasekit.kernels.launch import Arrays, launch
 from phasekit.phase.states import flat, systems
 
 Array = npt.NDArray[np.float64]
@@ -80,7 +80,6 @@ def orbits(
     >>> round(float(orbit.period), 9)
     6.382789698
     """
-    check_threads(threads)
     cells = systems(A, B, C, threads)
     shape = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
     arrays = (*cells.arrays, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
@@ -179,7 +178,6 @@ def _at_levels(
     gap: bool,
     threads: int | None,
 ) -> Orbits:
-    check_threads(threads)
     for name, value in (("saddle" if gap else "center", point), ("side", side)):
         if not np.isin(value, (0, 1)).all():
             raise ParameterError(f"{name}: got {value!r}, wants 0 or 1")

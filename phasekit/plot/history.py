@@ -84,7 +84,7 @@ def time_history(
         raise unknown("variable", variable, offered)
     times = ds[TIME]
     labels.monotone(times, "time")
-    motions = _motions(ds[variable], str(times.dims[0]), angles)
+    motions = motions_of(ds[variable], str(times.dims[0]), angles)
     axes = style.axes_for(ax, legend=legend and len(motions) > 1)
 
     stretch = factor if variable in SYMBOLS or ds[variable].attrs.get("units") == "rad" else 1.0
@@ -111,7 +111,7 @@ def _drawable(ds: xr.Dataset) -> list[str]:
     ]
 
 
-def _motions(values: xr.DataArray, along: str, angles: style.Angles) -> dict[str, xr.DataArray]:
+def motions_of(values: xr.DataArray, along: str, angles: style.Angles) -> dict[str, xr.DataArray]:
     """Return the motions one by one, under what tells each from the others."""
     dims = [str(dim) for dim in values.dims if dim != along]
     count = int(np.prod([values.sizes[dim] for dim in dims], dtype=int))

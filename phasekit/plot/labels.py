@@ -11,6 +11,8 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.schema import model_name
+from phasekit.labelled.system import MODELS, Model
 from phasekit.plot.style import Angles, angle_factor, angle_unit
 
 SYMBOLS = {
@@ -102,6 +104,20 @@ def dataset(
         if name not in value.variables:
             raise ParameterError(f"{argument}: got a Dataset without {name!r}, wants {wants}")
     return value
+
+
+def system_of(motion: xr.Dataset, argument: str, instead: str) -> Model:
+    """Return the system whose motion a Dataset holds."""
+    try:
+        name = model_name(motion)
+        if name not in MODELS:
+            raise ParameterError(f"ds: got a motion of {name}")
+        return MODELS[name].from_dataset(motion)
+    except ParameterError as error:
+        raise ParameterError(
+            f"{argument}: got a motion that does not tell its system ({error}); "
+            f"give {instead}(disk, motion)"
+        ) from None
 
 
 def swept(values: xr.DataArray, labels: Iterable[Hashable] = ()) -> list[str]:

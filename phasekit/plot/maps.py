@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.colors import BoundaryNorm, ListedColormap, LogNorm, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ def parameter_map(
     x: str | None = None,
     y: str | None = None,
     angles: style.Angles = "rad",
+    log: bool = False,
     legend: bool = True,
     ax: Axes | None = None,
     **sel: Any,
@@ -53,6 +54,8 @@ def parameter_map(
         The parameters on the axes; left out, the first two that are swept, in their order.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    log : bool
+        Whether numbers have a logarithmic scale of colors; those that are not positive are absent.
     legend : bool
         Whether to explain the curves under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -97,7 +100,7 @@ def parameter_map(
     axes = style.axes_for(ax, legend=legend, width=6.8)
 
     grid = labels.shown(across, angles)[0], labels.shown(up, angles)[0]
-    handles = _draw_field(axes, grid, field, angles, _named(ds[variable], sel))
+    handles = _draw_field(axes, grid, field, angles, _named(ds[variable], sel), log)
     handles += _draw_curves(axes, grid, chosen, across, up)
     axes.set_xlabel(labels.label(across, angles, style.letters(axes, "x")))
     axes.set_ylabel(labels.label(up, angles, style.letters(axes, "y")))
@@ -162,13 +165,13 @@ def _axes_of(
 
 
 def _draw_field(
-    ax: Axes, grid: Grid, field: xr.DataArray, angles: style.Angles, selected: str
+    ax: Axes, grid: Grid, field: xr.DataArray, angles: style.Angles, selected: str, log: bool
 ) -> list[Artist]:
     """Draw the cells and the color bar: codes by name, numbers on a scale."""
     text = labels.label(field, angles, style.letters(ax, "y"), selected)
     if field.dtype.kind in "iub":
         return _draw_codes(ax, grid, field, text)
-    return _draw_values(ax, grid, labels.shown(field, angles)[0], text)
+    return _draw_values(ax, grid, labels.shown(field, angles)[0], text, log)
 
 
 def _draw_codes(ax: Axes, grid: Grid, field: xr.DataArray, text: str) -> list[Artist]:
@@ -206,24 +209,25 @@ def _code_book(field: xr.DataArray) -> tuple[Mapping[int, str], Mapping[int, str
     return names, {-1: style.NOTHING, 0: style.NOTHING, **colors}
 
 
-def _draw_values(ax: Axes, grid: Grid, numbers: NDArray[Any], text: str) -> list[Artist]:
+def _draw_values(ax: Axes, grid: Grid, numbers: NDArray[Any], text: str, log: bool) -> list[Artist]:
     """Draw numbers; cells without one stay gray."""
-    low, high, extend = _limits(numbers)
+    if log:
+        numbers = np.where(numbers > 0.0, numbers, np.nan)
+    low, high, extend = _limits(np.log10(numbers) if log else numbers)
     finite = numbers[np.isfinite(numbers)]
     # pcolormesh would leave infinite cells out.
     shown = np.clip(numbers, finite.min(), finite.max()) if finite.size else numbers
     values = np.ma.masked_invalid(shown)
+    norm = Normalize(low, high)
+    if log and low is not None and high is not None:
+        norm = LogNorm(*(style.log_limits([10.0**low, 10.0**high]) or (None, None)))
     ax.set_facecolor(style.NOTHING)
     mesh = ax.pcolormesh(
-        *grid,
-        values,
-        cmap=style.SEQUENTIAL,
-        vmin=low,
-        vmax=high,
-        shading="nearest",
-        rasterized=True,
+        *grid, values, cmap=style.SEQUENTIAL, norm=norm, shading="nearest", rasterized=True
     )
-    ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend)
+    bar = ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend)
+    if isinstance(norm, LogNorm):
+        style.log_ticks(bar)
     absent = np.ma.getmaskarray(values).any()
     return [Patch(facecolor=style.NOTHING, edgecolor=style.GRAY, label="absent")] if absent else []
 

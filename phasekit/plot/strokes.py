@@ -20,6 +20,7 @@ from phasekit.plot.landscape import Arc, Landscape, Level, is_turn
 FloatArray = NDArray[np.float64]
 
 TURN = 2.0 * np.pi
+START: style.Look = {"marker": ">", "markersize": 6.5, "markeredgecolor": style.BLACK}
 # A marker this near to an edge (rad) is cut by it, and so stands on the other one too.
 SEAM = 0.02
 
@@ -123,11 +124,16 @@ def draw_orbit(
         else:
             x, y = round_the_cylinder(*closed(phi, speed))
         ax.plot(x * factor, y * factor, zorder=4, **look)
-    mark: style.Look = {"marker": ">", "markersize": 6.5, "markeredgecolor": style.BLACK}
     where = np.pi - (np.pi - phi0) % TURN
-    ax.plot([where * factor], [speed0 * factor], zorder=6, color=look["color"], **mark)
-    label = f"from ({where * factor:.4g}, {speed0 * factor:.4g})".replace("-", "\N{MINUS SIGN}")
-    return Line2D([], [], label=label, **mark, **look)
+    ax.plot([where * factor], [speed0 * factor], zorder=6, color=look["color"], **START)
+    return Line2D([], [], label=start_name(start, factor), **START, **look)
+
+
+def start_name(start: tuple[float, float], factor: float) -> str:
+    """Return a start (phi, phi') for print, its angle on the circle."""
+    where = np.pi - (np.pi - start[0]) % TURN
+    text = f"from ({where * factor:.4g}, {start[1] * factor:.4g})"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def draw_points(ax: Axes, land: Landscape, factor: float, *, on_potential: bool) -> list[Artist]:

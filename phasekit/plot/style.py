@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import ListedColormap, LogNorm, to_rgba
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, MultipleLocator, NullLocator
@@ -236,9 +237,25 @@ WALLS: Mapping[str, Look] = {
         "label": "energy of the degenerate point",
     },
 }
+ORIGIN: Look = {
+    "marker": "P",
+    "markersize": 7,
+    "markerfacecolor": BLACK,
+    "markeredgecolor": "white",
+    "linestyle": "none",
+    "label": "equilibria",
+}
 MOTION: Look = {"color": BLUE, "linestyle": "-", "linewidth": 1.8}
 ORBIT_COLORS = (GREEN, PURPLE, SKY, ORANGE, BLUE)
 ORBIT_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (6, 2, 1.5, 2)), (0, (1.5, 1.5)))
+# Magnitude and components of a force, or two bearings.
+LOAD_COLORS = (BLUE, VERMILLION, GREEN, PURPLE)
+# Sides of a force polygon: the four components, the weight; and what they sum to.
+POLYGON: tuple[Look, ...] = tuple(
+    {"color": color, "linestyle": "-", "linewidth": 2.0}
+    for color in (BLUE, SKY, GREEN, PURPLE, GRAY)
+)
+RESULTANT: Look = {"color": BLACK, "linestyle": "-", "linewidth": 2.6}
 
 # Cells of coded maps; the lightness falls from one code to the next.
 NOTHING = "#DDDDDD"
@@ -365,11 +382,15 @@ def log_limits(values: Any) -> tuple[float, float] | None:
 def log_bar(ax: Axes, limits: tuple[float, float], text: str) -> ScalarMappable:
     """Draw a color bar with round numbers, also where a logarithmic scale spans little."""
     mappable = ScalarMappable(LogNorm(*limits), LINES)
-    bar = ax.figure.colorbar(mappable, ax=ax, label=text)
-    bar.ax.yaxis.set_major_locator(FixedLocator(round_numbers(*limits)))
+    log_ticks(ax.figure.colorbar(mappable, ax=ax, label=text))
+    return mappable
+
+
+def log_ticks(bar: Colorbar) -> None:
+    """Put round numbers along a color bar with a logarithmic scale."""
+    bar.ax.yaxis.set_major_locator(FixedLocator(round_numbers(*bar.mappable.get_clim())))
     bar.ax.yaxis.set_minor_locator(NullLocator())
     bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
-    return mappable
 
 
 def round_numbers(low: float, high: float) -> list[float]:

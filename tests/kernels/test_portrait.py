@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from properties.strategies import systems
 
-from phasekit.phase import solve
+from phasekit.kernels import launch
 from phasekit.phase.action_angle import action_angle, orbits_with_angles, state_of
 from phasekit.phase.flow import flow
 from phasekit.phase.orbits import orbits, orbits_at_energy, orbits_at_gap
@@ -32,8 +32,8 @@ def test_compiled_and_interpreted_agree_to_the_last_bit(states, monkeypatch):
     A, B, C, phi0, v0, t = states
     found = []
     for most in (10**9, 0):
-        monkeypatch.setattr(solve, "INTERPRETED_AT_MOST", most)
-        monkeypatch.setattr(solve, "_interpreted", {})
+        monkeypatch.setattr(launch, "INTERPRETED_AT_MOST", most)
+        monkeypatch.setattr(launch, "_interpreted", {})
         with np.errstate(all="ignore"):
             found.append(
                 (

@@ -1,0 +1,464 @@
+"""Rigid bodies by mass, center and inertia, and their mass moment vectors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
+from phasekit.mechanics.vectors import (
+    Array,
+    Frozen,
+    apply,
+    bad,
+    common_shape,
+    cross,
+    directions,
+    dot,
+    numbers,
+    read_only,
+    tensors,
+    times,
+    vectors,
+)
+
+#: Relative error up to which a tensor counts as symmetric, possible or orthogonal.
+TOLERANCE = 1e-12
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RigidBody(Frozen):
+    """Rigid body, or a batch of them, by its mass, mass center and inertia at a pole.
+
+    The mass moment vectors at the pole for an axis through it say how the body resists a
+    rotation about that axis.
+
+    Parameters
+    ----------
+    mass : float or array_like
+        Mass in kg, > 0, shape (...).
+    center : array_like
+        Vector from the pole to the mass center in m, shape (..., 3).
+    inertia : array_like
+        Inertia tensor about the pole in kg m^2, shape (..., 3, 3), symmetric; its elements off
+        the diagonal are ``-sum m x y``. The shapes broadcast.
+
+    Raises
+    ------
+    ParameterError
+        If a single value is not finite, a mass not positive, a tensor not symmetric, or a single
+        body impossible: about the center, no principal moment exceeds the sum of the two others
+        (up to 1e-12 of the tensor). In a batch such bodies become NaN.
+
+    Notes
+    -----
+    Moments: [HedrihVeljovic2011] (2.1)-(2.6). ``n`` may have any length; batches of bodies and
+    of vectors broadcast.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from phasekit.mechanics.rigid_body import RigidBody
+    >>> body = RigidBody(2.0, [0.1, 0.0, 0.0], np.diag([0.1, 0.2, 0.25]))
+    >>> body
+    RigidBody(mass=2, center=[0.1, 0, 0], inertia=[[0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.25]])
+    >>> body.linear_moment([0, 0, 1]).tolist()
+    [0.0, 0.2, 0.0]
+    >>> float(body.axial_moment([0, 0, 3]))
+    0.25
+    """
+
+    mass: Any
+    center: Any
+    inertia: Any
+
+    def __post_init__(self) -> None:
+        """Check the values and keep them as read-only arrays."""
+        mass = numbers("mass", self.mass, "a number > 0 in kg, or an array of them")
+        if mass.ndim == 0 and not mass > 0.0:
+            raise bad("mass", self.mass, "a number > 0 in kg")
+        center = vectors("center", self.center, "three finite numbers in m, (..., 3)")
+        wants = "a symmetric tensor of finite numbers in kg m^2, (..., 3, 3)"
+        inertia = tensors("inertia", self.inertia, (3, 3), wants)
+        symmetric = _symmetric(inertia)
+        if inertia.ndim == 2 and not symmetric:
+            raise bad("inertia", self.inertia, wants)
+        common_shape(mass=mass.shape, center=center.shape[:-1], inertia=inertia.shape[:-2])
+        inertia = 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
+        excess = _excess(mass, center, inertia)
+        if excess.ndim == 0 and excess > TOLERANCE:
+            wants = (
+                "the tensor about the pole of a body of this mass and center; about the center "
+                f"one principal moment exceeds the sum of the others (by {excess:.1e}, relative)"
+            )
+            raise bad("inertia", self.inertia, wants)
+        self._keep(mass, center, inertia, symmetric & (mass > 0.0) & (excess <= TOLERANCE))
+
+    def _keep(
+        self, mass: Array, center: Array, inertia: Array, valid: npt.ArrayLike = True
+    ) -> None:
+        """Set the values, NaN where they are not a body."""
+        shape = common_shape(mass=mass.shape, center=center.shape[:-1], inertia=inertia.shape[:-2])
+        valid = np.asarray(valid & np.isfinite(mass) & np.isfinite(center).all(axis=-1))
+        valid = valid & np.isfinite(inertia).all(axis=(-2, -1))
+        mass = np.where(valid, np.broadcast_to(mass, shape), np.nan)
+        object.__setattr__(self, "mass", read_only(mass) if shape else float(mass))
+        object.__setattr__(self, "center", read_only(np.where(valid[..., None], center, np.nan)))
+        inertia = np.where(valid[..., None, None], inertia, np.nan)
+        object.__setattr__(self, "inertia", read_only(inertia))
+
+    @classmethod
+    def _make(cls, mass: Array, center: Array, inertia: Array, valid: npt.ArrayLike = True) -> Self:
+        """Make a body of values that are right by construction up to rounding."""
+        body = object.__new__(cls)
+        body._keep(mass, center, inertia, valid)
+        return body
+
+    @classmethod
+    def from_points(cls, masses: npt.ArrayLike, positions: npt.ArrayLike) -> Self:
+        """Return the body that particles make.
+
+        Parameters
+        ----------
+        masses : array_like
+            Masses in kg, >= 0 and not all zero, shape (..., n).
+        positions : array_like
+            Positions from the pole in m, shape (..., n, 3).
+
+        Raises
+        ------
+        ParameterError
+            If the shapes do not go together, or the particles of a single body are unusable.
+
+        Examples
+        --------
+        >>> RigidBody.from_points([1, 3], [[0, 0, 1], [0, 0, -1]])
+        RigidBody(mass=4, center=[0, 0, -0.5], inertia=[[4, 0, 0], [0, 4, 0], [0, 0, 0]])
+        """
+        wants = "masses in kg, finite, >= 0 and not all zero, (..., n)"
+        points = vectors("positions", positions, "positions in m, finite, (..., n, 3)")
+        m = numbers("masses", masses, wants)
+        if points.ndim < 2 or points.shape[-2] == 0:
+            raise bad("positions", positions, "positions in m, finite, (..., n, 3)")
+        if m.ndim == 0 or m.shape[-1] != points.shape[-2]:
+            raise bad("masses", masses, f"one mass a position, n = {points.shape[-2]}")
+        common_shape(masses=m.shape[:-1], positions=points.shape[:-2])
+        total = np.asarray(m.sum(axis=-1))
+        good = np.asarray((m >= 0.0).all(axis=-1) & (total > 0.0) & np.isfinite(total))
+        if m.ndim == 1 and not good:
+            raise bad("masses", masses, wants)
+        if points.ndim == 2 and np.isnan(points).any():
+            raise bad("positions", positions, "positions in m, finite, (..., n, 3)")
+        center = times(1.0 / np.where(good, total, np.nan), (m[..., None] * points).sum(axis=-2))
+        return cls._make(total, center, _steiner(m, points).sum(axis=-3), good)
+
+    @classmethod
+    def disk(
+        cls, m: npt.ArrayLike, r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike
+    ) -> Self:
+        """Return the thin disk that is skew and eccentric on its shaft, with O2 as the pole.
+
+        The axes are those of the carrier, (u01, v01, n1) = (shaft, outward, up), at phi = 0,
+        where the center hangs at ``e (cos beta, 0, -sin beta)``. So it is the disk for
+        ``CoupledRotation(body, n1=(0, 0, 1), n2=(1, 0, 0), a=a)``.
+
+        Parameters
+        ----------
+        m, r, e : float or array_like
+            Mass > 0 in kg; radius and distance of the center from O2, both >= 0 in m.
+        beta : float or array_like
+            Angle between the shaft and the diameter through O2, 0 to pi rad.
+
+        Raises
+        ------
+        ParameterError
+            If a scalar is unusable. In arrays such disks become NaN.
+
+        Examples
+        --------
+        >>> RigidBody.disk(2.0, 0.2, 0.1, np.pi / 2).axial_moment([1, 0, 0]).round(12).item()
+        0.06
+        """
+        limits = {"m": "> 0 in kg", "r": ">= 0 in m", "e": ">= 0 in m", "beta": "0 to pi in rad"}
+        kept = {}
+        for name, value in {"m": m, "r": r, "e": e, "beta": beta}.items():
+            kept[name] = numbers(name, value, f"a number {limits[name]}, or an array of them")
+            if kept[name].ndim == 0 and not _inside(name, kept[name]):
+                raise bad(name, value, f"a number {limits[name]}")
+        shape = common_shape(**{name: value.shape for name, value in kept.items()})
+        kept = {name: np.broadcast_to(value, shape) for name, value in kept.items()}
+        valid = np.all([_inside(name, value) for name, value in kept.items()], axis=0)
+        mass, r, e, beta = kept.values()
+        ju, jv, jn, jvn = disk_inertia(mass, r, e, beta)
+        zero = np.zeros_like(mass)
+        center = np.stack([e * np.cos(beta), zero, -disk_eccentricity(e, beta)], axis=-1)
+        # At phi = 0: u2 = v01, v2 = n1 and n2 = u01.
+        rows = [[jn, zero, jvn], [zero, ju, zero], [jvn, zero, jv]]
+        inertia = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        return cls._make(mass, center, inertia, valid)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Shape of the batch; () for a single body."""
+        return np.shape(self.mass)
+
+    def linear_moment(self, n: npt.ArrayLike) -> Array:
+        """Linear mass moment vector ``S_n = M [n, rho_C]`` in kg m.
+
+        [HedrihVeljovic2011] (2.1); perpendicular to n and to the vector to the center.
+
+        Examples
+        --------
+        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 0.0]]).linear_moment([0, 0, 1]).tolist()
+        [0.0, 6.0, 0.0]
+        """
+        return times(self.mass, cross(self._axis(n), self.center))
+
+    def inertia_moment(self, n: npt.ArrayLike) -> Array:
+        """Mass inertia moment vector ``J_n = sum m [rho, [n, rho]]`` in kg m^2.
+
+        The inertia tensor applied to n; [HedrihVeljovic2011] (2.2).
+
+        Examples
+        --------
+        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).inertia_moment([0, 0, 1]).tolist()
+        [-6.0, 0.0, 18.0]
+        """
+        return apply(self.inertia, self._axis(n))
+
+    def deviation_moment(self, n: npt.ArrayLike) -> Array:
+        """Deviation moment vector ``D_n = [n, [J_n, n]]``, the part of J_n across n, in kg m^2.
+
+        [HedrihVeljovic2011] (2.5), (2.6); it is zero for principal axes.
+
+        Examples
+        --------
+        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).deviation_moment([0, 0, 1]).tolist()
+        [-6.0, 0.0, 0.0]
+        """
+        n = self._axis(n)
+        return cross(n, cross(apply(self.inertia, n), n))
+
+    def axial_moment(self, n: npt.ArrayLike) -> Array:
+        """Moment of inertia ``(n, J_n)`` about the axis, in kg m^2.
+
+        Examples
+        --------
+        >>> float(RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).axial_moment([0, 0, 1]))
+        18.0
+        """
+        n = self._axis(n)
+        return dot(n, apply(self.inertia, n))
+
+    def polar_moment(self) -> Array:
+        """Polar moment ``J_O = sum m rho^2`` of the pole, half the trace of the tensor, in kg m^2.
+
+        Examples
+        --------
+        >>> float(RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).polar_moment())
+        20.0
+        """
+        return np.asarray(0.5 * np.trace(self.inertia, axis1=-2, axis2=-1))[()]
+
+    def spherical_moment(self, n: npt.ArrayLike) -> Array:
+        """Spherical part ``(2/3) J_O n`` of the inertia moment vector, in kg m^2.
+
+        Examples
+        --------
+        >>> RigidBody.from_points([3.0], [[2.0, 0.0, 0.0]]).spherical_moment([0, 0, 1]).tolist()
+        [0.0, 0.0, 8.0]
+        """
+        return times(self.polar_moment() / 1.5, self._axis(n))
+
+    def deviatoric_moment(self, n: npt.ArrayLike) -> Array:
+        """Deviatoric part ``J_n - (2/3) J_O n`` of the inertia moment vector, in kg m^2.
+
+        Examples
+        --------
+        >>> RigidBody.from_points([3.0], [[2.0, 0.0, 0.0]]).deviatoric_moment([0, 0, 1]).tolist()
+        [0.0, 0.0, 4.0]
+        """
+        return self.inertia_moment(n) - self.spherical_moment(n)
+
+    def linear_moment_rate(
+        self,
+        n: npt.ArrayLike,
+        angular_velocity: npt.ArrayLike,
+        axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Rate of change of S_n while the body turns about the pole, in kg m/s.
+
+        ``dS_n/dt = [omega, S_n] + M [[Omega - omega, n], rho_C]``, with ``omega`` of the body and
+        ``Omega`` of the axis ([HedrihVeljovic2011] section 3, where ``Omega = omega1 n1``).
+
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis now.
+        angular_velocity, axis_velocity : array_like
+            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s; by default
+            the axis keeps its direction.
+
+        Examples
+        --------
+        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 0.0]])
+        >>> body.linear_moment_rate([0, 0, 1], [0, 0, 5]).tolist()
+        [-30.0, 0.0, 0.0]
+        """
+        n, turning, slip = self._turning(n, angular_velocity, axis_velocity)
+        first = cross(turning, cross(n, self.center)) + cross(slip, self.center)
+        return times(self.mass, first)
+
+    def inertia_moment_rate(
+        self,
+        n: npt.ArrayLike,
+        angular_velocity: npt.ArrayLike,
+        axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
+    ) -> Array:
+        """Rate of change of J_n while the body turns about the pole, in kg m^2/s.
+
+        ``dJ_n/dt = [omega, J_n] + I [Omega - omega, n]``, I being the inertia tensor; arguments as
+        of `linear_moment_rate`.
+
+        Examples
+        --------
+        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]])
+        >>> body.inertia_moment_rate([0, 0, 1], [0, 0, 5]).tolist()
+        [0.0, -30.0, 0.0]
+        """
+        n, turning, slip = self._turning(n, angular_velocity, axis_velocity)
+        return cross(turning, apply(self.inertia, n)) + apply(self.inertia, slip)
+
+    def shifted(self, vector: npt.ArrayLike) -> Self:
+        """Return the body with another pole, at `vector` from this one, in m.
+
+        The transfer of [HedrihVeljovic2011] (2.3), whose vector points from the new pole to the
+        old one; to the mass center and from it, the theorem of Huygens and Steiner, (2.4).
+
+        Examples
+        --------
+        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).shifted([3, 0, 0])
+        RigidBody(mass=2, center=[0, 0, 1], inertia=[[2, 0, 0], [0, 2, 0], [0, 0, 0]])
+        """
+        step = vectors("vector", vector, "three finite numbers in m, (..., 3)")
+        common_shape(body=self.shape, vector=step.shape[:-1])
+        center = self.center - step
+        # m {c'^2 E - c' c'} - m {c^2 E - c c} without the squares that cancel
+        change = -_product(self.mass, step, self.center + center)
+        return self._make(np.asarray(self.mass), center, self.inertia + change)
+
+    def centroidal(self) -> Self:
+        """Return the body with its mass center as the pole.
+
+        Examples
+        --------
+        >>> RigidBody.from_points([1.0, 1.0], [[1, 0, 0], [1, 2, 0]]).centroidal()
+        RigidBody(mass=2, center=[0, 0, 0], inertia=[[2, 0, 0], [0, 0, 0], [0, 0, 2]])
+        """
+        return self.shifted(self.center)
+
+    def rotated(self, matrix: npt.ArrayLike) -> Self:
+        """Return the body turned about the pole, or mirrored.
+
+        Parameters
+        ----------
+        matrix : array_like
+            Orthogonal matrices (..., 3, 3); of determinant -1 they give mirror images.
+
+        Raises
+        ------
+        ParameterError
+            If a single matrix is not orthogonal up to 1e-12. In a batch such bodies become NaN.
+
+        Examples
+        --------
+        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 0.0]])
+        >>> body.rotated([[0, -1, 0], [1, 0, 0], [0, 0, 1]]).center.tolist()
+        [0.0, 3.0, 0.0]
+        """
+        wants = "an orthogonal matrix, (..., 3, 3)"
+        turn = tensors("matrix", matrix, (3, 3), wants)
+        across = np.swapaxes(turn, -1, -2)
+        orthogonal = (np.abs(turn @ across - np.eye(3)) <= TOLERANCE).all(axis=(-2, -1))
+        if turn.ndim == 2 and not orthogonal:
+            raise bad("matrix", matrix, wants)
+        common_shape(body=self.shape, matrix=turn.shape[:-2])
+        center, inertia = apply(turn, self.center), turn @ self.inertia @ across
+        inertia = 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
+        return self._make(np.asarray(self.mass), center, inertia, orthogonal)
+
+    def _axis(self, n: npt.ArrayLike) -> Array:
+        """Unit vectors along n, of a batch that goes with the body's."""
+        along = directions("n", n)
+        common_shape(body=self.shape, n=along.shape[:-1])
+        return along
+
+    def _turning(
+        self, n: npt.ArrayLike, angular_velocity: npt.ArrayLike, axis_velocity: npt.ArrayLike
+    ) -> tuple[Array, Array, Array]:
+        """Direction of an axis, angular velocity, and the axis's velocity relative to the body."""
+        n = self._axis(n)
+        omega = vectors("angular_velocity", angular_velocity)
+        axis = vectors("axis_velocity", axis_velocity)
+        common_shape(
+            body=self.shape,
+            n=n.shape[:-1],
+            angular_velocity=omega.shape[:-1],
+            axis_velocity=axis.shape[:-1],
+        )
+        return n, omega, cross(axis - omega, n)
+
+    def __repr__(self) -> str:
+        """Write a single body to six digits, a batch by its shape and masses."""
+        if not self.shape:
+            center, inertia = _brief(self.center), ", ".join(_brief(row) for row in self.inertia)
+            return f"RigidBody(mass={self.mass:.6g}, center={center}, inertia=[{inertia}])"
+        good = self.mass[np.isfinite(self.mass)]
+        span = f"mass {good.min():.6g} to {good.max():.6g}" if good.size else "none valid"
+        return f"RigidBody(<batch of shape {self.shape}, {span}>)"
+
+
+def _product(mass: npt.ArrayLike, x: Array, y: Array) -> Array:
+    """Tensor ``m {(x, y) E - (x y + y x)/2}``, (..., 3, 3)."""
+    outer = x[..., :, None] * y[..., None, :]
+    both = 0.5 * (outer + np.swapaxes(outer, -1, -2))
+    return np.asarray(mass)[..., None, None] * (dot(x, y)[..., None, None] * np.eye(3) - both)
+
+
+def _steiner(mass: npt.ArrayLike, x: Array) -> Array:
+    """Tensor of inertia of a particle at x."""
+    return _product(mass, x, x)
+
+
+def _symmetric(tensor: Array) -> npt.NDArray[np.bool_]:
+    gap = np.abs(tensor - np.swapaxes(tensor, -1, -2)).max(axis=(-2, -1))
+    return np.asarray(gap <= TOLERANCE * np.abs(tensor).max(axis=(-2, -1)))
+
+
+def _excess(mass: Array, center: Array, inertia: Array) -> Array:
+    """By how much a moment at the center exceeds the sum of the others, relative; NaN for NaN.
+
+    The tensor ``sum m x x`` has no negative eigenvalue if, and only if, none does.
+    """
+    about_center = inertia - _steiner(mass, center)
+    half_trace = 0.5 * np.trace(about_center, axis1=-2, axis2=-1)[..., None, None]
+    spread = half_trace * np.eye(3) - about_center
+    size = np.maximum(np.abs(np.trace(inertia, axis1=-2, axis2=-1)), mass * dot(center, center))
+    finite = np.isfinite(spread).all(axis=(-2, -1))
+    least = np.linalg.eigvalsh(np.where(finite[..., None, None], spread, 0.0))[..., 0]
+    with np.errstate(invalid="ignore"):
+        relative = np.where(size > 0.0, -2.0 * least / np.where(size > 0.0, size, 1.0), -least)
+    return np.asarray(np.where(finite, relative, np.nan))
+
+
+def _inside(name: str, value: Array) -> npt.NDArray[np.bool_]:
+    """Whether a parameter of the disk lies in its domain."""
+    low = value > 0.0 if name == "m" else value >= 0.0
+    return np.asarray(low & (value <= np.pi) if name == "beta" else low)
+
+
+def _brief(row: Array) -> str:
+    return "[" + ", ".join(f"{x + 0.0:.6g}" for x in row) + "]"
