@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from phasekit.errors import Topology as Topology
     from phasekit.labelled.asymptotics import near_center as near_center
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
+    from phasekit.labelled.atlas import branches as branches
     from phasekit.labelled.critical import critical as critical
     from phasekit.labelled.families import orbit_families as orbit_families
     from phasekit.labelled.free_rotor import FreeGyroRotor as FreeGyroRotor
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.integral import gradient as gradient
     from phasekit.labelled.integral import phase_velocity as phase_velocity
     from phasekit.labelled.integral import potential as potential
+    from phasekit.labelled.loci import bifurcation_set as bifurcation_set
     from phasekit.labelled.machine import bearing_forces as bearing_forces
     from phasekit.labelled.machine import fixed_bearing_forces as fixed_bearing_forces
     from phasekit.labelled.machine import rotators as rotators
@@ -54,6 +56,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
+    from phasekit.labelled.potential_system import Potential as Potential
     from phasekit.labelled.quantities import quantities as quantities
     from phasekit.labelled.store import open_map as open_map
     from phasekit.labelled.sweep import sweep as sweep
@@ -79,6 +82,7 @@ _MODULES = {
         "Topology",
     ),
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
+    "phasekit.labelled.atlas": ("branches",),
     "phasekit.labelled.critical": ("critical",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.labelled.free_rotor": ("FreeGyroRotor",),
@@ -90,11 +94,13 @@ _MODULES = {
         "phase_velocity",
         "potential",
     ),
+    "phasekit.labelled.loci": ("bifurcation_set",),
     "phasekit.labelled.machine": ("bearing_forces", "fixed_bearing_forces", "rotators"),
     "phasekit.labelled.models": ("Coefficients", "GyroRotorDisk"),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
+    "phasekit.labelled.potential_system": ("Potential",),
     "phasekit.labelled.quantities": ("quantities",),
     "phasekit.labelled.store": ("open_map",),
     "phasekit.labelled.sweep": ("sweep",),

@@ -36,32 +36,43 @@ class EquilibriumKind(IntEnum):
 
 
 class Topology(IntEnum):
-    """What the separatrices of one system look like on the cylinder."""
+    """What the separatrices of one system look like.
+
+    On a line they may close on one side of a saddle alone (homoclinic), or on neither (unbounded).
+    """
 
     NOT_COMPUTED = -1
     NONE = 0
     WINDING = 1
     FIGURE_EIGHT = 2
     HETEROCLINIC = 3
+    HOMOCLINIC = 4
+    UNBOUNDED = 5
 
 
 class Loop(IntEnum):
-    """What the separatrix of one saddle does: close on itself, wind round, or reach the partner."""
+    """What the separatrix of one saddle does: close on itself, wind round, or reach a partner.
+
+    On a line it may close on one side alone (lobe), or on neither (unbounded).
+    """
 
     ABSENT = 0
     LOBES = 1
     WINDING = 2
     HETEROCLINIC = 3
+    LOBE = 4
+    UNBOUNDED = 5
 
 
 class OrbitKind(IntEnum):
-    """Type of an orbit."""
+    """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at."""
 
     NOT_COMPUTED = -1
     EQUILIBRIUM = 0
     LIBRATION = 1
     ROTATION = 2
     ASYMPTOTIC = 3
+    UNBOUNDED = 4
 
 
 class OrbitFamily(IntEnum):

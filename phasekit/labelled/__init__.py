@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from phasekit.labelled import accessor, guises, models
+from phasekit.labelled import accessor, guises, models, potential_system
 
-__all__ = ["accessor", "guises", "models"]
+__all__ = ["accessor", "guises", "models", "potential_system"]

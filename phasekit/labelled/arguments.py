@@ -85,6 +85,17 @@ def flag(argument: str, value: object) -> None:
         raise bad(argument, value, "True or False")
 
 
+def one_of(argument: str, value: object, names: Sequence[str]) -> int:
+    """Return the place of a name among those that an argument may take.
+
+    >>> one_of("side", "right", ("left", "right"))
+    1
+    """
+    if not isinstance(value, str) or value not in names:
+        raise bad(argument, value, f"one of {', '.join(names)}")
+    return list(names).index(value)
+
+
 def numeric(argument: str, value: Any) -> Value:
     """Return `value` as a float, a read-only 1-D float64 array or a float64 DataArray.
 

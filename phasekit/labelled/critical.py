@@ -57,7 +57,7 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
     >>> pk.critical(disk, "beta").critical_fold.dims
     ('fold',)
     """
-    system = as_system(system)
+    system = as_system(system, closed_form="critical")
     names: dict[str, str] = {}
     if isinstance(system, GyroRotorDisk):
         names.update({p.name: p.units for p in system.declared if p.name in _NEUTRAL})

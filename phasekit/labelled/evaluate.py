@@ -21,12 +21,10 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, Value
 from phasekit.labelled.grid import Grid, make_grid, variable
 from phasekit.labelled.memory import refuse_too_large
-from phasekit.labelled.quantities import LABELS, ROWS, STATES, Pass, Quantity, pass_of
+from phasekit.labelled.quantities import ROWS, STATES, Pass, Quantity, pass_of
 from phasekit.labelled.schema import dataset_attrs, input_attrs, label_coords
 from phasekit.labelled.system import Model
 from phasekit.labelled.tiling import cut, run_tasks, tiles
-
-_COEFFICIENTS = ("A", "B", "C")
 
 
 @dataclass
@@ -42,9 +40,9 @@ class Cells:
     def get(self, name: str) -> Any:
         """Return an input, a coefficient or a quantity as an array."""
         if name not in self.computed:
-            if name in _COEFFICIENTS:
+            if name in self.model.derived:
                 abc = self.model.valid_coefficients(self.inputs)
-                self.computed.update(zip(_COEFFICIENTS, abc, strict=True))
+                self.computed.update(zip(self.model.derived, abc, strict=True))
             elif name in STATES:
                 state = self.inputs[name]
                 self.computed[name] = np.where(np.isfinite(state), state, np.nan)
@@ -117,7 +115,7 @@ def leaves(system: Model, names: Iterable[str], passes: Sequence[Pass]) -> list[
     """Return the parameters and states on which inputs of passes depend, in the end."""
     found: dict[str, None] = {}
     for name in names:
-        if name in _COEFFICIENTS:
+        if name in system.derived:
             found.update(dict.fromkeys(system.formula_inputs()))
         elif name in ROWS:
             found.update(
@@ -179,11 +177,12 @@ def lay_out(
     order: Sequence[str] = (),
 ) -> Layout:
     """Say what is computed where, and refuse what cannot be; arguments as in `evaluate`."""
+    rows, passes = system.methods.fitted(rows, passes)
     inputs = {**system.parameters, **(states or {})}
     grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = {one: leaves(system, one.inputs, passes) for one in passes}
     _refuse_missing(system, needs, inputs)
-    if not grid.sizes and any("A" in one.inputs for one in passes):
+    if not grid.sizes and any(set(system.derived) & set(one.inputs) for one in passes):
         system.coefficients()  # scalars that are invalid raise, where cells of arrays become NaN
     _refuse_taken(grid, rows)
     return Layout(system, grid, tuple(rows), needs)
@@ -270,7 +269,9 @@ def _lazy(layout: Layout) -> dict[str, xr.Variable]:
     for one, names in layout.needs.items():
         wanted = [row for row in layout.rows if row.group in one.groups]
         block = functools.partial(_block, layout.model, one, tuple(names), wanted)
-        sizes = {dim: len(LABELS[dim][0]) for row in wanted for dim in row.dims}
+        sizes = {
+            dim: size for row in wanted for dim, size in zip(row.dims, row.label_shape, strict=True)
+        }
         with warnings.catch_warnings():
             # Axes make an outer product: many more chunks than each of them has is what is meant.
             warnings.filterwarnings("ignore", message="Increasing number of chunks")
@@ -317,7 +318,7 @@ def assemble(layout: Layout, data: Mapping[str, xr.Variable]) -> xr.Dataset:
     for dim in layout.grid.sizes:
         if dim in layout.grid.coords:
             coords[dim] = _with_attrs(layout.system, dim, layout.grid.coords[dim])
-    coords.update(label_coords(dim for row in layout.rows for dim in row.dims))
+    coords.update(label_coords(layout.rows))
     for name, given in layout.grid.inputs.items():
         if name not in coords:
             coords[name] = _with_attrs(layout.system, name, given)

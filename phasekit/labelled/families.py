@@ -70,7 +70,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     >>> ds.energy_level.sel(family="outer").diff("level").min().item() > 0
     True
     """
-    system = as_system(system)
+    system = as_system(system, closed_form="orbit_families")
     if isinstance(n, (bool, np.bool_)) or not isinstance(n, (int, np.integer)) or n < 1:
         raise bad("n", n, "a number of orbits >= 1")
     top = None if energy_max is None else numeric("energy_max", energy_max)

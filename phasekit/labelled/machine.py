@@ -14,10 +14,10 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import NumberLike, bad, numeric
+from phasekit.labelled.arguments import NumberLike, bad, numeric, one_of
 from phasekit.labelled.models import GyroRotorDisk
 from phasekit.labelled.quantities import Pass, Quantity, pass_of, select
-from phasekit.labelled.states import at_states, one_of
+from phasekit.labelled.states import at_states
 from phasekit.labelled.system import Model, as_system
 from phasekit.mechanics import bearings as bearings_of
 from phasekit.mechanics import rotators as rotators_of

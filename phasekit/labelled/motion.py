@@ -5,16 +5,15 @@ Array parameters of the system and of the states span the result's dims, times t
 
 from __future__ import annotations
 
-import functools
 from typing import Any
 
 import xarray as xr
 
 from phasekit.labelled.arguments import NumberLike
-from phasekit.labelled.orbits import DEFAULT_SADDLE, SADDLES, SIDES, noted
-from phasekit.labelled.quantities import Pass, select
-from phasekit.labelled.states import at_states, one_of
-from phasekit.phase.flow import separatrix_motion as separatrix_motion_of
+from phasekit.labelled.orbits import noted
+from phasekit.labelled.quantities import select
+from phasekit.labelled.states import at_states
+from phasekit.labelled.system import as_system
 
 
 def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.Dataset:
@@ -57,7 +56,7 @@ def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.
 
 
 def separatrix_motion(
-    system: Any, t: NumberLike, *, saddle: str | None = None, side: str = "right"
+    system: Any, t: NumberLike, *, saddle: str | int | None = None, side: str = "right"
 ) -> xr.Dataset:
     """Motion on the separatrix of a saddle, in elementary functions.
 
@@ -69,7 +68,7 @@ def separatrix_motion(
         Times in s: 0 at the turning point of a lobe, where a winding separatrix is opposite to
         the saddle, and half-way to the partner between two saddles of equal energy. A bare array
         makes the dim ``time``.
-    saddle : {"lower", "upper"}, optional
+    saddle : {"lower", "upper"}, or int for a `Potential`, optional
         The saddle; by default the lower one where there are two (that of a figure-eight), else
         the only one (upper).
     side : {"right", "left"}, default "right"
@@ -97,10 +96,7 @@ def separatrix_motion(
     >>> abs(ds.motion_dphi.values.round(9)).tolist()
     [0.0, 0.0, 0.0]
     """
-    number = -1 if saddle is None else one_of("saddle", saddle, SADDLES)
-    function = functools.partial(
-        separatrix_motion_of, saddle=number, side=one_of("side", side, SIDES)
-    )
-    one = Pass(function, ("A", "B", "C", "time"), ("motion",))
+    system = as_system(system)
+    one, notes = system.methods.on_separatrix(saddle, side)
     ds = at_states(system, select("motion"), {"t": ("time", t)}, (one,))
-    return noted(ds, saddle=saddle or DEFAULT_SADDLE, side=side)
+    return noted(ds, **notes)

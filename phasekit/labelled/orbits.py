@@ -7,24 +7,19 @@ dims; they come back as coordinates (state_phi, state_dphi, ...).
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import EquilibriumKind, OrbitFamily, ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric
-from phasekit.labelled.quantities import LABELS, Pass, select
-from phasekit.labelled.states import at_states, one_of
+from phasekit.errors import OrbitFamily, ParameterError
+from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric, one_of
+from phasekit.labelled.methods import SIDES
+from phasekit.labelled.quantities import select
+from phasekit.labelled.states import at_states
+from phasekit.labelled.system import as_system
 from phasekit.phase.action_angle import state_of as state_of_codes
-from phasekit.phase.equilibria import equilibria
-from phasekit.phase.orbits import Orbits, orbits_at_energy, orbits_at_gap
-
-CENTERS = ("lower_center", "upper_center")
-SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
-DEFAULT_SADDLE = "lower where there is one, else upper"
 
 #: Families that have orbits of given action.
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
@@ -36,9 +31,9 @@ def orbits(
     dphi0: NumberLike | None = None,
     *,
     energy: NumberLike | None = None,
-    center: str | None = None,
+    center: str | int | None = None,
     gap: NumberLike | None = None,
-    saddle: str | None = None,
+    saddle: str | int | None = None,
     side: str = "right",
 ) -> xr.Dataset:
     """Period, action and turning points of orbits: through states, or of given energy.
@@ -51,13 +46,13 @@ def orbits(
         States on the orbits: angles in rad, angular velocities in s^-1.
     energy : float, 1-D array_like or xarray.DataArray
         In place of states: energies in s^-2, as `energy` gives them.
-    center : {"lower_center", "upper_center"}
+    center : {"lower_center", "upper_center"}, or int for a `Potential`
         With `energy`: the center round which the orbit goes, by default the lower one. It matters
         below the energy of the lower saddle, where each center has a well of its own.
     gap : float, 1-D array_like or xarray.DataArray
         In place of states: energies above that of a saddle in s^-2, negative below it. Next to a
         separatrix the gap keeps the digits that the energy has lost.
-    saddle : {"lower", "upper"}
+    saddle : {"lower", "upper"}, or int for a `Potential`
         With `gap`: the saddle; by default the lower one where there are two (that of a
         figure-eight), else the only one (upper).
     side : {"right", "left"}
@@ -73,7 +68,8 @@ def orbits(
         NaN for a rotation). Cells without an orbit, below the center or at an absent saddle, are
         not_computed and NaN. A state is an equilibrium if it is at rest and V' = 0 there in
         floating point, and asymptotic if its energy is a saddle's within the rounding of the
-        state; so the double next to a center is a libration of almost no action.
+        state; so the double next to a center is a libration of almost no action. An orbit of a
+        `Potential` that leaves the line, or its interval, is unbounded; its period is infinite.
 
     Raises
     ------
@@ -103,27 +99,22 @@ def orbits(
         saddle=saddle,
         side=side,
     )
+    system = as_system(system)
     rows = select("orbits")
     if energy is not None:
-        center = CENTERS[0] if center is None else center
-        function: Any = functools.partial(
-            orbits_at_energy, center=one_of("center", center, CENTERS)
-        )
-        one = Pass(function, ("A", "B", "C", "state_energy"), ("orbits",))
+        one, notes = system.methods.at_energy(center)
         ds = at_states(system, rows, {"energy": ("state_energy", energy)}, (one,))
-        return noted(ds, center=center)
+        return noted(ds, **notes)
     if gap is not None:
-        number = None if saddle is None else one_of("saddle", saddle, SADDLES)
-        function = functools.partial(_at_gap, number, one_of("side", side, SIDES))
-        one = Pass(function, ("A", "B", "C", "state_gap"), ("orbits",))
+        one, notes = system.methods.at_gap(saddle, side)
         ds = at_states(system, rows, {"gap": ("state_gap", gap)}, (one,))
-        return noted(ds, saddle=saddle or DEFAULT_SADDLE, side=side)
+        return noted(ds, **notes)
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
     return at_states(system, rows, states)
 
 
 def _refuse_mixed(
-    forms: dict[str, Any], *, center: str | None, saddle: str | None, side: str
+    forms: dict[str, Any], *, center: str | int | None, saddle: str | int | None, side: str
 ) -> None:
     """Refuse calls that give no orbit, several, or arguments that belong to another form."""
     given = [name for name, value in forms.items() if value is not None]
@@ -137,22 +128,12 @@ def _refuse_mixed(
             f"{given[-1]}: got it besides {' and '.join(given[:-1])}, wants one of state (phi0, "
             "dphi0), energy and gap"
         )
-    belongs = {"center": (center, "energy"), "saddle": (saddle, "gap")}
+    belongs: dict[str, tuple[Any, str]] = {"center": (center, "energy"), "saddle": (saddle, "gap")}
     if one_of("side", side, SIDES) != SIDES.index("right"):
         belongs["side"] = (side, "gap")
     for name, (value, form) in belongs.items():
         if value is not None and form not in given:
             raise bad(name, value, f"it with {form}= alone", f"leave it out, or give {form}=")
-
-
-def _at_gap(
-    saddle: int | None, side: int, A: FloatArray, B: FloatArray, C: FloatArray, gap: FloatArray
-) -> Orbits:
-    chosen: Any = saddle
-    if saddle is None:
-        lower = equilibria(A, B, C).kind[..., 1] == EquilibriumKind.SADDLE
-        chosen = np.where(lower, 0, 1)
-    return orbits_at_gap(A, B, C, gap, chosen, side)
 
 
 def noted(ds: xr.Dataset, **attrs: str) -> xr.Dataset:

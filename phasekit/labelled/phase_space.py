@@ -10,7 +10,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.labelled.evaluate import evaluate
-from phasekit.labelled.quantities import plan_passes, select
+from phasekit.labelled.quantities import select
 from phasekit.labelled.system import as_system
 
 
@@ -41,6 +41,9 @@ def equilibria(system: Any) -> xr.Dataset:
     The labels are the brackets of the location theorem, so each is a branch that does not jump
     when parameters change. The pair that merges on a fold stands once, as lower_saddle, with the
     kind degenerate. Angles are wrapped to (-pi, pi].
+
+    Those of a `Potential` are numbered from left to right instead, 0 to one less than the most
+    that a cell has; there is no ``fold_margin``, which belongs to the coefficients (A, B, C).
 
     Examples
     --------
@@ -78,7 +81,9 @@ def separatrices(system: Any) -> xr.Dataset:
 
     Notes
     -----
-    From the energy integral [Veljovic2015] (14) at the saddles' energies, in closed form.
+    From the energy integral [Veljovic2015] (14) at the saddles' energies, in closed form. The
+    saddles of a `Potential` are numbered from left to right; a separatrix that goes to infinity,
+    or out of the interval, has an infinite turning point and area.
 
     Examples
     --------
@@ -91,5 +96,5 @@ def separatrices(system: Any) -> xr.Dataset:
 
 
 def _of_system(group: str, system: Any) -> xr.Dataset:
-    rows = select(group)
-    return evaluate(as_system(system), rows, plan_passes(rows))
+    system, rows = as_system(system), select(group)
+    return evaluate(system, rows, system.methods.passes(rows))

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -28,8 +28,11 @@ from phasekit.errors import (
 )
 from phasekit.labelled.arguments import bad, unknown
 
+#: Labels of a dim, names or numbers, and its long name.
+Labels: TypeAlias = tuple[Sequence[Any], str]
+
 #: Label coordinates: dim -> (labels, long_name).
-LABELS: dict[str, tuple[tuple[str, ...], str]] = {
+LABELS: dict[str, Labels] = {
     "equilibrium": (
         ("lower_center", "lower_saddle", "upper_center", "upper_saddle"),
         "branch of equilibria",
@@ -91,6 +94,8 @@ class Quantity:
     equation: str
     source: str
     flags: type[IntEnum] | None = None
+    #: Labels of the row's dims where they are not those of the table.
+    labels: Mapping[str, Labels] | None = field(default=None, compare=False)
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -109,7 +114,11 @@ class Quantity:
     @property
     def label_shape(self) -> tuple[int, ...]:
         """Lengths of the label dims."""
-        return tuple(len(LABELS[dim][0]) for dim in self.dims)
+        return tuple(len(self.labels_of(dim)[0]) for dim in self.dims)
+
+    def labels_of(self, dim: str) -> Labels:
+        """Labels of a dim, with its long name."""
+        return (self.labels or LABELS)[dim]
 
     @property
     def cell_bytes(self) -> int:

@@ -17,7 +17,7 @@ import xarray as xr
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import describe
 from phasekit.labelled.grid import variable
-from phasekit.labelled.quantities import LABELS, ROWS, STATES
+from phasekit.labelled.quantities import LABELS, ROWS, STATES, Quantity
 from phasekit.labelled.system import Model, Parameter
 
 SCHEMA_VERSION = "1"
@@ -43,16 +43,23 @@ def versions() -> dict[str, str]:
 
 def dataset_attrs(system: Model) -> dict[str, str]:
     """Return the attributes of a Dataset: model, schema and versions."""
-    return {MODEL: type(system).__name__, SCHEMA: SCHEMA_VERSION, **versions()}
-
-
-def label_coords(dims: Iterable[str]) -> dict[str, xr.Variable]:
-    """Return the label coordinates of those dims that are label dims."""
     return {
-        dim: variable((dim,), np.array(LABELS[dim][0], LABEL_DTYPE), {"long_name": LABELS[dim][1]})
-        for dim in dict.fromkeys(dims)
-        if dim in LABELS
+        MODEL: type(system).__name__,
+        **system.definition,
+        SCHEMA: SCHEMA_VERSION,
+        **versions(),
     }
+
+
+def label_coords(rows: Iterable[Quantity]) -> dict[str, xr.Variable]:
+    """Return the label coordinates of the rows' dims: names, or numbers."""
+    coords = {}
+    for row in rows:
+        for dim in row.dims:
+            labels, long_name = row.labels_of(dim)
+            dtype: Any = LABEL_DTYPE if any(isinstance(x, str) for x in labels) else np.int64
+            coords[dim] = variable((dim,), np.array(labels, dtype), {"long_name": long_name})
+    return coords
 
 
 def input_attrs(system: Model, name: str) -> dict[str, str]:
@@ -118,7 +125,7 @@ def restore(ds: xr.Dataset) -> xr.Dataset:
     coords = {
         dim: variable(map(str, ds[dim].dims), ds[dim].values.astype(LABEL_DTYPE), ds[dim].attrs)
         for dim in LABELS
-        if dim in ds.coords and ds[dim].dtype != LABEL_DTYPE
+        if dim in ds.coords and ds[dim].dtype != LABEL_DTYPE and ds[dim].dtype.kind not in "iu"
     }
     known = [name for name in ROWS if name in ds.data_vars]
     ordered = ds[known + [name for name in ds.data_vars if name not in known]]

@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import Value, bad, numeric
+from phasekit.labelled.arguments import Value, numeric
 from phasekit.labelled.evaluate import evaluate
-from phasekit.labelled.quantities import AXES, Pass, Quantity, plan_passes
+from phasekit.labelled.quantities import AXES, Pass, Quantity
 from phasekit.labelled.system import as_system
 
 
@@ -36,7 +36,7 @@ def at_states(
     states : mapping of str to (str, value)
         For each argument, by the name that messages give it, the state that it is.
     passes : sequence of Pass, optional
-        What computes it; those of the table by default.
+        What computes it; those that the system names by default.
 
     Raises
     ------
@@ -59,19 +59,8 @@ def at_states(
     return evaluate(
         system,
         rows,
-        passes or plan_passes(rows),
+        passes or system.methods.passes(rows),
         states=kept,
         axis={name: "point" for name in kept if name not in AXES},
         called={name: argument for argument, (name, _) in states.items()},
     )
-
-
-def one_of(argument: str, value: object, names: Sequence[str]) -> int:
-    """Return the place of a name among those that an argument may take.
-
-    >>> one_of("side", "right", ("left", "right"))
-    1
-    """
-    if not isinstance(value, str) or value not in names:
-        raise bad(argument, value, f"one of {', '.join(names)}")
-    return list(names).index(value)

@@ -21,7 +21,7 @@ from phasekit.labelled.options import (
     check_workers,
     refuse_without_store,
 )
-from phasekit.labelled.quantities import STATES, Pass, Quantity, plan_passes, select
+from phasekit.labelled.quantities import STATES, Pass, Quantity, select
 from phasekit.labelled.store import NetcdfTarget, open_map, target_of
 from phasekit.labelled.stored import sweep_into
 from phasekit.labelled.system import Model, as_system
@@ -174,7 +174,7 @@ def _read(
     """Return the system with its axes, what to compute and how, the states, the order of dims."""
     system = as_system(system)
     rows = select(of)
-    passes = plan_passes(rows)
+    passes = system.methods.passes(rows)
     needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
     kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
     states = {name: value for name, value in kept.items() if name in STATES}

@@ -32,14 +32,22 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from phasekit.labelled.guises import Reduced
+    from phasekit.labelled.methods import Methods
     from phasekit.labelled.models import Coefficients
 
 #: Every model by its name, as maps store it.
 MODELS: dict[str, type[Model]] = {}
 
 
-def as_system(system: Any) -> Model:
+def as_system(system: Any, *, closed_form: str = "") -> Model:
     """Return the system that an argument is.
+
+    Parameters
+    ----------
+    system : Any
+        What was given.
+    closed_form : str, optional
+        What needs the coefficients (A, B, C), where a potential without them will not do.
 
     Raises
     ------
@@ -47,6 +55,11 @@ def as_system(system: Any) -> Model:
         If it is not a system, with the way from what it is to one.
     """
     if isinstance(system, Model):
+        if closed_form and not system.derived:
+            raise ParameterError(
+                f"system: got {system!r}, wants a system with coefficients (A, B, C), because "
+                f"{closed_form} is in closed form"
+            )
         return system
     make: Callable[..., Model] = MODELS["Coefficients"]
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
@@ -143,6 +156,8 @@ class Model:
     __slots__ = ()
 
     declared: ClassVar[tuple[Parameter, ...]]
+    #: What passes may ask for that is computed from the parameters.
+    derived: ClassVar[tuple[str, ...]] = ("A", "B", "C")
 
     @staticmethod
     def _abc(*args: Any, **kwargs: Any) -> tuple[FloatArray, ...]:
@@ -162,6 +177,18 @@ class Model:
         return tuple(inspect.signature(cls._abc).parameters)
 
     @property
+    def methods(self) -> Methods:
+        """What computes the quantities of this system."""
+        from phasekit.labelled.methods import CLOSED_FORM  # loads the kernels
+
+        return CLOSED_FORM
+
+    @property
+    def definition(self) -> dict[str, str]:
+        """What maps store of the system beside its name and parameters."""
+        return {}
+
+    @property
     def parameters(self) -> dict[str, Value]:
         """The parameters by name, those that are None left out."""
         values = {p.name: getattr(self, p.name) for p in self.declared}
@@ -170,8 +197,10 @@ class Model:
     @classmethod
     def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
         """Values of a parameter, NaN where they leave its domain."""
-        valid = next(p for p in cls.declared if p.name == name).valid(value)
-        return value if valid.all() else np.where(valid, value, np.nan)
+        for parameter in cls.declared:
+            if parameter.name == name and not (valid := parameter.valid(value)).all():
+                return np.where(valid, value, np.nan)
+        return value
 
     @classmethod
     def valid_coefficients(

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labelled.arguments import unknown
-from phasekit.plot import labels, strands, strokes, style
+from phasekit.plot import atlas, labels, strands, strokes, style
 
 FloatArray = NDArray[np.float64]
 
@@ -39,12 +39,13 @@ def bifurcation_diagram(
     Parameters
     ----------
     dataset : xarray.Dataset
-        What `equilibria` or `sweep` returns, with one swept parameter; select the others.
+        What `branches` returns; or `equilibria` or `sweep`, with one swept parameter: select the
+        others.
     x : str, optional
         The swept parameter, or another coordinate along it; not needed where there is one only.
     y : str
         The quantity to draw, any with the dim `equilibrium`: phi, energy, curvature,
-        natural_frequency, exponent.
+        natural_frequency, exponent; of an atlas phi, energy or curvature.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
     legend : bool
@@ -64,7 +65,9 @@ def bifurcation_diagram(
 
     Notes
     -----
-    A fold is placed where fold_margin, interpolated between the columns, vanishes; the curves are
+    The atlas of `branches` is drawn as it is, exact, with its special points labelled: LP fold,
+    BP branch point (pitchfork), CP cusp, NF no force. For columns of equilibria a fold is placed
+    where fold_margin, interpolated between the columns, vanishes; the curves are
     carried up to it on the parabola on which equilibria meet. The error is that of the
     interpolation, second order in the spacing of `x`; `critical` gives the exact value.
 
@@ -79,24 +82,30 @@ def bifurcation_diagram(
     """
     factor = style.angle_factor(angles)
     ds = labels.dataset(dataset, "dataset", ("phi", "kind"))
+    if ds["phi"].dims == atlas.DIMS:
+        return atlas.draw(ds, x, y, angles=angles, legend=legend, ax=ax)
     offered = _drawable(ds)
     if y not in offered:
         raise unknown("y", y, offered)
     columns, along = _columns(ds, x, y)
-    curves, mergers = strands.trace(columns)
+    # The numbers of a Potential's equilibria are no branches.
+    numbered = ds["equilibrium"].dtype.kind in "iu"
+    curves, mergers = ([], []) if numbered else strands.trace(columns)
     axes = style.axes_for(ax, legend=legend)
 
     values, _ = labels.shown(along, angles)
     stretch = (_stretch(along, factor), _stretch(ds[y], factor))
     handles = _draw_curves(axes, curves, y == "phi", stretch)
     handles |= _draw_mergers(axes, mergers, y == "phi", stretch)
-    if y == "phi":
+    if numbered:
+        handles |= _draw_points(axes, columns, stretch)
+    if y == "phi" and ds["phi"].attrs.get("units") == "rad":
         style.circle_axis(axes, "y", angles)
     axes.set_xlim(float(np.min(values)), float(np.max(values)))
     axes.set_xlabel(labels.label(along, angles, style.letters(axes, "x")))
     axes.set_ylabel(labels.label(ds[y], angles, style.letters(axes, "y")))
     if legend:
-        order = ("center", "saddle", "fold", "pitchfork")
+        order = ("center", "saddle", "degenerate", "fold", "pitchfork")
         style.legend_below(axes, [handles[name] for name in order if name in handles])
     return axes
 
@@ -126,6 +135,24 @@ def _draw_curves(
         if np.isfinite(up).any():
             (line,) = ax.plot(across * stretch[0], up * stretch[1], **look)
             handles.setdefault(str(look["label"]), line)
+    return handles
+
+
+def _draw_points(
+    ax: Axes, columns: strands.Columns, stretch: tuple[float, float]
+) -> dict[str, Artist]:
+    """Draw the equilibria of each column as points, by kind."""
+    handles: dict[str, Artist] = {}
+    across = np.broadcast_to(columns.x[:, None], columns.y.shape)
+    for kind, look in style.POINTS.items():
+        there = (columns.kind == kind) & np.isfinite(columns.y)
+        if there.any():
+            (handles[kind.name.lower()],) = ax.plot(
+                across[there] * stretch[0],
+                columns.y[there] * stretch[1],
+                linestyle="none",
+                **{**look, "markersize": 3.0, "markeredgewidth": 0.8},
+            )
     return handles
 
 

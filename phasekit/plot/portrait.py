@@ -10,8 +10,10 @@ from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.labelled.arguments import bad
-from phasekit.plot import strokes, style
+from phasekit.labelled.potential_system import Potential
+from phasekit.plot import potential, strokes, style
 from phasekit.plot.landscape import Arc, Landscape, Level
+from phasekit.plot.terrain import Terrain
 
 FloatArray = NDArray[np.float64]
 
@@ -43,7 +45,7 @@ def phase_portrait(
     Parameters
     ----------
     system
-        A system whose parameters are scalars.
+        A system whose parameters are scalars; a `Potential` on a line or a circle as well.
     energies : float or sequence of float, optional
         Energies (s^-2) of the level curves. Left out, they are chosen evenly in speed between the
         centers and saddles and above them. An empty list draws none; an energy below the least
@@ -84,10 +86,12 @@ def phase_portrait(
     >>> ax.get_xlabel()
     '$\\varphi$ (rad)'
     """
-    land = Landscape.of(system)
-    factor = style.angle_factor(angles)
     if color_by is not None and color_by not in tuple(COLORED):
         raise bad("color_by", color_by, f"one of {', '.join(COLORED)}")
+    if isinstance(system, Potential):
+        return _of_potential(system, energies, orbits, color_by, angles, legend, ax)
+    land = Landscape.of(system)
+    factor = style.angle_factor(angles)
     dense = energies is None and color_by is not None
     chosen = land.levels(1.0 / 12.0) if dense else levels_of(land, energies)
     starts = starts_of(land, orbits)
@@ -114,6 +118,28 @@ def phase_portrait(
     return axes
 
 
+def _of_potential(
+    system: Potential,
+    energies: ArrayLike | None,
+    orbits: ArrayLike | None,
+    color_by: str | None,
+    angles: style.Angles,
+    legend: bool,
+    ax: Axes | None,
+) -> Axes:
+    land = Terrain.of(system)
+    factor = potential.scale_of(land, angles)
+    dense = energies is None and color_by is not None
+    chosen = land.levels(1.0 / 12.0) if dense else levels_of(land, energies)
+    starts = starts_of(land, orbits)
+    axes = style.axes_for(ax, legend=legend, width=6.4 if color_by is None else 6.8)
+    colored = None if color_by is None else (color_by, COLORED[color_by])
+    handles = potential.draw_portrait(axes, land, chosen, starts, colored, factor)
+    if legend:
+        style.legend_below(axes, handles)
+    return axes
+
+
 def _colors(
     ax: Axes, land: Landscape, curves: list[tuple[float, Arc]], color_by: str | None
 ) -> list[str | None]:
@@ -133,7 +159,7 @@ def _reach(land: Landscape, energies: list[float]) -> float:
     return max(reach, 1.08 * float(np.sqrt(2.0 * max(highest - land.floor, 0.0))))
 
 
-def levels_of(land: Landscape, energies: ArrayLike | None) -> list[Level]:
+def levels_of(land: Landscape | Terrain, energies: ArrayLike | None) -> list[Level]:
     """Return the levels to draw: those asked for, or a choice."""
     if energies is None:
         return land.levels()
@@ -147,7 +173,7 @@ def levels_of(land: Landscape, energies: ArrayLike | None) -> list[Level]:
     return levels
 
 
-def starts_of(land: Landscape, orbits: ArrayLike | None) -> list[tuple[float, float]]:
+def starts_of(land: Landscape | Terrain, orbits: ArrayLike | None) -> list[tuple[float, float]]:
     """Return initial conditions as pairs of floats."""
     if orbits is None:
         return []
@@ -165,7 +191,7 @@ def starts_of(land: Landscape, orbits: ArrayLike | None) -> list[tuple[float, fl
     return starts
 
 
-def _has_speed(land: Landscape, energy: float) -> bool:
+def _has_speed(land: Landscape | Terrain, energy: float) -> bool:
     """Return whether the greatest speed on a level is a number."""
     return bool(np.isfinite(2.0 * (energy - land.floor)))
 

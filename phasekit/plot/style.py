@@ -89,6 +89,78 @@ MERGERS: Mapping[str, Look] = {
         "markeredgecolor": BLACK,
         "label": "pitchfork",
     },
+    "transcritical": {
+        "marker": "X",
+        "markersize": 8,
+        "markerfacecolor": GREEN,
+        "markeredgecolor": BLACK,
+        "label": "transcritical point",
+    },
+    "branch_point": {
+        "marker": "X",
+        "markersize": 8,
+        "markerfacecolor": PURPLE,
+        "markeredgecolor": BLACK,
+        "label": "branch point",
+    },
+    "cusp": {
+        "marker": "*",
+        "markersize": 12,
+        "markerfacecolor": ORANGE,
+        "markeredgecolor": BLACK,
+        "label": "cusp",
+    },
+    "no_force": {
+        "marker": "o",
+        "markersize": 6,
+        "markerfacecolor": "white",
+        "markeredgecolor": BLACK,
+        "label": "no force",
+    },
+}
+
+# Equilibria that stay degenerate along a branch.
+MERGED: Look = {"color": PURPLE, "linestyle": (0, (1, 1)), "linewidth": 2.4, "label": "degenerate"}
+
+# Curves in a plane of two parameters, by kind and the sign of A.
+LOCI: Mapping[tuple[str, int], Look] = {
+    ("fold", 1): {"color": BLUE, "linestyle": "-", "linewidth": 2.0, "label": "fold, $A > 0$"},
+    ("fold", -1): {
+        "color": VERMILLION,
+        "linestyle": (0, (6, 1.5)),
+        "linewidth": 2.0,
+        "label": "fold, $A < 0$",
+    },
+    ("pitchfork", 1): {
+        "color": BLUE,
+        "linestyle": "-",
+        "linewidth": 3.0,
+        "label": "pitchfork, $A > 0$",
+    },
+    ("pitchfork", -1): {
+        "color": VERMILLION,
+        "linestyle": (0, (4, 1)),
+        "linewidth": 3.0,
+        "label": "pitchfork, $A < 0$",
+    },
+    ("sign_change", 0): {
+        "color": BLACK,
+        "linestyle": (0, (4, 2)),
+        "linewidth": 1.2,
+        "label": "$A = 0$",
+    },
+    ("equal_saddles", 0): {
+        "color": GREEN,
+        "linestyle": (0, (7, 2, 1.5, 2)),
+        "linewidth": 1.8,
+        "label": "saddles of equal energy",
+    },
+    ("equal_centers", 0): {
+        "color": PURPLE,
+        "linestyle": (0, (1.2, 1.2)),
+        "linewidth": 1.8,
+        "label": "centers of equal energy",
+    },
 }
 
 LEVEL: Look = {"color": GRAY, "linestyle": "-", "linewidth": 0.8}
@@ -121,6 +193,7 @@ EIGHT_KEY: Look = {
 }
 REST: Look = {"color": PURPLE, "linestyle": "-", "linewidth": 3.0, "label": "rest, at every angle"}
 FOLD_CURVE: Look = {"color": BLACK, "linestyle": "-", "linewidth": 2.0, "label": "fold"}
+PITCHFORK_CURVE: Look = {**FOLD_CURVE, "linestyle": (0, (3, 1)), "label": "pitchfork"}
 SIGN_CHANGE: Look = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 1.4, "label": "$A = 0$"}
 # Both wells have the same period at the same energy: the dashes let the lower one show through.
 FAMILIES: Mapping[str, Look] = {
@@ -193,6 +266,8 @@ TOPOLOGY_COLORS: Mapping[int, str] = {
     Topology.WINDING: CODE_COLORS[0],
     Topology.FIGURE_EIGHT: CODE_COLORS[1],
     Topology.HETEROCLINIC: CODE_COLORS[2],
+    Topology.HOMOCLINIC: CODE_COLORS[3],
+    Topology.UNBOUNDED: CODE_COLORS[4],
 }
 COUNT_COLORS: Mapping[int, str] = {
     -1: "#FFFFFF",
@@ -250,7 +325,8 @@ def angle_factor(angles: object) -> float:
     raise bad("angles", angles, "'rad' or 'deg'")
 
 
-def _multiple_of_pi(value: float, _position: object = None) -> str:
+def multiple_of_pi(value: float, _position: object = None) -> str:
+    """Write an angle as a multiple of pi/2."""
     halves = round(value / (np.pi / 2))
     if halves == 0:
         return "0"
@@ -275,7 +351,7 @@ def circle_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
     axis.set_major_locator(FixedLocator(list(quarters * factor)))
     axis.set_minor_locator(MultipleLocator(np.pi / 8 * factor))
     if angles == "rad":
-        axis.set_major_formatter(FuncFormatter(_multiple_of_pi))
+        axis.set_major_formatter(FuncFormatter(multiple_of_pi))
     ax.set(**{f"{which}lim": (-np.pi * factor, np.pi * factor)})
 
 
@@ -291,7 +367,7 @@ def unwrapped_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
     step = next((step for step in steps if quarters <= 8.0 * step), quarters / 8.0)
     axis.set_major_locator(MultipleLocator(step * np.pi / 2 * factor))
     if angles == "rad":
-        axis.set_major_formatter(FuncFormatter(_multiple_of_pi))
+        axis.set_major_formatter(FuncFormatter(multiple_of_pi))
 
 
 def log_limits(values: Any) -> tuple[float, float] | None:

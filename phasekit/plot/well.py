@@ -10,9 +10,11 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from phasekit.errors import Loop
-from phasekit.plot import strokes, style
+from phasekit.labelled.potential_system import Potential
+from phasekit.plot import potential, strokes, style
 from phasekit.plot.landscape import Arc, Landscape, Level, is_turn
 from phasekit.plot.portrait import levels_of, phase_portrait, starts_of
+from phasekit.plot.terrain import Terrain
 
 
 def potential_well(
@@ -62,13 +64,35 @@ def potential_well(
     >>> well.get_xlim() == portrait.get_xlim()
     True
     """
-    land = Landscape.of(system)
+    land = Terrain.of(system) if isinstance(system, Potential) else Landscape.of(system)
     factor = style.angle_factor(angles)
-    chosen = levels_of(land, energies)
-    starts = starts_of(land, orbits)
+    chosen, starts = levels_of(land, energies), starts_of(land, orbits)
+    if isinstance(land, Terrain):
+        potential.scale_of(land, angles)
     panels = _panels(ax)
     well = panels[0]
+    if isinstance(land, Terrain):
+        potential.draw_well(well, land, chosen, starts, factor)
+    else:
+        _draw_well(well, land, chosen, starts, angles)
+    if len(panels) == 1:
+        return well
+    well.set_xlabel("")
+    well.tick_params(labelbottom=False)
+    portrait = phase_portrait(
+        system, energies=energies, orbits=orbits, angles=angles, legend=legend, ax=panels[1]
+    )
+    return well, portrait
 
+
+def _draw_well(
+    well: Axes,
+    land: Landscape,
+    chosen: list[Level],
+    starts: list[tuple[float, float]],
+    angles: style.Angles,
+) -> None:
+    factor = style.angle_factor(angles)
     phi = np.linspace(-np.pi, np.pi, 721)
     height = land.potential(phi)
     _draw_chords(well, land, chosen, starts, factor)
@@ -81,14 +105,7 @@ def potential_well(
     well.set_ylim(low - 0.1 * span, tallest + 0.2 * span)
     style.circle_axis(well, "x", angles)
     well.set_ylabel("$V$ (s$^{-2}$)")
-    if len(panels) == 1:
-        well.set_xlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
-        return well
-    well.tick_params(labelbottom=False)
-    portrait = phase_portrait(
-        system, energies=energies, orbits=orbits, angles=angles, legend=legend, ax=panels[1]
-    )
-    return well, portrait
+    well.set_xlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
 
 
 def _panels(ax: Axes | Sequence[Axes] | None) -> list[Axes]:

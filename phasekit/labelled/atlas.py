@@ -1,0 +1,248 @@
+"""The atlas of equilibria along one parameter, labelled."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.bifurcation.atlas import Curve, atlas
+from phasekit.bifurcation.forms import FORMS
+from phasekit.bifurcation.paths import Path
+from phasekit.bifurcation.survey import Meeting
+from phasekit.errors import EquilibriumKind
+from phasekit.labelled.arguments import FloatArray, bad, unknown
+from phasekit.labelled.grid import variable
+from phasekit.labelled.quantities import FROM_MOTION, LABELS, ROWS
+from phasekit.labelled.schema import LABEL_DTYPE, dataset_attrs, input_attrs
+from phasekit.labelled.system import Model, as_system
+
+#: What special points are called in pictures.
+SPECIAL = {
+    "fold": "LP",
+    "pitchfork": "BP",
+    "transcritical": "BP",
+    "branch_point": "BP",
+    "cusp": "CP",
+    "no_force": "NF",
+    "end": "EP",
+}
+
+COMPLETE = (
+    "complete: every equilibrium for every value of the parameter in the span lies on one of the "
+    "curves; all mergers are found by exact arithmetic, those closer together than 1e-15 of the "
+    "span as one"
+)
+
+
+def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Dataset:
+    """The complete atlas of equilibria along one parameter: all branches, all special points.
+
+    Parameters
+    ----------
+    system : system
+        A single system; its own value of the parameter is not used.
+    parameter : str
+        A parameter on which the equilibria depend: beta, e, a, omega1, r or g of a
+        `GyroRotorDisk`, lam, psi or Omega_sq of a `Reduced`, and so on.
+    span : (float, float)
+        First and last value of the parameter, in its unit.
+
+    Returns
+    -------
+    xarray.Dataset
+        On (``branch``, ``point``), in order along each branch: the parameter (a coordinate),
+        ``phi`` in rad, continuous along the branch, ``kind`` (`EquilibriumKind`), ``label`` (which
+        of the labels of `equilibria` the point has), ``energy`` and ``curvature`` in s^-2; shorter
+        branches end in NaN, kind absent and label -1. On ``branch``: ``closed``. On ``special``:
+        ``special_kind`` (fold, pitchfork, transcritical, branch_point, cusp, no_force, end),
+        ``special_label`` (LP, BP, CP, NF, EP), ``special_value`` of the parameter,
+        ``special_phi``, the coefficients ``unfolding``, ``quadratic`` and ``cubic`` of the normal
+        form, and ``on_branch`` (``special``, ``branch``).
+
+    Raises
+    ------
+    ParameterError
+        If the system is not a single one, has no such parameter, or the span leaves its domain.
+
+    Notes
+    -----
+    The atlas is complete. A, B and C are, up to a common factor, polynomials of the parameter (for
+    an angle: of the tangent of its half); the values where equilibria merge are the real roots of
+    ``(B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2``, all of which are found by exact arithmetic
+    [Basu2006]. Between them each label is one smooth arc, because its bracket holds exactly one
+    root of ``V'``. A branch goes on through a fold, where the parameter turns back, and through a
+    pitchfork, where two branches cross; it ends with the span, or where A = B = C = 0.
+
+    The normal form at a special point, with ``x = phi - phi*`` and ``mu = p - p*``: at a fold
+    ``x'' = unfolding mu + quadratic x^2``, at a pitchfork ``x'' = unfolding mu x + cubic x^3``, at
+    a cusp ``x'' = unfolding mu + cubic x^3``; quadratic is ``-V'''/2`` and cubic ``-V''''/6``
+    ([Kuznetsov2004] sections 3.3, 7.4, 8.2).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> from phasekit.labelled.atlas import branches
+    >>> ds = branches(pk.Reduced(lam=0.0, psi=0.0), "lam", (0.0, 1.5))
+    >>> ds.sizes["branch"], ds.special_label.values[ds.special_kind != "end"].tolist()
+    (3, ['BP'])
+    >>> ds.special_value.values[0].round(12).item(), ds.cubic.values[0].item()
+    (1.0, -0.5)
+    """
+    system, values = single(system)
+    formula = system.formula_inputs()
+    if not isinstance(parameter, str) or parameter not in formula:
+        raise unknown(f"parameter of branches for {type(system).__name__}", parameter, formula)
+    low, high = limits(system, parameter, "span", span)
+    path = Path(FORMS[type(system).__name__], values, parameter, (low, high))
+
+    def coefficients(at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        arrays = {name: np.full_like(at, value) for name, value in values.items()}
+        A, B, C = type(system).valid_coefficients({**arrays, parameter: at})
+        return A, B, C
+
+    curves, meetings = atlas(path, coefficients)
+    return _dataset(system, parameter, curves, meetings)
+
+
+def single(system: Any) -> tuple[Model, dict[str, float]]:
+    """Return a system and its parameters, all numbers, that enter the coefficients.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a system, or a parameter is an array.
+    """
+    system = as_system(system)
+    if type(system).__name__ not in FORMS:
+        hint = "pk.continuation follows the equilibria of any other"
+        raise bad("system", system, f"one of {', '.join(FORMS)}", hint)
+    values: dict[str, float] = {}
+    for name in system.formula_inputs():
+        value = system.parameters[name]
+        if not isinstance(value, float):
+            raise bad(name, value, "one number", "select one cell: ds.isel(...).phasekit.system()")
+        values[name] = value
+    return system, values
+
+
+def limits(system: Model, parameter: str, argument: str, span: Any) -> tuple[float, float]:
+    """Return the two ends of a span in rising order.
+
+    Raises
+    ------
+    ParameterError
+        If they are not two different numbers from the parameter's domain.
+    """
+    (declared,) = (p for p in system.declared if p.name == parameter)
+    wants = f"two different values of {parameter}, each {declared.wants}"
+    try:
+        low, high = (float(end) for end in span)
+    except (TypeError, ValueError):
+        raise bad(argument, span, wants) from None
+    if not (declared.valid(low) and declared.valid(high)) or low == high:
+        raise bad(argument, (low, high), wants)
+    return min(low, high), max(low, high)
+
+
+def _dataset(
+    system: Model, parameter: str, curves: list[Curve], meetings: list[Meeting]
+) -> xr.Dataset:
+    dims = ("branch", "point")
+    names = ("phi", "label", "kind", "energy", "curvature")
+    fill = {"label": -1, "kind": int(EquilibriumKind.ABSENT)}
+    size = max((curve.vertices.at.size for curve in curves), default=0)
+
+    def table(name: str) -> Any:
+        dtype = np.int8 if name in fill else np.float64
+        array = np.full((len(curves), size), fill.get(name, np.nan), dtype)
+        for row, curve in zip(array, curves, strict=True):
+            column = getattr(curve.vertices, name)
+            row[: column.size] = column
+        return array
+
+    data = {
+        name: variable(dims, table(name), _LABEL if name == "label" else ROWS[name].attrs)
+        for name in names
+    }
+    closed = np.array([curve.closed for curve in curves], bool)
+    data["closed"] = variable(("branch",), closed, {"long_name": "whether the branch is closed"})
+    attrs = input_attrs(system, parameter)
+    data.update(_special(attrs, curves, meetings))
+    coords = {
+        parameter: variable(dims, table("at"), attrs),
+        "branch": variable(("branch",), np.arange(len(curves)), {"long_name": "branch"}),
+    }
+    for name, value in system.parameters.items():
+        if name != parameter:
+            coords[name] = variable((), value, input_attrs(system, name))
+    attributes = {**dataset_attrs(system), "parameter": parameter, "completeness": COMPLETE}
+    return xr.Dataset(data, coords=coords, attrs=attributes)
+
+
+def _special(
+    attrs: Mapping[str, str], curves: list[Curve], meetings: list[Meeting]
+) -> dict[str, xr.Variable]:
+    dims = ("special",)
+    kinds = [meeting.kind for meeting in meetings]
+    on_branch = np.zeros((len(meetings), len(curves)), bool)
+    for j, curve in enumerate(curves):
+        on_branch[list(curve.meetings), j] = True
+    values = {
+        "special_value": ([m.at for m in meetings], {**attrs}),
+        "special_phi": (
+            [m.phi for m in meetings],
+            {"long_name": "angle of the special point", "units": "rad"},
+        ),
+        "unfolding": (
+            [m.normal_form.unfolding for m in meetings],
+            {
+                "long_name": "coefficient of the parameter in the normal form",
+                "equation": "-dV'/dp (fold, cusp) or -dV''/dp (pitchfork)",
+                "source": FROM_MOTION,
+            },
+        ),
+        "quadratic": (
+            [m.normal_form.quadratic for m in meetings],
+            {
+                "long_name": "coefficient of x^2 in the normal form",
+                "units": "s-2",
+                "equation": "-V'''/2 = -(3/2) A sin(phi) cos(phi)",
+                "source": FROM_MOTION,
+            },
+        ),
+        "cubic": (
+            [m.normal_form.cubic for m in meetings],
+            {
+                "long_name": "coefficient of x^3 in the normal form",
+                "units": "s-2",
+                "equation": "-V''''/6 = -(1/2) A cos(2 phi)",
+                "source": FROM_MOTION,
+            },
+        ),
+    }
+    data = {
+        "special_kind": variable(
+            dims, np.array(kinds, LABEL_DTYPE), {"long_name": "kind of the special point"}
+        ),
+        "special_label": variable(
+            dims,
+            np.array([SPECIAL[kind] for kind in kinds], LABEL_DTYPE),
+            {"long_name": "label of the special point"},
+        ),
+    }
+    for name, (column, about) in values.items():
+        data[name] = variable(dims, np.array(column, float), about)
+    data["on_branch"] = variable(
+        (*dims, "branch"), on_branch, {"long_name": "whether the point lies on the branch"}
+    )
+    return data
+
+
+_LABEL = {
+    "long_name": "label of the equilibrium",
+    "flag_values": np.arange(-1, 4, dtype=np.int8),
+    "flag_meanings": " ".join(("absent", *LABELS["equilibrium"][0])),
+}

@@ -1,0 +1,377 @@
+"""Any potential of one coordinate as a system: a formula, its parameters, a line or a circle."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from phasekit.errors import ParameterError
+from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, brief, same, unknown
+from phasekit.labelled.quantities import LABELS, ROWS, STATES
+from phasekit.labelled.system import MODELS, Model, Parameter, named_arguments
+from phasekit.phase.numerical.formula import Formula, check_period, make_formula
+
+if TYPE_CHECKING:
+    from phasekit.labelled.numerical import Numerical
+    from phasekit.labelled.problem import Problem
+
+#: Names that parameters cannot have, because results have them.
+_TAKEN = {*ROWS, *LABELS, *STATES, "point"}
+
+
+class Potential(Model):
+    """Any system of one degree of freedom, ``x'' = -V'(x)``, by its potential.
+
+    Goes wherever a `GyroRotorDisk` goes but for what is in closed form: potential and energy,
+    equilibria, separatrices, orbits, flow, portraits and sweeps, by numerical methods. Where
+    results call the coordinate phi, it is the coordinate of this system.
+
+    Parameters
+    ----------
+    expression : str or sympy expression
+        The potential V per unit of inertia. In a string ``^`` and ``**`` both raise to a power,
+        and functions have sympy's names. sympy evaluates strings as Python: read none that you do
+        not trust.
+    coordinate : str or sympy symbol
+        The coordinate in it.
+    parameters : mapping of str to float, 1-D array_like or xarray.DataArray, optional
+        Values of the other symbols. An array is an axis of its own name, as in other systems.
+    period : float, optional
+        Length of the circle on which the coordinate lies, 2 pi for an angle; None for a line.
+    interval : (float, float), optional
+        The part of a line that is looked at. Needed for equilibria and all that follows from them
+        if V is not a polynomial; orbits that leave it count as unbounded.
+
+    Raises
+    ------
+    ParameterError
+        If the expression cannot be read, a symbol has no value, or V does not repeat over the
+        period.
+
+    Notes
+    -----
+    All equilibria of polynomials and of finite Fourier sums over the period are found, from the
+    eigenvalues of companion matrices [Boyd2013]; those of any other function in the interval, or
+    on the circle, as far as Chebyshev polynomials on pieces represent it, which they do to
+    rounding or refuse. They are numbered from left to right, from 0; on a circle from
+    -period/2. Equilibria that have merged within rounding are one, degenerate.
+
+    Examples
+    --------
+    The figure-eight of the double well:
+
+    >>> import phasekit as pk
+    >>> well = Potential("x^4/4 - mu*x^2/2", "x", {"mu": 1.0})
+    >>> pk.equilibria(well).phi.values
+    array([-1.,  0.,  1.])
+    >>> pk.separatrices(well).lobe_area.values
+    array([[1.33333333, 1.33333333]])
+
+    A pendulum with a second harmonic, for two of its strengths:
+
+    >>> V = Potential("-cos(q) + b*cos(2*q)", "q", {"b": [0.1, 0.5]}, period=6.283185307179586)
+    >>> pk.equilibria(V).n_equilibria.values
+    array([2, 4], dtype=int16)
+    """
+
+    declared: ClassVar[tuple[Parameter, ...]] = ()
+    derived: ClassVar[tuple[str, ...]] = ()
+
+    formula: Formula
+    _values: dict[str, Value]
+
+    def __init__(
+        self,
+        expression: Any,
+        coordinate: Any,
+        parameters: Mapping[str, NumberLike] | None = None,
+        period: float | None = None,
+        *,
+        interval: Sequence[float] | None = None,
+    ) -> None:
+        name = _name("coordinate", coordinate)
+        if parameters is not None and not isinstance(parameters, Mapping):
+            raise bad("parameters", parameters, "a mapping of names to values, {'mu': 1.0}")
+        given = {_name("parameters", key): value for key, value in (parameters or {}).items()}
+        for key in given:
+            if key == name:
+                raise bad("parameters", key, "names other than the coordinate's")
+            if key in _TAKEN:
+                raise bad("parameters", key, f"another name, because results have {key!r}")
+        declared = tuple(
+            Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")
+            for key in given
+        )
+        values = {p.name: p.check(given[p.name]) for p in declared}
+        formula = make_formula(
+            _expression(expression),
+            name,
+            tuple(given),
+            _period(period),
+            _interval(interval, period),
+        )
+        check_period(formula, tuple(values.values()))
+        for key, value in (("declared", declared), ("_values", values), ("formula", formula)):
+            object.__setattr__(self, key, value)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        """Refuse: a system does not change."""
+        raise AttributeError(f"a Potential does not change; use .replace({name}=...)")
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        values = self.__dict__.get("_values", {})
+        if name not in values:
+            raise AttributeError(f"'Potential' object has no attribute {name!r}")
+        return values[name]
+
+    @property
+    def expression(self) -> Any:
+        """The potential as a sympy expression."""
+        return self.formula.expression
+
+    @property
+    def coordinate(self) -> str:
+        """Name of the coordinate."""
+        return self.formula.coordinate
+
+    @property
+    def period(self) -> float | None:
+        """Length of the circle, None on a line."""
+        return self.formula.period
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The part of the line that is looked at."""
+        return self.formula.interval
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters by name."""
+        return dict(self._values)
+
+    @property
+    def methods(self) -> Numerical:
+        """What computes the quantities of this system."""
+        from phasekit.labelled.numerical import Numerical
+
+        return Numerical(self)
+
+    def potential(self, x: ArrayLike) -> FloatArray:
+        """V at x, an array of the shape of x; `phasekit.potential` labels it.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is an array.
+        """
+        return self.formula.values(x, *self._scalars())
+
+    def gradient(self, x: ArrayLike) -> FloatArray:
+        """V' at x, an array of the shape of x."""
+        return self.formula.slopes(x, *self._scalars())
+
+    def curvature(self, x: ArrayLike) -> FloatArray:
+        """V'' at x, an array of the shape of x."""
+        return self.formula.bends(x, *self._scalars())
+
+    def problem(self) -> Problem:
+        """The planar system of (x, x') for `continuation`: its equilibria, orbits and loops.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is an array.
+        """
+        from phasekit.labelled.problem import Problem
+
+        values = dict(zip(self._values, self._scalars(), strict=True))
+        return Problem.from_potential(
+            self.formula.text, self.coordinate, values, period=self.period
+        )
+
+    def _scalars(self) -> list[float]:
+        values = []
+        for name, value in self._values.items():
+            if not isinstance(value, float):
+                raise bad(name, value, "a scalar", "for arrays use pk.potential, pk.gradient, ...")
+            values.append(value)
+        return values
+
+    def coefficients(self) -> NoReturn:
+        """Raise: a potential has no coefficients (A, B, C)."""
+        raise bad(
+            "system", self, "a system with coefficients (A, B, C); this needs the closed form"
+        )
+
+    @classmethod
+    def formula_inputs(cls) -> tuple[str, ...]:
+        """Nothing: there are no coefficients."""
+        return ()
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some parameters changed, or expression, period or interval.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown, or a value is unusable.
+        """
+        own = {
+            "expression": self.expression,
+            "coordinate": self.coordinate,
+            "period": self.period,
+            "interval": self.interval,
+        }
+        values = {**self._values, **{k: v for k, v in changes.items() if k not in own}}
+        own.update({key: value for key, value in changes.items() if key in own})
+        if own["expression"] is self.expression:
+            for name in values:
+                if name not in self._values:
+                    raise unknown("parameter of Potential", name, [*self._values, *own])
+        return type(self)(parameters=values, **own)
+
+    @property
+    def definition(self) -> dict[str, str]:
+        """What maps store beside the parameters' values."""
+        return {
+            "phasekit_expression": self.formula.text,
+            "phasekit_coordinate": self.coordinate,
+            "phasekit_parameters": " ".join(self.formula.names),
+            "phasekit_period": repr(self.period),
+            "phasekit_interval": " ".join(map(repr, self.interval or ())),
+        }
+
+    @classmethod
+    def from_dataset(cls, ds: Any) -> Self:
+        """Rebuild the potential from a map, or from any selection of it.
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, or a parameter's coordinate is gone.
+        """
+        from phasekit.labelled.schema import model_name, parameter_values
+
+        if model_name(ds) != cls.__name__:
+            raise ParameterError(
+                f"ds: got a map of {model_name(ds)}, wants one of {cls.__name__}; "
+                "use ds.phasekit.system()"
+            )
+        names = ds.attrs["phasekit_parameters"].split()
+        declared = [Parameter(name=name, units="1", long_name=name) for name in names]
+        period = ds.attrs["phasekit_period"]
+        interval = [float(end) for end in ds.attrs["phasekit_interval"].split()]
+        return cls(
+            ds.attrs["phasekit_expression"],
+            ds.attrs["phasekit_coordinate"],
+            parameter_values(ds, declared),
+            None if period == "None" else float(period),
+            interval=interval or None,
+        )
+
+    def __reduce__(self) -> Any:
+        """Pickle what it was made from; the functions are made anew."""
+        own = (str(self.formula.text), self.coordinate, self._values, self.period, self.interval)
+        return _rebuild, own
+
+    def __repr__(self) -> str:
+        """Write the potential and its parameters, long arrays by their ends."""
+        parts = [repr(self.formula.text), repr(self.coordinate)]
+        if self._values:
+            shown = ", ".join(f"{name!r}: {brief(value)}" for name, value in self._values.items())
+            parts.append(f"{{{shown}}}")
+        if self.period is not None:
+            parts.append(f"period={self.period!r}")
+        if self.interval is not None:
+            parts.append(f"interval={self.interval!r}")
+        return f"Potential({', '.join(parts)})"
+
+    def _key(self) -> tuple[Any, ...]:
+        formula = self.formula
+        return formula.text, formula.coordinate, formula.names, formula.period, formula.interval
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same formula with equal parameters; NaN equals NaN."""
+        if not isinstance(other, Potential):
+            return NotImplemented
+        return self._key() == other._key() and all(
+            same(value, other._values[name]) for name, value in self._values.items()
+        )
+
+    def __hash__(self) -> int:
+        """Hash of formula and parameters; one that holds DataArrays has none."""
+        values = self._values.values()
+        return hash(
+            (
+                *self._key(),
+                *((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values),
+            )
+        )
+
+
+Potential.__init__ = named_arguments("Potential", Potential.__init__)  # type: ignore[method-assign]
+MODELS["Potential"] = Potential
+
+
+def _rebuild(
+    text: str, coordinate: str, values: dict[str, Value], period: Any, interval: Any
+) -> Potential:
+    return Potential(text, coordinate, values, period, interval=interval)
+
+
+def _expression(expression: Any) -> Any:
+    if isinstance(expression, str):
+        return expression
+    if isinstance(expression, (int, float)) and not isinstance(expression, bool):
+        return repr(expression)
+    try:
+        import sympy as sp
+    except ImportError:  # pragma: no cover
+        raise ParameterError("expression: wants sympy installed to be read") from None
+    if not isinstance(expression, sp.Expr):
+        raise bad("expression", expression, "a string or a sympy expression")
+    return expression
+
+
+def _name(argument: str, name: Any) -> str:
+    text = str(name) if type(name).__module__.startswith("sympy") else name
+    if not isinstance(text, str) or not text.isidentifier() or text.startswith("__"):
+        raise bad(argument, name, "a name, such as 'x'")
+    if keyword.iskeyword(text):
+        raise bad(argument, name, "a name that Python does not use itself", f"such as {text[:3]!r}")
+    return text
+
+
+def _period(period: Any) -> float | None:
+    if period is None:
+        return None
+    wants = "a number > 0, the length of the circle, or None for a line"
+    if isinstance(period, (bool, str)):
+        raise bad("period", period, wants)
+    try:
+        value = float(period)
+    except (TypeError, ValueError):
+        raise bad("period", period, wants) from None
+    if not 0.0 < value < np.inf:
+        raise bad("period", period, wants)
+    return value
+
+
+def _interval(interval: Any, period: Any) -> tuple[float, float] | None:
+    if interval is None:
+        return None
+    if period is not None:
+        raise bad("interval", interval, "None on a circle, which is looked at as a whole")
+    wants = "two finite numbers (low, high), low < high"
+    try:
+        low, high = (float(end) for end in interval)
+    except (TypeError, ValueError):
+        raise bad("interval", interval, wants) from None
+    if not -np.inf < low < high < np.inf:
+        raise bad("interval", interval, wants)
+    return low, high

@@ -1,0 +1,118 @@
+"""Initial value problems by Gauss collocation, each with steps of its own, all at once.
+
+Eight stages: order 16, symmetric and symplectic [HairerLubichWanner2006]. The stages are found by
+fixed-point iteration, and the decay of their Legendre series tells how long a step may be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+#: y' for some of the problems: rows, and y of shape (problems, stages, components).
+Rate = Callable[[Index, Array], Array]
+
+STAGES = 8
+_TAIL = 3e-9  # of the stages' series; the end of a step is known to the square of it
+_NOISE = 1e-4
+_ITERATIONS = 40
+_MOST_STEPS = 20_000
+
+
+def _tables() -> tuple[Array, Array, Array]:
+    legendre: Any = np.polynomial.legendre
+    nodes, weights = legendre.leggauss(STAGES)
+    basis = legendre.legvander(nodes, STAGES - 1)
+    to_series = (basis * weights[:, None]).T * (np.arange(STAGES)[:, None] + 0.5)
+    integrals = np.stack(
+        [legendre.legval(nodes, legendre.legint(row, lbnd=-1)) for row in np.eye(STAGES)], axis=1
+    )
+    return np.asarray(0.5 * integrals @ to_series), 0.5 * weights, np.asarray(to_series[-2:])
+
+
+MATRIX, WEIGHTS, TO_TAIL = _tables()
+
+
+def integrate(rate: Rate, start: Array, time: Array, step: Array) -> Array:
+    """Solve y' = rate(y) from `start` over `time`, which may be negative.
+
+    Parameters
+    ----------
+    rate : callable
+        Right-hand side.
+    start : array of shape (problems, components)
+    time : array of shape (problems,)
+    step : array of shape (problems,)
+        Lengths of the first steps, > 0.
+
+    Returns
+    -------
+    array of shape (problems, components)
+        NaN where the solution grows without bound before the time is over, or takes more than
+        20,000 steps.
+    """
+    y = np.array(start, dtype=float)
+    lost = np.zeros(y.shape)  # what rounding has taken from y
+    left = np.abs(time)
+    sign = np.sign(time)
+    step = np.array(step, dtype=float)
+    refused = np.full(left.shape, np.inf)  # tail of the step that was last refused
+    rows = np.flatnonzero((left > 0.0) & np.isfinite(y).all(axis=1))
+    y[~(np.isfinite(time) & np.isfinite(y).all(axis=1))] = np.nan
+    for _ in range(_MOST_STEPS):
+        if not rows.size:
+            return y
+        h = np.minimum(step[rows], left[rows])
+        length = (sign[rows] * h)[:, None]
+        f, settled = _stages(rate, rows, y[rows], length)
+        size = np.max(np.abs(f), axis=1)
+        tail = np.max(np.abs(np.einsum("ts,psc->ptc", TO_TAIL, f)), axis=1) / (size + 1e-300)
+        tail = np.max(tail, axis=1)
+        # A tail that shorter steps do not shrink is noise of the rate.
+        noisy = (tail <= _NOISE) & (tail >= 0.2 * refused[rows])
+        good = settled & ((tail <= _TAIL) | noisy)
+        refused[rows] = np.where(good | ~settled, np.inf, tail)
+        with np.errstate(all="ignore"):
+            factor = 0.9 * (_TAIL / tail) ** (1.0 / STAGES)
+        factor = np.where(settled & ~noisy, np.where(np.isnan(factor), 0.5, factor), 0.5)
+        factor = np.where(good & noisy, 2.0, factor)
+        done = rows[good]
+        gain = length[good] * np.einsum("s,psc->pc", WEIGHTS, f[good]) + lost[done]
+        y[done], before = y[done] + gain, y[done]
+        lost[done] = gain - (y[done] - before)
+        left[done] = np.where(h[good] >= left[done], 0.0, left[done] - h[good])
+        step[rows] = h * np.clip(factor, 0.2, 3.0)
+        stuck = step[rows] <= 1e-13 * np.abs(time[rows])
+        y[rows[stuck & ~good]] = np.nan
+        rows = rows[(left[rows] > 0.0) & np.isfinite(y[rows]).all(axis=1)]
+    y[rows] = np.nan
+    return y
+
+
+def _stages(
+    rate: Rate, rows: Index, y: Array, length: Array
+) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Rates at the stages of a step, and whether their iteration has settled."""
+    f = np.repeat(rate(rows, y[:, None, :]), STAGES, axis=1)
+    settled = np.zeros(rows.size, dtype=bool)
+    last = np.full(rows.size, np.inf)
+    going = np.arange(rows.size)
+    for _ in range(_ITERATIONS):
+        inner = y[going, None] + length[going, None] * np.einsum("st,ptc->psc", MATRIX, f[going])
+        fresh = rate(rows[going], inner)
+        size = np.max(np.abs(fresh), axis=1, keepdims=True)
+        change = np.max(np.abs(fresh - f[going]) / (size + 1e-300), axis=(1, 2))
+        f[going] = fresh
+        # It shrinks until rounding stops it.
+        over = (change <= 4e-16) | ((change <= 1e-9) & (change >= 0.5 * last[going]))
+        settled[going[over]] = True
+        last[going] = change
+        going = going[~over & np.isfinite(change) & (change < 1e3)]
+        if not going.size:
+            break
+    return f, settled

@@ -1,0 +1,231 @@
+"""The array functions of a formula: parameters and states in, arrays out, as NumPy broadcasts.
+
+The namesakes of the closed-form functions of `phasekit.phase`, with a `Formula` first and its
+parameters where those have A, B, C. The equilibria of a system are found once, however many states
+broadcast against it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import EquilibriumKind
+from phasekit.phase.flow import Motion
+from phasekit.phase.numerical import motion as motions
+from phasekit.phase.numerical import orbits as rounds
+from phasekit.phase.numerical import separatrices as loops
+from phasekit.phase.numerical.arcs import distances
+from phasekit.phase.numerical.equilibria import Equilibria
+from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
+from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.ground import Ground, survey
+from phasekit.phase.numerical.systems import make_systems
+from phasekit.phase.orbits import Orbits
+from phasekit.phase.separatrices import Separatrices
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+Shape = tuple[int, ...]
+
+
+def potential(formula: Formula, *inputs: npt.ArrayLike) -> Array:
+    """V at phi, the last of the inputs."""
+    return formula.values(inputs[-1], *inputs[:-1])
+
+
+def gradient(formula: Formula, *inputs: npt.ArrayLike) -> Array:
+    """V' at phi, the last of the inputs."""
+    return formula.slopes(inputs[-1], *inputs[:-1])
+
+
+def curvature(formula: Formula, *inputs: npt.ArrayLike) -> Array:
+    """V'' at phi, the last of the inputs."""
+    return formula.bends(inputs[-1], *inputs[:-1])
+
+
+def energy(formula: Formula, *inputs: npt.ArrayLike) -> Array:
+    """Energy of states (phi, dphi), the last of the inputs."""
+    *parameters, phi, dphi = inputs
+    speed = np.asarray(dphi, dtype=float)
+    return np.asarray(0.5 * speed * speed + formula.values(phi, *parameters))
+
+
+def phase_velocity(formula: Formula, *inputs: npt.ArrayLike) -> Array:
+    """Speed at phi on the level of an energy, the last of the inputs; NaN where out of reach."""
+    *parameters, phi, level = inputs
+    kinetic = np.asarray(level, dtype=float) - formula.values(phi, *parameters)
+    return np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan))
+
+
+def equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Equilibria:
+    """All equilibria, from left to right on the last axis."""
+    systems, shape = make_systems(formula, parameters)
+    return Equilibria._make(f.reshape(shape + f.shape[1:]) for f in find_equilibria(systems))
+
+
+def separatrices(formula: Formula, *parameters: npt.ArrayLike) -> Separatrices:
+    """Separatrices, their saddles from left to right."""
+    return phase_space(formula, *parameters)[1]
+
+
+def phase_space(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibria, Separatrices]:
+    """Equilibria and separatrices at once."""
+    ground, shape = _survey(formula, parameters)
+    found = loops.separatrices(ground)
+    return (
+        Equilibria._make(f.reshape(shape + f.shape[1:]) for f in ground.points),
+        Separatrices._make(f.reshape(shape + f.shape[1:]) for f in found),
+    )
+
+
+def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int]:
+    """Greatest number of equilibria, and of saddles, that any of the systems has."""
+    ground, _ = _survey(formula, parameters)
+    rows, _ = loops.saddles_of(ground)
+    return ground.points.phi.shape[1], int(np.bincount(rows, minlength=1).max())
+
+
+def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
+    """Orbits through states (phi0, dphi0), the last of the inputs."""
+    *parameters, phi, dphi = inputs
+    ground, shape, (x, v) = _cells(formula, parameters, (phi, dphi))
+    return _shaped(rounds.orbits(ground, x, v), shape)
+
+
+def orbits_at_energy(formula: Formula, center: int | None, *inputs: npt.ArrayLike) -> Orbits:
+    """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
+    *parameters, level = inputs
+    ground, shape, (h,) = _cells(formula, parameters, (level,))
+    points = ground.points
+    usable = points.kind == EquilibriumKind.CENTER
+    column, there = _pick(points.energy, usable, center)
+    rows = np.arange(h.size)
+    excess = h[:, None] - points.energy
+    x = np.where(there, _at(points.phi, rows, column), np.nan)
+    kinetic = np.where(there, _at(excess, rows, column), np.nan)
+    kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
+    size = np.maximum(np.abs(h)[:, None], np.abs(points.energy))
+    states = rounds.States(x, np.zeros(x.shape), kinetic, excess, 4.0 * np.finfo(float).eps * size)
+    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * kinetic))
+    return _shaped(found, shape)
+
+
+def orbits_at_gap(
+    formula: Formula, saddle: int | None, side: int, *inputs: npt.ArrayLike
+) -> Orbits:
+    """Orbits by their energy above a saddle: its number, or the lowest; side 0 left, 1 right."""
+    *parameters, level = inputs
+    ground, shape, (gap,) = _cells(formula, parameters, (level,))
+    points = ground.points
+    column, there = _pick_saddle(ground, saddle)
+    rows = np.arange(gap.size)
+    height = _at(points.energy, rows, column)
+    rise = height[:, None] - points.energy
+    size = np.max(np.abs(points.energy), axis=1, initial=0.0, where=points.kind > 0)
+    rise = np.where(np.abs(rise) <= 8.0 * np.finfo(float).eps * size[:, None], 0.0, rise)
+    excess = gap[:, None] + rise
+    # Above the saddle an orbit passes it; below, it stays with the nearest center on that side.
+    way = distances(ground, _at(points.phi, rows, column), 1.0 if side else -1.0)
+    way = np.where((points.kind == EquilibriumKind.CENTER) & (way > 0.0), way, np.inf)
+    center = np.argmin(way, axis=1) if way.shape[1] else column
+    inside = gap <= 0.0
+    there &= ~inside | np.isfinite(_at(way, rows, center))
+    start = np.where(inside, center, column)
+    kinetic = np.where(there, _at(excess, rows, start), np.nan)
+    kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
+    x = np.where(there, _at(points.phi, rows, start), np.nan)
+    blur = np.zeros(excess.shape)
+    states = rounds.States(x, np.zeros(x.shape), kinetic, excess, blur)
+    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * kinetic))
+    energies = np.where(found.orbit_kind >= 0, height + gap, np.nan)
+    return _shaped(found._replace(orbit_energy=energies), shape)
+
+
+def flow(formula: Formula, *inputs: npt.ArrayLike) -> Motion:
+    """States after times, from states (phi0, dphi0); the three last of the inputs."""
+    *parameters, phi, dphi, t = inputs
+    ground, states, (x, v) = _cells(formula, parameters, (phi, dphi))
+    shape = np.broadcast_shapes(states, np.shape(t))
+    number = np.arange(x.size).reshape(states)
+    owner = np.array(np.broadcast_to(number, shape)).reshape(-1)
+    time = np.array(np.broadcast_to(np.asarray(t, float), shape)).reshape(-1)
+    return Motion(*(a.reshape(shape) for a in motions.flow(ground, x, v, owner, time)))
+
+
+def separatrix_motion(
+    formula: Formula, saddle: int | None, side: int, *inputs: npt.ArrayLike
+) -> Motion:
+    """Motion on the separatrix of a saddle at times, the last of the inputs."""
+    *parameters, t = inputs
+    ground, shape = _survey(formula, parameters)
+    column, there = _pick_saddle(ground, saddle)
+    rows = np.flatnonzero(there)
+    whole = np.broadcast_shapes(shape, np.shape(t))
+    if not rows.size:
+        return Motion(np.full(whole, np.nan), np.full(whole, np.nan))
+    branch = loops.branch_of(ground.take(rows), column[rows], 1.0 if side else -1.0)
+    number = np.full(there.size, -1)
+    number[rows] = np.arange(rows.size)
+    owner = np.array(np.broadcast_to(number.reshape(shape), whole)).reshape(-1)
+    time = np.array(np.broadcast_to(np.asarray(t, float), whole)).reshape(-1)
+    out = np.full((2, owner.size), np.nan)
+    cells = np.flatnonzero(owner >= 0)
+    out[:, cells] = motions.separatrix_motion(branch, owner[cells], time[cells])
+    return Motion(*(array.reshape(whole) for array in out))
+
+
+# ------------------------------------------------------------------------- cells
+
+
+def _survey(formula: Formula, parameters: Sequence[npt.ArrayLike]) -> tuple[Ground, Shape]:
+    systems, shape = make_systems(formula, tuple(parameters))
+    return survey(systems), shape
+
+
+def _cells(
+    formula: Formula, parameters: list[npt.ArrayLike], states: tuple[npt.ArrayLike, ...]
+) -> tuple[Ground, Shape, tuple[Array, ...]]:
+    """Systems spread over the cells of the states, one row each, and the states."""
+    ground, own = _survey(formula, parameters)
+    shape = np.broadcast_shapes(own, *(np.shape(state) for state in states))
+    number = np.broadcast_to(np.arange(ground.systems.size).reshape(own), shape)
+    flat = tuple(np.array(np.broadcast_to(np.asarray(s, float), shape)).reshape(-1) for s in states)
+    return ground.take(np.array(number).reshape(-1)), shape, flat
+
+
+def _shaped(found: Orbits, shape: Shape) -> Orbits:
+    return Orbits._make(array.reshape(shape) for array in found)
+
+
+def _at(values: Array, rows: Index, column: Index) -> Array:
+    """Entries of an array by row, NaN where it has no columns."""
+    return values[rows, column] if values.shape[1] else np.full(rows.shape, np.nan)
+
+
+def _pick(
+    height: Array, usable: npt.NDArray[np.bool_], number: int | None
+) -> tuple[Index, npt.NDArray[np.bool_]]:
+    """Column of the equilibrium of a number, or of the lowest usable; whether it is there."""
+    rows, columns = height.shape
+    if not columns or (number is not None and number >= columns):
+        return np.zeros(rows, np.intp), np.zeros(rows, dtype=bool)
+    if number is None:
+        column = np.argmin(np.where(usable, height, np.inf), axis=1)
+    else:
+        column = np.full(rows, number)
+    return column, usable[np.arange(rows), column]
+
+
+def _pick_saddle(ground: Ground, number: int | None) -> tuple[Index, npt.NDArray[np.bool_]]:
+    """Column of the saddle of a number among the saddles, or of the lowest."""
+    usable = np.zeros(ground.points.phi.shape, dtype=bool)
+    usable[loops.saddles_of(ground)] = True
+    if number is None:
+        return _pick(ground.points.energy, usable, None)
+    nth = usable & (np.cumsum(usable, axis=1) == number + 1)
+    if not nth.shape[1]:
+        return np.zeros(len(nth), np.intp), np.zeros(len(nth), dtype=bool)
+    return np.argmax(nth, axis=1), nth.any(axis=1)

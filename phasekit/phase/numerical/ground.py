@@ -1,0 +1,135 @@
+"""Differences of the potential that keep their digits, next to equilibria and turning points.
+
+V(c + u) - V(c) is of second order in u where c is an equilibrium: subtraction would lose what
+small oscillations and separatrices are made of. There it is the integral of V'' by Gauss' rule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.phase.numerical.equilibria import Equilibria, equilibria
+from phasekit.phase.numerical.formula import Shape
+from phasekit.phase.numerical.systems import Index, Systems
+
+Array = npt.NDArray[np.float64]
+
+
+def _gauss(count: int) -> tuple[Array, Array]:
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return 0.5 * (1.0 + nodes), 0.5 * weights
+
+
+NODES, WEIGHTS = _gauss(8)
+_FINE_NODES, _FINE_WEIGHTS = _gauss(13)
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Systems with their equilibria, and how far from each of these Gauss' rule holds."""
+
+    systems: Systems
+    points: Equilibria
+    near: Array
+
+    def take(self, rows: Index) -> Ground:
+        """The systems of some rows, which may repeat."""
+        points = Equilibria._make(field[rows] for field in self.points)
+        return Ground(self.systems.take(rows), points, self.near[rows])
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """An equilibrium in each of some systems, from which differences are taken.
+
+    Where there is none, any point may stand in with ``near = 0``.
+    """
+
+    systems: Systems
+    at: Array
+    near: Array
+
+    def take(self, rows: Index) -> Anchor:
+        """The anchors of some rows."""
+        return Anchor(self.systems.take(rows), self.at[rows], self.near[rows])
+
+    def rise(self, u: Array) -> Array:
+        """V(at + u) - V(at), for u of shape (systems,)."""
+        result = self.systems.potential(self.at + u) - self.systems.potential(self.at)
+        rows = np.flatnonzero(np.abs(u) < self.near)
+        if rows.size:
+            few, step = self.take(rows), u[rows]
+            bend = few.systems.bend(few.at[:, None] + step[:, None] * NODES)
+            result[rows] = step * step * (bend @ (WEIGHTS * (1.0 - NODES)))
+        return result
+
+    def slope(self, u: Array) -> Array:
+        """V'(at + u), for u of shape (systems,)."""
+        result = self.systems.slope(self.at + u)
+        rows = np.flatnonzero(np.abs(u) < self.near)
+        if rows.size:
+            few, step = self.take(rows), u[rows]
+            result[rows] = step * (
+                few.systems.bend(few.at[:, None] + step[:, None] * NODES) @ WEIGHTS
+            )
+        return result
+
+    def climb(self, u: Array, d: Array) -> Array:
+        """V(at + u + d) - V(at + u), with all digits also where d is small."""
+        result = self.rise(u + d) - self.rise(u)
+        rows = np.flatnonzero(np.abs(d) < self.near)
+        if rows.size:
+            many = self.take(np.repeat(rows, NODES.size))
+            inner = (u[rows, None] + d[rows, None] * NODES).reshape(-1)
+            result[rows] = d[rows] * (many.slope(inner).reshape(-1, NODES.size) @ WEIGHTS)
+        return result
+
+
+def survey(systems: Systems) -> Ground:
+    """Find the equilibria of systems, and how far from each of them Gauss' rule holds."""
+    points = equilibria(systems)
+    x = points.phi
+    low, high = systems.formula.ends
+    period = systems.formula.period
+    with np.errstate(all="ignore"):
+        # Past the neighbors, if the rule holds so far: shallow wells and low saddles need it.
+        near = np.where(np.isfinite(x), 1.0 + np.abs(x), np.nan)
+        if np.isfinite(high):
+            near = np.where(np.isfinite(x), 0.25 * (high - low), np.nan)
+        if x.shape[1] > 1:
+            gap = np.diff(x, axis=1)
+            around = np.full((len(x), 1), -np.inf)
+            if period is not None:
+                last = np.nanmax(np.where(np.isnan(x), -np.inf, x), axis=1, keepdims=True)
+                around = x[:, :1] + period - last
+            gap = np.where(np.isnan(gap), -np.inf, gap)
+            left = np.concatenate([around, gap], axis=1)
+            right = np.concatenate([gap, np.full((len(x), 1), -np.inf)], axis=1)
+            reach = np.maximum(left, right)
+            near = np.where(reach > 0.0, np.minimum(near, 2.0 * reach), near)
+        near = _proved(systems, x, near)
+    return Ground(systems, points, near)
+
+
+def _proved(systems: Systems, x: Array, near: Array) -> Array:
+    """Shorten each stretch until two rules of Gauss agree on it."""
+    formula = systems.formula
+    if formula.shape is Shape.POLYNOMIAL and systems.coefficients().shape[1] <= 2 * NODES.size:
+        return near  # where the rule is exact
+    for _ in range(40):
+        worst = np.zeros(x.shape)
+        for sign in (1.0, -1.0):
+            u = sign * near[..., None]
+            coarse = systems.bend(x[..., None] + u * NODES) @ (WEIGHTS * (1.0 - NODES))
+            bend = systems.bend(x[..., None] + u * _FINE_NODES)
+            fine = bend @ (_FINE_WEIGHTS * (1.0 - _FINE_NODES))
+            size = np.max(np.abs(bend), axis=-1)
+            worst = np.maximum(worst, np.abs(coarse - fine) / size)
+        rough = worst > 2e-15
+        if not rough.any():
+            break
+        near = np.where(rough, 0.5 * near, near)
+    return near

@@ -1,0 +1,185 @@
+"""Motion in time: states after any time, and motion on separatrices.
+
+Bounded orbits are integrated over half a period at most. On a separatrix a variable w takes the
+place of the coordinate in which the motion is slow at no end: with u the distance from the saddle
+and L that of the turning point, u = L sech(w)^2; between two saddles u = L/(1 + exp(-w)). Then
+w' is smooth, tends to a constant, and errors do not grow as the saddle is approached.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import OrbitKind
+from phasekit.phase.flow import Motion
+from phasekit.phase.numerical.collocation import integrate
+from phasekit.phase.numerical.ground import Ground
+from phasekit.phase.numerical.orbits import orbits_of, resting_ends, states_of
+from phasekit.phase.numerical.pieces import speeds
+from phasekit.phase.numerical.separatrices import Branch, branch_of
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.intp]
+
+
+def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motion:
+    """States after times.
+
+    Parameters
+    ----------
+    ground : Ground
+        One row for each start.
+    x, v : array of shape (starts,)
+    owner : array of int, shape (times,)
+        The start from which each time counts.
+    time : array of shape (times,)
+    """
+    states = states_of(ground, x, v)
+    orbit = orbits_of(ground, states, v)
+    kind, period = orbit.orbit_kind[owner], orbit.period[owner]
+    turning = np.isfinite(period) & (period > 0.0) & (kind != OrbitKind.EQUILIBRIUM)
+    with np.errstate(all="ignore"):
+        rounds = np.where(turning, np.round(time / period), 0.0)
+    rest = np.where(turning, time - rounds * np.where(turning, period, 0.0), time)
+    still = (kind == OrbitKind.EQUILIBRIUM) | (kind == OrbitKind.NOT_COMPUTED)
+    out_x, out_v = states.x[owner], v[owner].astype(float)
+    out_x[kind == OrbitKind.NOT_COMPUTED] = np.nan
+    out_v[kind == OrbitKind.NOT_COMPUTED] = np.nan
+    asymptotic = np.flatnonzero(kind == OrbitKind.ASYMPTOTIC)
+    if asymptotic.size:
+        out_x[asymptotic], out_v[asymptotic], known = _asymptotic(
+            ground, states.x, v, owner[asymptotic], time[asymptotic]
+        )
+        asymptotic = asymptotic[known]
+    moving = ~still
+    moving[asymptotic] = False
+    rows = np.flatnonzero(moving)
+    if rows.size:
+        systems = ground.systems.take(owner[rows])
+
+        def rate(few: Index, y: Array) -> Array:
+            return np.stack([y[..., 1], -systems.take(few).slope(y[..., 0])], axis=-1)
+
+        bend = np.abs(systems.bend(out_x[rows]))
+        pace = np.sqrt(bend) + 1.0 / np.where(turning[rows], period[rows], 1e3)
+        start = np.stack([out_x[rows], out_v[rows]], axis=-1)
+        with np.errstate(all="ignore"):
+            end = integrate(rate, start, rest[rows], 0.5 / pace)
+        out_x[rows], out_v[rows] = end.T
+    turn = ground.systems.formula.period or 0.0
+    rotating = kind == OrbitKind.ROTATION
+    shift = states.turns[owner] + np.where(rotating, rounds * turn * np.sign(v[owner]), 0.0)
+    out_v = np.where(np.isfinite(time), out_v, np.nan)
+    return Motion(np.where(np.isfinite(time), out_x + shift, np.nan), out_v)
+
+
+def separatrix_motion(branch: Branch, owner: Index, time: Array) -> Motion:
+    """Motion along branches of separatrices.
+
+    Time 0 is at the turning point of a lobe, and half-way to the partner saddle, or to the same
+    saddle a turn later. NaN for branches that end nowhere.
+    """
+    return _along(branch, owner, np.zeros(time.shape), time)
+
+
+def _along(branch: Branch, owner: Index, start: Array, time: Array) -> Motion:
+    """Motion along branches from the values `start` of w."""
+    finite = np.isfinite(branch.length[owner]) & np.isfinite(time)
+    x, v = np.full(time.shape, np.nan), np.full(time.shape, np.nan)
+    rows = np.flatnonzero(finite)
+    if not rows.size:
+        return Motion(x, v)
+    own = owner[rows]
+
+    def rate(few: Index, y: Array) -> Array:
+        return _pace(branch, own[few], y[..., 0])[..., None]
+
+    exponent = branch.ground.systems.take(own).bend(branch.saddle[own])
+    step = 0.25 / (np.sqrt(np.abs(exponent)) + 1e-3)
+    w = integrate(rate, start[rows, None], time[rows], step)[:, 0]
+    near, far, slope = _place(branch, own, w[:, None])
+    pace = _pace(branch, own, w[:, None])
+    u, d = near[:, 0], far[:, 0]
+    length = branch.length[own]
+    end = branch.saddle[own] + branch.side * length
+    x[rows] = np.where(u <= d, branch.saddle[own] + branch.side * u, end - branch.side * d)
+    v[rows] = branch.side * (slope * pace)[:, 0]
+    return Motion(x, v)
+
+
+def _place(branch: Branch, own: Index, w: Array) -> tuple[Array, Array, Array]:
+    """Distances from the saddle and from the far end at w, and du/dw."""
+    length = branch.length[own, None]
+    with np.errstate(over="ignore"):
+        half = np.exp(-np.abs(w))
+        square = half * half
+        # lobe: u = L sech(w)^2; else: u = L/(1 + exp(-w))
+        sech = 4.0 * square / (1.0 + square) ** 2
+        tanh = (1.0 - square) / (1.0 + square)
+        small, large = half / (1.0 + half), 1.0 / (1.0 + half)
+    joins = branch.joins[own, None]
+    near = length * np.where(joins, np.where(w < 0.0, small, large), sech)
+    far = length * np.where(joins, np.where(w < 0.0, large, small), tanh * tanh)
+    slope = np.where(joins, length * small * large, -2.0 * length * sech * np.sign(w) * tanh)
+    return near, far, slope
+
+
+def _pace(branch: Branch, own: Index, w: Array) -> Array:
+    """Rate of w: speed/(du/dw), which is smooth through the ends."""
+    # Beyond this the distances are lost beside the ends, and w' is constant to rounding.
+    held = np.clip(w, -300.0, 300.0)
+    # The turning point itself has neither speed nor slope.
+    held = np.where((held == 0.0) & ~branch.joins[own, None], 1e-8, held)
+    near, far, slope = _place(branch, own, held)
+    result = np.empty(w.shape)
+    low = near <= far
+    for end, distance, sign, part in (
+        (branch.near, near, branch.side, low),
+        (branch.far, far, -branch.side, ~low),
+    ):
+        rows, columns = np.nonzero(part)
+        few = end.take(own[rows])
+        d = sign * distance[rows, columns][:, None]
+        result[rows, columns] = speeds(few.anchor, few.u, few.excess, d)[:, 0]
+    return result / np.abs(slope)
+
+
+def _asymptotic(
+    ground: Ground, x: Array, v: Array, owner: Index, time: Array
+) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+    """Motion from states on separatrices; which of them lie on one that ends somewhere."""
+    starts, inverse = np.unique(owner, return_inverse=True)
+    few = ground.take(starts)
+    ends = resting_ends(few, states_of(few, x[starts], v[starts]))
+    out = np.full((2, time.size), np.nan)
+    known = np.zeros(time.size, dtype=bool)
+    done = np.zeros(starts.size, dtype=bool)
+    for side, (column, distance) in zip((1.0, -1.0), ends, strict=True):
+        # A saddle behind, as seen from this side: the branch leaves it towards the state.
+        rows = np.flatnonzero((column >= 0) & ~done)
+        if not rows.size:
+            continue
+        branch = branch_of(few.take(rows), column[rows], side)
+        u, length = distance[rows], branch.length
+        good = np.isfinite(length) & (u > 0.0) & (u < length * (1.0 + 1e-9))
+        with np.errstate(all="ignore"):
+            d = np.maximum(length - u, 0.0)
+            lobe = np.arctanh(np.sqrt(d / length)) * np.sign(-side * v[starts[rows]])
+            w = np.where(branch.joins, np.log(u / d), lobe)
+        good &= np.isfinite(w)
+        done[rows[good]] = True
+        place = np.full(starts.size, -1)
+        place[rows[good]] = np.flatnonzero(good)
+        cells = np.flatnonzero(place[inverse] >= 0)
+        own = place[inverse[cells]]
+        # Between saddles w grows away from the one behind; the state may move back to it.
+        forward = np.where(branch.joins, np.sign(side * v[starts[rows]]), 1.0)[own]
+        motion = _along(branch, own, w[own], forward * time[cells])
+        start = branch.saddle[own] + side * u[own]
+        out[0, cells] = motion.motion_phi + (x[owner[cells]] - start)
+        out[1, cells] = forward * motion.motion_dphi
+        known[cells] = True
+    rest = ~known
+    out[0, rest], out[1, rest] = x[owner[rest]], v[owner[rest]]
+    return out[0], out[1], known

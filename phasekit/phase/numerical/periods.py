@@ -1,0 +1,121 @@
+"""Period and action of librations and rotations, by quadrature.
+
+A libration over [m - w, m + w] is parametrised by x = m + w sin(theta). There
+``h - V = w^2 cos^2(theta) K``, and K is a mean of V'' over the arc with a positive weight, the
+Green's function of d^2/dx^2 that vanishes at both ends. So K has all its digits, however small
+the oscillation, and the period is the mean of 1/sqrt(2 K), a smooth periodic function of theta.
+Where that converges slowly, next to separatrices, the arc is cut at the maxima of V, and each
+piece is integrated by the double-exponential rule [TakahasiMori1974].
+"""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.phase.numerical.arcs import End
+from phasekit.phase.numerical.ground import Ground
+from phasekit.phase.numerical.pieces import between, integrate, round_the_circle
+
+Array = npt.NDArray[np.float64]
+
+#: Rules for librations, tried one after another: points at which V'' is taken, points of the rule.
+_RULES = ((16, 16), (32, 32), (64, 64), (128, 128), (128, 256))
+#: Two rules that agree so far: the finer one, whose error is the square, has all digits.
+_AGREE = 1e-10
+
+
+@functools.cache
+def _mean_of_bend(count: int, points: int) -> tuple[Array, Array, Array, Array]:
+    """Nodes of V'' and of K in (-1, 1); matrices from V'' to K and to its Chebyshev series."""
+    angles = np.pi * (np.arange(count) + 0.5) / count
+    y = np.cos(np.pi * (np.arange(points) + 0.5) / points)
+    gauss, weights = np.polynomial.legendre.leggauss(count // 2 + 2)
+    gauss, weights = 0.5 * (1.0 + gauss), 0.5 * weights
+    orders = np.arange(count)
+    to_series = (2.0 / count) * np.cos(np.outer(orders, angles))
+    to_series[0] *= 0.5
+    matrix = np.zeros((points, count))
+    for sign in (1.0, -1.0):
+        # From the end at -sign to y, with the weight (1 + sign s)/(2 (1 + sign y)).
+        length = 1.0 + sign * y
+        s = sign * (length[:, None] * gauss - 1.0)
+        basis = np.polynomial.chebyshev.chebvander(np.clip(s, -1.0, 1.0), count - 1)
+        matrix += np.einsum("g,jgk->jk", 0.5 * weights * gauss, basis) * length[:, None]
+    return np.cos(angles), y, matrix @ to_series, to_series
+
+
+def librations(
+    ground: Ground, x: Array, excess: Array, left: End, right: End
+) -> tuple[Array, Array]:
+    """Period and action of orbits between two turning points."""
+    period, action = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
+    middle, half = _arc(x, left, right)
+    coarse: tuple[Array, Array] | None = None
+    rows = np.arange(x.size)
+    for count, points in _RULES:
+        nodes, y, matrix, to_series = _mean_of_bend(count, points)
+        few = ground.systems.take(rows)
+        bend = few.bend(middle[rows, None] + half[rows, None] * nodes)
+        root = np.sqrt(2.0 * (bend @ matrix.T))
+        fine = (
+            2.0 * np.pi * np.mean(1.0 / root, axis=1),
+            half[rows] ** 2 * np.mean((1.0 - y**2) * root, axis=1),
+        )
+        if coarse is not None:
+            good = np.all(
+                [np.abs(f - c) <= _AGREE * f for f, c in zip(fine, coarse, strict=True)], axis=0
+            )
+            # Rules that differ in their points alone say nothing of how well V'' is known.
+            tail = np.max(np.abs(bend @ to_series[-4:].T), axis=1)
+            good &= tail <= 1e-12 * np.max(np.abs(bend), axis=1)
+            period[rows[good]], action[rows[good]] = fine[0][good], fine[1][good]
+            rows, fine = rows[~good], (fine[0][~good], fine[1][~good])
+        if not rows.size:
+            return period, action
+        coarse = fine
+    rest, left, right = ground.take(rows), left.take(rows), right.take(rows)
+    start, width = x[rows] - left.offset, left.offset + right.offset
+    time, area = integrate(rest, between(rest, start, width, excess[rows], left, right))
+    period[rows], action[rows] = 2.0 * time, area / np.pi
+    return period, action
+
+
+def _arc(x: Array, left: End, right: End) -> tuple[Array, Array]:
+    """Middle and half the width of arcs, from their equilibrium where that is one well's."""
+    middle = x + 0.5 * (right.offset - left.offset)
+    half = 0.5 * (right.offset + left.offset)
+    same = left.anchor.at == right.anchor.at
+    same &= left.u < right.u  # not a saddle that is the wall on both sides
+    middle = np.where(same, right.anchor.at + 0.5 * (right.u + left.u), middle)
+    return middle, np.where(same, 0.5 * (right.u - left.u), half)
+
+
+def rotations(ground: Ground, x: Array, kinetic: Array, excess: Array) -> tuple[Array, Array]:
+    """Period (of one turn) and action of orbits that run round the circle."""
+    turn = ground.systems.formula.period
+    assert turn is not None
+    period, action = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
+    base = ground.systems.potential(x)
+    coarse: tuple[Array, Array] | None = None
+    rows = np.arange(x.size)
+    for count in (32, 64, 128, 256):
+        few = ground.systems.take(rows)
+        height = few.potential(x[rows, None] + turn * np.arange(count) / count)
+        speed = np.sqrt(2.0 * (kinetic[rows, None] + (base[rows, None] - height)))
+        fine = (turn * np.mean(1.0 / speed, axis=1), turn * np.mean(speed, axis=1))
+        if coarse is not None:
+            good = np.all(
+                [np.abs(f - c) <= _AGREE * f for f, c in zip(fine, coarse, strict=True)], axis=0
+            )
+            period[rows[good]], action[rows[good]] = fine[0][good], fine[1][good] / (2.0 * np.pi)
+            rows, fine = rows[~good], (fine[0][~good], fine[1][~good])
+        if not rows.size:
+            return period, action
+        coarse = fine
+    rest = ground.take(rows)
+    time, area = integrate(rest, round_the_circle(rest, excess[rows]))
+    period[rows], action[rows] = time, area / (2.0 * np.pi)
+    return period, action
