@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from phasekit import plot as plot
+    from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
     from phasekit.errors import Loop as Loop
@@ -31,7 +32,11 @@ if TYPE_CHECKING:
     from phasekit.labelled.asymptotics import near_center as near_center
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
     from phasekit.labelled.atlas import branches as branches
+    from phasekit.labelled.branch import Branch as Branch
+    from phasekit.labelled.continuation import continuation as continuation
     from phasekit.labelled.critical import critical as critical
+    from phasekit.labelled.diagram import diagram as diagram
+    from phasekit.labelled.eights import figure_eights as figure_eights
     from phasekit.labelled.families import orbit_families as orbit_families
     from phasekit.labelled.free_rotor import FreeGyroRotor as FreeGyroRotor
     from phasekit.labelled.guises import ParticleOnCircle as ParticleOnCircle
@@ -57,7 +62,9 @@ if TYPE_CHECKING:
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.labelled.potential_system import Potential as Potential
+    from phasekit.labelled.problem import Problem as Problem
     from phasekit.labelled.quantities import quantities as quantities
+    from phasekit.labelled.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.store import open_map as open_map
     from phasekit.labelled.sweep import sweep as sweep
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
@@ -70,6 +77,7 @@ deg: float = 0.017453292519943295
 rpm: float = 0.10471975511965977
 
 _MODULES = {
+    "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),
     "phasekit.errors": (
         "ConvergenceError",
         "EquilibriumKind",
@@ -83,7 +91,11 @@ _MODULES = {
     ),
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.atlas": ("branches",),
+    "phasekit.labelled.branch": ("Branch",),
+    "phasekit.labelled.continuation": ("continuation",),
     "phasekit.labelled.critical": ("critical",),
+    "phasekit.labelled.diagram": ("diagram",),
+    "phasekit.labelled.eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.labelled.free_rotor": ("FreeGyroRotor",),
     "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "Reduced", "StonerWohlfarth"),
@@ -101,7 +113,9 @@ _MODULES = {
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.labelled.potential_system": ("Potential",),
+    "phasekit.labelled.problem": ("Problem",),
     "phasekit.labelled.quantities": ("quantities",),
+    "phasekit.labelled.special_point": ("SpecialPoint",),
     "phasekit.labelled.store": ("open_map",),
     "phasekit.labelled.sweep": ("sweep",),
     "phasekit.mechanics.coupled_rotation": ("CoupledRotation",),
