@@ -1,0 +1,1 @@
+"""Continuation of equilibria of any smooth system, arrays only."""

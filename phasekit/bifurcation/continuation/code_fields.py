@@ -1,0 +1,196 @@
+"""Right-hand sides that are code: compiled by numba, or plain Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.fields import Field
+from phasekit.errors import ParameterError
+from phasekit.kernels.defining import PLAIN
+
+Array = npt.NDArray[np.float64]
+
+
+class CompiledField(Field):
+    """A numba-compiled f(x, parameters by name); its derivatives are differences, compiled."""
+
+    mode = PLAIN
+
+    def __init__(
+        self, function: Any, names: Sequence[str], states: Sequence[str], parameters: Sequence[str]
+    ) -> None:
+        """Take the function and the names of its arguments after x, in its own order."""
+        super().__init__(states, parameters)
+        self.function, self.names = function, tuple(names)
+        self._wrapped: Any = None
+
+    def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
+        """Address of f alone."""
+        if self._wrapped is None:
+            self._wrapped = _wrap(
+                self.function,
+                len(self.states),
+                tuple(self.parameters.index(name) for name in self.names),
+            )
+        return int(self._wrapped.address)
+
+    def second(self, active: tuple[int, ...]) -> int:
+        """Address of f alone."""
+        return self.first(active)
+
+
+def _wrap(function: Any, n: int, order: tuple[int, ...]) -> Any:
+    """Wrap f as a native function of the state and all parameters."""
+    import numba
+    from numba import types
+
+    carray: Any = numba.carray  # type: ignore[attr-defined]
+    cfunc: Any = numba.cfunc
+
+    arguments = ", ".join(["x", *(f"p[{i}]" for i in order)])
+    result = function.py_func if hasattr(function, "py_func") else function
+    lines = [
+        "def wrapped(x_, p_, z_, out):",
+        f"    x = carray(x_, ({n},))",
+        f"    p = carray(p_, ({max(order, default=0) + 1},))",
+        f"    value = f({arguments})",
+    ]
+    lines += [f"    out[{i}] = value[{i}]" for i in range(n)]
+    space: dict[str, Any] = {"f": function, "carray": carray}
+    pointer: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+    signature = types.void(pointer, pointer, pointer, pointer)
+    try:
+        exec("\n".join(lines), space)
+        return cfunc(signature)(space["wrapped"])
+    except Exception:
+        if n == 1:
+            lines[-1] = "    out[0] = value"
+            try:
+                exec("\n".join(lines), space)
+                return cfunc(signature)(space["wrapped"])
+            except Exception as again:
+                error = again
+        name = getattr(result, "__name__", "f")
+        raise ParameterError(
+            f"f: got the compiled function {name}, which numba cannot call with a float64 array "
+            f"and floats and index {n} numbers of what it returns: {error}"
+        ) from error
+
+
+class PythonField(Field):
+    """A Python function f(x, **parameters); its derivatives are differences, unless it has them."""
+
+    compiled = False
+    accuracy = 1e-10
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        jacobian: Callable[..., Any] | None,
+        states: Sequence[str],
+        parameters: Sequence[str],
+    ) -> None:
+        super().__init__(states, parameters)
+        self.function, self.jacobian = function, jacobian
+        self.scale = np.ones(len(states) + len(parameters))
+
+    def prepare(self, scale: Array) -> None:
+        """Take the scales of the unknowns, for differences."""
+        self.scale = np.asarray(scale, dtype=float)
+
+    def value(self, x: Array, p: Mapping[str, float]) -> Array:
+        """F as an array; NaN where it has no value. Warnings are the caller's."""
+        try:
+            return np.asarray(self.function(x, **p), dtype=float).reshape(-1)
+        except (ArithmeticError, ValueError):
+            return np.full(len(self.states), np.nan)
+
+    def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Callable[..., None]:
+        """A function that fills f and its derivatives."""
+        names, n = self.parameters, len(self.states)
+        free = [names[i] for i in active]
+        m = n + len(free)
+        # Central differences: of second order while stepping, of fourth for refined points.
+        step = 2.0**-10 if sharp else 2.0**-17
+        sides = ((1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)) if sharp else ((1.0, 0.5),)
+        exact = self.jacobian
+
+        def first(u: Array, par: Array, z: Array, out: Array) -> None:
+            p = dict(zip(names, par.tolist(), strict=True))
+            values = u[:m].tolist()
+            for name, number in zip(free, values[n:], strict=True):
+                p[name] = number
+            x = np.array(values[:n])
+            out[:n] = self.value(x.copy(), p)
+            slopes = out[n : n + n * m].reshape(n, m)
+            begin = 0
+            if exact is not None:
+                try:
+                    slopes[:, :n] = np.asarray(exact(x.copy(), **p), dtype=float).reshape(n, n)
+                except (ArithmeticError, ValueError):
+                    slopes[:, :n] = np.nan
+                begin = n
+            for j in range(begin, m):
+                h = step * max(abs(values[j]), self.scale[j])
+                # A power of two, so that what is added to a number of its size is exact.
+                h = 2.0 ** math.floor(math.log2(h))
+                slope: Any = 0.0
+                for k, weight in sides:
+                    if j < n:
+                        ahead, behind = x.copy(), x.copy()
+                        ahead[j] += k * h
+                        behind[j] -= k * h
+                        slope = slope + weight * (self.value(ahead, p) - self.value(behind, p))
+                    else:
+                        up = self.value(x.copy(), p | {free[j - n]: values[j] + k * h})
+                        down = self.value(x.copy(), p | {free[j - n]: values[j] - k * h})
+                        slope = slope + weight * (up - down)
+                slopes[:, j] = slope / h
+
+        return first
+
+    def second(self, active: tuple[int, ...]) -> Callable[..., None]:
+        """A function that fills f, its derivatives and those of f_u z."""
+        jet = self.first(active, sharp=True)
+        names, n = self.parameters, len(self.states)
+        free = [names[i] for i in active]
+        m = n + len(free)
+        exact: Any = self.jacobian
+
+        def at(u: Array, par: Array) -> tuple[Array, dict[str, float]]:
+            p = dict(zip(names, par.tolist(), strict=True))
+            p.update(zip(free, u[n:m].tolist(), strict=True))
+            return u[:n].copy(), p
+
+        def second(u: Array, par: Array, z: Array, out: Array) -> None:
+            jet(u, par, z, out)
+            u, z = u[:m].copy(), z[:m].copy()
+            bent = out[n + n * m : n + 2 * n * m].reshape(n, m)
+            size = np.maximum(np.abs(u), self.scale[:m])
+            length = np.max(np.abs(z) / size)
+            bent[:] = 0.0
+            if not length > 0.0:
+                return
+            in_state = exact is not None and not np.any(z[n:])
+            along = 2.0**-12 / length
+            for j in range(m):
+                h = (2.0**-17 if in_state else 2.0**-12) * size[j]
+                for k in (1.0, -1.0):
+                    shifted = u.copy()
+                    shifted[j] += k * h
+                    if in_state:
+                        x, p = at(shifted, par)
+                        slope = np.asarray(exact(x, **p), dtype=float).reshape(n, n) @ z[:n]
+                        bent[:, j] += k * slope / (2.0 * h)
+                    else:
+                        difference = self.value(*at(shifted + along * z, par)) - self.value(
+                            *at(shifted - along * z, par)
+                        )
+                        bent[:, j] += k * difference / (4.0 * h * along)
+
+        return second

@@ -1,0 +1,55 @@
+"""Whether a point lies on a traced path: by the curve, not only by its points."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.path import Path
+
+Array = npt.NDArray[np.float64]
+SAME = 1e-7  # distance on scaled axes
+
+
+def turned(curve: Curve, gap: Array) -> Array:
+    """Differences of unknowns, angles modulo their periods."""
+    gap = np.array(gap)
+    for j in range(curve.m):
+        if curve.period[j] > 0.0:
+            gap[..., j] -= curve.period[j] * np.round(gap[..., j] / curve.period[j])
+    return gap
+
+
+def lies_on(curve: Curve, path: Path, u: Array) -> bool:
+    """Whether the curve of a path goes through a point of the same problem."""
+    m = curve.m
+    weight = 1.0 / curve.scale[:m] ** 2
+    gap = turned(curve, u[:m] - path.u[:, :m])
+    distance = np.sqrt(np.sum(weight * gap**2, axis=1))
+    if np.min(distance) < SAME:
+        return True
+    chord = np.diff(path.u[:, :m], axis=0)
+    square = np.sum(weight * chord**2, axis=1)
+    along = np.sum(weight * chord * gap[:-1], axis=1) / np.where(square > 0.0, square, 1.0)
+    across = np.sqrt(
+        np.sum(weight * (gap[:-1] - np.clip(along, 0.0, 1.0)[:, None] * chord) ** 2, axis=1)
+    )
+    length = np.sqrt(square)
+    near = np.flatnonzero((across < 0.3 * length + SAME) & (along > -0.05) & (along < 1.05))
+    for i in near:
+        row = weight * chord[i]
+        s = along[i]
+        target = path.u[i, :m] + gap[i]
+        guess = (
+            path.u[i, :m]
+            + (3.0 - 2.0 * s) * s * s * chord[i]
+            + length[i] * s * (1.0 - s)
+            * ((1.0 - s) * path.tangent[i, :m] - s * path.tangent[i + 1, :m])
+        )  # fmt: skip
+        point = curve.refine(guess, row, float(np.dot(row, target)))
+        if point.converged:
+            off = turned(curve, point.u[:m] - target)
+            if np.sqrt(np.sum(weight * off**2)) < SAME:
+                return True
+    return False

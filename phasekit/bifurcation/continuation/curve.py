@@ -1,0 +1,312 @@
+"""One curve of equilibria, folds, Hopf or branch points: its points, and how it is followed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.kernels import defining, newton, trace
+from phasekit.kernels import state as state_places
+from phasekit.kernels.defining import EQUILIBRIUM
+from phasekit.kernels.state import NUMBERS, VECTORS
+
+Array = npt.NDArray[np.float64]
+
+CHUNK = 256
+TIGHT = 1e-13
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of a curve: unknowns, unit tangent, residual G and the derivatives of f."""
+
+    u: Array
+    tangent: Array
+    residual: Array
+    slopes: Array
+    steps: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether Newton's method came to an end."""
+        return self.steps > 0
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Why a curve ends: full, bound, closed, stuck or not_finite; and what says so in words."""
+
+    reason: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Track:
+    """Points of a curve in one direction from a start, and the state to go on from."""
+
+    record: Array
+    state: Array
+    stop: Stop
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """What defines a curve: the field, its free parameters, and how lengths are measured.
+
+    Attributes
+    ----------
+    field : Field
+        The right-hand side.
+    kind : int
+        EQUILIBRIUM, FOLD, HOPF or BRANCH.
+    par : ndarray
+        All parameters; those that are free are not used.
+    active : tuple of int
+        Places of the free parameters.
+    scale : ndarray
+        Sizes of the unknowns (states, free parameters and the rest).
+    period : ndarray
+        Periods of angles among the unknowns, 0 for others.
+    low, high : ndarray
+        Bounds of the unknowns.
+    options : ContinuationOptions
+    """
+
+    field: Field
+    kind: int
+    par: Array
+    active: tuple[int, ...]
+    scale: Array
+    period: Array
+    low: Array
+    high: Array
+    options: ContinuationOptions
+    aux: Array | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.field.states)
+
+    @property
+    def m(self) -> int:
+        """Number of states and free parameters."""
+        return self.n + len(self.active)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return defining.unknowns(self.kind, self.n, len(self.active))
+
+    @property
+    def rows(self) -> int:
+        """Number of equations."""
+        return defining.equations(self.kind, self.n)
+
+    @property
+    def weight(self) -> Array:
+        """Weights of lengths: of states and free parameters only."""
+        weight = np.zeros(self.size)
+        weight[: self.m] = 1.0 / self.scale[: self.m] ** 2
+        return weight
+
+    def length(self, difference: Array) -> float:
+        """Length of a difference of unknowns."""
+        return float(np.sqrt(np.sum(self.weight * difference**2)))
+
+    def _kernel(self, kernel: Any) -> Any:
+        return kernel if self.field.compiled else kernel.py_func
+
+    def _functions(self, *, sharp: bool = False) -> tuple[Any, Any, int]:
+        self.field.prepare(self.scale[: self.m])
+        first = self.field.first(self.active, sharp=sharp)
+        second = first if self.kind == EQUILIBRIUM else self.field.second(self.active)
+        return first, second, self.field.mode
+
+    def refine(
+        self,
+        u: Array,
+        row: Array | None = None,
+        target: float | None = None,
+        *,
+        tolerance: float | None = None,
+        iterations: int = 20,
+    ) -> Point:
+        """Newton's method from u, in the plane row.u = target (default: through u)."""
+        size, rows, n, m = self.size, self.rows, self.n, self.m
+        w = np.zeros(defining.work_size(self.kind, n, len(self.active)))
+        w[3 * size : 4 * size] = self.scale
+        head = VECTORS * size + NUMBERS
+        if self.aux is not None:
+            w[head : head + n] = self.aux
+        place = head + n
+        w[place : place + size] = u
+        row = np.zeros(size) if row is None else row
+        w[place + size : place + 2 * size] = row
+        aim = float(np.dot(row, u)) if target is None else target
+        kernel = self._kernel(newton.refine)
+        with np.errstate(all="ignore"):
+            steps = kernel(
+                *self._functions(sharp=True), self.kind, n, self.par.copy(),
+                np.array(self.active, dtype=np.int64), w, aim,
+                self.options.tolerance if tolerance is None else tolerance, iterations,
+            )  # fmt: skip
+        places = defining.places(self.kind, n, len(self.active))
+        base, g = places[6], places[7]
+        point = w[place : place + size].copy()
+        tangent = w[place + 2 * size : place + 3 * size].copy()
+        length = self.length(tangent)
+        if length > 0.0:
+            tangent /= length
+        if not np.isfinite(point).all():
+            steps = -1
+        return Point(
+            point, tangent, w[g : g + rows].copy(), w[base + n : base + n + n * m].reshape(n, m),
+            int(steps),
+        )  # fmt: skip
+
+    def at(self, u: Array) -> tuple[Array, Array]:
+        """F and its derivatives by states and free parameters."""
+        n, m = self.n, self.m
+        w = np.zeros(m + n + n * m + 8 * m + 8)
+        w[:m] = u[:m]
+        w[m : 2 * m] = self.scale[:m]
+        out = 2 * m
+        first, _, mode = self._functions(sharp=True)
+        w = np.concatenate([w, np.zeros(n + n * m + 4 * m)])
+        spare = out + n + n * m
+        active = np.array(self.active, dtype=np.int64)
+        kernel = self._kernel(defining.first_derivatives)
+        with np.errstate(all="ignore"):
+            kernel(first, mode, n, w, 0, self.par.copy(), active, m, out, spare)
+        return w[out : out + n].copy(), w[out + n : spare].reshape(n, m).copy()
+
+    def bend(self, u: Array, z: Array) -> Array:
+        """The derivatives of f_u z by states and free parameters, shape (n, m)."""
+        full = np.zeros(self.m)
+        full[: z.size] = z
+        second = self.field.second(self.active)
+        jet = self.n * (1 + self.m)
+        out = self._derive(second, u, full, jet + self.n * self.m)
+        return out[jet:].reshape(self.n, self.m)
+
+    def bend_all(self, u: Array, z: Array) -> Array:
+        """`bend` at many points (rows of u), each with its own direction, shape (count, n, m)."""
+        n, m = self.n, self.m
+        out = np.empty((len(u), n * m))
+        first, second = self.field.first(self.active), self.field.second(self.active)
+        self.field.prepare(self.scale[:m])
+        with np.errstate(all="ignore"):
+            self._kernel(defining.bend_all)(
+                first, second, self.field.mode, n, self.par.copy(),
+                np.array(self.active, dtype=np.int64), self.scale[:m].copy(),
+                np.ascontiguousarray(u[:, :m]), np.ascontiguousarray(z), out,
+            )  # fmt: skip
+        return out.reshape(-1, n, m)
+
+    def twist(self, u: Array, a: Array, b: Array, c: Array) -> Array:
+        """The third derivative of f along three directions, of a symbolic field."""
+        third = self.field.third(self.active)
+        return self._derive(third, u, np.concatenate([a, b, c]), self.n)
+
+    def _derive(self, function: Any, u: Array, z: Array, count: int) -> Array:
+        n, m = self.n, self.m
+        place = 2 * m
+        out = place + z.size
+        w = np.zeros(out + count + 2 * m + 2 * n)
+        w[:m], w[m:place], w[place:out] = u[:m], self.scale[:m], z
+        self.field.prepare(self.scale[:m])
+        kernel = self._kernel(defining.second_derivatives)
+        with np.errstate(all="ignore"):
+            kernel(
+                self.field.first(self.active), function, self.field.mode, n, w, 0, self.par.copy(),
+                np.array(self.active, dtype=np.int64), m, place, out, out + count,
+            )  # fmt: skip
+        return w[out : out + count].copy()
+
+    def start_state(self, u: Array, tangent: Array) -> Array:
+        """The state of a trace that begins at a point, in the direction of its tangent."""
+        size, n = self.size, self.n
+        w = np.zeros(VECTORS * size + NUMBERS + n)
+        vectors = w[: VECTORS * size].reshape(VECTORS, size)
+        vectors[state_places.POINT] = vectors[state_places.START] = u
+        vectors[state_places.SCALE], vectors[state_places.WEIGHT] = self.scale, self.weight
+        t = tangent / self.length(tangent)
+        vectors[state_places.TANGENT] = vectors[state_places.BEFORE] = vectors[
+            state_places.START_TANGENT
+        ] = t
+        w[VECTORS * size + state_places.NEXT] = self.options.initial_step
+        if self.aux is not None:
+            w[VECTORS * size + NUMBERS :] = self.aux
+        return w
+
+    def follow(self, state: Array, points: int) -> Track:
+        """Follow the curve from a state for at most so many points."""
+        size, n, free = self.size, self.n, len(self.active)
+        o = self.options
+        settings = [o.max_step, o.min_step, o.tolerance, o.max_iterations, o.turn, o.max_turn]
+        fixed = np.concatenate([settings, self.period, self.low, self.high])
+        w = np.zeros(defining.work_size(self.kind, n, free))
+        w[: state.size] = state
+        kernel = self._kernel(trace.trace)
+        functions = self._functions()
+        active = np.array(self.active, dtype=np.int64)
+        columns = 2 * size + n * self.m + trace.RECORDED
+        records = []
+        reason = trace.FULL
+        which = 0
+        left = points
+        with np.errstate(all="ignore"):
+            while reason == trace.FULL and left > 0:
+                record = np.empty((min(left, CHUNK), columns))
+                count, reason, which = kernel(
+                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record
+                )
+                records.append(record[:count])
+                left -= count
+        record = np.concatenate(records) if records else np.empty((0, columns))
+        return Track(record, w[: state.size].copy(), self._stop(reason, which, record, w))
+
+    def _stop(self, reason: int, which: int, record: Array, w: Array) -> Stop:
+        names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]
+        where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
+        where += ", ..." if len(names) > 4 else ""
+        if reason == trace.BOUND and which >= self.m:
+            return Stop("bound", f"branches no longer meet on the curve beyond {where}")
+        if reason == trace.BOUND:
+            over = w[which] - self.low[which] > 0.5 * (self.high[which] - self.low[which])
+            if not np.isfinite(self.low[which]) or not np.isfinite(self.high[which]):
+                over = bool(np.isfinite(self.high[which])) or w[which] > 0.0
+            side, bound = ("upper", self.high) if over else ("lower", self.low)
+            return Stop("bound", f"{names[which]} met its {side} bound {bound[which]:.9g}")
+        if reason == trace.CLOSED:
+            return Stop("closed", f"the curve closed on its start at {where}")
+        if reason == trace.STUCK:
+            return Stop(
+                "stuck", f"no step longer than min_step = {self.options.min_step:g} converged "
+                f"at {where}",
+            )  # fmt: skip
+        if reason == trace.NOT_FINITE:
+            return Stop("not_finite", f"f is not finite beyond {where}")
+        return Stop(
+            "max_points", f"max_points were computed, the last at {where}; extend() goes on"
+        )
+
+    def replace(self, **changes: Any) -> Curve:
+        """A copy with changes."""
+        return replace(self, **changes)
+
+
+def nullspace(slopes: Array, scale: Array, *, tolerance: float = 1e-9) -> Array:
+    """Unit tangents (rows, on the scaled axes) of the kernel of f_u, least singular value last."""
+    scaled = slopes * scale
+    rows = np.max(np.abs(scaled), axis=1, keepdims=True)
+    _, values, vectors = np.linalg.svd(scaled / np.where(rows > 0.0, rows, 1.0))
+    n = slopes.shape[0]
+    rank = int(np.sum(values > tolerance * max(1e-300, values[0]))) if n else 0
+    return np.asarray(vectors[rank:] * scale)

@@ -1,0 +1,161 @@
+"""Where something happens on a path of equilibria: brackets of one special point each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.path import Path, Sample, between
+from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, test_functions
+
+DEPTH = 10
+TESTS = ("fold", "branch", "pair")
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """Two points of the path between which test functions change sign.
+
+    ``crossing`` counts eigenvalues that cross between them beyond what the changes explain.
+    """
+
+    a: Sample
+    b: Sample
+    changes: frozenset[str]
+    crossing: int
+    index: int = 0  # of the path's point before it
+
+
+def brackets(
+    curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
+) -> tuple[list[Bracket], npt.NDArray[np.complex128]]:
+    """All brackets of a path, in order, and the eigenvalues of f_x at its points."""
+    pairs = "hopf" in detect and curve.n > 1
+    tests = test_functions(curve, path.tangent, path.slopes, pairs=pairs)
+    if conservative or is_conservative(tests.eigenvalues):
+        tests = Tests(
+            tests.fold, tests.branch, np.ones(path.count), tests.unstable, tests.eigenvalues
+        )
+        pairs = False
+    eigenvalues = tests.eigenvalues
+    keep = _regular(tests)
+    tests = Tests(*(getattr(tests, f.name)[keep] for f in fields(tests)))
+    seek = _Seek(curve, pairs, detect)
+    found: list[Bracket] = []
+    signs = {name: np.sign(getattr(tests, name)) for name in TESTS}
+    for i in seek.interesting(tests, signs):
+        a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
+        for bracket in seek.explore(a, b, DEPTH, force=True):
+            found.append(replace(bracket, index=int(keep[i])))
+    return found, eigenvalues
+
+
+def _regular(tests: Tests) -> npt.NDArray[np.int64]:
+    """Points that are no branch points themselves, where signs are those of rounding errors."""
+    size = np.abs(tests.branch)
+    around = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
+    regular = size > 1e-7 * around
+    regular[[0, -1]] = True
+    return np.flatnonzero(regular | (len(size) < 3))
+
+
+class _Seek:
+    def __init__(self, curve: Curve, pairs: bool, detect: tuple[str, ...]) -> None:
+        self.curve, self.pairs, self.detect = curve, pairs, detect
+        self.seen: dict[int, tuple[Sample, Tests]] = {}  # the sample itself keeps its id alive
+
+    def interesting(self, tests: Tests, signs: dict[str, np.ndarray]) -> list[int]:
+        """Intervals with a change, and those beside a test function that almost has one."""
+        marked: set[int] = set()
+        count = len(tests.fold)
+        for name in TESTS:
+            sign = signs[name]
+            marked.update(np.flatnonzero(sign[1:] != sign[:-1]).tolist())
+            value = np.abs(getattr(tests, name))
+            if count < 3:
+                continue
+            left, middle, right = value[:-2], value[1:-1], value[2:]
+            dip = (middle <= left) & (middle <= right) & (sign[:-2] == sign[2:])
+            # The parabola through three points: what is left of the value at its lowest point.
+            bend = left - 2.0 * middle + right
+            with np.errstate(all="ignore"):
+                lowest = middle - (right - left) ** 2 / (8.0 * bend)
+            near = dip & ((lowest < 0.3 * middle) | (middle < 0.6 * np.minimum(left, right)))
+            for i in np.flatnonzero(near):
+                marked.update((int(i), int(i) + 1))
+        if self.pairs or self.curve.n > 1:
+            marked.update(np.flatnonzero(np.diff(tests.unstable) != 0).tolist())
+        return sorted(marked)
+
+    def tests(self, sample: Sample) -> Tests:
+        key = id(sample)
+        if key not in self.seen:
+            tests = test_functions(self.curve, sample.tangent, sample.slopes, pairs=self.pairs)
+            self.seen[key] = (sample, tests)
+        return self.seen[key][1]
+
+    def value(self, name: str) -> Callable[[Sample], float]:
+        return lambda sample: float(getattr(self.tests(sample), name))
+
+    def explore(self, a: Sample, b: Sample, depth: int, *, force: bool) -> Iterator[Bracket]:
+        """Brackets between two points; the interval is halved where it holds more than one."""
+        one, two = self.tests(a), self.tests(b)
+        changes = {n for n in TESTS if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
+        jump = abs(int(two.unstable) - int(one.unstable))
+        simple = len(changes & {"fold", "branch"})
+        explained = simple + 2 * ("pair" in changes)
+        odd = (jump - simple) % 2 != 0 and bool(changes or jump)
+        several = jump > explained or len(changes) > 1 or (odd and self.curve.n > 1)
+        if several and depth > 0:
+            middle = between(self.curve, a, b, 0.5)
+            if middle is not None:
+                yield from self.explore(a, middle, depth - 1, force=False)
+                yield from self.explore(middle, b, depth - 1, force=False)
+                return
+        if changes or jump:
+            yield Bracket(a, b, frozenset(changes), max(0, jump - explained))
+        elif force:
+            split = self._dip(a, b)
+            if split is not None:
+                yield from self.explore(a, split, depth - 1, force=False)
+                yield from self.explore(split, b, depth - 1, force=False)
+
+    def _dip(self, a: Sample, b: Sample) -> Sample | None:
+        """A point between with the other sign of a test function that almost vanishes, if any."""
+        for name in TESTS:
+            if name == "pair" and not self.pairs:
+                continue
+            test = self.value(name)
+            sign = np.sign(test(a))
+            low, high = 0.0, 1.0
+            ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+            marks: list[tuple[float, float]] = []
+            for s in (1.0 - ratio, ratio):
+                sample = between(self.curve, a, b, s)
+                if sample is None:
+                    break
+                if sign * test(sample) <= 0.0:
+                    return sample
+                marks.append((s, sign * test(sample)))
+            if len(marks) < 2:
+                continue
+            for _ in range(12):  # golden section
+                (s1, v1), (s2, v2) = marks
+                if v1 < v2:
+                    high = s2
+                    new = high - ratio * (high - low)
+                else:
+                    low = s1
+                    new = low + ratio * (high - low)
+                sample = between(self.curve, a, b, new)
+                if sample is None:
+                    break
+                value = sign * test(sample)
+                if value <= 0.0:
+                    return sample
+                marks = sorted([(new, value), marks[0] if v1 < v2 else marks[1]])
+        return None

@@ -1,0 +1,146 @@
+"""Right-hand sides in the form that the stepping code calls.
+
+A `Field` is f(x, p) with all its parameters. `first(active)` and `second(active)` are what the
+kernels of `phasekit.kernels.trace` take: functions of the unknowns u = (x, free parameters) that
+write f with its derivatives by u, row by row; the second goes on with the derivatives of f_u z.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.kernels.defining import DERIVED
+
+Array = npt.NDArray[np.float64]
+
+
+class Field:
+    """A right-hand side with states and parameters by name."""
+
+    mode = DERIVED
+    compiled = True
+    accuracy = 1e-13  # of its first derivatives, relative
+
+    def __init__(self, states: Sequence[str], parameters: Sequence[str]) -> None:
+        self.states, self.parameters = tuple(states), tuple(parameters)
+
+    def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Any:
+        """F and its derivatives, or f alone where the mode is PLAIN.
+
+        ``sharp`` asks for derivatives of points that are refined, where they may take longer.
+        """
+        raise NotImplementedError
+
+    def second(self, active: tuple[int, ...]) -> Any:
+        """Function that writes f, its derivatives and those of f_u z."""
+        raise NotImplementedError
+
+    def third(self, active: tuple[int, ...]) -> Any:
+        """Third derivative along the three directions that z holds, of a symbolic field."""
+        raise NotImplementedError
+
+    def prepare(self, scale: Array) -> None:
+        """Take the scales of the states, for differences."""
+
+
+class SymbolicField(Field):
+    """A right-hand side of sympy expressions; its derivatives are exact."""
+
+    def __init__(
+        self, expressions: Sequence[Any], states: Sequence[str], parameters: Sequence[str]
+    ) -> None:
+        super().__init__(states, parameters)
+        self.expressions = tuple(expressions)
+
+    def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
+        """Machine code for f and its derivatives."""
+        return _first(self.expressions, self.states, self.parameters, active)
+
+    def second(self, active: tuple[int, ...]) -> int:
+        """Machine code for f, its derivatives and those of f_u z."""
+        return _second(self.expressions, self.states, self.parameters, active)
+
+    def third(self, active: tuple[int, ...]) -> int:
+        """Machine code for the third derivative along three directions."""
+        return _third(self.expressions, self.states, self.parameters, active)
+
+
+def _unknowns(
+    states: tuple[str, ...], parameters: tuple[str, ...], active: tuple[int, ...]
+) -> tuple[list[Any], dict[Any, tuple[int, int]]]:
+    import sympy
+
+    names = [*states, *(parameters[i] for i in active)]
+    u = [sympy.Symbol(name, real=True) for name in names]
+    places = {sympy.Symbol(name, real=True): (1, i) for i, name in enumerate(parameters)}
+    places.update({symbol: (0, i) for i, symbol in enumerate(u)})
+    return u, places
+
+
+def _derivative(expression: Any, symbol: Any) -> Any:
+    return expression.diff(symbol) if symbol in expression.free_symbols else expression * 0
+
+
+@functools.lru_cache(maxsize=256)
+def _first(
+    expressions: tuple[Any, ...],
+    states: tuple[str, ...],
+    parameters: tuple[str, ...],
+    active: tuple[int, ...],
+) -> int:
+    from phasekit.bifurcation.continuation.machine import compile_expressions
+
+    u, places = _unknowns(states, parameters, active)
+    return compile_expressions(
+        [*expressions, *(_derivative(e, s) for e in expressions for s in u)], places
+    )
+
+
+@functools.lru_cache(maxsize=256)
+def _second(
+    expressions: tuple[Any, ...],
+    states: tuple[str, ...],
+    parameters: tuple[str, ...],
+    active: tuple[int, ...],
+) -> int:
+    import sympy
+
+    from phasekit.bifurcation.continuation.machine import compile_expressions
+
+    u, places = _unknowns(states, parameters, active)
+    z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
+    along = [*expressions, *(_derivative(e, s) for e in expressions for s in u)]
+    for e in expressions:
+        slope = sympy.Add(*(_derivative(e, s) * t for s, t in zip(u, z, strict=True)))
+        along.extend(_derivative(slope, s) for s in u)
+    places.update({symbol: (2, i) for i, symbol in enumerate(z)})
+    return compile_expressions(along, places)
+
+
+@functools.lru_cache(maxsize=256)
+def _third(
+    expressions: tuple[Any, ...],
+    states: tuple[str, ...],
+    parameters: tuple[str, ...],
+    active: tuple[int, ...],
+) -> int:
+    import sympy
+
+    from phasekit.bifurcation.continuation.machine import compile_expressions
+
+    u, places = _unknowns(states, parameters, active)
+    z = [sympy.Dummy(f"z{i}", real=True) for i in range(3 * len(u))]
+    along = list(expressions)
+    for k in range(3):
+        directions = z[k * len(u) : (k + 1) * len(u)]
+        along = [
+            sympy.Add(*(_derivative(e, s) * t for s, t in zip(u, directions, strict=True)))
+            for e in along
+        ]
+    places.update({symbol: (2, i) for i, symbol in enumerate(z)})
+    return compile_expressions(along, places)

@@ -1,0 +1,252 @@
+"""Expressions to machine code: a straight-line native function that fills an array.
+
+A symbolic system needs no more of a compiler than this, and is ready in milliseconds.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import llvmlite.binding as llvm
+import sympy
+from llvmlite import ir
+
+from phasekit.errors import ParameterError
+
+_DOUBLE = ir.DoubleType()
+_KEPT: list[Any] = []  # machine code lives as long as the process
+
+#: Functions of one argument that come from the C library.
+_LIBRARY = {
+    "sin": "sin",
+    "cos": "cos",
+    "tan": "tan",
+    "asin": "asin",
+    "acos": "acos",
+    "atan": "atan",
+    "sinh": "sinh",
+    "cosh": "cosh",
+    "tanh": "tanh",
+    "asinh": "asinh",
+    "acosh": "acosh",
+    "atanh": "atanh",
+    "exp": "exp",
+    "log": "log",
+    "erf": "erf",
+    "erfc": "erfc",
+    "gamma": "tgamma",
+    "loggamma": "lgamma",
+}
+_COMPARISONS = {
+    sympy.StrictLessThan: "<",
+    sympy.LessThan: "<=",
+    sympy.StrictGreaterThan: ">",
+    sympy.GreaterThan: ">=",
+    sympy.Equality: "==",
+    sympy.Unequality: "!=",
+}
+
+
+def compile_expressions(
+    expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Symbol, tuple[int, int]]
+) -> int:
+    """Address of ``void (double *x, double *p, double *z, double *out)``.
+
+    Parameters
+    ----------
+    expressions : sequence of sympy.Expr
+        One for each entry of ``out``.
+    inputs : mapping
+        Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
+
+    Raises
+    ------
+    ParameterError
+        If an expression holds a function that has no machine code.
+    """
+    pointer = _DOUBLE.as_pointer()
+    module = ir.Module(name="phasekit")
+    module.triple = llvm.get_process_triple()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer] * 4), name="fill")
+    builder = ir.IRBuilder(function.append_basic_block())
+    shared, results = sympy.cse(list(expressions), symbols=sympy.numbered_symbols("_c"))
+    writer = _Writer(module, builder, function.args, inputs)
+    for symbol, expression in shared:
+        writer.values[symbol] = writer.write(expression)
+    values = [writer.write(result) for result in results]
+    for i, value in enumerate(values):
+        builder.store(value, writer.place(function.args[3], i))
+    builder.ret_void()
+    return _machine_code(str(module))
+
+
+@functools.cache
+def _target() -> Any:
+    try:
+        llvm.initialize_native_target()
+        llvm.initialize_native_asmprinter()
+    except RuntimeError:
+        pass  # newer versions initialise themselves
+    return llvm.Target.from_triple(llvm.get_process_triple())
+
+
+def _machine_code(text: str) -> int:
+    target = _target()
+    module = llvm.parse_assembly(text)
+    module.verify()
+    engine = llvm.create_mcjit_compiler(module, target.create_target_machine(opt=2))
+    engine.finalize_object()
+    _KEPT.append(engine)
+    return int(engine.get_function_address("fill"))
+
+
+class _Writer:
+    """Writes expressions as instructions; every value is a double."""
+
+    def __init__(
+        self,
+        module: ir.Module,
+        builder: ir.IRBuilder,
+        arrays: Sequence[Any],
+        inputs: Mapping[sympy.Symbol, tuple[int, int]],
+    ) -> None:
+        self.module, self.builder = module, builder
+        self.arrays, self.inputs = arrays, inputs
+        self.values: dict[Any, Any] = {}
+
+    def place(self, array: Any, index: int) -> Any:
+        return self.builder.gep(array, [ir.Constant(ir.IntType(64), index)])
+
+    def library(self, name: str, *args: Any) -> Any:
+        known = self.module.globals.get(name)
+        if known is None:
+            kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * len(args))
+            known = ir.Function(self.module, kind, name=name)
+        return self.builder.call(known, args)
+
+    def write(self, expression: Any) -> Any:
+        """The value of an expression."""
+        if expression not in self.values:
+            self.values[expression] = self._write(expression)
+        return self.values[expression]
+
+    def _write(self, e: Any) -> Any:
+        b = self.builder
+        if e.is_Symbol:
+            which, index = self.inputs[e]
+            return b.load(self.place(self.arrays[which], index))
+        if e.is_number and e.is_real and not e.free_symbols:
+            return ir.Constant(_DOUBLE, float(e))
+        if e.is_Add:
+            # Products with a negative coefficient are subtracted.
+            value = None
+            for term in e.args:
+                minus = term.could_extract_minus_sign()
+                part = self.write(-term if minus else term)
+                if value is None:
+                    value = b.fneg(part) if minus else part
+                else:
+                    value = b.fsub(value, part) if minus else b.fadd(value, part)
+            return value
+        if e.is_Mul:
+            return self._product(e)
+        if e.is_Pow:
+            return self._power(self.write(e.base), e)
+        name = type(e).__name__
+        if name in _LIBRARY:
+            return self.library(_LIBRARY[name], self.write(e.args[0]))
+        if name == "atan2":
+            return self.library("atan2", *(self.write(x) for x in e.args))
+        if name == "Abs":
+            value = self.write(e.args[0])
+            return b.select(b.fcmp_ordered("<", value, _constant(0.0)), b.fneg(value), value)
+        if name == "DiracDelta":
+            return _constant(0.0)  # the derivative of a jump, anywhere but on it
+        if name in ("sign", "Heaviside"):
+            value, zero = self.write(e.args[0]), _constant(0.0)
+            below, middle = (-1.0, 0.0) if name == "sign" else (0.0, 0.5)
+            other = b.select(b.fcmp_ordered("<", value, zero), _constant(below), _constant(middle))
+            return b.select(b.fcmp_ordered(">", value, zero), _constant(1.0), other)
+        if name in ("Max", "Min"):
+            value = self.write(e.args[0])
+            for argument in e.args[1:]:
+                other = self.write(argument)
+                better = b.fcmp_ordered(">" if name == "Max" else "<", other, value)
+                value = b.select(better, other, value)
+            return value
+        if name == "Piecewise":
+            value = _constant(math.nan)
+            for part, condition in reversed(e.args):
+                value = b.select(self._condition(condition), self.write(part), value)
+            return value
+        raise ParameterError(
+            f"f: got the function {name} in {e}, wants elementary functions; "
+            "a Python or numba-compiled f may hold any"
+        )
+
+    def _condition(self, c: Any) -> Any:
+        if c in (sympy.true, sympy.false):
+            return ir.Constant(ir.IntType(1), int(bool(c)))
+        if type(c) in _COMPARISONS:
+            left, right = self.write(c.lhs), self.write(c.rhs)
+            return self.builder.fcmp_ordered(_COMPARISONS[type(c)], left, right)
+        if isinstance(c, (sympy.And, sympy.Or)):
+            value = self._condition(c.args[0])
+            for other in c.args[1:]:
+                join = self.builder.and_ if isinstance(c, sympy.And) else self.builder.or_
+                value = join(value, self._condition(other))
+            return value
+        if isinstance(c, sympy.Not):
+            return self.builder.not_(self._condition(c.args[0]))
+        raise ParameterError(f"f: got the condition {c}, wants comparisons")
+
+    def _product(self, e: Any) -> Any:
+        b = self.builder
+        above, below = [], []
+        for factor in e.args:
+            if factor.is_Pow and factor.exp.is_number and factor.exp.is_negative:
+                below.append(sympy.Pow(factor.base, -factor.exp))
+            else:
+                above.append(factor)
+        minus = above and above[0] == -1
+        if minus:
+            above = above[1:]
+        value = self.write(above[0]) if above else _constant(1.0)
+        for factor in above[1:]:
+            value = b.fmul(value, self.write(factor))
+        if below:
+            divisor = self.write(below[0])
+            for factor in below[1:]:
+                divisor = b.fmul(divisor, self.write(factor))
+            value = b.fdiv(value, divisor)
+        return b.fneg(value) if minus else value
+
+    def _power(self, base: Any, e: Any) -> Any:
+        b, exponent = self.builder, e.exp
+        if exponent.is_Integer and 0 < abs(int(exponent)) <= 64:
+            value = self._repeated(base, abs(int(exponent)))
+            return value if exponent > 0 else b.fdiv(_constant(1.0), value)
+        if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) <= 64:
+            root = self.library("sqrt", base)
+            value = self._repeated(root, abs(int(exponent.p)))
+            return value if exponent > 0 else b.fdiv(_constant(1.0), value)
+        if e.base is sympy.E:
+            return self.library("exp", self.write(exponent))
+        return self.library("pow", base, self.write(exponent))
+
+    def _repeated(self, value: Any, times: int) -> Any:
+        result = None
+        while True:
+            if times & 1:
+                result = value if result is None else self.builder.fmul(result, value)
+            times >>= 1
+            if not times:
+                return result
+            value = self.builder.fmul(value, value)
+
+
+def _constant(value: float) -> Any:
+    return ir.Constant(_DOUBLE, value)

@@ -1,0 +1,164 @@
+"""All options of a continuation in one frozen object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from phasekit.errors import ParameterError
+
+DIRECTIONS = ("both", "forward", "backward")
+DETECTABLE = ("fold", "branch_point", "hopf")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContinuationOptions:
+    """Options of a continuation. The defaults suit most problems.
+
+    Lengths are measured on scaled axes: the parameter by the width of its span, an angle by its
+    period over 2 pi, another state by its size along the branch (or by `scales`). So a step of
+    0.05 is a twentieth of the span where only the parameter changes.
+
+    Parameters
+    ----------
+    max_step : float, default 0.05
+        Longest step. Make it smaller where a branch jumps to another one or for a smoother
+        picture; larger for long, dull branches.
+    min_step : float, default 1e-9
+        Shortest step, below which the branch ends as stuck. Rarely changed.
+    initial_step : float, default 0.01
+        First step. Make it smaller where already the first step goes astray.
+    max_points : int, default 2000
+        Most points in each direction. A branch that ends for this reason can be extended.
+    tolerance : float, default 1e-11
+        Size of the last Newton step, on scaled axes, at which a point counts as found; the step
+        is still made, so that points are accurate to rounding. Raise it for functions that are
+        noisy (1e-7 for the result of an integration).
+    max_iterations : int, default 8
+        Newton steps for one point before the step is shortened.
+    turn : float, default 0.15
+        Angle in rad between the tangents of neighbouring points that steps aim at. Make it
+        smaller for a smoother curve, larger for speed.
+    max_turn : float, default 0.5
+        Angle at which a step is refused and shortened. Make it smaller where a branch jumps.
+    directions : {"both", "forward", "backward"}
+        From the start to both sides, or only towards larger or smaller parameters.
+    detect : sequence of {"fold", "branch_point", "hopf"}
+        What is looked for; neutral saddles come with Hopf points. Leave out what is not wanted to
+        save time with many states.
+    bounds : mapping of str to (float, float), optional
+        Limits of states by name (and of other free parameters): the branch ends on them.
+    scales : mapping of str to float, optional
+        Sizes of states by name, where those found along the branch mislead.
+
+    Raises
+    ------
+    ParameterError
+        If a value is unusable.
+
+    Examples
+    --------
+    >>> ContinuationOptions(max_step=0.01).max_step
+    0.01
+    """
+
+    max_step: float = 0.05
+    min_step: float = 1e-9
+    initial_step: float = 0.01
+    max_points: int = 2000
+    tolerance: float = 1e-11
+    max_iterations: int = 8
+    turn: float = 0.15
+    max_turn: float = 0.5
+    directions: str = "both"
+    detect: tuple[str, ...] = DETECTABLE
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    scales: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Check every value."""
+        for name in ("max_step", "min_step", "initial_step", "tolerance", "turn", "max_turn"):
+            value = _number(name, getattr(self, name))
+            if not value > 0.0:
+                raise ParameterError(f"{name}: got {value!r}, wants a number > 0")
+            object.__setattr__(self, name, value)
+        for name in ("max_points", "max_iterations"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
+                raise ParameterError(f"{name}: got {value!r}, wants a whole number >= 1")
+            object.__setattr__(self, name, int(value))
+        if not self.min_step <= self.initial_step:
+            raise ParameterError(
+                f"initial_step: got {self.initial_step}, wants at least min_step = {self.min_step}"
+            )
+        if not self.initial_step <= self.max_step:
+            object.__setattr__(self, "initial_step", self.max_step)
+        if not self.min_step < self.max_step:
+            raise ParameterError(
+                f"max_step: got {self.max_step}, wants more than min_step = {self.min_step}"
+            )
+        if not self.tolerance <= 1e-3:
+            raise ParameterError(f"tolerance: got {self.tolerance}, wants at most 1e-3")
+        if not self.turn <= self.max_turn < 1.5:
+            raise ParameterError(
+                f"max_turn: got {self.max_turn} with turn = {self.turn}, wants turn <= max_turn "
+                "< 1.5 rad"
+            )
+        if self.directions not in DIRECTIONS:
+            raise ParameterError(
+                f"directions: got {self.directions!r}, wants {', '.join(DIRECTIONS)}"
+            )
+        given: Any = self.detect
+        detect = (given,) if isinstance(given, str) else tuple(given)
+        for name in detect:
+            if name not in DETECTABLE:
+                raise ParameterError(f"detect: got {name!r}, wants {', '.join(DETECTABLE)}")
+        object.__setattr__(self, "detect", detect)
+        bounds = {}
+        for name, pair in _mapping("bounds", self.bounds).items():
+            try:
+                low, high = (float(value) for value in pair)
+            except (TypeError, ValueError):
+                raise ParameterError(
+                    f"bounds: got {pair!r} for {name}, wants a pair (low, high)"
+                ) from None
+            if not low < high:
+                raise ParameterError(f"bounds: got {pair!r} for {name}, wants low < high")
+            bounds[name] = (low, high)
+        object.__setattr__(self, "bounds", MappingProxyType(bounds))
+        scales = {}
+        for name, value in _mapping("scales", self.scales).items():
+            scales[name] = _number(f"scales[{name!r}]", value)
+            if not scales[name] > 0.0:
+                raise ParameterError(f"scales: got {value!r} for {name}, wants a number > 0")
+        object.__setattr__(self, "scales", MappingProxyType(scales))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The options as plain values, which make the same options again."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values["detect"] = list(self.detect)
+        values["bounds"] = {name: list(pair) for name, pair in self.bounds.items()}
+        values["scales"] = dict(self.scales)
+        return values
+
+    def __hash__(self) -> int:
+        """Hash of the values."""
+        return hash(repr(self.as_dict()))
+
+
+def _number(name: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise ParameterError(f"{name}: got {value!r}, wants a number")
+    if not np.isfinite(value):
+        raise ParameterError(f"{name}: got {value!r}, wants a finite number")
+    return float(value)
+
+
+def _mapping(name: str, value: Any) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{name}: got {value!r}, wants a mapping from names")
+    return dict(value)

@@ -1,0 +1,168 @@
+"""A traced curve as one path from its backward to its forward end, and points between points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.kernels import trace
+from phasekit.kernels.defining import EQUILIBRIUM
+
+Array = npt.NDArray[np.float64]
+
+DOUBTFUL = 1e-6  # real parts that are smaller, relative to the largest eigenvalue of the path
+
+
+@dataclass(frozen=True)
+class Path:
+    """Points in order: unknowns, unit tangents along the path, derivatives of f, step data."""
+
+    u: Array
+    tangent: Array
+    slopes: Array
+    info: Array
+    start: int
+    stops: tuple[Stop, Stop]
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.u)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the path ends on its start."""
+        return self.stops[1].reason == "closed"
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One point of a path, with what test functions need."""
+
+    u: Array
+    tangent: Array
+    slopes: Array
+
+
+def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | None) -> Path:
+    """One path of two tracks from the same start; the start stands once between them."""
+    size, n, m = curve.size, curve.n, curve.m
+    columns = 2 * size + n * m + trace.RECORDED
+    middle = np.zeros((1, columns))
+    middle[0, :size], middle[0, size : 2 * size] = start.u, start.tangent
+    middle[0, 2 * size : 2 * size + n * m] = start.slopes.ravel()
+    nothing = np.empty((0, columns))
+    # A copy: the record belongs to the track.
+    behind = np.array(backward.record[::-1]) if backward is not None else nothing
+    behind[:, size : 2 * size] *= -1.0
+    behind[:, -trace.RECORDED + trace.ARCLENGTH] *= -1.0
+    ahead = forward.record if forward is not None else nothing
+    table = np.concatenate([behind, middle, ahead])
+    start_stop = Stop("start", "the start; this direction was not asked for")
+    stops = (
+        backward.stop if backward is not None else start_stop,
+        forward.stop if forward is not None else start_stop,
+    )
+    if forward is not None and forward.stop.reason == "closed":
+        stops = (forward.stop, forward.stop)
+    slopes = table[:, 2 * size : 2 * size + n * m].reshape(-1, n, m)
+    return Path(
+        table[:, :size],
+        table[:, size : 2 * size],
+        _sharpened(curve, table[:, :size], slopes),
+        table[:, -trace.RECORDED :],
+        len(behind),
+        stops,
+    )
+
+
+def _sharpened(curve: Curve, u: Array, slopes: Array) -> Array:
+    """Derivatives at the points themselves, where the sign of an eigenvalue could hang on it.
+
+    A trace leaves those of the point before the last Newton step. On curves of special points an
+    eigenvalue is zero everywhere, and its sign says nothing.
+    """
+    if curve.kind != EQUILIBRIUM:
+        return slopes
+    values = eigenvalues_of(slopes)
+    size = np.max(np.abs(values), axis=1)
+    with np.errstate(all="ignore"):
+        doubtful = np.min(np.abs(values.real), axis=1) < DOUBTFUL * np.nanmax(size)
+    for i in np.flatnonzero(doubtful):
+        slopes[i] = curve.at(u[i])[1]
+    return slopes
+
+
+def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | None:
+    """The point of the curve at a fraction of the chord from a to b; None if it is not found."""
+    chord = b.u - a.u
+    row = curve.weight * chord
+    h = curve.length(chord)
+    if not h > 0.0:
+        return None
+    s = fraction
+    # The cubic with the tangents of both ends.
+    guess = (
+        a.u
+        + (3.0 - 2.0 * s) * s * s * chord
+        + h * s * (1.0 - s) * ((1.0 - s) * a.tangent - s * b.tangent)
+    )
+    guess += (s - np.dot(row, guess - a.u) / np.dot(row, chord)) * chord
+    point = curve.refine(guess, row)
+    if not point.converged or curve.length(point.u - guess) > 0.5 * h:
+        return None
+    sign = 1.0 if np.dot(row, point.tangent) >= 0.0 else -1.0
+    return Sample(point.u, sign * point.tangent, point.slopes)
+
+
+def bracket_root(
+    curve: Curve,
+    a: Sample,
+    b: Sample,
+    test: Callable[[Sample], float],
+    *,
+    steps: int = 12,
+    width: float = 1e-5,
+) -> tuple[Sample, Sample, Sample]:
+    """Narrow a change of sign of a test function: the best sample, and the two around it.
+
+    Bisection and regula falsi by turns (Illinois), on the chord between two points.
+    """
+    left, right = a, b
+    low, high = 0.0, 1.0
+    at_low, at_high = test(a), test(b)
+    best = a if abs(at_low) < abs(at_high) else b
+    least = min(abs(at_low), abs(at_high))
+    side = 0
+    for step in range(steps):
+        s = 0.5 * (low + high)
+        if step % 3 < 2 and np.isfinite(at_low) and np.isfinite(at_high) and at_low != at_high:
+            s = (low * at_high - high * at_low) / (at_high - at_low)
+            s = min(max(s, low + 0.02 * (high - low)), high - 0.02 * (high - low))
+        sample = between(curve, a, b, s)
+        if sample is None:
+            sample = between(curve, a, b, 0.5 * (low + high) + 0.1234 * (high - low))
+            s = 0.5 * (low + high) + 0.1234 * (high - low)
+            if sample is None:
+                break
+        value = test(sample)
+        if abs(value) < least or not np.isfinite(least):
+            best, least = sample, abs(value)
+        if value == 0.0:
+            break
+        if (value > 0.0) == (at_high > 0.0):
+            high, at_high, right = s, value, sample
+            at_low *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low, at_low, left = s, value, sample
+            at_high *= 0.5 if side == -1 else 1.0
+            side = -1
+        if high - low < width:
+            break
+    return best, left, right

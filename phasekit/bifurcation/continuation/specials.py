@@ -1,0 +1,119 @@
+"""All special points of a path, in order and once each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.compare import turned
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.events import Bracket, brackets
+from phasekit.bifurcation.continuation.locate import CONVERGED, Special, locate
+from phasekit.bifurcation.continuation.path import Path
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.kernels.defining import EQUILIBRIUM
+
+Array = npt.NDArray[np.float64]
+SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
+TURNS = 1e-4  # part of a unit tangent along the parameter, on scaled axes
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A special point and where it stands: after which point of the path, how far along."""
+
+    index: int
+    along: float
+    special: Special
+
+
+def find(
+    curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
+) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
+    """Special points of a path, and the eigenvalues of f_x at its points."""
+    with np.errstate(all="ignore"):
+        return _find(curve, path, detect, conservative)
+
+
+def _find(
+    curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
+) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
+    if curve.kind != EQUILIBRIUM:
+        from phasekit.bifurcation.continuation.codimension_two import find_on
+
+        return find_on(curve, path), eigenvalues_of(path.slopes)
+    found, eigenvalues = brackets(curve, path, detect, conservative)
+    placed: list[Placed] = []
+    for bracket in found:
+        for special in locate(curve, bracket):
+            if not wanted(special, detect):
+                continue
+            placed.append(place(curve, path, bracket, special))
+    placed = unique(curve, placed)
+    # The start of a closed curve is its end as well.
+    if path.closed and len(placed) > 1:
+        first, last = placed[0], placed[-1]
+        if first.special.kind == last.special.kind and _distance(curve, first, last) < SAME:
+            placed = placed[:-1]
+    return placed, eigenvalues
+
+
+def wanted(special: Special, detect: tuple[str, ...]) -> bool:
+    """Whether a kind was asked for."""
+    group = {"fold": "fold", "hopf": "hopf", "neutral_saddle": "hopf"}
+    return group.get(special.kind, "branch_point") in detect
+
+
+def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:
+    """Where on the path a special point stands."""
+    i = bracket.index
+    m = curve.m
+    chord = path.u[i + 1] - path.u[i]
+    gap = np.zeros(curve.size)
+    gap[:m] = special.u[:m] - path.u[i, :m]
+    square = float(np.dot(curve.weight * chord, chord))
+    return Placed(i, float(np.dot(curve.weight * chord, gap)) / square if square else 0.0, special)
+
+
+def unique(curve: Curve, placed: list[Placed]) -> list[Placed]:
+    """In order along the path, each once: one that lies on a point of the path is seen twice."""
+    placed = sorted(placed, key=lambda one: (one.index, one.along))
+    kept: list[Placed] = []
+    for one in placed:
+        twin = None
+        for i in range(len(kept) - 1, max(-1, len(kept) - 4), -1):
+            other = kept[i]
+            near = one.index - other.index <= 2 and other.special.kind == one.special.kind
+            if near and _distance(curve, one, other) < SAME:
+                twin = i
+        if twin is None:
+            kept.append(one)
+        elif kept[twin].special.status != "converged" and one.special.status == "converged":
+            kept[twin] = one
+    return [one for one in kept if not _echo(curve, one, kept)]
+
+
+def _distance(curve: Curve, one: Placed, other: Placed) -> float:
+    """Distance on scaled axes, angles modulo their periods."""
+    m = curve.m
+    gap = turned(curve, one.special.u[:m] - other.special.u[:m])
+    return float(np.sqrt(np.sum((gap / curve.scale[:m]) ** 2)))
+
+
+def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
+    """Whether a fold is but the turn of a pitchfork's side branch at the pitchfork itself."""
+    if one.special.status != CONVERGED and one.special.extra is None:  # a multiple point
+        for other in all_:
+            if other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
+                return True
+    if one.special.kind != "fold":
+        return False
+    for other in all_:
+        t = other.special.tangent
+        if other.special.kind in ("pitchfork", "branch_point") and t is not None:
+            flat = abs(t[curve.n]) / curve.scale[curve.n] < TURNS
+            if flat and _distance(curve, one, other) < 1e2 * SAME:
+                return True
+    return False

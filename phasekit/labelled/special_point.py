@@ -1,0 +1,139 @@
+"""`SpecialPoint`: where something happens on a branch."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.locate import Special
+from phasekit.labelled.branch_points import LABELS, eigenvalues_at, wrap
+from phasekit.labelled.problem import Problem
+
+if TYPE_CHECKING:
+    from phasekit.labelled.branch import Branch
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpecialPoint:
+    """A point of a branch where something happens.
+
+    Attributes
+    ----------
+    kind : str
+        fold, branch_point, pitchfork, transcritical, hopf, neutral_saddle, cusp,
+        bogdanov_takens, generalized_hopf, zero_hopf or end.
+    label : str
+        LP, BP (also pitchfork and transcritical), H, NS, CP, BT, GH, ZH or EP.
+    x : ndarray
+        The state.
+    parameters : mapping of str to float
+        All parameters there.
+    interval : tuple of float
+        The values of the (first) free parameter at the two points of the branch between which it
+        was found; a fold may lie beside it by the square of the step.
+    residual : float
+        Largest residual of the equations that define it, in the units of f.
+    status : {"converged", "guess"}
+        Whether these equations were solved to rounding. A guess is a point of the branch.
+    message : str
+        Why it is a guess, or why the branch ends.
+    normal_form : mapping of str to float
+        Coefficients on the center manifold, p the parameter, critical eigenvector of unit length:
+        fold ``xi' = b (p - p0) + a xi^2``; transcritical ``xi' = d (p - p0) xi + a xi^2``;
+        pitchfork ``xi' = d (p - p0) xi + c xi^3`` (supercritical: c < 0); Hopf: ``l1``, the first
+        Lyapunov coefficient (divided by 2 omega once, see Notes), ``omega`` and ``d``, the speed
+        at which the real part grows with the parameter.
+    eigenvalues : ndarray
+        Eigenvalues of f_x.
+
+    Notes
+    -----
+    ``l1 = Re[<p, C(q, q, q*)> - 2 <p, B(q, A^-1 B(q, q*))> + <p, B(q*, (2 i omega - A)^-1
+    B(q, q))>]/(2 omega)`` with ``<q, q> = <p, q> = 1`` ([Kuznetsov2004] (5.62)); negative:
+    supercritical.
+    """
+
+    kind: str
+    x: FloatArray
+    parameters: Mapping[str, float]
+    interval: tuple[float, float]
+    residual: float
+    status: str
+    message: str
+    normal_form: Mapping[str, float]
+    eigenvalues: npt.NDArray[np.complex128]
+    index: int
+    special: Special
+    branch: Branch
+
+    @property
+    def label(self) -> str:
+        """LP, BP, H, NS, CP, BT, GH, ZH or EP."""
+        return LABELS[self.kind]
+
+    def __getitem__(self, name: str) -> float:
+        """A state or parameter by name."""
+        if name in self.branch.problem_state:
+            return float(self.x[self.branch.problem_state.index(name)])
+        return self.parameters[name]
+
+    def switch(self, *, options: Any = None) -> Branch:
+        """The other branch through a branch point.
+
+        See Also
+        --------
+        continuation, diagram
+        """
+        return _module("switch")(self, options=options)  # type: ignore[no-any-return]
+
+    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Branch:
+        """The curve of such points in this branch's parameter and a second one."""
+        return _module("point_curve")(self, parameter, span, options=options)  # type: ignore[no-any-return]
+
+    def __repr__(self) -> str:
+        """Write kind, place and how well it is known."""
+        where = [f"{name}={self.parameters[name]:.10g}" for name in self.branch.free]
+        where += [
+            f"{n}={v:.6g}" for n, v in zip(self.branch.problem_state[:4], self.x, strict=False)
+        ]
+        notes = [f"{name}={value:.6g}" for name, value in self.normal_form.items()]
+        notes += [self.status] if self.status != "converged" else []
+        notes += [self.message] if self.message else []
+        text = f"{self.label} {self.kind} at {', '.join(where)}"
+        return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
+
+
+def _module(name: str) -> Callable[..., Any]:
+    function: Callable[..., Any] = getattr(
+        importlib.import_module("phasekit.labelled.point_curves"), name
+    )
+    return function
+
+
+def special_point(
+    problem: Problem, curve: Curve, special: Special, index: int, branch: Branch
+) -> SpecialPoint:
+    """A special point of a branch, angles wrapped."""
+    n = curve.n
+    parameters = dict(problem.parameters)
+    for i, name in enumerate(branch.free):
+        parameters[name] = float(special.u[n + i])
+    x = special.u[:n].copy()
+    for j in range(n):
+        if curve.period[j] > 0.0:
+            x[j] = wrap(x[j], float(curve.period[j]))
+    x.flags.writeable = False
+    return SpecialPoint(
+        special.kind, x, MappingProxyType(parameters), special.interval, special.residual,
+        special.status, special.message, MappingProxyType(dict(special.normal_form)),
+        eigenvalues_at(curve, special.u), index, special, branch,
+    )  # fmt: skip
