@@ -125,7 +125,7 @@ class Branch:
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curve with its special points: see `phasekit.plot.branch`."""
-        function = importlib.import_module("phasekit.plot.branch").branch
+        function = importlib.import_module("phasekit.plot.continued").branch
         return function(self, ax=ax, **keywords)
 
     def extend(self, points: int | None = None) -> Branch:

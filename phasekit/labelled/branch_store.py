@@ -14,11 +14,11 @@ from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import bad, flag
 from phasekit.labelled.branch import NUMBERS, Branch, make_branch
 from phasekit.labelled.problem import Problem, as_problem
 from phasekit.labelled.schema import MODEL, SCHEMA, SCHEMA_VERSION, versions
-from phasekit.labelled.store import StoreTarget
+from phasekit.labelled.store import WholeTarget, target_of
 
 _NAME = "Branch"
 _ARRAYS = ("par", "scale", "period", "low", "high")
@@ -27,7 +27,8 @@ _ARRAYS = ("par", "scale", "period", "low", "high")
 def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
     """Write a branch: its points as a Dataset, and what it takes to go on."""
     curve, problem = branch.known()
-    target = StoreTarget(path, overwrite=overwrite)
+    flag("overwrite", overwrite)
+    target = WholeTarget(target_of(path), overwrite=overwrite)
     ds = branch.to_dataset()
     for name, array in {
         **{f"curve_{name}": getattr(curve, name) for name in _ARRAYS},

@@ -1,8 +1,9 @@
-"""Stored maps: netCDF files written whole, and maps read back as they were."""
+"""What is stored in one go, netCDF maps and branches; and maps read back as they were."""
 
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import tempfile
 from collections.abc import Iterator
@@ -20,17 +21,20 @@ from phasekit.labelled.place import NETCDF, ZARR, Place, place_of
 from phasekit.labelled.schema import MODEL, model_name, restore
 
 
-class NetcdfTarget:
-    """A netCDF file for a map; everything that can be refused is refused before it is made."""
+class WholeTarget:
+    """A local name for a Dataset; everything that can be refused is refused before it is made."""
 
     def __init__(self, place: Place, *, overwrite: bool = False) -> None:
-        self.path = Path(place.name)
+        if place.path is None:
+            raise StoreError(f"store: {place.name} is no local path, which this is written to")
+        self.path = place.path
         self.overwrite = overwrite
         if not self.path.parent.is_dir():
             raise StoreError(f"store: the folder {self.path.parent} does not exist; make it first")
         if not os.access(self.path.parent, os.W_OK):
             raise StoreError(f"store: the folder {self.path.parent} cannot be written to")
-        _need_h5netcdf()
+        if place.is_netcdf:
+            _need_h5netcdf()
         self._refuse_existing()
 
     def _refuse_existing(self) -> None:
@@ -47,13 +51,18 @@ class NetcdfTarget:
             )
 
     def write(self, ds: xr.Dataset) -> None:
-        """Write a Dataset in one go; the name appears only when the map is complete."""
+        """Write a Dataset in one go; the name appears only when it is complete."""
         folder = self.path.parent
         try:
             with tempfile.TemporaryDirectory(prefix=f".{self.path.name}.", dir=folder) as scratch:
                 fresh = Path(scratch) / self.path.name
-                ds.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
+                if self.path.suffix == ZARR:
+                    ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
+                else:
+                    ds.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
                 self._refuse_existing()  # it may have appeared while the map was computed
+                if self.path.is_dir():
+                    self.path.rename(Path(scratch) / "replaced")
                 fresh.replace(self.path)
         except OSError as error:
             if isinstance(error, StoreError):
@@ -132,10 +141,12 @@ def _as_store_error(name: str) -> Iterator[None]:
 
 
 def _is_map_file(path: Path) -> bool:
-    """Whether overwriting may remove it: a file that says which model of phasekit made it."""
+    """Whether overwriting may remove it: a store that says which model of phasekit made it."""
     if path.is_symlink():
         return False
     try:
+        if path.suffix == ZARR:
+            return MODEL in json.loads((path / "zarr.json").read_bytes())["attributes"]
         import h5netcdf
 
         with h5netcdf.File(path, "r") as file:

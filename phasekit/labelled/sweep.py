@@ -22,7 +22,7 @@ from phasekit.labelled.options import (
     refuse_without_store,
 )
 from phasekit.labelled.quantities import STATES, Pass, Quantity, select
-from phasekit.labelled.store import NetcdfTarget, open_map, target_of
+from phasekit.labelled.store import WholeTarget, open_map, target_of
 from phasekit.labelled.stored import sweep_into
 from phasekit.labelled.system import Model, as_system
 
@@ -131,7 +131,7 @@ def sweep(
     swept, rows, passes, states, order = _read(system, axes, of, axes_by_name)
     dtypes = check_dtypes(dtype, rows)
     rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
-    target = None if place is None else NetcdfTarget(place, overwrite=overwrite)
+    target = None if place is None else WholeTarget(place, overwrite=overwrite)
     ds = evaluate(swept, rows, passes, states=states, order=order, progress=progress)
     if target is not None:
         target.write(ds)

@@ -1,6 +1,7 @@
 """Pictures of systems and of Datasets: every function takes ``ax=`` and returns the Axes."""
 
 from phasekit.plot.bearing_loads import bearing_forces
+from phasekit.plot.continued import branch
 from phasekit.plot.diagram import bifurcation_diagram
 from phasekit.plot.history import time_history
 from phasekit.plot.hodographs import hodograph
@@ -18,6 +19,7 @@ __all__ = [
     "bearing_load_map",
     "bifurcation_diagram",
     "bifurcation_set",
+    "branch",
     "branch_surface",
     "force_polygon",
     "frequency_action",
