@@ -193,6 +193,7 @@ def find_action(code: int, action: float, w: Array) -> None:
         w[DIRECTION] = -1.0 if code == BACKWARD else 1.0
         return
     lower = 0.0
+    top = upper
     gap = 0.5 * upper
     last = False
     for _ in range(200):
@@ -205,7 +206,8 @@ def find_action(code: int, action: float, w: Array) -> None:
         else:
             upper = gap
         new = gap - step
-        close = abs(step) <= 1e-8 * gap
+        # Newton squares the error, but next to a separatrix only that against the distance to it.
+        close = abs(step) <= max(1e-8 * min(gap, top - gap), 4e-16 * gap)
         if not (lower < new < upper):
             new = gap if close else 0.5 * (lower + upper)
         gap = new

@@ -113,7 +113,7 @@ def map_info(store: Any) -> MapInfo:
 
 def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:
     """Return the job that would finish a map: all that it takes is in the store."""
-    system = MODELS[plan.model.partition(" (")[0]].from_dataset(ds)
+    system = MODELS[plan.model].from_dataset(ds)
     rows = [row for one in left for row in one.part.rows]
     states = {name: ds[name] for name in STATES if name in ds.coords}
     values = {name: float(x) if not x.dims else x.load() for name, x in states.items()}

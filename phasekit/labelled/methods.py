@@ -30,6 +30,9 @@ Noted = tuple[Pass, dict[str, str]]
 class Methods(Protocol):
     """What labelled functions ask of a system."""
 
+    #: Whether the shape of a cell's results is the same in all maps, so that tiles fit together.
+    by_tiles: bool
+
     def passes(self, rows: Iterable[Quantity]) -> tuple[Pass, ...]:
         """Return the passes that compute rows of the table."""
 
@@ -50,6 +53,8 @@ class Methods(Protocol):
 
 class ClosedForm:
     """Closed forms in (A, B, C)."""
+
+    by_tiles = True
 
     def passes(self, rows: Iterable[Quantity]) -> tuple[Pass, ...]:
         """Return the passes that compute rows of the table."""

@@ -55,6 +55,8 @@ _EMPTY = {"kind": 0, "loop": 0}
 class Numerical:
     """Numerical methods for one potential; see `phasekit.labelled.methods.Methods`."""
 
+    by_tiles = False  # the number of equilibria is that of the cell which has most
+
     def __init__(self, system: Potential) -> None:
         self.system = system
 

@@ -80,5 +80,8 @@ def refuse_without_store(**options: Any) -> None:
     for name, value in options.items():
         if value is not None and value is not False:
             raise bad(
-                name, value, "None, for a map that is not put into a Zarr store", "give store="
+                name,
+                value,
+                "None, for a map that is not put into a Zarr store tile by tile",
+                "give store=; maps of a Potential are written whole",
             )

@@ -100,10 +100,7 @@ def new_plan(layout: Layout) -> Plan:
         for name, x in {**layout.grid.coords, **inputs}.items()
         if x.dims
     }
-    model = type(layout.system).__name__
-    if layout.system.definition:  # of a formula the name is not all
-        model += f" ({', '.join(layout.system.definition.values())})"
-    return Plan(model, scalars, arrays, dict(layout.grid.sizes), ())
+    return Plan(type(layout.system).__name__, scalars, arrays, dict(layout.grid.sizes), ())
 
 
 def fingerprint(values: xr.Variable) -> str:

@@ -113,7 +113,8 @@ def sweep(
     if progress is not None:
         flag("progress", progress)
     place = None if store is None else target_of(store)
-    if place is not None and not place.is_netcdf:
+    system = as_system(system)
+    if place is not None and not place.is_netcdf and system.methods.by_tiles:
         layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
         sweep_into(
             place,

@@ -262,7 +262,9 @@ UNDEFINED = [
 ]
 
 
-@pytest.mark.parametrize(("change", "undefined"), UNDEFINED, ids=str)
+@pytest.mark.parametrize(
+    ("change", "undefined"), UNDEFINED, ids=[str(change) for change, _ in UNDEFINED]
+)
 def test_undefined_rotators(change, undefined):
     got = rotators(*{**DISK, **change}.values(), **STATES)
     for i, name in enumerate(ROTATORS):
