@@ -1,6 +1,6 @@
 """Branches of equilibria of the published systems: every special point, and no other.
 
-Every form of every system is tried by ``PHASEKIT_SYSTEMS=all pytest tests/published``; otherwise
+Every form of every system is tried by ``PHASEKIT_PUBLISHED=all pytest tests/published``; otherwise
 the compiled and the Python form are tried on some systems.
 """
 
@@ -15,7 +15,7 @@ from published import compare, reference
 from published.compare import kind_of
 from published.systems import HOPF, SYSTEMS
 
-ALL = os.environ.get("PHASEKIT_SYSTEMS") == "all"
+ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 SOME = (
     "cusp",
     "A -> B reaction",

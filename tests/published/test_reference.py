@@ -11,7 +11,7 @@ from published import reference
 from published.systems import HOPF, SYSTEMS
 from scipy.optimize import root
 
-ALL = os.environ.get("PHASEKIT_SYSTEMS") == "all"
+ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
