@@ -205,6 +205,32 @@ def test_sweep_says_beforehand_what_it_takes(tmp_path, capsys, monkeypatch):
     assert main(["sweep", "map.toml", "--force"]) == 0
     assert main(["sweep", "map.toml", "--estimate"]) == 0
     assert "nothing is left to compute" in capsys.readouterr().out
+    said = refused(capsys, "sweep", "map.toml", "--estimate", "--store", "map.nc")
+    assert "--estimate: got 'map.nc' as store, wants a Zarr store" in said
+
+
+@pytest.mark.parametrize(
+    ("in_file", "given", "expected"),
+    [
+        ("workers = 2", ["--scheduler", "tcp://a:1"], (None, "tcp://a:1")),
+        ('scheduler = "tcp://a:1"', ["--workers", "1"], (1, None)),
+        ('scheduler = "tcp://a:1"', [], (None, "tcp://a:1")),
+    ],
+)
+def test_who_computes_is_what_the_command_line_says(
+    in_file, given, expected, tmp_path, monkeypatch
+):
+    calls = []
+
+    def watched(*args, **options):
+        calls.append((options["workers"], options["client"]))
+        return sweep(*args, **{**options, "workers": 1, "client": None})
+
+    sweep = pk.sweep
+    monkeypatch.setattr(pk, "sweep", watched)
+    (tmp_path / "map.toml").write_text(f"{in_file}\n{RECIPE}")
+    assert main(["sweep", "map.toml", *given]) == 0
+    assert calls == [expected]
 
 
 def test_info(tmp_path, capsys):
@@ -215,7 +241,7 @@ def test_info(tmp_path, capsys):
         assert main(["info", store]) == 0
         lines = capsys.readouterr().out.splitlines()
         assert lines[0].startswith(f"{store}: map of GyroRotorDisk, made by phasekit")
-        assert lines[1] == "fixed: e = 0.05, g = 9.80665, omega1 = 31.4159, r = 0.2"
+        assert lines[1] == "fixed: e = 0.05 m, g = 9.80665 m s-2, omega1 = 31.4159 s-1, r = 0.2 m"
         assert lines[2:4] == [
             "axis beta: 4 values, 0 to 1.5708 rad",
             "axis a: 3 values, 0 to 0.024 m",

@@ -67,11 +67,21 @@ def run(argv: Sequence[str]) -> None:
     for key in ("store", "workers", "scheduler"):
         if getattr(options, key) is not None:
             recipe[key] = getattr(options, key)
+    # What the command line names replaces what the file does.
+    if options.scheduler is not None and options.workers is None:
+        recipe.pop("workers", None)
+    if options.workers is not None and options.scheduler is None:
+        recipe.pop("scheduler", None)
     store = recipe.get("store")
     if not isinstance(store, str) or not store:
         raise ParameterError(
             f"store: got {store!r}, wants a name that ends in .zarr or .nc, in the file "
             "or as --store"
+        )
+    if options.estimate and store.endswith(".nc"):
+        raise ParameterError(
+            f"--estimate: got {store!r} as store, wants a Zarr store; what goes into a .nc file "
+            "is computed in memory"
         )
     if "://" not in store:
         path = common.path_called("store", store)
@@ -93,11 +103,11 @@ def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], optio
         what["chunks"] = recipe["chunks"]
     sizes = " x ".join(f"{name} {np.size(values)}" for name, values in axes.items())
     title = f"{type(system).__name__}: {sizes} cells"
-    if options.estimate or not store.endswith(".nc"):
+    if not store.endswith(".nc"):
         job = plan_sweep(system, axes, overwrite=options.overwrite, **what)
         if options.estimate or job.cells > MANY_CELLS:
             common.say(title)
-            _say_estimate(job, recipe.get("workers"))
+            _say_estimate(job, 1 if "scheduler" in recipe else recipe.get("workers"))
         if options.estimate:
             return
     ds = sweep(

@@ -91,7 +91,7 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     >>> ds.special_value.values[0].round(12).item(), ds.cubic.values[0].item()
     (1.0, -0.5)
     """
-    system, values = single(system)
+    system, values = single(system, parameter)
     formula = system.formula_inputs()
     if not isinstance(parameter, str) or parameter not in formula:
         raise unknown(f"parameter of branches for {type(system).__name__}", parameter, formula)
@@ -107,8 +107,10 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     return _dataset(system, parameter, curves, meetings)
 
 
-def single(system: Any) -> tuple[Model, dict[str, float]]:
+def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
     """Return a system and its parameters, all numbers, that enter the coefficients.
+
+    Where `names` are lam and psi, the reduced form of a system that has no such parameters.
 
     Raises
     ------
@@ -116,6 +118,9 @@ def single(system: Any) -> tuple[Model, dict[str, float]]:
         If it is not a system, or a parameter is an array.
     """
     system = as_system(system)
+    own = system.formula_inputs()
+    if all(name in ("lam", "psi") for name in names) and not all(name in own for name in names):
+        system = system.reduced()
     if type(system).__name__ not in FORMS:
         hint = "pk.continuation follows the equilibria of any other"
         raise bad("system", system, f"one of {', '.join(FORMS)}", hint)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -24,9 +24,6 @@ from phasekit.labelled.arguments import bad
 from phasekit.labelled.branch_points import LABELS, points_of
 from phasekit.labelled.problem import Problem
 from phasekit.labelled.special_point import SpecialPoint, special_point
-
-if TYPE_CHECKING:
-    pass
 
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
@@ -68,11 +65,16 @@ class Branch:
     curve: Curve | None
     start: Sample
     tracks: tuple[Track | None, Track | None]
-    points: xr.Dataset
+    _points: xr.Dataset
     special_points: tuple[SpecialPoint, ...]
     stops: tuple[Stop, Stop]
     kind: str
     record: Record
+
+    @property
+    def points(self) -> xr.Dataset:
+        """The points, as a Dataset of its own that shares the (read-only) values."""
+        return self._points.copy()
 
     @property
     def parameter(self) -> str:
@@ -94,7 +96,7 @@ class Branch:
             parameter and state, ``special_residual``, ``special_status``, ``special_index`` (the
             point of the curve), ``special_interval`` on (``special_point``, ``end``).
         """
-        ds = self.points.copy()
+        ds = self.points
         dim = "special_point"
         text = np.dtypes.StringDType()
         specials = self.special_points
@@ -191,10 +193,10 @@ class Branch:
 
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""
-        u = {name: self.points[name].values for name in self.free}
+        u = {name: self._points[name].values for name in self.free}
         ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
         of = {"equilibrium": "equilibria"}.get(self.kind, f"{self.kind} points")
-        lines = [f"<Branch of {of}: {self.points.sizes['point']} points, {ranges}"]
+        lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]
         lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []

@@ -176,7 +176,7 @@ def _dataset(
 
         ds = ds.assign(recorded(problem, ds, names[n:], record))
     for array in ds.variables.values():
-        if isinstance(array.data, np.ndarray) and array.data.dtype != np.dtypes.StringDType():
+        if isinstance(array.data, np.ndarray):
             array.data.flags.writeable = False
     return ds
 

@@ -158,6 +158,9 @@ def check_span(span: Any) -> tuple[float, float]:
 def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:
     check_parameter(problem, parameter)
     low, high = check_span(span)
+    for declared in () if problem.system is None else problem.system.declared:
+        if declared.name == parameter and not (declared.valid(low) and declared.valid(high)):
+            raise bad("span", (low, high), f"values of {parameter}, each {declared.wants}")
     value = problem.parameters[parameter]
     if not low <= value <= high:
         raise bad(

@@ -71,6 +71,11 @@ def figure_eights(
     s = np.linspace(0.0, 1.0, int(n))
     ds = separatrices(_at(system, ways, s))
     marks = _marks(system, ways, s)
+    invalid = np.flatnonzero(marks[:, 2] < 0)
+    if invalid.size:
+        place = s[invalid[:1]]
+        got = ", ".join(f"{name} = {way(place)[0]:.6g}" for name, way in ways.items())
+        raise ParameterError(f"path: got {got}, wants values that {type(system).__name__} can have")
     found: list[tuple[float, tuple[Any, ...], tuple[Any, ...]]] = []
     for i in np.flatnonzero(np.any(marks[1:] != marks[:-1], axis=1)):
         found.extend(_narrow(system, ways, float(s[i]), float(s[i + 1])))

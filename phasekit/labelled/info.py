@@ -54,7 +54,9 @@ class MapInfo:
             {p.name for p in MODELS[model].declared} | set(STATES) if model in MODELS else set()
         )
         fixed = [
-            f"{n} = {c.item():.6g}" for n, c in ds.coords.items() if n in inputs and not c.dims
+            f"{name} = {coord.item():.6g}{_unit(coord)}"
+            for name, coord in ds.coords.items()
+            if name in inputs and not coord.dims
         ]
         if fixed:
             lines.append(f"fixed: {', '.join(sorted(fixed))}")
@@ -123,8 +125,11 @@ def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:
 
 def _axis(name: str, coord: xr.DataArray) -> str:
     values = coord.values
-    units = coord.attrs.get("units", "1")
-    unit = "" if units == "1" else f" {units}"
     dims = "" if coord.dims == (name,) else f" along {' x '.join(map(str, coord.dims))}"
     low, high = (f"{value:.6g}" for value in (values.flat[0], values.flat[-1]))
-    return f"{name}: {values.size} values{dims}, {low} to {high}{unit}"
+    return f"{name}: {values.size} values{dims}, {low} to {high}{_unit(coord)}"
+
+
+def _unit(coord: xr.DataArray) -> str:
+    units = coord.attrs.get("units", "1")
+    return "" if units == "1" else f" {units}"

@@ -101,7 +101,7 @@ def bifurcation_set(
     >>> bool((abs(gap) < 1e-12).all()), bool(astroid.closed), ds.sizes["cusp"]
     (True, True, 4)
     """
-    system, values = single(system)
+    system, values = single(system, x, y)
     formula = system.formula_inputs()
     for argument, name in (("x", x), ("y", y)):
         if not isinstance(name, str) or name not in formula:

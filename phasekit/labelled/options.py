@@ -82,6 +82,7 @@ def refuse_without_store(**options: Any) -> None:
             raise bad(
                 name,
                 value,
-                "None, for a map that is not put into a Zarr store tile by tile",
-                "give store=; maps of a Potential are written whole",
+                "None, for what is not put into a Zarr store tile by tile: maps without a store, "
+                "in a .nc file, or of a Potential",
+                "give store='map.zarr', or leave it out",
             )

@@ -49,7 +49,14 @@ def with_computed(ds: xr.Dataset, store: Any, name: str, chunks: Any) -> xr.Data
     dims = tuple(dim for dim in plan.sizes if any(dim in part.dims for part in plan.parts))
     data = indexing.LazilyIndexedArray(_Computed(dims, plan.sizes, done))
     computed = xr.Variable(dims, data, _ATTRS)
-    return ds.assign({COMPUTED: computed if chunks is None else computed.chunk(chunks)})
+    if chunks is not None:
+        if isinstance(chunks, Mapping):  # what it does not name is cut as it is stored
+            tiles = {
+                d: n for part in plan.parts for d, n in zip(part.dims, part.chunks, strict=True)
+            }
+            chunks = {dim: chunks.get(dim, tiles[dim]) for dim in dims}
+        computed = computed.chunk(chunks)
+    return ds.assign({COMPUTED: computed})
 
 
 class _Computed(BackendArray):

@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import prod
 
+from phasekit.errors import ParameterError
 from phasekit.labelled.evaluate import Box
+from phasekit.labelled.memory import SHARE, available_memory, human
 from phasekit.labelled.quantities import ROWS, Pass, Quantity, plan_passes
 
 #: Cells of a tile, where its results stay below `MOST_BYTES`. Small maps are cut as well, so that
@@ -59,7 +61,13 @@ class Part:
 
 
 def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str, int]) -> Part:
-    """Cut the dims that the call leaves open into tiles that are about as long in each."""
+    """Cut the dims that the call leaves open into tiles that are about as long in each.
+
+    Raises
+    ------
+    ParameterError
+        If the call asks for tiles that do not fit into memory.
+    """
     quantities = {row.name: row.dtype for row in box.rows}
     whole = prod(sizes[dim] for dim in box.dims)
     cells = min(
@@ -77,4 +85,20 @@ def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str,
         pieces = -(-sizes[dim] // step)
         found[dim] = -(-sizes[dim] // pieces)
         room = max(room // found[dim], 1)
-    return Part(name, box.dims, tuple(found[dim] for dim in box.dims), quantities)
+    part = Part(name, box.dims, tuple(found[dim] for dim in box.dims), quantities)
+    _refuse_large_tiles(part)
+    return part
+
+
+def _refuse_large_tiles(part: Part) -> None:
+    """Refuse tiles that no process could hold; those cut here are never as large."""
+    needed = prod(part.chunks) * part.cell_bytes
+    available = available_memory() if needed > MOST_BYTES else None
+    if available is None or needed <= SHARE * available:
+        return
+    tile = " x ".join(f"{dim} {n}" for dim, n in zip(part.dims, part.chunks, strict=True))
+    raise ParameterError(
+        f"chunks: got tiles of {tile} cells, {human(needed)} of results, wants at most "
+        f"{human(int(SHARE * available))}, {SHARE:.0%} of the memory that is free; chunks= is the "
+        "length of a tile along each dim: take a smaller one, or leave it out"
+    )

@@ -46,7 +46,7 @@ class Place:
         Raises
         ------
         StoreError
-            If the URL is of a kind that nothing here can read.
+            If nothing here can read or write it.
         """
         from zarr.storage import FsspecStore, LocalStore
 
@@ -54,6 +54,13 @@ class Place:
             return LocalStore(self.path, read_only=read_only)
         if self.url is None:
             store: Store = self.store
+            if not read_only and store.read_only:
+                raise StoreError(f"store: {self.name} was opened for reading; open it for writing")
+            if not store.read_only and not store.supports_deletes:  # nor are values replaced there
+                raise StoreError(
+                    f"store: {self.name} is of a kind that cannot be changed once it is written, "
+                    "so that a sweep could not go on; take a folder, a URL or another store"
+                )
             return store.with_read_only(True) if read_only and not store.read_only else store
         try:
             return FsspecStore.from_url(self.url, read_only=read_only)
@@ -101,6 +108,10 @@ class Place:
         """Raise a `StoreError` where nothing can be written."""
         if self.path is None:
             return
+        if self.path.exists() and not self.path.is_dir():
+            raise StoreError(
+                f"store: {self.name} is a file, not a folder of Zarr; choose another name"
+            )
         there = self.path.is_dir()
         folder = self.path if there else self.path.parent
         if not folder.is_dir():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Self
@@ -277,16 +278,16 @@ class Problem:
             "periods": dict(self.periods),
             "conservative": self.conservative,
         }
-        if self.system is not None and type(self.system).__name__ in FORMULAS:
+        if self.system is not None:
             spec["system"] = type(self.system).__name__
-            spec["system_parameters"] = dict(self.system.parameters)
+            spec["system_parameters"] = _arguments(self.system)
         return spec
 
     @classmethod
     def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
         """Make a problem of what `specification` gave; None where f was code."""
         if spec.get("system"):
-            return cls.from_system(MODELS[spec["system"]](**spec["system_parameters"]))
+            return cls.from_system(_model(spec["system"])(**spec["system_parameters"]))
         if spec["f"] is None:
             return None
         return cls(
@@ -314,6 +315,28 @@ class Problem:
         return f"Problem({equations}{'; ' if notes else ''}{', '.join(notes)})"
 
 
+def _arguments(system: Any) -> dict[str, Any]:
+    """What makes a system with scalar parameters again, as plain values."""
+    values = dict(system.parameters)
+    if not hasattr(system, "formula"):
+        return values
+    return {
+        "expression": system.formula.text,
+        "coordinate": system.coordinate,
+        "parameters": values,
+        "period": system.period,
+        "interval": system.interval,
+    }
+
+
+def _model(name: str) -> Callable[..., Model]:
+    """A model by its name; models are known once they are imported."""
+    if name not in MODELS:
+        for module in ("models", "guises", "potential_system"):
+            importlib.import_module(f"phasekit.labelled.{module}")
+    return MODELS[name]
+
+
 def as_problem(problem: Any) -> Problem:
     """Return the problem that an argument is: a Problem, or a system.
 
@@ -332,4 +355,5 @@ def as_problem(problem: Any) -> Problem:
         if isinstance(made, Problem):
             return made
     hint = "pk.Problem(f, state=..., parameters=...) makes one" if callable(problem) else ""
-    raise bad("problem", problem, f"a Problem or a system ({', '.join(FORMULAS)})", hint)
+    systems = ", ".join([*FORMULAS, "Potential"])
+    raise bad("problem", problem, f"a Problem or a system ({systems})", hint)

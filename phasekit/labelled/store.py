@@ -136,6 +136,8 @@ def _as_store_error(name: str) -> Iterator[None]:
         raise StoreError(f"store: {name} is not a map of phasekit: {error}") from error
     except StoreError:
         raise
+    except FileNotFoundError as error:
+        raise StoreError(f"store: {name} cannot be read: there is no map, or not yet") from error
     except Exception as error:  # whatever is made of files that are not what they were
         raise StoreError(f"store: {name} cannot be read: {reason(error)}") from error
 

@@ -71,8 +71,8 @@ def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
         if here is not None:
             if workers is not None or client is not None:
                 raise StoreError(
-                    f"store: the map cannot be computed in other processes: {here}; or pass "
-                    "workers=1"
+                    f"store: the map cannot be computed in other processes: {here}; pass "
+                    "workers=1 and no client=, or choose another store"
                 )
             most = 1
     freed = (job.place.size() or 0) if job.old is None and not job.place.empty else 0

@@ -158,6 +158,8 @@ def connected(client: Any) -> Iterator[Any]:
             "client: clusters need dask: pip install 'phasekit[distributed]'"
         ) from None
     if isinstance(client, distributed.Client):
+        if client.status != "running":
+            raise StoreError(f"client: it is {client.status}, wants one that is connected")
         yield client
         return
     if not isinstance(client, str) or not client:

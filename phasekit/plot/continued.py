@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from phasekit.errors import EquilibriumKind
 from phasekit.labelled.arguments import bad, flag, unknown
+from phasekit.labelled.branch import Branch
+from phasekit.plot import labels as words
 from phasekit.plot import style
 
 _STABLE: style.Look = {
@@ -42,6 +45,9 @@ _CURVES: dict[str, style.Look] = {
         "label": "branch points",
     },
 }
+#: Distance in pixels within which the labels of special points would cover each other.
+_TOUCHING = 8.0
+
 _MARKS = {
     "LP": ("s", style.YELLOW),
     "BP": ("^", style.PURPLE),
@@ -59,6 +65,8 @@ def branch(
     x: str | None = None,
     y: str | None = None,
     *,
+    sel: Mapping[str, Any] | None = None,
+    angles: style.Angles = "rad",
     labels: bool = True,
     legend: bool = True,
     ax: Axes | None = None,
@@ -75,6 +83,10 @@ def branch(
     x, y : str, optional
         Variables of ``branch.points``; default: the parameter and the first state, or the two
         parameters.
+    sel : mapping of str to label, optional
+        Of a recorded quantity with more dims which one: ``sel={"bearing": "A2"}``.
+    angles : {"rad", "deg"}
+        Unit in which angles are shown.
     labels : bool
         Whether to write LP, BP, H, ... beside special points.
     legend : bool
@@ -97,61 +109,90 @@ def branch(
     first = several[0]
     x = x or first.free[0]
     y = y or (first.free[1] if len(first.free) > 1 else first.problem_state[0])
-    for argument, name in (("x", x), ("y", y)):
-        offered = [str(n) for n, v in first.points.data_vars.items() if v.dims == ("point",)]
-        if name not in offered:
-            raise unknown(argument, name, offered)
+    style.angle_factor(angles)
+    columns = [(_column(one, "x", x, sel), _column(one, "y", y, sel)) for one in several]
     axes = style.axes_for(ax, legend=legend)
     handles: dict[str, Artist] = {}
-    for one in several:
-        for look, across, up in _pieces(one, x, y):
+    for one, pair in zip(several, columns, strict=True):
+        for look, across, up in _pieces(one, pair, angles):
             (line,) = axes.plot(across, up, **look)
             handles.setdefault(str(look["label"]), line)
     marks: dict[str, list[tuple[float, float]]] = {}
-    for one in several:
+    for one, pair in zip(several, columns, strict=True):
+        across, up = (words.shown(column, angles)[0] for column in pair)
         for special in one.special_points:
-            if special.kind == "end" or x not in one.points or y not in one.points:
+            if special.kind == "end":
                 continue
-            place = (float(one.points[x][special.index]), float(one.points[y][special.index]))
+            place = (float(across[special.index]), float(up[special.index]))
             marks.setdefault(special.label, []).append(place)
     for label, places in marks.items():
         marker, color = _MARKS[label]
         across, up = np.array(places).T
         axes.plot(
             across, up, linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
-            markeredgecolor=style.BLACK, zorder=4,
+            markeredgecolor=style.BLACK, zorder=3 if label == "NS" else 4,
         )  # fmt: skip
-        for spot in _apart(places) if labels else []:
-            axes.annotate(
-                label, spot, xytext=(6, 6), textcoords="offset points", fontsize="small", zorder=5
-            )
         handles[label] = Line2D(
             [], [], linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
             markeredgecolor=style.BLACK, label=label,
         )  # fmt: skip
-    axes.set_xlabel(_label(first, x))
-    axes.set_ylabel(_label(first, y))
+    if columns[0][1].name == "phi" and columns[0][1].attrs.get("units") == "rad":
+        style.circle_axis(axes, "y", angles)
+    for text, spot in _texts(axes, marks) if labels else []:
+        axes.annotate(
+            text, spot, xytext=(6, 6), textcoords="offset points", fontsize="small", zorder=5
+        )
+    axes.set_xlabel(words.label(columns[0][0], angles, style.letters(axes, "x")))
+    axes.set_ylabel(words.label(columns[0][1], angles, style.letters(axes, "y")))
     if legend:
         style.legend_below(axes, list(handles.values()))
     return axes
 
 
-def _several(branches: Any) -> list[Any]:
+def holds_branches(what: Any) -> bool:
+    """Whether something is a Branch or a sequence of them."""
+    first = what[0] if isinstance(what, Sequence) and what else what
+    return isinstance(first, Branch)
+
+
+def _several(branches: Any) -> list[Branch]:
     several = list(branches) if isinstance(branches, Sequence) else [branches]
-    if hasattr(branches, "branches"):
-        several = list(branches.branches)
     for one in several:
-        if not hasattr(one, "special_points") or not hasattr(one, "points"):
+        if not isinstance(one, Branch):
             raise bad("branches", one, "a Branch, or several")
     if not several:
         raise bad("branches", branches, "at least one Branch")
     return several
 
 
-def _pieces(one: Any, x: str, y: str) -> list[tuple[style.Look, Any, Any]]:
-    """Runs of points of one look; each begins where the one before ends, and angles may wrap."""
+def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None) -> xr.DataArray:
+    """A quantity of a branch along its points."""
     points = one.points
-    across, up = points[x].values.astype(float), points[y].values.astype(float)
+    offered = [
+        str(n)
+        for n, v in points.data_vars.items()
+        if v.dims[:1] == ("point",) and v.dtype.kind in "if" and n != "tangent"
+    ]
+    if name not in offered:
+        raise unknown(argument, name, offered)
+    column: xr.DataArray = points[name]
+    for dim in column.dims[1:]:
+        if dim not in (sel or {}):
+            values = column[dim].values.tolist()
+            raise bad("sel", sel, f"one of {dim} = {values} for {argument} = {name}")
+        try:
+            column = column.sel({dim: (sel or {})[str(dim)]})
+        except (KeyError, TypeError):
+            raise unknown(f"sel: {dim}", (sel or {})[str(dim)], column[dim].values) from None
+    return column
+
+
+def _pieces(
+    one: Branch, pair: tuple[xr.DataArray, xr.DataArray], angles: style.Angles
+) -> list[tuple[style.Look, Any, Any]]:
+    """Runs of points of one look; each begins where the one before ends, and angles may wrap."""
+    cuts = _cuts(one, pair)
+    across, up = (words.shown(column, angles)[0].astype(float) for column in pair)
     looks = _looks(one)
     pieces = []
     begin = 0
@@ -159,12 +200,14 @@ def _pieces(one: Any, x: str, y: str) -> list[tuple[style.Look, Any, Any]]:
         if i < len(across) and looks[i] is looks[begin]:
             continue
         stop = min(i + 1, len(across))
-        pieces.append((looks[begin], *_broken(one, x, y, across[begin:stop], up[begin:stop])))
+        places = cuts[(cuts > begin) & (cuts < stop)] - begin
+        xs, ys = (np.insert(values[begin:stop], places, np.nan) for values in (across, up))
+        pieces.append((looks[begin], xs, ys))
         begin = i
     return pieces
 
 
-def _looks(one: Any) -> list[style.Look]:
+def _looks(one: Branch) -> list[style.Look]:
     points = one.points
     if one.kind == "hopf":
         pair = [str(name) or "hopf" for name in points.kind_of_pair.values]
@@ -186,29 +229,27 @@ def _looks(one: Any) -> list[style.Look]:
     return [_STABLE if k == 0 else _UNSTABLE for k in points.n_unstable.values]
 
 
-def _broken(one: Any, x: str, y: str, across: Any, up: Any) -> tuple[Any, Any]:
-    """Lines with a gap where an angle jumps by about its period."""
+def _cuts(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> Any:
+    """The points before which a line has a gap: an angle jumps by about its period."""
     periods = dict(one.problem.periods) if one.problem is not None else {}
-    jump = np.zeros(max(len(across) - 1, 0), dtype=bool)
-    for name, values in ((x, across), (y, up)):
-        if name in periods:
-            jump |= np.abs(np.diff(values)) > 0.5 * periods[name]
-    places = np.flatnonzero(jump) + 1
-    return np.insert(across, places, np.nan), np.insert(up, places, np.nan)
+    jump = np.zeros(max(pair[0].size - 1, 0), dtype=bool)
+    for column in pair:
+        if column.name in periods:
+            jump |= np.abs(np.diff(column.values)) > 0.5 * periods[column.name]
+    return np.flatnonzero(jump) + 1
 
 
-def _apart(places: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """One of those that coincide."""
-    kept: list[tuple[float, float]] = []
-    for place in places:
-        if all(np.hypot(place[0] - q[0], place[1] - q[1]) > 1e-9 * (1 + abs(q[0])) for q in kept):
-            kept.append(place)
-    return kept
-
-
-def _label(one: Any, name: str) -> str:
-    attrs = one.points[name].attrs
-    text = attrs.get("long_name", name)
-    units = attrs.get("units", "")
-    text = f"{name}, {text}" if text != name else name
-    return f"{text} ({units})" if units not in ("", "1") else text
+def _texts(
+    axes: Axes, marks: Mapping[str, list[tuple[float, float]]]
+) -> list[tuple[str, tuple[float, float]]]:
+    """Labels and their places; those of points that touch on the page are one text."""
+    kept: list[tuple[list[str], tuple[float, float], Any]] = []
+    for label, places in marks.items():
+        for place in places:
+            at = axes.transData.transform(place)
+            near = [one for one in kept if np.hypot(*(at - one[2])) < _TOUCHING]
+            if not near:
+                kept.append(([label], place, at))
+            elif label not in near[0][0]:
+                near[0][0].append(label)
+    return [(", ".join(names), place) for names, place, _ in kept]

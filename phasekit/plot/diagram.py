@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labelled.arguments import unknown
-from phasekit.plot import atlas, labels, strands, strokes, style
+from phasekit.plot import atlas, continued, labels, strands, strokes, style
 
 FloatArray = NDArray[np.float64]
 
@@ -22,9 +22,9 @@ VANISHING = ("natural_frequency", "exponent")
 
 
 def bifurcation_diagram(
-    dataset: xr.Dataset,
+    dataset: Any,
     x: str | None = None,
-    y: str = "phi",
+    y: str | None = None,
     *,
     angles: style.Angles = "rad",
     legend: bool = True,
@@ -38,14 +38,15 @@ def bifurcation_diagram(
 
     Parameters
     ----------
-    dataset : xarray.Dataset
+    dataset : xarray.Dataset, Branch or sequence of Branch
         What `branches` returns; or `equilibria` or `sweep`, with one swept parameter: select the
-        others.
+        others; or what `continuation` or `diagram` return, drawn by `branch`.
     x : str, optional
         The swept parameter, or another coordinate along it; not needed where there is one only.
-    y : str
-        The quantity to draw, any with the dim `equilibrium`: phi, energy, curvature,
-        natural_frequency, exponent; of an atlas phi, energy or curvature.
+    y : str, optional
+        The quantity to draw, phi if left out: any with the dim `equilibrium`: phi, energy,
+        curvature, natural_frequency, exponent; of an atlas phi, energy or curvature; of a Branch
+        any along its points, its first state if left out.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
     legend : bool
@@ -81,6 +82,9 @@ def bifurcation_diagram(
     '$\\varphi$, angle of the equilibrium (°)'
     """
     factor = style.angle_factor(angles)
+    if continued.holds_branches(dataset):
+        return continued.branch(dataset, x, y, angles=angles, legend=legend, ax=ax)
+    y = "phi" if y is None else y
     ds = labels.dataset(dataset, "dataset", ("phi", "kind"))
     if ds["phi"].dims == atlas.DIMS:
         return atlas.draw(ds, x, y, angles=angles, legend=legend, ax=ax)

@@ -642,7 +642,7 @@ def test_pictures():
     assert ax.get_xlabel() == "p1"
     assert ax.get_ylabel() == "u1"
     texts = sorted(text.get_text() for text in ax.texts)
-    assert texts == ["H", "LP", "LP", "NS"]
+    assert texts == ["H", "LP", "LP, NS"]  # fold and neutral saddle touch on the page
     styles = {line.get_linestyle() for line in ax.lines}
     assert {"-", "--"} <= styles
     curve = branch.special("LP")[0].curve("p3", (0.5, 4.0))
@@ -651,6 +651,66 @@ def test_pictures():
     assert "CP" in [text.get_text() for text in ax.texts]
     with pytest.raises(pk.ParameterError, match="'u3' is unknown"):
         branch.plot(y="u3")
+
+
+def test_pictures_of_a_disk_have_its_words_units_and_recorded_forces():
+    disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0, m=2.0, half_span=0.1)
+    branch = continuation(disk, "beta", x0="lower_saddle", span=(0.1, 1.5), record=["force"])
+    ax = pk.plot.bifurcation_diagram([branch], angles="deg")
+    assert ax.get_ylabel() == "$\\varphi$, angle of the equilibrium (°)"
+    assert [text.get_text() for text in ax.texts] == ["LP"]
+    drawn = np.concatenate([np.asarray(line.get_ydata()) for line in ax.lines])
+    assert drawn.max() == pytest.approx(np.rad2deg(branch.points.phi.values.max()), abs=1e-12)
+    component = {"bearing": "B2", "disk_axis": "v2"}
+    ax = branch.plot(y="force", sel=component)
+    drawn = np.concatenate([np.asarray(line.get_ydata()) for line in ax.lines])
+    assert set(drawn) == set(branch.points.force.sel(component).values)
+    with pytest.raises(pk.ParameterError, match="sel: got None, wants one of bearing"):
+        branch.plot(y="force")
+    with pytest.raises(pk.ParameterError, match="'C2' is unknown"):
+        branch.plot(y="force", sel={**component, "bearing": "C2"})
+
+
+def test_a_branch_of_a_potential_is_saved_with_its_potential(tmp_path):
+    well = pk.Potential("x**4/4 - mu*x**2/2 - h*x", "x", {"mu": 1.0, "h": 0.0}, interval=(-3, 3))
+    options = pk.ContinuationOptions(max_points=10)
+    arguments = {"x0": 1.0, "span": (-1.0, 1.0), "record": ["potential"]}
+    short = continuation(well, "h", **arguments, options=options)
+    short.save(tmp_path / "well.nc")
+    loaded = Branch.load(tmp_path / "well.nc")
+    assert loaded.problem.system == well
+    assert loaded.points.identical(short.points)
+    assert loaded.extend(1000).points.identical(continuation(well, "h", **arguments).points)
+
+
+@pytest.mark.parametrize("jac", [None, lambda x, l: [[-1.0 / l]]])  # noqa: E741
+def test_derivatives_where_a_newton_step_led_nowhere_are_nan(jac):
+    field = Problem(lambda x, l: -x.item() / l, "x", {"l": 1.0}, jac=jac).field  # noqa: E741
+    for u in (np.array([np.nan, 1.0]), np.array([np.inf, 1.0]), np.array([1.0, 0.0])):
+        out = np.zeros(5)
+        field.second((0,))(u, np.array([1.0]), np.array([1.0, 0.0]), out)
+        assert np.isnan(out[1 if u[1] else 0])
+
+
+def test_a_span_or_path_that_a_system_cannot_have_is_refused():
+    disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)
+    for follow in (continuation, pk.diagram):
+        with pytest.raises(pk.ParameterError, match="span: got .* wants values of beta"):
+            follow(disk, "beta", span=(-1.0, 4.0))
+    with pytest.raises(pk.ParameterError, match="path: got beta = .*, wants values"):
+        pk.figure_eights(disk, {"beta": (0.0, 4.0)})
+
+
+def test_a_branch_does_not_change():
+    branch = continuation(Problem("mu - x", "x", {"mu": 0.0}), "mu", span=(-1.0, 1.0))
+    branch.points["x"] = 1.0
+    assert branch.points.x.dims == ("point",)
+    for name in ("x", "special", "tangent"):
+        with pytest.raises(ValueError, match="read-only"):
+            branch.points[name].values[0] = branch.points[name].values[1]
+    for what, name in ((branch, "kind"), (branch, "points"), (branch.special_points[0], "kind")):
+        with pytest.raises(AttributeError):
+            setattr(what, name, None)
 
 
 # ------------------------------------------------------------------------------ figure-eights

@@ -323,3 +323,17 @@ def test_bad_arguments(changes, message):
     with pytest.raises(pk.ParameterError) as error:
         bifurcation_set(**arguments)
     assert message in str(error.value)
+
+
+def test_planes_of_lambda_and_psi_are_those_of_the_reduced_system():
+    disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4)
+    box = {"xlim": (-1.5, 1.5), "ylim": (-1.5, 1.5)}
+    got = pk.bifurcation_set(disk, "lam", "psi", **box)
+    want = pk.bifurcation_set(disk.reduced(), "lam", "psi", **box)
+    assert got.identical(want)
+    assert set(got.sign_of_A.values) == {-1}
+    assert pk.branches(disk, "lam", (-2.0, 2.0)).identical(
+        pk.branches(disk.reduced(), "lam", (-2.0, 2.0))
+    )
+    with pytest.raises(pk.ParameterError, match="'lam' is unknown"):
+        pk.bifurcation_set(disk, "beta", "lam", **box)

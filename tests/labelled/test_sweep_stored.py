@@ -1,5 +1,6 @@
 """Sweeps into stores: the same map in every way, and only what is new is computed."""
 
+import shutil
 import subprocess
 import sys
 
@@ -161,6 +162,32 @@ def test_stores_of_zarr():
     xr.testing.assert_identical(pk.open_map(store).load(), WHOLE)
     with pytest.raises(pk.StoreError, match="in other processes: .* lies in the memory"):
         pk.sweep(DISK, AXES, store=zarr.storage.MemoryStore(), workers=2, chunks=2)
+
+
+def test_stores_that_cannot_be_continued(tmp_path):
+    pk.sweep(DISK, AXES, of=CODES, store=tmp_path / "map.zarr")
+    archive = shutil.make_archive(str(tmp_path / "map"), "zip", tmp_path / "map.zarr")
+    with zarr.storage.ZipStore(archive, mode="r") as store:
+        assert pk.open_map(store).load().equals(pk.sweep(DISK, AXES, of=CODES))
+    store = zarr.storage.ZipStore(tmp_path / "new.zip", mode="w")
+    with pytest.raises(pk.StoreError, match="cannot be changed once it is written"):
+        pk.sweep(DISK, AXES, store=store)
+    store = zarr.storage.LocalStore(tmp_path / "new.zarr", read_only=True)
+    with pytest.raises(pk.StoreError, match="was opened for reading"):
+        pk.sweep(DISK, AXES, store=store)
+
+
+def test_a_file_is_in_the_way(tmp_path):
+    (tmp_path / "map.zarr").write_text("text")
+    for overwrite in (False, True):
+        with pytest.raises(pk.StoreError, match="map.zarr is a file, not a folder of Zarr"):
+            pk.sweep(DISK, AXES, store=tmp_path / "map.zarr", overwrite=overwrite)
+
+
+def test_a_map_that_has_only_just_been_begun(tmp_path):
+    (tmp_path / "map.zarr").mkdir()
+    with pytest.raises(pk.StoreError, match="there is no map, or not yet"):
+        pk.open_map(tmp_path / "map.zarr")
 
 
 def test_an_empty_folder_is_free(tmp_path):
@@ -340,7 +367,9 @@ def test_what_is_computed_can_be_selected_before_it_is_read(key, part):
 def test_it_is_read_lazily_and_in_chunks(part, monkeypatch):
     pytest.importorskip("dask")
     lazy = pk.open_map(part, chunks={})
-    assert lazy.computed.chunks is not None
+    assert lazy.computed.chunks == lazy.topology.chunks == ((3, 3, 1), (3, 2))
+    assert pk.open_map(part, chunks={"beta": -1}).computed.chunks == ((7,), (3, 2))
+    assert pk.open_map(part, chunks=-1).computed.chunks == ((7,), (5,))
     xr.testing.assert_identical(lazy.compute(), pk.open_map(part).load())
 
 
@@ -458,6 +487,14 @@ def test_options_of_stores_need_a_zarr_store(option, store, tmp_path):
         pk.sweep(DISK, AXES, store=store, **option)
 
 
+def test_tiles_that_no_process_can_hold(tmp_path):
+    axes = {"beta": np.linspace(0, 1.5, 400_000), "a": np.linspace(0, 0.06, 300_000)}
+    for chunks in (-1, 10**6):
+        with pytest.raises(pk.ParameterError, match="chunks: got tiles of beta .* TB of results"):
+            pk.sweep(DISK, axes, store=tmp_path / "map.zarr", chunks=chunks, force=True)
+    assert not (tmp_path / "map.zarr").exists()
+
+
 def test_no_scheduler_there(tmp_path):
     pytest.importorskip("distributed")
     with pytest.raises(pk.StoreError, match="client: no scheduler answers at nowhere"):
@@ -474,6 +511,8 @@ def test_on_a_cluster(tmp_path):
         xr.testing.assert_identical(ds.load(), WHOLE)
         with distributed.Client(cluster, set_as_default=False) as client:
             pk.sweep(DISK, AXES, store=tmp_path / "two.zarr", chunks=2, client=client)
+        with pytest.raises(pk.StoreError, match="client: it is closed, wants one that is"):
+            pk.sweep(DISK, AXES, store=tmp_path / "three.zarr", client=client)
     assert content(tmp_path / "map.zarr") == content(tmp_path / "two.zarr")
 
 

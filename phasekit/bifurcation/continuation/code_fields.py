@@ -110,6 +110,15 @@ class PythonField(Field):
         except (ArithmeticError, ValueError):
             return np.full(len(self.states), np.nan)
 
+    def slopes(self, x: Array, p: Mapping[str, float]) -> Array:
+        """The given derivatives by the states; NaN where they have no value."""
+        n = len(self.states)
+        assert self.jacobian is not None
+        try:
+            return np.asarray(self.jacobian(x, **p), dtype=float).reshape(n, n)
+        except (ArithmeticError, ValueError):
+            return np.full((n, n), np.nan)
+
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Callable[..., None]:
         """A function that fills f and its derivatives."""
         names, n = self.parameters, len(self.states)
@@ -123,6 +132,9 @@ class PythonField(Field):
         def first(u: Array, par: Array, z: Array, out: Array) -> None:
             p = dict(zip(names, par.tolist(), strict=True))
             values = u[:m].tolist()
+            if not all(map(math.isfinite, values)):  # a Newton step led nowhere
+                out[: n + n * m] = np.nan
+                return
             for name, number in zip(free, values[n:], strict=True):
                 p[name] = number
             x = np.array(values[:n])
@@ -130,10 +142,7 @@ class PythonField(Field):
             slopes = out[n : n + n * m].reshape(n, m)
             begin = 0
             if exact is not None:
-                try:
-                    slopes[:, :n] = np.asarray(exact(x.copy(), **p), dtype=float).reshape(n, n)
-                except (ArithmeticError, ValueError):
-                    slopes[:, :n] = np.nan
+                slopes[:, :n] = self.slopes(x.copy(), p)
                 begin = n
             for j in range(begin, m):
                 h = step * max(abs(values[j]), self.scale[j])
@@ -185,8 +194,7 @@ class PythonField(Field):
                     shifted[j] += k * h
                     if in_state:
                         x, p = at(shifted, par)
-                        slope = np.asarray(exact(x, **p), dtype=float).reshape(n, n) @ z[:n]
-                        bent[:, j] += k * slope / (2.0 * h)
+                        bent[:, j] += k * (self.slopes(x, p) @ z[:n]) / (2.0 * h)
                     else:
                         difference = self.value(*at(shifted + along * z, par)) - self.value(
                             *at(shifted - along * z, par)
