@@ -23,7 +23,6 @@ from phasekit.labelled.options import (
 )
 from phasekit.labelled.quantities import STATES, Pass, Quantity, select
 from phasekit.labelled.store import WholeTarget, open_map, target_of
-from phasekit.labelled.stored import sweep_into
 from phasekit.labelled.system import Model, as_system
 
 
@@ -115,6 +114,8 @@ def sweep(
     place = None if store is None else target_of(store)
     system = as_system(system)
     if place is not None and not place.is_netcdf and system.methods.by_tiles:
+        from phasekit.labelled.stored import sweep_into  # here: it loads multiprocessing
+
         layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
         sweep_into(
             place,
