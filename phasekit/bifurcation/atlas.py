@@ -69,7 +69,7 @@ def atlas(path: Path, coefficients: Coefficients) -> tuple[list[Curve], list[Mee
     Parameters
     ----------
     path : Path
-        The form, the other parameters, and the span.
+        The law, the other parameters, and the span.
     coefficients : callable
         A, B, C at an array of values of the parameter.
 

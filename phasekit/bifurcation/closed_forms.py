@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.forms import Form
+from phasekit.laws.trigonometric import Trigonometric
 
 Array = npt.NDArray[np.float64]
 
@@ -77,20 +77,20 @@ def cubic_coefficient(A: npt.ArrayLike, phi: npt.ArrayLike) -> Array:
 
 
 def normal_form(
-    form: Form, values: Mapping[str, float], parameter: str, phi: float, kind: str
+    law: Trigonometric, values: Mapping[str, float], parameter: str, phi: float, kind: str
 ) -> NormalForm:
     """Coefficients of the normal form at a special point of a path.
 
     Parameters
     ----------
-    form, values, parameter
+    law, values, parameter
         The system, its parameters at the point, and the one that varies.
     phi : float
         Angle of the degenerate equilibrium.
     kind : {"fold", "pitchfork", "cusp"}
     """
-    A, B, C, N = form(values)
-    moved = form({**values, parameter: complex(values[parameter], STEP)})
+    A, B, C, N = law(values)
+    moved = law({**values, parameter: complex(values[parameter], STEP)})
     # V' and V'' vanish at the point, so that N counts as a constant.
     dA, dB, dC = (complex(x).imag / STEP / N for x in moved[:3])
     sin, cos = math.sin(phi), math.cos(phi)

@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.closed_forms import fold_angle
-from phasekit.bifurcation.forms import Factor
 from phasekit.bifurcation.paths import Path
 from phasekit.bifurcation.plane import TURN, Plane
 from phasekit.bifurcation.real_roots import add
 from phasekit.bifurcation.tracing import EDGE, Equations, Trace, newton, solve, trace
+from phasekit.laws.trigonometric import Factor
 
 Array = npt.NDArray[np.float64]
 
@@ -64,7 +64,7 @@ def loci(plane: Plane) -> tuple[list[Piece], list[Cusp]]:
             pieces += _pitchforks(plane, "C" if B_flat else "B")
         else:
             pieces += _folds(plane, cusps)
-        for factor in plane.form.sign_changes:
+        for factor in plane.law.sign_changes:
             for curve in _zero_curves(plane, factor):
                 if _A_turns(plane, curve):
                     piece = _piece(plane, "sign_change", curve.vertices, curve.closed, sign=0)
@@ -81,7 +81,7 @@ def _folds(plane: Plane, cusps: list[Cusp]) -> list[Piece]:
     pieces: list[Piece] = []
     curves: list[Trace] = []
     for fixed, u, point in plane.crossings(lambda path: path.discriminant):
-        A, B, C, _ = plane.form(plane.values_at(point))
+        A, B, C, _ = plane.law(plane.values_at(point))
         if A == 0.0:
             continue
         guess = np.append(point, fold_angle(A, B, C) / TURN)
@@ -103,7 +103,7 @@ def _off_corners(plane: Plane, vertices: Array) -> Array:
     """Leave out ends in a corner of the plane where no force is left, and so no direction."""
 
     def lost(z: Array) -> bool:
-        A, B, C, _ = plane.form(plane.values_at(z))
+        A, B, C, _ = plane.law(plane.values_at(z))
         return bool(np.abs(z[:2] - np.round(z[:2])).max() < EDGE and np.hypot(A, B) + abs(C) < LOST)
 
     while len(vertices) and lost(vertices[0]):
@@ -159,7 +159,7 @@ def _by_sign(plane: Plane, equations: Equations, curve: Trace) -> Iterator[tuple
     """Cut a curve where there is no force: parts, the sign of A on each, whether it is closed."""
 
     def sign(z: Array) -> int:
-        return int(np.sign(plane.form(plane.values_at(z))[0]))
+        return int(np.sign(plane.law(plane.values_at(z))[0]))
 
     signs = [sign(z) for z in curve.vertices]
     part: list[Array] = []
@@ -196,7 +196,7 @@ def _last(
 
 def _cusp(plane: Plane, row: Array) -> Cusp:
     x, y = plane.parameters(row[None])[0]
-    A = float(plane.form(plane.values_at(row))[0])
+    A = float(plane.law(plane.values_at(row))[0])
     phi = float(np.pi - (np.pi - TURN * row[2]) % TURN)
     along_B = abs(np.cos(phi)) > 0.5
     return Cusp(float(x), float(y), phi, "center" if along_B == (A > 0.0) else "saddle")
@@ -224,7 +224,7 @@ def _A_turns(plane: Plane, curve: Trace) -> bool:
     k = len(curve.vertices) // 2
     (dx, dy), middle = np.diff(curve.vertices[k - 1 : k + 1], axis=0)[0], curve.vertices[k]
     across = 1e-5 * np.array([-dy, dx]) / np.hypot(dx, dy)
-    left, right = (plane.form(plane.values_at(middle + z))[0] for z in (across, -across))
+    left, right = (plane.law(plane.values_at(middle + z))[0] for z in (across, -across))
     return bool(left * right < 0.0)
 
 
@@ -242,14 +242,14 @@ def _pitchforks(plane: Plane, name: str) -> list[Piece]:
     for sign in (1, -1):
 
         def difference(v: Any, sign: int = sign) -> Any:
-            products = plane.form.products(v)
+            products = plane.law.products(v)
             return products[place] - sign * products[0]
 
         def along(path: Path, sign: int = sign) -> Any:
             return add(path.products[place], path.products[0], -sign)
 
         def relative(z: Array, sign: int = sign) -> tuple[Array, Array]:
-            abc, dx, dy = plane._derivatives(lambda v: plane.form(v)[:3], z)
+            abc, dx, dy = plane._derivatives(lambda v: plane.law(v)[:3], z)
             f, fx, fy = (part[place] - sign * part[0] for part in (abc, dx, dy))
             size = float(np.hypot(fx, fy)) or 1.0
             return np.array([f / size]), np.array([[fx, fy]]) / size
@@ -273,8 +273,8 @@ def _equal_energies(plane: Plane) -> list[Piece]:
     They are the parts inside the fold set of the curves on which B or C vanishes.
     """
     pieces = []
-    for zero in plane.form.zeros:
-        sample = zero.factor(plane.form.turned(plane.values_at(np.array([0.37, 0.41]))))
+    for zero in plane.law.zeros:
+        sample = zero.factor(plane.law.turned(plane.values_at(np.array([0.37, 0.41]))))
         if sample == 0.0:
             continue  # it vanishes in the whole plane
         for curve in _zero_curves(plane, zero.factor):
@@ -286,7 +286,7 @@ def _equal_energies(plane: Plane) -> list[Piece]:
 def _inside(plane: Plane, factor: Factor, vertices: Array, of_B: bool, of_C: bool) -> list[Piece]:
     def measured(z: Array) -> tuple[int, float]:
         """Sign of A, and how far inside the fold set: (|A| - |B + C|)/sum, as one of them is 0."""
-        A, B, C, _ = plane.form(plane.values_at(z))
+        A, B, C, _ = plane.law(plane.values_at(z))
         rest = (0.0 if of_B else abs(B)) + (0.0 if of_C else abs(C))
         total = abs(A) + rest
         return int(np.sign(A)), (abs(A) - rest) / total if total > 0.0 else 0.0

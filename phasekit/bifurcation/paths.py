@@ -1,8 +1,8 @@
 """A system along one parameter: every value at which its equilibria change, by exact arithmetic.
 
-With A, B and C polynomials of the parameter (`phasekit.bifurcation.forms`), equilibria merge at the
-real roots of Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2, labels change hands at those of B and C,
-and without force, where A, B and C have a common root, everything is an equilibrium.
+With A, B and C polynomials of the parameter (`phasekit.laws.trigonometric`), equilibria merge at
+the real roots of Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2, labels change hands at those of B
+and C, and without force, where A, B and C have a common root, everything is an equilibrium.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from phasekit.bifurcation.forms import Factor, Form, Values, exact
 from phasekit.bifurcation.real_roots import (
     Polynomial,
     Rational,
@@ -25,16 +24,14 @@ from phasekit.bifurcation.real_roots import (
     value,
     whole,
 )
-
-# Degree of A N, B N and C N in a parameter or in the tangent of half an angle, at most.
-DEGREE = 4
+from phasekit.laws.trigonometric import Factor, Trigonometric, Values, exact
 
 
 @dataclass(frozen=True)
 class Path:
-    """A form of system with one parameter running over a span; `values` holds the others."""
+    """A law with one parameter running over a span; `values` holds the others."""
 
-    form: Form
+    law: Trigonometric
     values: Values
     parameter: str
     span: tuple[float, float]
@@ -66,18 +63,18 @@ class Path:
     @cached_property
     def _products(self) -> list[Polynomial]:
         def place(i: int) -> Polynomial:
-            return self.polynomial(lambda v: self.form.products(v)[i])
+            return self.polynomial(lambda v: self.law.products(v)[i])
 
         return [place(i) for i in range(3)]
 
     def polynomial(self, factor: Factor) -> Polynomial:
-        """Return a factor of the form as a polynomial of x."""
-        fixed = exact(self.form.turned({**self.values, self.parameter: self.span[0]}))
+        """Return a factor of the law as a polynomial of x."""
+        fixed = exact(self.law.turned({**self.values, self.parameter: self.span[0]}))
         low, high = (Fraction(end) for end in self._ends)
         values = []
-        for k in range(DEGREE + 1):
+        for k in range(self.law.degree(self.parameter) + 1):
             u = low + (high - low) * k
-            here = self.form.half_angle(u) if self.parameter == self.form.angle else u
+            here = self.law.half_angle(self.parameter, u) if self._turns else u
             values.append(Fraction(factor({**fixed, self.parameter: here})))
         return interpolate([Fraction(v) for v in values])
 
@@ -85,8 +82,8 @@ class Path:
         """Return the parameter at x."""
         low, high = self._ends
         u = float(Fraction(low) + (Fraction(high) - Fraction(low)) * x)
-        if self.parameter == self.form.angle:
-            u = self.form.middle + 2.0 * math.atan(u)
+        if self._turns:
+            u = self.law.middle(self.parameter) + 2.0 * math.atan(u)
         return min(max(u, self.span[0]), self.span[1])
 
     def value(self, polynomial: Sequence[Rational], x: Fraction) -> Fraction:
@@ -102,6 +99,11 @@ class Path:
     @property
     def _ends(self) -> tuple[float, float]:
         low, high = self.span
-        if self.parameter != self.form.angle:
+        if not self._turns:
             return low, high
-        return math.tan(0.5 * (low - self.form.middle)), math.tan(0.5 * (high - self.form.middle))
+        middle = self.law.middle(self.parameter)
+        return math.tan(0.5 * (low - middle)), math.tan(0.5 * (high - middle))
+
+    @property
+    def _turns(self) -> bool:
+        return self.parameter in self.law.angles

@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.closed_forms import STEP
-from phasekit.bifurcation.forms import Factor, Form
 from phasekit.bifurcation.paths import Path
 from phasekit.bifurcation.real_roots import unit_roots
 from phasekit.bifurcation.tracing import Equations
+from phasekit.laws.trigonometric import Factor, Trigonometric
 
 Array = npt.NDArray[np.float64]
 Limits = tuple[float, float]
@@ -32,9 +32,9 @@ TURN = 2.0 * np.pi
 
 @dataclass(frozen=True)
 class Plane:
-    """Two parameters of a form over a rectangle; `values` holds the others."""
+    """Two parameters of a law over a rectangle; `values` holds the others."""
 
-    form: Form
+    law: Trigonometric
     values: Mapping[str, float]
     names: tuple[str, str]
     limits: tuple[Limits, Limits]
@@ -70,7 +70,7 @@ class Plane:
 
     def fold(self, z: Array) -> tuple[Array, Array]:
         """V' and V'' and their Jacobian at (x, y, phi in turns), relative to the force."""
-        (A, B, C), dx, dy = self._derivatives(lambda v: self.form(v)[:3], z)
+        (A, B, C), dx, dy = self._derivatives(lambda v: self.law(v)[:3], z)
         phi = TURN * z[2]
         sin, cos = np.sin(phi), np.cos(phi)
         sin2, cos2 = 2.0 * sin * cos, (cos - sin) * (cos + sin)
@@ -91,7 +91,7 @@ class Plane:
         """Equation of the set where a factor vanishes."""
 
         def equation(z: Array) -> tuple[Array, Array]:
-            f, dx, dy = self._derivatives(lambda v: (factor(self.form.turned(v)),), z)
+            f, dx, dy = self._derivatives(lambda v: (factor(self.law.turned(v)),), z)
             size = float(np.hypot(dx[0], dy[0])) or 1.0
             return f / size, np.array([[dx[0], dy[0]]]) / size
 
@@ -103,7 +103,7 @@ class Plane:
     def flat(self) -> tuple[bool, bool, bool]:
         """Whether A, B, C vanish in the whole plane."""
         rng = np.random.default_rng(0)
-        samples = [self.form(self.values_at(u))[:3] for u in rng.random((3, 2))]
+        samples = [self.law(self.values_at(u))[:3] for u in rng.random((3, 2))]
         return tuple(all(s[i] == 0.0 for s in samples) for i in range(3))  # type: ignore[return-value]
 
     # ---------------------------------------------------------------- net of lines
@@ -115,7 +115,7 @@ class Plane:
             low, high = self.limits[i]
             value = high if u == 1.0 else float(low + (high - low) * u)
             values = {**self.values, self.names[i]: value}
-            yield i, u, Path(self.form, values, self.names[1 - i], self.limits[1 - i])
+            yield i, u, Path(self.law, values, self.names[1 - i], self.limits[1 - i])
 
     @cached_property
     def net(self) -> list[tuple[int, float, Path]]:
@@ -144,7 +144,7 @@ def regions(plane: Plane, cells: int = 160) -> list[tuple[float, float, int, flo
     grid = np.stack(np.meshgrid(ticks, ticks, indexing="ij"), axis=-1).reshape(-1, 2)
     x, y = plane.parameters(grid).T
     values = {name: np.full(x.size, value) for name, value in plane.values.items()}
-    A, B, C = plane.form({**values, plane.names[0]: x, plane.names[1]: y})[:3]
+    A, B, C = plane.law({**values, plane.names[0]: x, plane.names[1]: y})[:3]
     number = np.where(np.cbrt(B) ** 2 + np.cbrt(C) ** 2 < np.cbrt(A) ** 2, 4, 2)
     number = np.where((A == 0.0) & (B == 0.0) & (C == 0.0), 0, number).reshape(cells, cells)
     # Points keep off the lines on which A, B or C changes sign.

@@ -165,7 +165,7 @@ def _handed_over(event: Event, left: Interval, right: Interval) -> dict[int, int
 
 def _merged_angle(path: Path, event: Event, left: Interval) -> tuple[float, str | None]:
     """Angle at which equilibria merge, and which of B and C is zero there."""
-    A, B, C, _ = path.form({**path.values, path.parameter: event.at})
+    A, B, C, _ = path.law({**path.values, path.parameter: event.at})
     if event.C_vanishes or left.C == 0:
         return float(fold_angle(A, B, 0.0)), "C"
     if event.B_vanishes or left.B == 0:
@@ -175,7 +175,7 @@ def _merged_angle(path: Path, event: Event, left: Interval) -> tuple[float, str 
 
 def _special(path: Path, event: Event, phi: float, kind: str) -> Meeting:
     values = {**path.values, path.parameter: event.at}
-    return Meeting(event.at, phi, kind, normal_form(path.form, values, path.parameter, phi, kind))
+    return Meeting(event.at, phi, kind, normal_form(path.law, values, path.parameter, phi, kind))
 
 
 def _join_pair(

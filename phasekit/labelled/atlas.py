@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.atlas import Curve, atlas
-from phasekit.bifurcation.forms import FORMS
 from phasekit.bifurcation.paths import Path
 from phasekit.bifurcation.survey import Meeting
 from phasekit.errors import EquilibriumKind
@@ -96,7 +95,7 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     if not isinstance(parameter, str) or parameter not in formula:
         raise unknown(f"parameter of branches for {type(system).__name__}", parameter, formula)
     low, high = limits(system, parameter, "span", span)
-    path = Path(FORMS[type(system).__name__], values, parameter, (low, high))
+    path = Path(system.law(), values, parameter, (low, high))
 
     def coefficients(at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         arrays = {name: np.full_like(at, value) for name, value in values.items()}
@@ -121,9 +120,9 @@ def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
     own = system.formula_inputs()
     if all(name in ("lam", "psi") for name in names) and not all(name in own for name in names):
         system = system.reduced()
-    if type(system).__name__ not in FORMS:
+    if not system.derived:
         hint = "pk.continuation follows the equilibria of any other"
-        raise bad("system", system, f"one of {', '.join(FORMS)}", hint)
+        raise bad("system", system, "a system with coefficients (A, B, C)", hint)
     values: dict[str, float] = {}
     for name in system.formula_inputs():
         value = system.parameters[name]

@@ -10,17 +10,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.critical import critical_disk, critical_reduced
+from phasekit.bifurcation.critical import critical_reduced
+from phasekit.bifurcation.fold_values import fold_values
 from phasekit.labelled.arguments import FloatArray, unknown
 from phasekit.labelled.evaluate import evaluate
-from phasekit.labelled.models import GyroRotorDisk
 from phasekit.labelled.quantities import ROWS, Pass
-from phasekit.labelled.system import as_system
+from phasekit.labelled.system import Model, as_system
 
 _CRITICAL = ("critical_fold", "critical_sign_change")
-
-#: A legal value in place of the parameter that is solved for.
-_NEUTRAL = {"beta": np.pi / 2, "e": 1.0, "a": 0.0, "omega1": 1.0, "lam": 1.0, "psi": 1.0}
 
 
 def critical(system: Any, parameter: str) -> xr.Dataset:
@@ -30,15 +27,17 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
     ----------
     system : system
         Any system; its own value of the parameter is not used.
-    parameter : {"beta", "e", "a", "omega1", "lam", "psi"}
-        beta, e, a and omega1 for a `GyroRotorDisk`; lam and psi for every system.
+    parameter : str
+        Any parameter on which the system's coefficients depend: beta, e, a, omega1, r or g of a
+        `GyroRotorDisk`, h_x of a `StonerWohlfarth`, ...; lam and psi for every system.
 
     Returns
     -------
     xarray.Dataset
         ``critical_fold`` on the dim ``fold`` (minus: the one with A < 0, plus: A > 0) and
-        ``critical_sign_change``: the positive solution (beta in [0, pi/2]), NaN where there is
-        none. In the units of the parameter, which the attribute ``parameter`` names.
+        ``critical_sign_change``: the positive solution (angles in [0, pi/2]), the least where
+        there are several (`branches` has them all), NaN where there is none. In the units of the
+        parameter, which the attribute ``parameter`` names.
 
     Raises
     ------
@@ -47,8 +46,9 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
 
     Notes
     -----
-    The fold is ``|B|^(2/3) + |C|^(2/3) = |A|^(2/3)``, the sign change ``A = 0``, solved for the
-    parameter in closed form.
+    The fold is ``|B|^(2/3) + |C|^(2/3) = |A|^(2/3)``, the sign change ``A = 0``. They are solved
+    in closed form for beta, e, a and omega1 of a disk and for lam and psi, and by exact isolation
+    of the roots of a polynomial for all other parameters (some milliseconds a cell).
 
     Examples
     --------
@@ -58,28 +58,33 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
     ('fold',)
     """
     system = as_system(system, closed_form="critical")
-    names: dict[str, str] = {}
-    if isinstance(system, GyroRotorDisk):
-        names.update({p.name: p.units for p in system.declared if p.name in _NEUTRAL})
-    names.update({"lam": "1", "psi": "1"})
-    if not isinstance(parameter, str) or parameter not in names:
-        raise unknown(f"parameter of critical for {type(system).__name__}", parameter, names)
+    units = {p.name: p.units for p in system.declared if p.name in system.formula_inputs()}
+    units |= {"lam": "1", "psi": "1"}
+    if not isinstance(parameter, str) or parameter not in units:
+        raise unknown(f"parameter of critical for {type(system).__name__}", parameter, units)
     function: Callable[..., Any]
     if parameter in ("lam", "psi"):
         inputs: tuple[str, ...] = ("A", "B", "C")
         function = functools.partial(critical_reduced, parameter)
     else:
-        inputs = GyroRotorDisk.formula_inputs()
-        function = functools.partial(_by_name, functools.partial(critical_disk, parameter), inputs)
-    if parameter in system.parameters:  # not an input: neither its value nor its axis counts
-        system = system.replace(**{parameter: _NEUTRAL[parameter]})
+        inputs = system.formula_inputs()
+        solve = system.critical_values.get(parameter)
+        function = functools.partial(_by_name, solve or _of(system, parameter), inputs)
+    for declared in system.declared:
+        if declared.name == parameter:  # not an input: neither its value nor its axis counts
+            system = system.replace(**{parameter: declared.example})
     one = Pass(functools.partial(_critical_fields, function), inputs, ("critical",))
-    rows = [replace(ROWS[n], units=names[parameter]) for n in _CRITICAL]
+    rows = [replace(ROWS[n], units=units[parameter]) for n in _CRITICAL]
     ds = evaluate(system, rows, (one,))
     ds = ds.drop_vars(parameter, errors="ignore")
     for name in _CRITICAL:
         ds[name].attrs["parameter"] = parameter
     return ds
+
+
+def _of(system: Model, parameter: str) -> Callable[..., Any]:
+    law = system.law()
+    return lambda **values: fold_values(law, parameter, values)
 
 
 def _by_name(function: Callable[..., Any], names: tuple[str, ...], *arrays: FloatArray) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from phasekit.labelled.arguments import FloatArray, NumberLike
 from phasekit.labelled.grid import combine
 from phasekit.labelled.models import STANDARD_GRAVITY
 from phasekit.labelled.system import Model, Parameter, attrs_of, model
+from phasekit.laws.trigonometric import Values
 
 
 @model
@@ -55,8 +56,9 @@ class Reduced(Model):
     )
 
     @staticmethod
-    def _abc(lam: FloatArray, psi: FloatArray, Omega_sq: FloatArray) -> tuple[FloatArray, ...]:
-        return Omega_sq, lam * Omega_sq, psi * Omega_sq
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """[Veljovic2015] (12)."""
+        return v["Omega_sq"], v["lam"] * v["Omega_sq"], v["psi"] * v["Omega_sq"], 1
 
 
 def reduce(system: Model) -> Reduced:
@@ -159,19 +161,15 @@ class ParticleOnCircle(Model):
     )
 
     @staticmethod
-    def _abc(
-        radius: FloatArray,
-        omega: FloatArray,
-        tilt: FloatArray,
-        offset: FloatArray,
-        normal_offset: FloatArray,
-        g: FloatArray,
-    ) -> tuple[FloatArray, ...]:
-        cos, sin = np.cos(tilt), np.sin(tilt)
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """The particle's law, as polynomials of its parameters."""
+        sine, cosine, unit = v["tilt"]
+        omega_sq = v["omega"] * v["omega"]
         return (
-            (omega * cos) ** 2,
-            (g * cos + omega**2 * normal_offset * sin) / radius,
-            omega**2 * offset / radius,
+            v["radius"] * (omega_sq * (cosine * cosine)),
+            (v["g"] * cosine + omega_sq * v["normal_offset"] * sine) * unit,
+            omega_sq * v["offset"] * (unit * unit),
+            v["radius"] * (unit * unit),
         )
 
 
@@ -208,9 +206,9 @@ class Pendulum(Model):
     )
 
     @staticmethod
-    def _abc(length: FloatArray, g: FloatArray) -> tuple[FloatArray, ...]:
-        B = g / length
-        return np.zeros_like(B), B, np.zeros_like(B)
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """Gravity alone."""
+        return 0 * v["g"], v["g"], 0 * v["g"], v["length"]
 
 
 @model
@@ -259,5 +257,6 @@ class StonerWohlfarth(Model):
     )
 
     @staticmethod
-    def _abc(K: FloatArray, h_x: FloatArray, h_y: FloatArray) -> tuple[FloatArray, ...]:
-        return -2.0 * K, h_x, h_y
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """Anisotropy and field."""
+        return -2 * v["K"], v["h_x"], v["h_y"], 1

@@ -8,7 +8,6 @@ import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.closed_forms import cubic_coefficient, quadratic_coefficient
-from phasekit.bifurcation.forms import FORMS
 from phasekit.bifurcation.loci import Cusp, Piece, loci
 from phasekit.bifurcation.plane import Plane, regions
 from phasekit.errors import ParameterError
@@ -110,7 +109,7 @@ def bifurcation_set(
     if x == y:
         raise ParameterError(f"y: got {y!r}, wants a parameter that is not on x")
     box = limits(system, x, "xlim", xlim), limits(system, y, "ylim", ylim)
-    plane = Plane(FORMS[type(system).__name__], values, (x, y), box)
+    plane = Plane(system.law(), values, (x, y), box)
     pieces, cusps = loci(plane)
     return _dataset(system, plane, pieces, cusps)
 

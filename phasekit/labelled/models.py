@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from phasekit.bifurcation.critical import critical_disk
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, same
 from phasekit.labelled.grid import combine
@@ -20,7 +21,8 @@ from phasekit.labelled.system import (
     model,
     named_arguments,
 )
-from phasekit.mechanics.disk import disk_coefficients, disk_eccentricity, disk_inertia
+from phasekit.laws.trigonometric import Values
+from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_products
 
 STANDARD_GRAVITY = 9.80665
 
@@ -85,8 +87,9 @@ class Coefficients(Model, _ABC):
         return self
 
     @staticmethod
-    def _abc(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
-        return A, B, C
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """The coefficients themselves."""
+        return v["A"], v["B"], v["C"], 1
 
     def __eq__(self, other: object) -> bool:
         """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
@@ -230,16 +233,10 @@ class GyroRotorDisk(Model):
                 "e sin(beta) > 0; with both zero nothing has inertia about the shaft"
             )
 
-    @staticmethod
-    def _abc(
-        beta: FloatArray,
-        e: FloatArray,
-        a: FloatArray,
-        r: FloatArray,
-        omega1: FloatArray,
-        g: FloatArray,
-    ) -> tuple[FloatArray, ...]:
-        return disk_coefficients(beta, e, a, r, omega1, g)
+    products = staticmethod(disk_products)
+    critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {
+        name: functools.partial(critical_disk, name) for name in ("beta", "e", "a", "omega1")
+    }
 
     @property
     def eccentricity(self) -> Value:

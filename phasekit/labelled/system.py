@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
@@ -27,6 +28,8 @@ from phasekit.labelled.arguments import (
     same,
     unknown,
 )
+from phasekit.laws.trigonometric import Trigonometric, Values
+from phasekit.laws.trigonometric import law as make_law
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -90,6 +93,18 @@ class Parameter:
     high: float = np.inf
     positive: bool = False  # zero is excluded
     optional: bool = False
+
+    @property
+    def least(self) -> float:
+        """The least value, just above zero where that is excluded."""
+        return max(self.low, math.ulp(0.0)) if self.positive else self.low
+
+    @property
+    def example(self) -> float:
+        """A value of the domain, for where the parameter's own value does not count."""
+        if np.isfinite(self.low) and np.isfinite(self.high):
+            return 0.5 * (self.low + self.high)
+        return max(1.0, self.low)
 
     @property
     def wants(self) -> str:
@@ -156,13 +171,21 @@ class Model:
     __slots__ = ()
 
     declared: ClassVar[tuple[Parameter, ...]]
+    #: Parameters for which folds are known in closed form, with the function that solves for each.
+    critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     #: What passes may ask for that is computed from the parameters.
     derived: ClassVar[tuple[str, ...]] = ("A", "B", "C")
 
     @staticmethod
-    def _abc(*args: Any, **kwargs: Any) -> tuple[FloatArray, ...]:
-        """Coefficients from arrays that broadcast: the model's formula, overridden by each."""
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each."""
         raise NotImplementedError
+
+    @classmethod
+    def law(cls) -> Trigonometric:
+        """The law, and what follows from it."""
+        declared = ((p.name, p.units, p.least, p.high) for p in cls.declared)
+        return make_law(cls.products, tuple(declared))
 
     def __post_init__(self) -> None:
         """Check the parameters and keep them."""
@@ -174,7 +197,7 @@ class Model:
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
         """Names of the parameters on which the coefficients depend."""
-        return tuple(inspect.signature(cls._abc).parameters)
+        return cls.law().parameters
 
     @property
     def methods(self) -> Methods:
@@ -212,7 +235,7 @@ class Model:
             valid = functools.reduce(
                 np.logical_and, [p.valid(used[p.name]) for p in cls.declared if p.name in used]
             )
-            A, B, C = cls._abc(**used)
+            A, B, C = cls.law().coefficients(used)
             if not valid.all():
                 A, B, C = (np.where(valid, x, np.nan) for x in (A, B, C))
         return A, B, C

@@ -2,10 +2,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.laws.trigonometric import Values, turn
+
 Array = npt.NDArray[np.float64]
+
+
+def disk_products(v: Values) -> tuple[Any, Any, Any, Any]:
+    """A N, B N, C N and N = 4 e^2 s^2 + r^2 (1 + s^2) of a disk, s = sin beta.
+
+    The law of the disk ([Veljovic2015] (12), (13), corrected) in its length form, which is regular
+    where the papers' lambda and psi are not; see `phasekit.laws.trigonometric` for what it takes.
+    """
+    sine, cosine, radius = v["beta"]
+    offset, reach = 2 * v["e"] * sine, v["r"] * cosine
+    omega_sq = v["omega1"] * v["omega1"]
+    return (
+        omega_sq * ((offset - reach) * (offset + reach)),
+        2 * v["g"] * offset * radius,
+        2 * omega_sq * v["a"] * offset * radius,
+        offset * offset + v["r"] * v["r"] * (radius * radius + sine * sine),
+    )
 
 
 def disk_coefficients(
@@ -55,17 +76,12 @@ def disk_coefficients(
         *(np.asarray(value, dtype=float) for value in (beta, e, a, r, omega1, g))
     )
     with np.errstate(all="ignore"):
-        s = _sine(beta)
-        offset = 2.0 * e * s
-        reach = r * np.cos(beta)
-        inertia = offset * offset + r * r * (1.0 + s * s)
+        values = {"beta": turn(beta), "e": e, "a": a, "r": r, "omega1": omega1, "g": g}
+        *products, inertia = disk_products(values)
         legal = (beta >= 0.0) & (beta <= np.pi) & (e >= 0.0) & (r >= 0.0) & (inertia > 0.0)
         legal &= np.isfinite(inertia + a + omega1 + g)
         inertia = np.where(legal, inertia, np.nan)
-        omega_sq = omega1 * omega1
-        A = omega_sq * ((offset - reach) * (offset + reach) / inertia)
-        B = 2.0 * g * offset / inertia
-        C = 2.0 * omega_sq * a * offset / inertia
+        A, B, C = (product / inertia for product in products)
     return A, B, C
 
 
@@ -82,7 +98,7 @@ def disk_mixing(r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike) -> Arra
     """
     r, e, beta = (np.asarray(value, dtype=float) for value in (r, e, beta))
     with np.errstate(all="ignore"):
-        s = _sine(beta)
+        s = turn(beta)[0]
         inertia = 4.0 * e * e * s * s + r * r * (1.0 + s * s)
         return np.asarray((r * r + 4.0 * e * e) * s * np.cos(beta) / inertia)
 
@@ -98,7 +114,7 @@ def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
     >>> float(disk_eccentricity(0.1, np.pi))
     0.0
     """
-    return np.asarray(np.asarray(e, dtype=float) * _sine(np.asarray(beta, dtype=float)))
+    return np.asarray(np.asarray(e, dtype=float) * turn(np.asarray(beta, dtype=float))[0])
 
 
 def disk_inertia(
@@ -121,12 +137,7 @@ def disk_inertia(
     [0.025, 0.027817, 0.007183, 0.007058]
     """
     m, r, e, beta = (np.asarray(value, dtype=float) for value in (m, r, e, beta))
-    s, c = _sine(beta), np.cos(beta)
+    s, c, _ = turn(beta)
     ju = m * (0.25 * r * r + e * e)
     j = 0.25 * m * r * r
     return ju, j + ju * c * c, j + ju * s * s, ju * s * c
-
-
-def _sine(beta: Array) -> Array:
-    """Sine, exactly 0 at the double nearest to pi (a shaft in the disk's plane)."""
-    return np.where(beta == np.pi, 0.0, np.sin(beta))

@@ -10,9 +10,9 @@ import pytest
 
 import phasekit as pk
 from phasekit.bifurcation.atlas import atlas
-from phasekit.bifurcation.forms import Form
 from phasekit.bifurcation.paths import Path
 from phasekit.labelled.atlas import branches
+from phasekit.laws.trigonometric import law
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.05, a=0.012, r=0.2, omega1=31.4)
 PARTICLE = pk.ParticleOnCircle(radius=0.1, omega=20.0, tilt=0.2, offset=0.01, normal_offset=0.02)
@@ -186,7 +186,7 @@ def test_a_closed_branch_is_marked():
 
 
 def along(products, span=(-0.5, 0.5)):
-    form = Form(lambda v: (*products(v["p"]), 1))
+    form = law(lambda v: (*products(v["p"]), 1), (("p", "1", -np.inf, np.inf),))
 
     def coefficients(at):
         return tuple(np.broadcast_to(np.asarray(c, float), at.shape) for c in products(at))

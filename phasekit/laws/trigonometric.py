@@ -1,0 +1,196 @@
+"""The trigonometric law, phi'' + B sin phi - A sin phi cos phi - C cos phi = 0, of any system.
+
+A system says one thing: the products A N, B N, C N and N > 0 of its parameters, polynomials in
+each parameter and in sine, cosine and radius of an angle. The same few lines are run with floats,
+arrays, complex numbers (whose imaginary part carries derivatives), fractions and symbols; the
+coefficients, the formulas, the factors with which a coefficient vanishes and the degrees all
+follow from them.
+"""
+
+from __future__ import annotations
+
+import cmath
+import functools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from phasekit.laws.factors import Atom, Name, Product, entries, named
+
+#: Sine, cosine and radius of an angle, up to a common factor.
+Turn = tuple[Any, Any, Any]
+Values = Mapping[str, Any]
+#: A polynomial of the parameters; angles among them are given as a `Turn`.
+Factor = Callable[[Values], Any]
+#: A N, B N, C N and N > 0 of parameters by name; angles among them are given as a `Turn`.
+Products = Callable[[Values], tuple[Any, Any, Any, Any]]
+
+SINE, COSINE, RADIUS = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Zero:
+    """A factor with which B, C or both vanish, and A need not."""
+
+    factor: Factor
+    of_B: bool = False
+    of_C: bool = False
+
+
+@dataclass(frozen=True)
+class Trigonometric:
+    """One system's law.
+
+    Attributes
+    ----------
+    products : callable
+        A N, B N, C N and N > 0.
+    domains : mapping
+        Parameter -> its least and greatest value, in the order in which they are declared.
+    angles : iterable of str
+        Parameters that are angles, in rad.
+    """
+
+    products: Products
+    domains: Mapping[str, tuple[float, float]]
+    angles: frozenset[str] = field(default=frozenset())
+
+    # ---------------------------------------------------------------- values
+
+    def turned(self, values: Values) -> dict[str, Any]:
+        """Return the values with angles as a `Turn`."""
+        return {
+            name: turn(value) if name in self.angles else value for name, value in values.items()
+        }
+
+    def __call__(self, values: Values) -> tuple[Any, Any, Any, Any]:
+        """A N, B N, C N and N at plain values."""
+        return self.products(self.turned(values))
+
+    def coefficients(self, values: Values) -> tuple[Any, Any, Any]:
+        """A, B and C from floats or arrays that broadcast; NaN where N is not positive."""
+        *products, scale = self(values)
+        scale = np.where(np.asarray(scale) > 0, scale, np.nan)
+        A, B, C = (np.asarray(product / scale) for product in products)
+        return A, B, C
+
+    def formulas(self, symbols: Values) -> tuple[Any, Any, Any]:
+        """A, B and C as sympy expressions of symbols."""
+        import sympy
+
+        turned = {
+            name: (sympy.sin(x), sympy.cos(x), sympy.Integer(1)) if name in self.angles else x
+            for name, x in symbols.items()
+        }
+        *products, scale = self.products(turned)
+        A, B, C = (sympy.sympify(product) / scale for product in products)
+        return A, B, C
+
+    # ---------------------------------------------------------------- half-angles
+
+    def middle(self, angle: str) -> float:
+        """The middle of an angle's range, from which its half-angle is measured."""
+        low, high = self.domains[angle]
+        return 0.5 * (low + high) if math.isfinite(high - low) else 0.0
+
+    def half_angle(self, angle: str, tangent: Any) -> Turn:
+        """Return the `Turn` of ``middle + 2 atan(tangent)``, without division."""
+        sine, cosine = 2 * tangent, 1 - tangent * tangent
+        radius = 1 + tangent * tangent
+        return (cosine, -sine, radius) if self.middle(angle) else (sine, cosine, radius)
+
+    # ---------------------------------------------------------------- what follows
+
+    @cached_property
+    def symbolic(self) -> tuple[Product, Product, Product, Product]:
+        """The products as what remembers its factors."""
+        values = {
+            name: entries(name) if name in self.angles else named(name) for name in self.domains
+        }
+        parts = [x if isinstance(x, Product) else Product(x) for x in self.products(values)]
+        A, B, C, N = parts
+        return A, B, C, N
+
+    @cached_property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters on which the coefficients depend, as they are declared."""
+        used = {name for product in self.symbolic for name in product.names()}
+        return tuple(name for name in self.domains if name in used)
+
+    def degree(self, parameter: str) -> int:
+        """Greatest degree of A N, B N and C N in a parameter or its half-angle tangent."""
+        return max(product.degree(parameter) for product in self.symbolic[:3])
+
+    @cached_property
+    def sign_changes(self) -> tuple[Factor, ...]:
+        """Factors with which A changes sign."""
+        powers = self.symbolic[0].powers
+        return tuple(atom for atom, power in powers if power % 2 and not self._keeps_sign(atom))
+
+    @cached_property
+    def zeros(self) -> tuple[Zero, ...]:
+        """Factors with which B, C or both vanish, and A need not."""
+        A, B, C, _ = (product.atoms for product in self.symbolic)
+        found = [
+            Zero(atom, atom in B, atom in C)
+            for atom in dict.fromkeys((*B, *C))
+            if atom not in A and not self._never_zero(atom)
+        ]
+        return tuple(sorted(found, key=lambda zero: zero.of_B and zero.of_C))
+
+    def _keeps_sign(self, atom: Atom) -> bool:
+        if not isinstance(atom, Name):
+            return False
+        low, high = self.domains[atom.name]
+        if atom.entry is None:
+            return low >= 0.0 or high <= 0.0
+        if atom.entry == SINE:
+            return low >= 0.0 and high <= math.pi
+        return atom.entry == RADIUS or (low >= -math.pi / 2 and high <= math.pi / 2)
+
+    def _never_zero(self, atom: Atom) -> bool:
+        if not isinstance(atom, Name):
+            return False
+        low, high = self.domains[atom.name]
+        return atom.entry == RADIUS or (atom.entry is None and (low > 0.0 or high < 0.0))
+
+
+def turn(angle: Any) -> Turn:
+    """Sine, cosine and radius 1 of an angle; the sine of the double nearest to pi is 0."""
+    if isinstance(angle, complex):
+        return cmath.sin(angle), cmath.cos(angle), 1.0
+    if isinstance(angle, np.ndarray):
+        return np.where(angle == np.pi, 0.0, np.sin(angle)), np.cos(angle), 1.0
+    return 0.0 if angle == math.pi else math.sin(angle), math.cos(angle), 1.0
+
+
+def exact(values: Values) -> dict[str, Any]:
+    """Return turned values as fractions."""
+    return {
+        name: tuple(map(Fraction, value)) if isinstance(value, tuple) else Fraction(value)
+        for name, value in values.items()
+    }
+
+
+@functools.cache
+def law(products: Products, parameters: tuple[tuple[str, str, float, float], ...]) -> Trigonometric:
+    """Make a law of its products and its parameters: name, units, least and greatest value.
+
+    Examples
+    --------
+    >>> ball = law(lambda v: (v["w"] * v["w"], v["g"], 0 * v["g"], v["R"]),
+    ...     (("w", "s-1", -math.inf, math.inf), ("g", "m s-2", -math.inf, math.inf),
+    ...      ("R", "m", math.ulp(0.0), math.inf)))
+    >>> ball.parameters, ball.degree("w"), len(ball.sign_changes), len(ball.zeros)
+    (('w', 'g', 'R'), 2, 0, 1)
+    """
+    return Trigonometric(
+        products,
+        {name: (low, high) for name, _, low, high in parameters},
+        frozenset(name for name, units, _, _ in parameters if units == "rad"),
+    )
