@@ -17,6 +17,7 @@ from phasekit.labelled.grid import variable
 from phasekit.labelled.quantities import FROM_MOTION, LABELS, ROWS
 from phasekit.labelled.schema import LABEL_DTYPE, dataset_attrs, input_attrs
 from phasekit.labelled.system import Model, as_system
+from phasekit.laws.trigonometric import Trigonometric
 
 #: What special points are called in pictures.
 SPECIAL = {
@@ -95,7 +96,7 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     if not isinstance(parameter, str) or parameter not in formula:
         raise unknown(f"parameter of branches for {type(system).__name__}", parameter, formula)
     low, high = limits(system, parameter, "span", span)
-    path = Path(system.law(), values, parameter, (low, high))
+    path = Path(system.trigonometric(), values, parameter, (low, high))
 
     def coefficients(at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         arrays = {name: np.full_like(at, value) for name, value in values.items()}
@@ -120,9 +121,9 @@ def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
     own = system.formula_inputs()
     if all(name in ("lam", "psi") for name in names) and not all(name in own for name in names):
         system = system.reduced()
-    if not system.derived:
+    if not issubclass(system.rung, Trigonometric):
         hint = "pk.continuation follows the equilibria of any other"
-        raise bad("system", system, "a system with coefficients (A, B, C)", hint)
+        raise bad("system", system, Trigonometric.called, hint)
     values: dict[str, float] = {}
     for name in system.formula_inputs():
         value = system.parameters[name]

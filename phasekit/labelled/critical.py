@@ -16,6 +16,7 @@ from phasekit.labelled.arguments import FloatArray, unknown
 from phasekit.labelled.evaluate import evaluate
 from phasekit.labelled.quantities import ROWS, Pass
 from phasekit.labelled.system import Model, as_system
+from phasekit.laws.trigonometric import Trigonometric
 
 _CRITICAL = ("critical_fold", "critical_sign_change")
 
@@ -57,9 +58,9 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
     >>> pk.critical(disk, "beta").critical_fold.dims
     ('fold',)
     """
-    system = as_system(system, closed_form="critical")
-    units = {p.name: p.units for p in system.declared if p.name in system.formula_inputs()}
-    units |= {"lam": "1", "psi": "1"}
+    system = as_system(system, rung=Trigonometric, what="critical")
+    units = {"lam": "1", "psi": "1"}
+    units |= {p.name: p.units for p in system.declared if p.name in system.formula_inputs()}
     if not isinstance(parameter, str) or parameter not in units:
         raise unknown(f"parameter of critical for {type(system).__name__}", parameter, units)
     function: Callable[..., Any]
@@ -83,7 +84,7 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
 
 
 def _of(system: Model, parameter: str) -> Callable[..., Any]:
-    law = system.law()
+    law = system.trigonometric()
     return lambda **values: fold_values(law, parameter, values)
 
 

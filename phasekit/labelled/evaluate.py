@@ -19,6 +19,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, Value
+from phasekit.labelled.dispatch import fitted
 from phasekit.labelled.grid import Grid, make_grid, variable
 from phasekit.labelled.memory import refuse_too_large
 from phasekit.labelled.quantities import ROWS, STATES, Pass, Quantity, pass_of
@@ -40,9 +41,9 @@ class Cells:
     def get(self, name: str) -> Any:
         """Return an input, a coefficient or a quantity as an array."""
         if name not in self.computed:
-            if name in self.model.derived:
+            if name in self.model.rung.derived:
                 abc = self.model.valid_coefficients(self.inputs)
-                self.computed.update(zip(self.model.derived, abc, strict=True))
+                self.computed.update(zip(self.model.rung.derived, abc, strict=True))
             elif name in STATES:
                 state = self.inputs[name]
                 self.computed[name] = np.where(np.isfinite(state), state, np.nan)
@@ -115,7 +116,7 @@ def leaves(system: Model, names: Iterable[str], passes: Sequence[Pass]) -> list[
     """Return the parameters and states on which inputs of passes depend, in the end."""
     found: dict[str, None] = {}
     for name in names:
-        if name in system.derived:
+        if name in system.rung.derived:
             found.update(dict.fromkeys(system.formula_inputs()))
         elif name in ROWS:
             found.update(
@@ -177,12 +178,12 @@ def lay_out(
     order: Sequence[str] = (),
 ) -> Layout:
     """Say what is computed where, and refuse what cannot be; arguments as in `evaluate`."""
-    rows, passes = system.methods.fitted(rows, passes)
+    rows, passes = fitted(system, rows, passes)
     inputs = {**system.parameters, **(states or {})}
     grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = {one: leaves(system, one.inputs, passes) for one in passes}
     _refuse_missing(system, needs, inputs)
-    if not grid.sizes and any(set(system.derived) & set(one.inputs) for one in passes):
+    if not grid.sizes and any(set(system.rung.derived) & set(one.inputs) for one in passes):
         system.coefficients()  # scalars that are invalid raise, where cells of arrays become NaN
     _refuse_taken(grid, rows)
     return Layout(system, grid, tuple(rows), needs)

@@ -14,6 +14,7 @@ from phasekit.labelled.arguments import FloatArray, bad, numeric
 from phasekit.labelled.quantities import ROWS, Pass
 from phasekit.labelled.states import at_states
 from phasekit.labelled.system import as_system
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.equilibria import equilibria
 from phasekit.phase.orbits import orbits_at_gap
 
@@ -70,7 +71,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     >>> ds.energy_level.sel(family="outer").diff("level").min().item() > 0
     True
     """
-    system = as_system(system, closed_form="orbit_families")
+    system = as_system(system, rung=Trigonometric, what="orbit_families")
     if isinstance(n, (bool, np.bool_)) or not isinstance(n, (int, np.integer)) or n < 1:
         raise bad("n", n, "a number of orbits >= 1")
     top = None if energy_max is None else numeric("energy_max", energy_max)

@@ -109,7 +109,7 @@ def bifurcation_set(
     if x == y:
         raise ParameterError(f"y: got {y!r}, wants a parameter that is not on x")
     box = limits(system, x, "xlim", xlim), limits(system, y, "ylim", ylim)
-    plane = Plane(system.law(), values, (x, y), box)
+    plane = Plane(system.trigonometric(), values, (x, y), box)
     pieces, cusps = loci(plane)
     return _dataset(system, plane, pieces, cusps)
 

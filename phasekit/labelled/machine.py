@@ -7,7 +7,7 @@ force is the one that the bearing exerts on the rotor.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -15,12 +15,11 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import NumberLike, bad, numeric, one_of
+from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.models import GyroRotorDisk
-from phasekit.labelled.quantities import Pass, Quantity, pass_of, select
+from phasekit.labelled.quantities import Quantity, select
 from phasekit.labelled.states import at_states
 from phasekit.labelled.system import Model, as_system
-from phasekit.mechanics import bearings as bearings_of
-from phasekit.mechanics import rotators as rotators_of
 
 FRAMES = ("disk", "carrier")
 CURVES = ("equilibria", "separatrix", "orbit")
@@ -82,7 +81,7 @@ def rotators(
     array([   0., -100.,    0.])
     """
     system, states = _states(disk, phi, dphi, ddphi, domega1)
-    return _at(system, select("rotators"), states, rotators_of.rotators)
+    return _at(system, select("rotators"), states)
 
 
 def bearing_forces(
@@ -148,8 +147,7 @@ def bearing_forces(
     rows = select("bearing_forces")
     if carrier:
         rows = tuple(_in_carrier(row) for row in rows)
-    function = functools.partial(bearings_of.bearing_forces, carrier=carrier)
-    return _at(system, rows, states, function)
+    return _at(system, rows, states, carrier=carrier)
 
 
 def fixed_bearing_forces(
@@ -204,7 +202,7 @@ def fixed_bearing_forces(
         raise bad("rho_b1", rho_b1, "a distance between the bearings that is not zero")
     system, states = _states(disk, phi, dphi, ddphi, domega1)
     states["rho_b1"] = ("rho_b1", rho_b1)
-    return _at(system, select("fixed_bearing_forces"), states, bearings_of.fixed_bearing_forces)
+    return _at(system, select("fixed_bearing_forces"), states)
 
 
 # ------------------------------------------------------------------------------ at states
@@ -251,22 +249,13 @@ def _at(
     system: Model,
     rows: tuple[Quantity, ...],
     states: Mapping[str, tuple[str, Any]],
-    function: Callable[..., Any],
+    **keywords: Any,
 ) -> xr.Dataset:
     """Evaluate at states, with the accelerations that are given."""
-    plain = pass_of(rows[0].group, ())
-    given = {state for state, _ in states.values()}
-    extra = {"state_ddphi": "ddphi", "domega1": "domega1"}
-    keywords = tuple(keyword for state, keyword in extra.items() if state in given)
-    inputs = (*plain.inputs, *(state for state in extra if state in given))
-    call = functools.partial(_with_keywords, function, keywords)
-    return at_states(system, rows, states, (Pass(call, inputs, plain.groups),))
-
-
-def _with_keywords(function: Callable[..., Any], keywords: tuple[str, ...], *arrays: Any) -> Any:
-    """Call a function whose last arrays go by keyword."""
-    own = len(arrays) - len(keywords)
-    return function(*arrays[:own], **dict(zip(keywords, arrays[own:], strict=True)))
+    (one,) = passes_of(system, rows, given=[state for state, _ in states.values()])
+    if keywords:
+        one = replace(one, function=functools.partial(one.resolved, **keywords))
+    return at_states(system, rows, states, (one,))
 
 
 def _in_carrier(row: Quantity) -> Quantity:

@@ -10,6 +10,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.labelled.arguments import NumberLike
+from phasekit.labelled.dispatch import pass_from
 from phasekit.labelled.orbits import noted
 from phasekit.labelled.quantities import select
 from phasekit.labelled.states import at_states
@@ -97,6 +98,6 @@ def separatrix_motion(
     [0.0, 0.0, 0.0]
     """
     system = as_system(system)
-    one, notes = system.methods.on_separatrix(saddle, side)
+    one, notes = pass_from(system, "motion", "time", saddle=saddle, side=side)
     ds = at_states(system, select("motion"), {"t": ("time", t)}, (one,))
     return noted(ds, **notes)

@@ -15,7 +15,7 @@ import xarray as xr
 
 from phasekit.errors import OrbitFamily, ParameterError
 from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric, one_of
-from phasekit.labelled.methods import SIDES
+from phasekit.labelled.dispatch import SIDES, pass_from
 from phasekit.labelled.quantities import select
 from phasekit.labelled.states import at_states
 from phasekit.labelled.system import as_system
@@ -102,11 +102,11 @@ def orbits(
     system = as_system(system)
     rows = select("orbits")
     if energy is not None:
-        one, notes = system.methods.at_energy(center)
+        one, notes = pass_from(system, "orbits", "state_energy", center=center)
         ds = at_states(system, rows, {"energy": ("state_energy", energy)}, (one,))
         return noted(ds, **notes)
     if gap is not None:
-        one, notes = system.methods.at_gap(saddle, side)
+        one, notes = pass_from(system, "orbits", "state_gap", saddle=saddle, side=side)
         ds = at_states(system, rows, {"gap": ("state_gap", gap)}, (one,))
         return noted(ds, **notes)
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}

@@ -9,6 +9,7 @@ from typing import Any
 
 import xarray as xr
 
+from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.evaluate import evaluate
 from phasekit.labelled.quantities import select
 from phasekit.labelled.system import as_system
@@ -97,4 +98,4 @@ def separatrices(system: Any) -> xr.Dataset:
 
 def _of_system(group: str, system: Any) -> xr.Dataset:
     system, rows = as_system(system), select(group)
-    return evaluate(system, rows, system.methods.passes(rows))
+    return evaluate(system, rows, passes_of(system, rows))

@@ -13,10 +13,10 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, brief, same, unknown
 from phasekit.labelled.quantities import LABELS, ROWS, STATES
 from phasekit.labelled.system import MODELS, Model, Parameter, named_arguments
+from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
 
 if TYPE_CHECKING:
-    from phasekit.labelled.numerical import Numerical
     from phasekit.labelled.problem import Problem
 
 #: Names that parameters cannot have, because results have them.
@@ -79,7 +79,7 @@ class Potential(Model):
     """
 
     declared: ClassVar[tuple[Parameter, ...]] = ()
-    derived: ClassVar[tuple[str, ...]] = ()
+    rung: ClassVar[type[Conservative]] = Conservative
 
     formula: Formula
     _values: dict[str, Value]
@@ -155,11 +155,9 @@ class Potential(Model):
         return dict(self._values)
 
     @property
-    def methods(self) -> Numerical:
-        """What computes the quantities of this system."""
-        from phasekit.labelled.numerical import Numerical
-
-        return Numerical(self)
+    def law(self) -> Conservative:
+        """The formula."""
+        return self.formula
 
     def potential(self, x: ArrayLike) -> FloatArray:
         """V at x, an array of the shape of x; `phasekit.potential` labels it.
@@ -208,10 +206,9 @@ class Potential(Model):
             "system", self, "a system with coefficients (A, B, C); this needs the closed form"
         )
 
-    @classmethod
-    def formula_inputs(cls) -> tuple[str, ...]:
-        """Nothing: there are no coefficients."""
-        return ()
+    def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the parameters: all of them."""
+        return tuple(self._values)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed, or expression, period or interval.

@@ -14,8 +14,6 @@ from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labelled.arguments import bad, flag, unknown
 from phasekit.labelled.problem_parts import (
-    FORMULAS,
-    INERTIA,
     expressions_of,
     make_field,
     names_of,
@@ -187,39 +185,21 @@ class Problem:
         Raises
         ------
         ParameterError
-            If a parameter is an array, or the model is not known.
+            If a parameter is an array.
         """
-        name = type(system).__name__
-        if hasattr(system, "formula") and hasattr(system, "coordinate"):
-            return cls._from_formula(system)
-        if name not in FORMULAS:
-            raise bad("problem", system, f"a Problem, or one of {', '.join(FORMULAS)}")
-        names = system.formula_inputs()
-        values: dict[str, Any] = {key: system.parameters[key] for key in names}
-        for key, value in values.items():
-            if not isinstance(value, float):
-                raise bad(key, value, "a single number, to continue a single system")
-        texts = [text.replace("N", INERTIA) if name == "GyroRotorDisk" else text
-                 for text in FORMULAS[name]]  # fmt: skip
-        force = f"(({texts[0]})*cos(phi) - ({texts[1]}))*sin(phi) + ({texts[2]})*cos(phi)"
-        numbers = {key: float(value) for key, value in values.items()}
-        problem = cls(force, "phi", numbers, periods={"phi": 2.0 * np.pi}, conservative=True)
-        problem._set("system", system)
-        return problem
-
-    @classmethod
-    def _from_formula(cls, system: Any) -> Problem:
-        """The force of a potential."""
-        values = dict(system.parameters)
-        for key, value in values.items():
-            if not isinstance(value, float):
-                raise bad(key, value, "a single number, to continue a single system")
-        (V,) = expressions_of([system.expression], [system.coordinate, *values], "potential")
         from phasekit.bifurcation.continuation.expressions import symbols_of
 
-        x = system.coordinate
-        periods = {} if system.period is None else {x: system.period}
-        force = -V.diff(symbols_of([x])[x])
+        law = system.law
+        names = system.formula_inputs()
+        values: dict[str, float] = {}
+        for key in names:
+            value = system.parameters[key]
+            if not isinstance(value, float):
+                raise bad(key, value, "a single number, to continue a single system")
+            values[key] = value
+        x = law.coordinate
+        force = -law.gradient_formula(symbols_of([x, *names]))
+        periods = {} if law.period is None else {x: law.period}
         problem = cls([force], x, values, periods=periods, conservative=True)
         problem._set("system", system)
         return problem
@@ -355,5 +335,4 @@ def as_problem(problem: Any) -> Problem:
         if isinstance(made, Problem):
             return made
     hint = "pk.Problem(f, state=..., parameters=...) makes one" if callable(problem) else ""
-    systems = ", ".join([*FORMULAS, "Potential"])
-    raise bad("problem", problem, f"a Problem or a system ({systems})", hint)
+    raise bad("problem", problem, f"a Problem or a system ({', '.join(MODELS)})", hint)

@@ -14,25 +14,6 @@ from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad, unknown
 
-#: Coefficients (A, B, C) of the models as formulas of their parameters.
-FORMULAS: dict[str, tuple[str, str, str]] = {
-    "Coefficients": ("A", "B", "C"),
-    "Reduced": ("Omega_sq", "lam*Omega_sq", "psi*Omega_sq"),
-    "GyroRotorDisk": (
-        "omega1**2*(2*e*sin(beta) - r*cos(beta))*(2*e*sin(beta) + r*cos(beta))/N",
-        "4*g*e*sin(beta)/N",
-        "4*omega1**2*a*e*sin(beta)/N",
-    ),
-    "ParticleOnCircle": (
-        "(omega*cos(tilt))**2",
-        "(g*cos(tilt) + omega**2*normal_offset*sin(tilt))/radius",
-        "omega**2*offset/radius",
-    ),
-    "Pendulum": ("0", "g/length", "0"),
-    "StonerWohlfarth": ("-2*K", "h_x", "h_y"),
-}
-INERTIA = "(4*e**2*sin(beta)**2 + r**2*(1 + sin(beta)**2))"
-
 
 def names_of(argument: str, given: Any) -> tuple[str, ...]:
     """Names that can be states or parameters."""

@@ -27,6 +27,8 @@ from phasekit.errors import (
     Topology,
 )
 from phasekit.labelled.arguments import bad, unknown
+from phasekit.laws.ladder import Conservative
+from phasekit.laws.trigonometric import Trigonometric
 
 #: Labels of a dim, names or numbers, and its long name.
 Labels: TypeAlias = tuple[Sequence[Any], str]
@@ -94,6 +96,10 @@ class Quantity:
     equation: str
     source: str
     flags: type[IntEnum] | None = None
+    #: The most general rung of the ladder of laws on which it is computed.
+    of: type[Conservative] = Conservative
+    #: The equation on that rung, where `equation` is that of (A, B, C).
+    general: str = ""
     #: Labels of the row's dims where they are not those of the table.
     labels: Mapping[str, Labels] | None = field(default=None, compare=False)
 
@@ -131,21 +137,33 @@ class Pass:
     """One call of an array function, which computes whole groups at once.
 
     `inputs` are coefficients (A, B, C), parameters, states, or quantities of other groups; those
-    come with their label axes last. The function returns one result a group, each a NamedTuple
-    whose fields are named as the quantities, or arrays in the order of the group's rows.
+    come with their label axes last. `LAW` among them is the law itself, with its parameters after
+    it. The function returns one result a group, each a NamedTuple whose fields are named as the
+    quantities, or arrays in the order of the group's rows.
     """
 
     function: str | Callable[..., Any]  # "module:name", imported when it is first needed
     inputs: tuple[str, ...]
     groups: tuple[str, ...]
+    #: The rung of the ladder of laws for which it holds.
+    of: type[Conservative] = Trigonometric
+    #: Keywords that a call has to say: numbers of a center or saddle, a side.
+    options: tuple[str, ...] = ()
+    #: States that it can do without, with their keywords.
+    optional: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def resolved(self) -> Callable[..., Any]:
+        """The function."""
+        if not isinstance(self.function, str):
+            return self.function
+        module, _, name = self.function.partition(":")
+        function: Callable[..., Any] = getattr(importlib.import_module(module), name)
+        return function
 
     def call(self, *arrays: Any) -> dict[str, Any]:
         """Return the arrays by the names of the quantities."""
-        function = self.function
-        if isinstance(function, str):
-            module, _, name = function.partition(":")
-            function = getattr(importlib.import_module(module), name)
-        result = function(*arrays)
+        result = self.resolved(*arrays)
         results = result if len(self.groups) > 1 else (result,)
         named: dict[str, Any] = {}
         for group, part in zip(self.groups, results, strict=True):
@@ -171,10 +189,12 @@ QUANTITIES: tuple[Quantity, ...] = (
              "[Veljovic2015] (15) plus Omega^2/2, corrected coefficients"),
     Quantity("potential_gradient", "potential_gradient", (), "float64", "s-2",
              "gradient of the potential",
-             "V' = B sin(phi) - A sin(phi) cos(phi) - C cos(phi)", FROM_MOTION),
+             "V' = B sin(phi) - A sin(phi) cos(phi) - C cos(phi)", FROM_MOTION,
+             general="V'"),
     Quantity("potential_curvature", "potential_curvature", (), "float64", "s-2",
              "curvature of the potential",
-             "V'' = B cos(phi) - A cos(2 phi) + C sin(phi)", "derivative of " + FROM_MOTION),
+             "V'' = B cos(phi) - A cos(2 phi) + C sin(phi)", "derivative of " + FROM_MOTION,
+             general="V''"),
     Quantity("energy_integral", "energy_integral", (), "float64", "s-2", "energy integral",
              "h = phi'^2/2 + V(phi)", FROM_ENERGY),
     Quantity("phase_velocity", "phase_velocity", (), "float64", "s-1",
@@ -197,16 +217,20 @@ QUANTITIES: tuple[Quantity, ...] = (
              "exponent of the saddle", "k = sqrt(-V''(phi))", FROM_MOTION),
     Quantity("n_equilibria", "equilibria", (), "int8", "1",
              "number of distinct equilibria, -1 where the system is not valid",
-             "sign of Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2", FROM_MOTION),
+             "sign of Delta = (B^2 + C^2 - A^2)^3 + 27 A^2 B^2 C^2", FROM_MOTION,
+             general="changes of sign of V' between the zeros of V''"),
     Quantity("fold_margin", "equilibria", (), "float64", "1",
              "distance from the fold, > 0 where four equilibria exist",
-             "1 - (|B/A|^(2/3) + |C/A|^(2/3))^(3/2)", FROM_MOTION),
+             "1 - (|B/A|^(2/3) + |C/A|^(2/3))^(3/2)", FROM_MOTION,
+             of=Trigonometric),
     Quantity("topology", "separatrices", (), "int8", "1", "topology of the separatrices",
-             "by the number of saddles and the order of their energies", FROM_ENERGY, Topology),
+             "by the number of saddles and the order of their energies", FROM_ENERGY, Topology,
+             general="by what the separatrices of all saddles do"),
     Quantity("figure_eight", "separatrices", (), "bool", "1",
              "whether a separatrix has the shape of a figure-eight (the trigger of coupled "
              "singularities: center, saddle, center)",
-             "Delta < 0 and the saddles' energies differ", FROM_ENERGY),
+             "Delta < 0 and the saddles' energies differ", FROM_ENERGY,
+             general="V = h_s on both sides of a saddle, before a saddle as high"),
     Quantity("saddle_phi", "separatrices", _SADDLES, "float64", "rad", "angle of the saddle",
              "V'(phi_s) = 0, V''(phi_s) < 0", FROM_MOTION),
     Quantity("saddle_energy", "separatrices", _SADDLES, "float64", "s-2",
@@ -216,16 +240,19 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("loop", "separatrices", _SADDLES, "int8", "1",
              "what the separatrix of the saddle does",
              "sign of D = (A^2/4) sin(2 phi_s)^2 + (B cos(phi_s) + C sin(phi_s)) k^2",
-             FROM_ENERGY, Loop),
+             FROM_ENERGY, Loop,
+             general="where V = h_s again on either side of the saddle"),
     Quantity("winding_area", "separatrices", _SADDLES, "float64", "s-1",
              "area under one branch of the winding separatrix",
-             "integral of |phi'| over 2 pi at h = h_s", FROM_ENERGY),
+             "integral of |phi'| over 2 pi at h = h_s", FROM_ENERGY,
+             general="integral of |phi'| over the circle at h = h_s"),
     Quantity("turning_offset", "separatrices", _SIDES, "float64", "rad",
              "signed angle from the saddle to the turning point, or to the partner saddle",
              "phi_t - phi_s", FROM_ENERGY),
     Quantity("turning_phi", "separatrices", _SIDES, "float64", "rad",
              "angle of the turning point of the separatrix, or of the partner saddle",
-             "phi_t = -phi_s +- arccos(cos(2 phi_s) - 2 k^2/A)", FROM_ENERGY),
+             "phi_t = -phi_s +- arccos(cos(2 phi_s) - 2 k^2/A)", FROM_ENERGY,
+             general="V(phi_t) = h_s"),
     Quantity("lobe_area", "separatrices", _SIDES, "float64", "s-1",
              "area inside the separatrix on one side of the saddle",
              "closed integral of phi' over the lobe at h = h_s", FROM_ENERGY),
@@ -236,12 +263,14 @@ QUANTITIES: tuple[Quantity, ...] = (
              "h = phi'^2/2 + V(phi)", FROM_ENERGY),
     Quantity("period", "orbits", (), "float64", "s",
              "time of one round, infinite on a separatrix",
-             "T = closed integral of dphi/phi' (rotation: over 2 pi)", FROM_ENERGY),
+             "T = closed integral of dphi/phi' (rotation: over 2 pi)", FROM_ENERGY,
+             general="T = closed integral of dphi/phi' (rotation: over the circle)"),
     Quantity("frequency", "orbits", (), "float64", "s-1", "angular frequency of the orbit",
              "2 pi/T", FROM_ENERGY),
     Quantity("action", "orbits", (), "float64", "s-1",
              "area inside the orbit, or under one turn of a rotation, over 2 pi",
-             "J = (1/2 pi) closed integral of phi' dphi (rotation: over 2 pi)", ACTION_ANGLE),
+             "J = (1/2 pi) closed integral of phi' dphi (rotation: over 2 pi)", ACTION_ANGLE,
+             general="J = (1/2 pi) closed integral of phi' dphi (rotation: over the circle)"),
     Quantity("phi_min", "orbits", (), "float64", "rad",
              "least angle of the orbit, NaN for a rotation", "V(phi_min) = h", FROM_ENERGY),
     Quantity("phi_max", "orbits", (), "float64", "rad",
@@ -396,6 +425,9 @@ QUANTITIES += (
 
 ROWS: dict[str, Quantity] = {row.name: row for row in QUANTITIES}
 
+#: Among the inputs of a pass: the law, and its parameters.
+LAW = "law"
+
 _ABC = ("A", "B", "C")
 _DISK = ("beta", "e", "a", "r", "omega1", "g")
 _HEAVY = ("beta", "e", "a", "r", "omega1", "m", "g")
@@ -403,9 +435,12 @@ _BORNE = (*_HEAVY, "half_span")
 _STATE = ("state_phi", "state_dphi")
 _LOOPS = ("saddle_phi", "saddle_exponent", "turning_offset", "loop")
 
-#: Passes over the cells, those that compute more groups first. Groups that need an argument of
-#: their own (critical: the parameter) have none; their functions make one for the call, as do those
-#: that find orbits by something else than a state.
+_MOVED = (("state_ddphi", "ddphi"), ("domega1", "domega1"))
+_NUMERICAL = "phasekit.phase.numerical.functions:"
+
+#: Passes over the cells, those that compute more groups first; `phasekit.labelled.dispatch` finds
+#: the one for a system. Groups that need an argument of their own (critical: the parameter) have
+#: none; their functions make one for the call.
 PASSES: tuple[Pass, ...] = (
     Pass("phasekit.phase.separatrices:phase_space", _ABC, ("equilibria", "separatrices")),
     Pass("phasekit.phase.equilibria:equilibria", _ABC, ("equilibria",)),
@@ -437,12 +472,23 @@ PASSES: tuple[Pass, ...] = (
     Pass("phasekit.phase.flow:flow", (*_ABC, "state_phi", "state_dphi", "time"), ("motion",)),
     Pass("phasekit.phase.asymptotics:near_center", (*_ABC, "state_excess"), ("near_center",)),
     Pass("phasekit.phase.asymptotics:near_separatrix", (*_ABC, "state_gap"), ("near_separatrix",)),
-    Pass("phasekit.mechanics.rotators:rotators", (*_DISK, *_STATE), ("rotators",)),
-    Pass("phasekit.mechanics.bearings:bearing_forces", (*_BORNE, *_STATE), ("bearing_forces",)),
+    Pass(
+        "phasekit.mechanics.rotators:rotators",
+        (*_DISK, *_STATE),
+        ("rotators",),
+        optional=_MOVED,
+    ),
+    Pass(
+        "phasekit.mechanics.bearings:bearing_forces",
+        (*_BORNE, *_STATE),
+        ("bearing_forces",),
+        optional=_MOVED,
+    ),
     Pass(
         "phasekit.mechanics.bearings:fixed_bearing_forces",
         (*_HEAVY, "rho_b1", *_STATE),
         ("fixed_bearing_forces",),
+        optional=_MOVED,
     ),
     Pass("phasekit.phase.loads:equilibrium_rotators", (*_DISK, "phi"), ("equilibrium_rotators",)),
     Pass("phasekit.phase.loads:equilibrium_forces", (*_BORNE, "phi"), ("equilibrium_forces",)),
@@ -450,6 +496,43 @@ PASSES: tuple[Pass, ...] = (
     Pass("phasekit.phase.loads:separatrix_forces", (*_BORNE, *_LOOPS), ("separatrix_forces",)),
     Pass("phasekit.phase.loads:orbit_rotators", (*_DISK, *_STATE), ("orbit_rotators",)),
     Pass("phasekit.phase.loads:orbit_forces", (*_BORNE, *_STATE), ("orbit_forces",)),
+    Pass(
+        "phasekit.phase.orbits:orbits_at_energy",
+        (*_ABC, "state_energy"),
+        ("orbits",),
+        options=("center",),
+    ),
+    Pass(
+        "phasekit.phase.orbits:orbits_at_gap",
+        (*_ABC, "state_gap"),
+        ("orbits",),
+        options=("saddle", "side"),
+    ),
+    Pass(
+        "phasekit.phase.flow:separatrix_motion",
+        (*_ABC, "time"),
+        ("motion",),
+        options=("saddle", "side"),
+    ),
+    # Any potential, numerically.
+    *(
+        Pass(_NUMERICAL + name, (LAW, *states), groups, Conservative, options)
+        for name, states, groups, options in (
+            ("phase_space", (), ("equilibria", "separatrices"), ()),
+            ("equilibria", (), ("equilibria",), ()),
+            ("separatrices", (), ("separatrices",), ()),
+            ("potential", ("state_phi",), ("potential",), ()),
+            ("gradient", ("state_phi",), ("potential_gradient",), ()),
+            ("curvature", ("state_phi",), ("potential_curvature",), ()),
+            ("energy", _STATE, ("energy_integral",), ()),
+            ("phase_velocity", ("state_phi", "state_energy"), ("phase_velocity",), ()),
+            ("orbits", _STATE, ("orbits",), ()),
+            ("flow", (*_STATE, "time"), ("motion",), ()),
+            ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
+            ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
+            ("separatrix_motion", ("time",), ("motion",), ("saddle", "side")),
+        )
+    ),
 )
 
 
@@ -480,23 +563,35 @@ def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
     return tuple(row for row in QUANTITIES if row.name in wanted)
 
 
-def plan_passes(rows: Iterable[Quantity]) -> tuple[Pass, ...]:
-    """Return the passes that compute the rows, as few as the table has."""
+def plan_passes(
+    rows: Iterable[Quantity], rung: type[Conservative] = Trigonometric
+) -> tuple[Pass, ...]:
+    """Return the passes that compute the rows on a rung, as few as the table has."""
     missing = {row.group for row in rows}
-    chosen = []
-    for candidate in PASSES:
+    chosen: list[Pass] = []
+    for candidate in fitting(rung):
         if missing.issuperset(candidate.groups):
             chosen.append(candidate)
             missing.difference_update(candidate.groups)
     for group in sorted(missing):  # its passes compute others as well, which are not wanted
-        if pass_of(group, chosen) not in chosen:
-            chosen.append(pass_of(group, chosen))
+        if pass_of(group, chosen, rung) not in chosen:
+            chosen.append(pass_of(group, chosen, rung))
     return tuple(chosen)
 
 
-def pass_of(group: str, chosen: Sequence[Pass]) -> Pass:
+def fitting(rung: type[Conservative]) -> list[Pass]:
+    """Return the lines of the table for a rung: of each group the most special ones."""
+    able = [one for one in PASSES if issubclass(rung, one.of) and not one.options]
+    special = {group: max(len(one.of.__mro__) for one in able if group in one.groups)
+               for group in {group for one in able for group in one.groups}}  # fmt: skip
+    return [
+        one for one in able if all(len(one.of.__mro__) == special[group] for group in one.groups)
+    ]
+
+
+def pass_of(group: str, chosen: Sequence[Pass], rung: type[Conservative] = Trigonometric) -> Pass:
     """Return the pass for a group: one of those chosen, else the one that computes the least."""
-    for candidate in (*chosen, *reversed(PASSES)):
+    for candidate in (*chosen, *reversed(fitting(rung))):
         if group in candidate.groups:
             return candidate
     raise KeyError(group)

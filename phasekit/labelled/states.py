@@ -14,6 +14,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, numeric
+from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.evaluate import evaluate
 from phasekit.labelled.quantities import AXES, Pass, Quantity
 from phasekit.labelled.system import as_system
@@ -59,7 +60,7 @@ def at_states(
     return evaluate(
         system,
         rows,
-        passes or system.methods.passes(rows),
+        passes or passes_of(system, rows),
         states=kept,
         axis={name: "point" for name in kept if name not in AXES},
         called={name: argument for argument, (name, _) in states.items()},

@@ -12,6 +12,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
+from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.evaluate import Layout, evaluate, lay_out, leaves
 from phasekit.labelled.job import Job, plan_job
 from phasekit.labelled.memory import refuse_too_large
@@ -113,7 +114,7 @@ def sweep(
         flag("progress", progress)
     place = None if store is None else target_of(store)
     system = as_system(system)
-    if place is not None and not place.is_netcdf and system.methods.by_tiles:
+    if place is not None and not place.is_netcdf and system.rung.labels_fixed:
         from phasekit.labelled.stored import sweep_into  # here: it loads multiprocessing
 
         layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
@@ -176,7 +177,7 @@ def _read(
     """Return the system with its axes, what to compute and how, the states, the order of dims."""
     system = as_system(system)
     rows = select(of)
-    passes = system.methods.passes(rows)
+    passes = passes_of(system, rows)
     needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
     kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
     states = {name: value for name, value in kept.items() if name in STATES}

@@ -28,6 +28,7 @@ from phasekit.labelled.arguments import (
     same,
     unknown,
 )
+from phasekit.laws.ladder import Conservative, Law
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 
@@ -35,22 +36,23 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from phasekit.labelled.guises import Reduced
-    from phasekit.labelled.methods import Methods
     from phasekit.labelled.models import Coefficients
 
 #: Every model by its name, as maps store it.
 MODELS: dict[str, type[Model]] = {}
 
 
-def as_system(system: Any, *, closed_form: str = "") -> Model:
+def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
     """Return the system that an argument is.
 
     Parameters
     ----------
     system : Any
         What was given.
-    closed_form : str, optional
-        What needs the coefficients (A, B, C), where a potential without them will not do.
+    rung : type, optional
+        The rung of the ladder on which its law has to stand.
+    what : str, optional
+        What needs that.
 
     Raises
     ------
@@ -58,12 +60,7 @@ def as_system(system: Any, *, closed_form: str = "") -> Model:
         If it is not a system, with the way from what it is to one.
     """
     if isinstance(system, Model):
-        if closed_form and not system.derived:
-            raise ParameterError(
-                f"system: got {system!r}, wants a system with coefficients (A, B, C), because "
-                f"{closed_form} is in closed form"
-            )
-        return system
+        return stands_on(system, rung, what)
     make: Callable[..., Model] = MODELS["Coefficients"]
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
         coefficients = system.coefficients()
@@ -77,6 +74,21 @@ def as_system(system: Any, *, closed_form: str = "") -> Model:
     elif hasattr(system, "data_vars"):
         hint = "a map gives its system back by ds.phasekit.system()"
     raise bad("system", system, f"one of {', '.join(MODELS)}", hint)
+
+
+def stands_on(system: Model, rung: type[Law], what: str) -> Model:
+    """Return a system whose law stands on a rung, or on a more special one.
+
+    Raises
+    ------
+    ParameterError
+        If it does not.
+    """
+    if issubclass(system.rung, rung):
+        return system
+    raise ParameterError(
+        f"system: got {system!r}, wants {rung.called}, because {what} is in closed form"
+    )
 
 
 ModelType = TypeVar("ModelType", bound="Model")
@@ -173,17 +185,22 @@ class Model:
     declared: ClassVar[tuple[Parameter, ...]]
     #: Parameters for which folds are known in closed form, with the function that solves for each.
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
-    #: What passes may ask for that is computed from the parameters.
-    derived: ClassVar[tuple[str, ...]] = ("A", "B", "C")
+    #: The rung of its law, which says what can be computed of it.
+    rung: ClassVar[type[Conservative]] = Trigonometric
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
         """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each."""
         raise NotImplementedError
 
-    @classmethod
-    def law(cls) -> Trigonometric:
+    @property
+    def law(self) -> Conservative:
         """The law, and what follows from it."""
+        return self.trigonometric()
+
+    @classmethod
+    def trigonometric(cls) -> Trigonometric:
+        """The law of all systems of this kind, for those whose law is that of (A, B, C)."""
         declared = ((p.name, p.units, p.least, p.high) for p in cls.declared)
         return make_law(cls.products, tuple(declared))
 
@@ -197,14 +214,7 @@ class Model:
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
         """Names of the parameters on which the coefficients depend."""
-        return cls.law().parameters
-
-    @property
-    def methods(self) -> Methods:
-        """What computes the quantities of this system."""
-        from phasekit.labelled.methods import CLOSED_FORM  # loads the kernels
-
-        return CLOSED_FORM
+        return cls.trigonometric().parameters
 
     @property
     def definition(self) -> dict[str, str]:
@@ -235,7 +245,7 @@ class Model:
             valid = functools.reduce(
                 np.logical_and, [p.valid(used[p.name]) for p in cls.declared if p.name in used]
             )
-            A, B, C = cls.law().coefficients(used)
+            A, B, C = cls.trigonometric().coefficients(used)
             if not valid.all():
                 A, B, C = (np.where(valid, x, np.nan) for x in (A, B, C))
         return A, B, C

@@ -16,11 +16,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from phasekit.laws.factors import Atom, Name, Product, entries, named
+from phasekit.laws.ladder import Conservative
 
 #: Sine, cosine and radius of an angle, up to a common factor.
 Turn = tuple[Any, Any, Any]
@@ -43,8 +44,8 @@ class Zero:
 
 
 @dataclass(frozen=True)
-class Trigonometric:
-    """One system's law.
+class Trigonometric(Conservative):
+    """One system's law, with V = -B cos phi + (A/2) cos^2 phi - C sin phi.
 
     Attributes
     ----------
@@ -55,6 +56,17 @@ class Trigonometric:
     angles : iterable of str
         Parameters that are angles, in rad.
     """
+
+    called: ClassVar[str] = "a system with coefficients (A, B, C)"
+    derived: ClassVar[tuple[str, ...]] = ("A", "B", "C")
+    labels_fixed: ClassVar[bool] = True
+    default: ClassVar[Mapping[str, str]] = {
+        "center": "lower_center",
+        "saddle": "lower where there is one, else upper",
+    }
+
+    coordinate = "phi"
+    period = 2.0 * math.pi
 
     products: Products
     domains: Mapping[str, tuple[float, float]]
@@ -90,6 +102,14 @@ class Trigonometric:
         *products, scale = self.products(turned)
         A, B, C = (sympy.sympify(product) / scale for product in products)
         return A, B, C
+
+    def gradient_formula(self, symbols: Values) -> Any:
+        """V' as a sympy expression of symbols, [Veljovic2015] (12)."""
+        import sympy
+
+        A, B, C = self.formulas({name: symbols[name] for name in self.parameters})
+        sine, cosine = sympy.sin(symbols["phi"]), sympy.cos(symbols["phi"])
+        return (B - A * cosine) * sine - C * cosine
 
     # ---------------------------------------------------------------- half-angles
 

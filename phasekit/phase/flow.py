@@ -95,7 +95,7 @@ def separatrix_motion(
     B: npt.ArrayLike,
     C: npt.ArrayLike,
     t: npt.ArrayLike,
-    saddle: npt.ArrayLike = -1,
+    saddle: npt.ArrayLike | None = None,
     side: npt.ArrayLike = 1,
     *,
     threads: int | None = None,
@@ -113,8 +113,8 @@ def separatrix_motion(
         Times in s: 0 at the turning point of a lobe, where a winding loop is opposite to the
         saddle, and half-way to the partner on a heteroclinic arc.
     saddle : array_like of int
-        0 for the lower saddle, 1 for the upper one, -1 for the lower one where there are two,
-        else the only one.
+        0 for the lower saddle, 1 for the upper one; by default (-1) the lower one where there are
+        two, else the only one.
     side : array_like of int
         Side on which the motion leaves the saddle: 0 left, 1 right. All six broadcast.
     threads : int, optional
@@ -135,6 +135,7 @@ def separatrix_motion(
     >>> round(float(motion.motion_phi / np.pi), 9), float(motion.motion_dphi)
     (2.0, 2.0)
     """
+    saddle = -1 if saddle is None else saddle
     for name, value, wanted in (("saddle", saddle, (-1, 0, 1)), ("side", side, (0, 1))):
         if not np.isin(value, wanted).all():
             raise ParameterError(f"{name}: got {value!r}, wants one of {wanted}")

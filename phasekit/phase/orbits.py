@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ParameterError
+from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.kernels import portrait as kernels
 from phasekit.kernels.launch import Arrays, launch
+from phasekit.phase.equilibria import equilibria
 from phasekit.phase.states import flat, systems
 
 Array = npt.NDArray[np.float64]
@@ -93,7 +94,7 @@ def orbits_at_energy(
     B: npt.ArrayLike,
     C: npt.ArrayLike,
     energy: npt.ArrayLike,
-    center: npt.ArrayLike,
+    center: npt.ArrayLike | None = None,
     *,
     threads: int | None = None,
 ) -> Orbits:
@@ -110,7 +111,7 @@ def orbits_at_energy(
         Energies h in 1/s^2. Where they are below that of the center, or the center is absent, the
         kind is not_computed and the rest NaN.
     center : array_like of int
-        0 for the lower center, 1 for the upper one. All five broadcast.
+        0 for the lower center, 1 for the upper one; the lower one by default. All five broadcast.
     threads : int, optional
         Number of threads for large arrays; all cores by default.
 
@@ -126,7 +127,7 @@ def orbits_at_energy(
     >>> orbit.period.round(9).tolist()
     [6.216582005, 6.216582005]
     """
-    return _at_levels(A, B, C, energy, center, 0, False, threads)
+    return _at_levels(A, B, C, energy, 0 if center is None else center, 0, False, threads)
 
 
 def orbits_at_gap(
@@ -134,8 +135,8 @@ def orbits_at_gap(
     B: npt.ArrayLike,
     C: npt.ArrayLike,
     gap: npt.ArrayLike,
-    saddle: npt.ArrayLike,
-    side: npt.ArrayLike,
+    saddle: npt.ArrayLike | None = None,
+    side: npt.ArrayLike = 1,
     *,
     threads: int | None = None,
 ) -> Orbits:
@@ -148,7 +149,8 @@ def orbits_at_gap(
     gap : array_like
         Energy minus that of the saddle, in 1/s^2: negative inside.
     saddle : array_like of int
-        0 for the lower saddle, 1 for the upper one.
+        0 for the lower saddle, 1 for the upper one; the lower one by default where there are two,
+        else the only one.
     side : array_like of int
         0 for the well on the left of the saddle, 1 for that on its right; it matters where the
         orbit stays in one of them. All six broadcast.
@@ -165,6 +167,9 @@ def orbits_at_gap(
     >>> orbits_at_gap(2.0, 1.0, 0.0, gaps, 0, 1).period.round(3).tolist()
     [49.517, 95.569, 187.673]
     """
+    if saddle is None:
+        lower = equilibria(A, B, C, threads=threads).kind[..., 1] == EquilibriumKind.SADDLE
+        saddle = np.where(lower, 0, 1)
     return _at_levels(A, B, C, gap, saddle, side, True, threads)
 
 

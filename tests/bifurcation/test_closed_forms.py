@@ -16,7 +16,7 @@ from phasekit.bifurcation.closed_forms import (
 from phasekit.bifurcation.critical import critical_disk
 from phasekit.labelled.system import MODELS
 
-LAWS = {name: model.law() for name, model in MODELS.items() if model.derived}
+LAWS = {name: model.trigonometric() for name, model in MODELS.items() if model.rung.derived}
 
 A, B, C, PHI = sympy.symbols("A B C phi")
 V = -B * sympy.cos(PHI) + A / 2 * sympy.cos(PHI) ** 2 - C * sympy.sin(PHI)

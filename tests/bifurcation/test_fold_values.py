@@ -24,7 +24,7 @@ def random_disk(rng):
 @pytest.mark.parametrize("parameter", ["beta", "e", "a", "omega1"])
 def test_the_disk_in_closed_form(parameter):
     rng = np.random.default_rng(5)
-    law = pk.GyroRotorDisk.law()
+    law = pk.GyroRotorDisk.trigonometric()
     compared = 0
     for _ in range(40):
         disk = random_disk(rng)
@@ -50,7 +50,7 @@ def test_the_magnet_by_hand():
     assert K.critical_sign_change.item() == 0.0
 
 
-@pytest.mark.parametrize("name", pk.ParticleOnCircle.law().parameters)
+@pytest.mark.parametrize("name", pk.ParticleOnCircle.trigonometric().parameters)
 def test_the_count_changes_at_the_particles_folds(name):
     rng = np.random.default_rng(11)
     seen = 0

@@ -34,7 +34,7 @@ def value_at(law, atom, values):
 
 @pytest.mark.parametrize("model", MODELS, ids=lambda m: m.__name__)
 def test_products_multiply_out_to_the_coefficients(model):
-    law = model.law()
+    law = model.trigonometric()
     symbols = symbols_of(law)
     A, B, C = law.formulas(symbols)
     *products, scale = law.symbolic
@@ -48,7 +48,7 @@ def test_products_multiply_out_to_the_coefficients(model):
 @pytest.mark.parametrize("model", MODELS, ids=lambda m: m.__name__)
 def test_formulas_are_the_coefficients_in_floating_point(model):
     rng = np.random.default_rng(3)
-    law = model.law()
+    law = model.trigonometric()
     symbols = symbols_of(law)
     formulas = law.formulas(symbols)
     for _ in range(5):
@@ -65,7 +65,7 @@ def test_formulas_are_the_coefficients_in_floating_point(model):
 
 def test_factors_of_the_disk():
     """A changes sign with 2 e s -+ r c; B vanishes with g, C with a, both with e and s."""
-    law = pk.GyroRotorDisk.law()
+    law = pk.GyroRotorDisk.trigonometric()
     symbols = symbols_of(law)
     e, r, beta = symbols["e"], symbols["r"], symbols["beta"]
     s, c = sympy.sin(beta), sympy.cos(beta)
@@ -81,10 +81,10 @@ def test_factors_of_the_disk():
 
 
 def test_what_keeps_its_sign_or_never_vanishes_is_no_factor():
-    particle = pk.ParticleOnCircle.law()
+    particle = pk.ParticleOnCircle.trigonometric()
     assert particle.sign_changes == ()  # radius omega^2 cos(tilt)^2
     assert [(z.of_B, z.of_C) for z in particle.zeros] == [(True, False), (False, True)]
-    (K,) = pk.StonerWohlfarth.law().sign_changes
+    (K,) = pk.StonerWohlfarth.trigonometric().sign_changes
     assert K({"K": 3.0}) == 3.0
 
 

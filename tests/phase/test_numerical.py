@@ -284,7 +284,7 @@ def test_orbits_by_energy_of_the_rotor():
     for share in (0.02, 0.6, 0.97, 1.4, 4.0):
         energy = points.energy[:, 0] + share * (points.energy[:, 3] - points.energy[:, 0])
         want = closed_orbits.orbits_at_energy(A, B, C, energy, 0)
-        got = functions.orbits_at_energy(DISK, None, A, B, C, energy)
+        got = functions.orbits_at_energy(DISK, A, B, C, energy)
         np.testing.assert_array_equal(got.orbit_kind, want.orbit_kind)
         error = np.abs(got.period / want.period - 1.0)
         assert np.quantile(error, 0.98) < 1e-12
@@ -305,7 +305,7 @@ def test_hardening_oscillator():
 def test_double_well_next_to_its_figure_eight(side):
     """T = 2 K(m)/(a/sqrt 2) with 1 - m = b^2/a^2 and turning points b < a."""
     gap = -np.array([0.2, 0.05, 1e-4, 1e-8, 1e-12, 1e-20, 1e-30])
-    got = functions.orbits_at_gap(DOUBLE, 0, side, gap)
+    got = functions.orbits_at_gap(DOUBLE, gap, saddle=0, side=side)
     root = np.sqrt(1.0 + 4.0 * gap)
     outer, inner = 1.0 + root, -4.0 * gap / (1.0 + root)
     np.testing.assert_allclose(
@@ -318,7 +318,7 @@ def test_double_well_next_to_its_figure_eight(side):
 
 def test_double_well_above_its_figure_eight():
     gap = np.array([3.0, 0.1, 1e-4, 1e-8, 1e-12, 1e-20])
-    got = functions.orbits_at_gap(DOUBLE, None, 1, gap)
+    got = functions.orbits_at_gap(DOUBLE, gap)
     # x = a cn: frequency^2 = sqrt(1 + 4 h), 1 - m = (w2 - 1)/(2 w2)
     square = np.sqrt(1.0 + 4.0 * gap)
     rest = 4.0 * gap / (1.0 + square) / (2.0 * square)
@@ -328,26 +328,26 @@ def test_double_well_above_its_figure_eight():
 def test_pendulum_on_both_sides_of_its_separatrix():
     formula = circle("-cos(x)")
     gap = np.array([1e-1, 1e-6, 1e-12, 1e-18])
-    outside = functions.orbits_at_gap(formula, 0, 1, gap)
+    outside = functions.orbits_at_gap(formula, gap, saddle=0)
     k = 2.0 / (2.0 + gap)
     np.testing.assert_allclose(
         outside.period, 2 * np.sqrt(k) * ellipkm1(gap / (2 + gap)), rtol=2e-14
     )
     assert (outside.orbit_kind == OrbitKind.ROTATION).all()
-    inside = functions.orbits_at_gap(formula, 0, 1, -gap)
+    inside = functions.orbits_at_gap(formula, -gap, saddle=0)
     np.testing.assert_allclose(inside.period, 4 * ellipkm1(gap / 2), rtol=2e-14)
 
 
 def test_morse_oscillator():
     a, D = 1.3, 2.7
     energy = D * np.array([1e-12, 1e-3, 0.3, 0.9, 0.999])
-    got = functions.orbits_at_energy(MORSE, None, a, D, energy)
+    got = functions.orbits_at_energy(MORSE, a, D, energy)
     share = energy / D
     error = got.period / (TURN / (a * np.sqrt(2 * (D - energy)))) - 1.0
     assert np.all(np.abs(error) * (1 - share) < 2e-15)  # the rounding of the energy
     action = np.sqrt(2 * D) / a * share / (1 + np.sqrt(1 - share))
     np.testing.assert_allclose(got.action, action, rtol=2e-13)
-    high = functions.orbits_at_energy(MORSE, None, a, D, [D, 1.2 * D])
+    high = functions.orbits_at_energy(MORSE, a, D, [D, 1.2 * D])
     assert (high.orbit_kind == OrbitKind.UNBOUNDED).all()
     assert np.isinf(high.period).all()
 
@@ -373,9 +373,9 @@ def test_action_is_the_integral_of_the_period():
     for center in np.flatnonzero(points.kind == CENTER):
         rim = min(points.energy[(center + s) % points.phi.size] for s in (-1, 1))
         low, high = points.energy[center] + np.array([0.1, 0.7]) * (rim - points.energy[center])
-        ends = functions.orbits_at_energy(formula, int(center), [low, high]).action
+        ends = functions.orbits_at_energy(formula, [low, high], center=int(center)).action
         energy = 0.5 * (low + high) + 0.5 * (high - low) * nodes
-        period = functions.orbits_at_energy(formula, int(center), energy).period
+        period = functions.orbits_at_energy(formula, energy, center=int(center)).period
         assert ends[1] - ends[0] == pytest.approx(
             0.5 * (high - low) * np.sum(weights * period) / TURN, rel=1e-12
         )
@@ -400,20 +400,20 @@ def test_motion_on_separatrices_of_the_rotor():
     A, B, C, *_ = systems(100)
     t = np.array([-300.0, -4.0, 0.0, 0.7, 30.0])
     want = closed_flow.separatrix_motion(A[:, None], B[:, None], C[:, None], t)
-    got = functions.separatrix_motion(DISK, None, 1, A[:, None], B[:, None], C[:, None], t)
+    got = functions.separatrix_motion(DISK, A[:, None], B[:, None], C[:, None], t)
     for mine, theirs in zip(got, want, strict=True):
         np.testing.assert_allclose(mine, theirs, rtol=1e-10, atol=1e-12)
 
 
 def test_homoclinic_motions_in_closed_form():
     t = np.array([-90.0, -20.0, -1.3, 0.0, 0.4, 5.0, 200.0])
-    x, v = functions.separatrix_motion(DOUBLE, None, 1, t)
+    x, v = functions.separatrix_motion(DOUBLE, t)
     np.testing.assert_allclose(x, 2**0.5 / np.cosh(t), rtol=1e-13)
     np.testing.assert_allclose(v, -(2**0.5) * np.tanh(t) / np.cosh(t), rtol=1e-13)
-    x, v = functions.separatrix_motion(CUBIC, 0, 0, t[1:-1])
+    x, v = functions.separatrix_motion(CUBIC, t[1:-1], saddle=0, side=0)
     np.testing.assert_allclose(1 - x, 1.5 / np.cosh(t[1:-1] / 2) ** 2, rtol=1e-13, atol=1e-16)
-    assert np.isnan(functions.separatrix_motion(CUBIC, 0, 1, 0.0).motion_phi)
-    kink = functions.separatrix_motion(line("x^2/2 - x^4/4"), 0, 1, t)
+    assert np.isnan(functions.separatrix_motion(CUBIC, 0.0, saddle=0).motion_phi)
+    kink = functions.separatrix_motion(line("x^2/2 - x^4/4"), t, saddle=0)
     np.testing.assert_allclose(kink.motion_phi, np.tanh(t / 2**0.5), rtol=1e-13)
 
 

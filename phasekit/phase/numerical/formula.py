@@ -7,7 +7,7 @@ the eigenvalues of a companion matrix, anything else is interpolated on an inter
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any
@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
+from phasekit.laws.ladder import Conservative
 
 Array = npt.NDArray[np.float64]
 Values = Sequence[npt.ArrayLike]
@@ -33,7 +34,7 @@ class Shape(Enum):
 
 
 @dataclass(frozen=True, eq=False)
-class Formula:
+class Formula(Conservative):
     """A potential of one coordinate and named parameters, on a line or a circle.
 
     `values`, `slopes` and `bends` are V, V' and V''; each takes x and the parameters in the order
@@ -51,6 +52,11 @@ class Formula:
     slopes: Callable[..., Array]
     bends: Callable[..., Array]
     _coefficients: Callable[..., Any] | None
+
+    def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
+        """V' as a sympy expression of real symbols."""
+        own = {symbol: symbols[str(symbol)] for symbol in self.expression.free_symbols}
+        return self.expression.xreplace(own).diff(symbols[self.coordinate])
 
     @property
     def bounded(self) -> bool:

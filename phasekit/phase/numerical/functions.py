@@ -95,7 +95,7 @@ def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
     return _shaped(rounds.orbits(ground, x, v), shape)
 
 
-def orbits_at_energy(formula: Formula, center: int | None, *inputs: npt.ArrayLike) -> Orbits:
+def orbits_at_energy(formula: Formula, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
     *parameters, level = inputs
     ground, shape, (h,) = _cells(formula, parameters, (level,))
@@ -114,7 +114,7 @@ def orbits_at_energy(formula: Formula, center: int | None, *inputs: npt.ArrayLik
 
 
 def orbits_at_gap(
-    formula: Formula, saddle: int | None, side: int, *inputs: npt.ArrayLike
+    formula: Formula, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> Orbits:
     """Orbits by their energy above a saddle: its number, or the lowest; side 0 left, 1 right."""
     *parameters, level = inputs
@@ -156,7 +156,7 @@ def flow(formula: Formula, *inputs: npt.ArrayLike) -> Motion:
 
 
 def separatrix_motion(
-    formula: Formula, saddle: int | None, side: int, *inputs: npt.ArrayLike
+    formula: Formula, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> Motion:
     """Motion on the separatrix of a saddle at times, the last of the inputs."""
     *parameters, t = inputs

@@ -1,0 +1,156 @@
+"""Who computes a quantity: one function over the table, by the rung of the law and what is given.
+
+Each line of `PASSES` says which groups it computes, of which rung of the ladder of laws, and from
+what. The most special line that fits answers.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from phasekit.labelled import quantities
+from phasekit.labelled.arguments import bad, one_of
+from phasekit.labelled.quantities import LABELS, LAW, Pass, Quantity, plan_passes
+from phasekit.labelled.system import Model, stands_on
+
+CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
+SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
+
+#: A pass, and what is noted of the arguments that it was made from.
+Noted = tuple[Pass, dict[str, str]]
+
+
+def passes_of(
+    system: Model, rows: Iterable[Quantity], given: Iterable[str] = ()
+) -> tuple[Pass, ...]:
+    """Return the passes that compute rows of the table for a system.
+
+    Parameters
+    ----------
+    system : Model
+        The system.
+    rows : iterable of Quantity
+        What to compute.
+    given : iterable of str
+        Names of states; a pass takes those of them that it can do without as well.
+
+    Raises
+    ------
+    ParameterError
+        If a row is not offered on the rung of the system's law.
+    """
+    rows = tuple(rows)
+    for group in dict.fromkeys(row.group for row in rows):
+        stands_on(system, lowest_rung(group), group)
+    states = set(given)
+    return tuple(bound(one, system, states) for one in plan_passes(rows, system.rung))
+
+
+def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
+    """Return the pass that computes a group from a state of another kind, and from options.
+
+    Parameters
+    ----------
+    system : Model
+        The system.
+    group : str
+        What to compute.
+    start : str
+        The state that is given.
+    **options : str, int or None
+        What else the call says: center, saddle, side.
+
+    Raises
+    ------
+    ParameterError
+        If an option is not a label that the system has, or nothing computes the group from this.
+    """
+    fitting = [
+        one
+        for one in quantities.PASSES
+        if group in one.groups and start in one.inputs and set(one.options) == set(options)
+    ]
+    rungs = [one.of for one in fitting if issubclass(system.rung, one.of)]
+    if not rungs:
+        stands_on(system, fitting[0].of, f"{group} from {start}")
+    best = max(rungs, key=depth)
+    (one,) = (one for one in fitting if one.of is best)
+    chosen = {name: _option(system, name, value) for name, value in options.items()}
+    notes = {
+        name: str(system.rung.default[name] if value is None else value)
+        for name, value in options.items()
+    }
+    return bound(one, system, set(), chosen), notes
+
+
+def lowest_rung(group: str) -> Any:
+    """The most general rung on which a group is computed."""
+    return min((one.of for one in quantities.PASSES if group in one.groups), key=depth)
+
+
+def depth(rung: type) -> int:
+    """How special a rung is."""
+    return len(rung.__mro__)
+
+
+def bound(one: Pass, system: Model, given: set[str], options: dict[str, Any] | None = None) -> Pass:
+    """Return a line of the table for one system: with its law, options and optional states."""
+    extra = {state: keyword for state, keyword in one.optional if state in given}
+    if LAW not in one.inputs and not options and not extra:
+        return one
+    function = one.resolved
+    inputs = one.inputs
+    if LAW in inputs:
+        function = functools.partial(function, system.law)
+        own = tuple(system.parameters)
+        inputs = tuple(x for name in inputs for x in (own if name == LAW else (name,)))
+    if options:
+        function = functools.partial(function, **options)
+    if extra:
+        function = functools.partial(_with_keywords, function, tuple(extra.values()))
+    return Pass(function, (*inputs, *extra), one.groups, one.of)
+
+
+def _with_keywords(function: Any, keywords: tuple[str, ...], *arrays: Any, **options: Any) -> Any:
+    """Call a function whose last arrays go by keyword."""
+    own = len(arrays) - len(keywords)
+    return function(*arrays[:own], **dict(zip(keywords, arrays[own:], strict=True)), **options)
+
+
+def _option(system: Model, name: str, value: Any) -> int | None:
+    """Return an option as the number that array functions take; None where nothing is said."""
+    if name == "side":
+        return one_of(name, value, SIDES)
+    if value is None:
+        return None
+    if system.rung.labels_fixed:
+        return one_of(name, value, {"center": CENTERS, "saddle": SADDLES}[name])
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 0:
+        dim = {"center": "equilibrium", "saddle": "saddle"}[name]
+        wants = f"a {name}'s number on the dim {dim}, 0 or more, for a {type(system).__name__}"
+        raise bad(name, value, wants)
+    return int(value)
+
+
+def fitted(
+    system: Model, rows: Sequence[Quantity], passes: Sequence[Pass]
+) -> tuple[Sequence[Quantity], Sequence[Pass]]:
+    """Return rows and passes with the labels and words that the system's results have.
+
+    Raises
+    ------
+    ParameterError
+        If nothing is left of what was asked for, or the system lacks what it needs.
+    """
+    kept = [row for row in rows if issubclass(system.rung, row.of)]
+    if not kept:
+        raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
+    if system.rung.labels_fixed:
+        return rows, passes
+    from phasekit.labelled import numbered  # loads scipy, which named labels do not need
+
+    return numbered.fitted(system, kept, passes)

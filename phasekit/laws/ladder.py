@@ -1,0 +1,40 @@
+"""The ladder of laws: each rung is a set of equations, and a method belongs to a rung.
+
+A law says by its rung what can be computed of it; the table of quantities names for each rung what
+computes it, and the most special line that fits answers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, ClassVar
+
+
+class Law:
+    """Anything that moves: ``x' = f(t, x; p)``."""
+
+    #: What messages call a system with such a law.
+    called: ClassVar[str] = "a system"
+    #: What is computed of the parameters before anything else, and may be asked for by name.
+    derived: ClassVar[tuple[str, ...]] = ()
+
+
+class Autonomous(Law):
+    """A law without time in it: ``x' = f(x; p)``."""
+
+
+class Conservative(Autonomous):
+    """One degree of freedom in a potential: ``x'' = -V'(x; p)``."""
+
+    called: ClassVar[str] = "a system in a potential"
+    #: Whether equilibria have names, so that all cells have the same; else they are numbered.
+    labels_fixed: ClassVar[bool] = False
+    #: Name of the coordinate, and its period where it is an angle.
+    coordinate: str
+    period: float | None
+    #: Which center or saddle is meant where none is named.
+    default: ClassVar[Mapping[str, str]] = {"center": "the lowest", "saddle": "the lowest"}
+
+    def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
+        """V' as a sympy expression of real symbols: of the coordinate and the parameters."""
+        raise NotImplementedError
