@@ -16,12 +16,12 @@ from phasekit.labelled.arguments import bad, flag, unknown
 from phasekit.labelled.problem_parts import (
     FORMULAS,
     INERTIA,
-    expressions_of,
     make_field,
     names_of,
     values_of,
 )
 from phasekit.labelled.system import MODELS, Model
+from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -172,10 +172,8 @@ class Problem:
         velocity = f"d{coordinate}"
         states = names_of("coordinate", (coordinate,)) + (velocity,)
         values = values_of("parameters", parameters or {})
-        (V,) = expressions_of([potential], [*states, *values], "potential")
-        from phasekit.bifurcation.continuation.expressions import symbols_of
-
-        symbols = symbols_of(states)
+        symbols = symbols_of([*states, *values])
+        V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
         force = -V.diff(symbols[coordinate])
         periods = {} if period is None else {coordinate: period}
         return cls([symbols[velocity], force], states, values, periods=periods, conservative=True)
@@ -214,10 +212,8 @@ class Problem:
         for key, value in values.items():
             if not isinstance(value, float):
                 raise bad(key, value, "a single number, to continue a single system")
-        (V,) = expressions_of([system.expression], [system.coordinate, *values], "potential")
-        from phasekit.bifurcation.continuation.expressions import symbols_of
-
         x = system.coordinate
+        V = take_formula(system.expression, symbols_of([x, *values]), "potential")
         periods = {} if system.period is None else {x: system.period}
         force = -V.diff(symbols_of([x])[x])
         problem = cls([force], x, values, periods=periods, conservative=True)
@@ -270,7 +266,7 @@ class Problem:
 
     def specification(self) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code."""
-        formulas = [str(e) for e in self.f] if self.kind == "symbolic" else None
+        formulas = [write_formula(e) for e in self.f] if self.kind == "symbolic" else None
         spec: dict[str, Any] = {
             "f": formulas,
             "state": list(self.state),

@@ -1,0 +1,1 @@
+"""Laws of motion as text: formulas, read safely and once."""
