@@ -327,9 +327,13 @@ def _arguments(system: Any) -> dict[str, Any]:
 
 def _model(name: str) -> Callable[..., Model]:
     """A model by its name; models are known once they are imported."""
+    if not isinstance(name, str):
+        raise bad("problem: model", name, "a name")
     if name not in MODELS:
         for module in ("models", "guises", "potential_system"):
             importlib.import_module(f"phasekit.labelled.{module}")
+    if name not in MODELS:
+        raise unknown("problem: model", name, MODELS)
     return MODELS[name]
 
 

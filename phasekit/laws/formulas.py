@@ -146,10 +146,10 @@ def take_formula(
         )
     replaced: dict[Any, Any] = {x: sympy.Float(float(x)) for x in expression.atoms(sympy.Float)}
     for symbol in expression.free_symbols:
-        name = getattr(symbol, "name", None)
+        name = str(getattr(symbol, "name", symbol))
         if name in symbols:
             replaced[symbol] = symbols[name]
-        elif isinstance(symbol, sympy.Symbol):
+        else:
             raise ParameterError(
                 f"{argument}: got {_cut(str(expression))} with the unknown symbol {name}; wants "
                 f"one of {', '.join(symbols)}{declare and '; ' + declare}"
@@ -202,16 +202,16 @@ def _number(value: Any, argument: str) -> Any:
 
     import sympy
 
-    if isinstance(value, numbers.Real) and not isinstance(value, bool):
-        whole = isinstance(value, numbers.Integral)
-        number = int(value) if whole else float(value)
-        if abs(number) < 1e308 and math.isfinite(number):
-            return sympy.Integer(number) if whole else sympy.Float(number)
-    got = f"a {type(value).__name__}" if isinstance(value, (bool, bytes)) else "it"
-    raise ParameterError(
-        f"{argument}: got {value!r}"[:80] + f", wants a formula as a string or a sympy expression "
-        f"({got} is neither)"
-    )
+    # In this order: repr refuses whole numbers of many digits.
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise ParameterError(
+            f"{argument}: got {value!r:.80}, wants a formula as a string or a sympy expression"
+        )
+    if abs(value) > 1e308 or not math.isfinite(value):
+        raise ParameterError(f"{argument}: got a number that no double holds, wants a formula")
+    if isinstance(value, numbers.Integral):
+        return sympy.Integer(int(value))
+    return sympy.Float(float(value))
 
 
 def _known(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:
