@@ -34,7 +34,8 @@ def zarr_group(store: Any) -> Any:
     """Return the group of a store."""
     import zarr
 
-    return zarr.open_group(store, mode="r" if store.read_only else "r+")
+    # Format 2 has codecs that unpickle what they read; phasekit writes none of it.
+    return zarr.open_group(store, mode="r" if store.read_only else "r+", zarr_format=3)
 
 
 def read_plan(group: Any) -> Plan | None:
@@ -108,7 +109,7 @@ def _documents(ds: xr.Dataset, plan: Plan, root: Mapping[str, Any]) -> dict[str,
     for variable in ds.variables.values():
         variable.encoding = {"chunks": variable.shape} if variable.shape else {}
     ds.to_zarr(store, mode="w", zarr_format=3, consolidated=False)
-    group: Any = zarr.open_group(store, mode="r+")
+    group: Any = zarr.open_group(store, mode="r+", zarr_format=3)
     # What a call does not name, earlier ones did: their coordinates, and versions of libraries.
     named = {*root.get(_NAMED, "").split(), *group.attrs.get(_NAMED, "").split()}
     attrs = {**group.attrs, **root}
@@ -126,7 +127,7 @@ def refuse_damaged(place: Place, plan: Plan) -> None:
     """Raise a `StoreError` where arrays are not those of the plan."""
     store = place.open(read_only=True)
     group = zarr_group(store)
-    with xr.open_zarr(store, consolidated=False, chunks=None) as ds:
+    with xr.open_zarr(store, consolidated=False, chunks=None, zarr_format=3) as ds:
         for name, array in plan.arrays.items():
             if fingerprint(ds[name].variable) != array["sha256"]:
                 raise _damaged(place, name)

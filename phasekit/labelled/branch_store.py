@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -10,18 +11,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.path import Sample
-from phasekit.errors import ParameterError, StoreError
+from phasekit.errors import StoreError
 from phasekit.labelled.arguments import bad, flag
-from phasekit.labelled.branch import NUMBERS, Branch, make_branch
-from phasekit.labelled.problem import Problem, as_problem
+from phasekit.labelled.arrays import reason
+from phasekit.labelled.branch import Branch, make_branch
+from phasekit.labelled.branch_stored import ARRAYS, Stored, damaged
+from phasekit.labelled.problem import as_problem
 from phasekit.labelled.schema import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.labelled.store import WholeTarget, target_of
 
 _NAME = "Branch"
-_ARRAYS = ("par", "scale", "period", "low", "high")
 
 
 def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
@@ -31,7 +30,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
     target = WholeTarget(target_of(path), overwrite=overwrite)
     ds = branch.to_dataset()
     for name, array in {
-        **{f"curve_{name}": getattr(curve, name) for name in _ARRAYS},
+        **{f"curve_{name}": getattr(curve, name) for name in ARRAYS},
         "curve_aux": np.zeros(0) if curve.aux is None else curve.aux,
         "start_u": branch.start.u,
         "start_tangent": branch.start.tangent,
@@ -60,74 +59,67 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
 
 
 def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
-    """Read a branch and make it again of what was traced."""
-    ds = _open(path)
-    spec = json.loads(ds.attrs["branch"])
-    if problem is None:
-        problem = Problem.from_specification(spec["problem"])
-        if problem is None:
-            raise ParameterError(
-                "problem: the branch is one of Python or compiled code, which is not saved; "
-                "wants the problem itself: Branch.load(path, problem=...)"
-            )
-    else:
-        problem = as_problem(problem)
-        wants = spec["problem"]
-        same = list(problem.state) == wants["state"] and dict(problem.parameters) == {
-            name: float(value) for name, value in wants["parameters"].items()
-        }
-        if not same:
-            raise bad("problem", problem, f"the problem of the branch, with {wants['state']} and "
-                      f"{wants['parameters']}")  # fmt: skip
-    functions = _functions(spec["record"], record)
-    options = spec["options"]
-    options["detect"] = tuple(options["detect"])
-    options["bounds"] = {name: tuple(pair) for name, pair in options["bounds"].items()}
-    names = list(problem.parameters)
-    aux = ds["raw_curve_aux"].values
-    curve = Curve(
-        field=problem.field,
-        kind=NUMBERS[spec["kind"]],
-        active=tuple(names.index(name) for name in spec["free"]),
-        options=ContinuationOptions(**options),
-        aux=aux if aux.size else None,
-        **{name: ds[f"raw_curve_{name}"].values for name in _ARRAYS},
-    )
-    start = Sample(*(ds[f"raw_start_{name}"].values for name in ("u", "tangent", "slopes")))
-    tracks: list[Track | None] = []
-    for name, stop in zip(("backward", "forward"), spec["stops"], strict=True):
-        if stop is None:
-            tracks.append(None)
-            continue
-        record_ = ds[f"raw_{name}"].values
-        tracks.append(Track(record_, ds[f"raw_{name}_state"].values, Stop(*stop)))
-    return make_branch(problem, curve, start, tracks[0], tracks[1], functions)
+    """Read a branch and make it again of what was traced.
+
+    Raises
+    ------
+    StoreError
+        If nothing is there, or what is there is damaged or was made by another version.
+    ParameterError
+        If the problem or the functions to record are needed, or are not those of the branch.
+    """
+    if record is not None and not isinstance(record, Mapping):
+        raise bad("record", record, "a mapping from names to functions, or None")
+    place = _place(path)
+    with _open(place) as ds:
+        stored = Stored(ds, str(place), _bytes(place))
+        given = None if problem is None else as_problem(problem)
+        if given is not None:
+            stored.refuse_other(given)
+        else:
+            given = stored.problem()
+        functions = stored.functions(record or {})
+        curve = stored.curve(given)
+        start, tracks = stored.traces(curve)
+    if problem is not None or any(functions.values()):
+        return make_branch(given, curve, start, *tracks, functions)  # what f raises is the user's
+    with damaged(str(place), "its points"):
+        return make_branch(given, curve, start, *tracks, functions)
 
 
-def _functions(kept: dict[str, bool], given: Any) -> dict[str, Any]:
-    given = dict(given or {})
-    missing = [name for name, by_name in kept.items() if not by_name and name not in given]
-    if missing:
-        raise ParameterError(
-            f"record: the branch records {', '.join(missing)} by functions, which are not saved; "
-            "wants them again: Branch.load(path, record={...})"
-        )
-    return {name: None if by_name else given[name] for name, by_name in kept.items()}
-
-
-def _open(path: str | PathLike[str]) -> xr.Dataset:
-    place = Path(fspath(path)).expanduser()
+def _place(path: Any) -> Path:
+    try:
+        text = fspath(path)
+    except TypeError:
+        raise bad("path", path, "a path that ends in .zarr or .nc") from None
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise bad("path", path, "a path that ends in .zarr or .nc, without null bytes")
+    try:
+        place = Path(text).expanduser()
+    except RuntimeError as error:
+        raise bad("path", path, f"a path that can exist: {error}") from None
     if not place.exists():
         raise StoreError(f"path: {place} does not exist")
+    return place
+
+
+def _bytes(place: Path) -> int:
+    files = place.rglob("*") if place.is_dir() else [place]
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
+def _open(place: Path) -> xr.Dataset:
+    """Open what is there, without reading its arrays."""
     ds: xr.Dataset
     try:
         if place.is_dir():
-            ds = xr.open_zarr(place, consolidated=False, chunks=None).load()
+            # Format 2 has codecs that unpickle what they read; branches are of format 3.
+            ds = xr.open_zarr(place, consolidated=False, chunks=None, zarr_format=3)
         else:
-            with xr.open_dataset(place, engine="h5netcdf") as opened:
-                ds = opened.load()
-    except (OSError, ValueError, KeyError) as error:
-        raise StoreError(f"path: {place} cannot be read: {error}") from error
+            ds = xr.open_dataset(place, engine="h5netcdf")
+    except Exception as error:  # whatever is made of files that are not what they were
+        raise StoreError(f"path: {place} cannot be read: {reason(error)}") from error
     if ds.attrs.get(MODEL) != _NAME or "branch" not in ds.attrs:
+        ds.close()
         raise StoreError(f"path: {place} holds no branch of phasekit")
     return ds

@@ -146,7 +146,7 @@ class Place:
             import zarr
 
             with contextlib.suppress(FileNotFoundError):
-                group = zarr.open_group(self.open(read_only=False), mode="r+")
+                group = zarr.open_group(self.open(read_only=False), mode="r+", zarr_format=3)
                 for name in list(group):
                     del group[name]
             return

@@ -13,6 +13,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, brief, same, unknown
 from phasekit.labelled.quantities import LABELS, ROWS, STATES
 from phasekit.labelled.system import MODELS, Model, Parameter, named_arguments
+from phasekit.laws.formulas import NAME, is_name, read_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
 
@@ -34,14 +35,15 @@ class Potential(Model):
     ----------
     expression : str or sympy expression
         The potential V per unit of inertia. In a string ``^`` and ``**`` both raise to a power,
-        and functions have sympy's names. sympy evaluates strings as Python: read none that you do
-        not trust.
+        and functions have sympy's names; special functions are those of SciPy. Strings are read
+        as formulas and nothing else, so that one from another's file can do no harm.
     coordinate : str or sympy symbol
         The coordinate in it.
     parameters : mapping of str to float, 1-D array_like or xarray.DataArray, optional
         Values of the other symbols. An array is an axis of its own name, as in other systems.
-    period : float, optional
-        Length of the circle on which the coordinate lies, 2 pi for an angle; None for a line.
+    period : float or str, optional
+        Length of the circle on which the coordinate lies, 2 pi for an angle (``"2*pi"`` as well);
+        None for a line.
     interval : (float, float), optional
         The part of a line that is looked at. Needed for equilibria and all that follows from them
         if V is not a polynomial; orbits that leave it count as unbounded.
@@ -188,9 +190,7 @@ class Potential(Model):
         from phasekit.labelled.problem import Problem
 
         values = dict(zip(self._values, self._scalars(), strict=True))
-        return Problem.from_potential(
-            self.formula.text, self.coordinate, values, period=self.period
-        )
+        return Problem.from_potential(self.expression, self.coordinate, values, period=self.period)
 
     def _scalars(self) -> list[float]:
         values = []
@@ -324,23 +324,25 @@ def _rebuild(
 def _expression(expression: Any) -> Any:
     if isinstance(expression, str):
         return expression
-    if isinstance(expression, (int, float)) and not isinstance(expression, bool):
-        return repr(expression)
-    try:
-        import sympy as sp
-    except ImportError:  # pragma: no cover
-        raise ParameterError("expression: wants sympy installed to be read") from None
-    if not isinstance(expression, sp.Expr):
-        raise bad("expression", expression, "a string or a sympy expression")
-    return expression
+    import sympy as sp
+
+    if isinstance(expression, sp.Expr):
+        return expression
+    # Numbers as text, for the formula of 1.0 is not that of 1.
+    if isinstance(expression, (float, np.floating)):
+        return repr(float(expression))
+    whole = isinstance(expression, (int, np.integer)) and not isinstance(expression, bool)
+    if whole and abs(expression) < 1e308:
+        return repr(int(expression))
+    raise bad("expression", expression, "a string or a sympy expression")
 
 
 def _name(argument: str, name: Any) -> str:
     text = str(name) if type(name).__module__.startswith("sympy") else name
-    if not isinstance(text, str) or not text.isidentifier() or text.startswith("__"):
-        raise bad(argument, name, "a name, such as 'x'")
-    if keyword.iskeyword(text):
+    if isinstance(text, str) and keyword.iskeyword(text):
         raise bad(argument, name, "a name that Python does not use itself", f"such as {text[:3]!r}")
+    if not isinstance(text, str) or not is_name(text):
+        raise bad(argument, name, f"a name, such as 'x', of at most {NAME} letters and digits")
     return text
 
 
@@ -348,11 +350,13 @@ def _period(period: Any) -> float | None:
     if period is None:
         return None
     wants = "a number > 0, the length of the circle, or None for a line"
-    if isinstance(period, (bool, str)):
+    if isinstance(period, str):
+        period = read_formula(period, {}, "period")
+    if isinstance(period, (bool, np.bool_)) or np.ndim(period):
         raise bad("period", period, wants)
     try:
         value = float(period)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise bad("period", period, wants) from None
     if not 0.0 < value < np.inf:
         raise bad("period", period, wants)
@@ -367,7 +371,7 @@ def _interval(interval: Any, period: Any) -> tuple[float, float] | None:
     wants = "two finite numbers (low, high), low < high"
     try:
         low, high = (float(end) for end in interval)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise bad("interval", interval, wants) from None
     if not -np.inf < low < high < np.inf:
         raise bad("interval", interval, wants)

@@ -14,12 +14,12 @@ from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labelled.arguments import bad, flag, unknown
 from phasekit.labelled.problem_parts import (
-    expressions_of,
     make_field,
     names_of,
     values_of,
 )
 from phasekit.labelled.system import MODELS, Model
+from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -170,10 +170,8 @@ class Problem:
         velocity = f"d{coordinate}"
         states = names_of("coordinate", (coordinate,)) + (velocity,)
         values = values_of("parameters", parameters or {})
-        (V,) = expressions_of([potential], [*states, *values], "potential")
-        from phasekit.bifurcation.continuation.expressions import symbols_of
-
-        symbols = symbols_of(states)
+        symbols = symbols_of([*states, *values])
+        V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
         force = -V.diff(symbols[coordinate])
         periods = {} if period is None else {coordinate: period}
         return cls([symbols[velocity], force], states, values, periods=periods, conservative=True)
@@ -187,8 +185,6 @@ class Problem:
         ParameterError
             If a parameter is an array.
         """
-        from phasekit.bifurcation.continuation.expressions import symbols_of
-
         law = system.law
         names = system.formula_inputs()
         values: dict[str, float] = {}
@@ -250,7 +246,7 @@ class Problem:
 
     def specification(self) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code."""
-        formulas = [str(e) for e in self.f] if self.kind == "symbolic" else None
+        formulas = [write_formula(e) for e in self.f] if self.kind == "symbolic" else None
         spec: dict[str, Any] = {
             "f": formulas,
             "state": list(self.state),
@@ -311,9 +307,13 @@ def _arguments(system: Any) -> dict[str, Any]:
 
 def _model(name: str) -> Callable[..., Model]:
     """A model by its name; models are known once they are imported."""
+    if not isinstance(name, str):
+        raise bad("problem: model", name, "a name")
     if name not in MODELS:
         for module in ("models", "guises", "potential_system"):
             importlib.import_module(f"phasekit.labelled.{module}")
+    if name not in MODELS:
+        raise unknown("problem: model", name, MODELS)
     return MODELS[name]
 
 

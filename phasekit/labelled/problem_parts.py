@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import inspect
-import keyword
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
-from phasekit.bifurcation.continuation.fields import Field, SymbolicField
+from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad, unknown
+from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula
 
 
 def names_of(argument: str, given: Any) -> tuple[str, ...]:
@@ -22,8 +22,11 @@ def names_of(argument: str, given: Any) -> tuple[str, ...]:
     except TypeError:
         raise bad(argument, given, "names") from None
     for name in names:
-        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-            raise bad(argument, name, "names that are Python identifiers and no keywords")
+        if not is_name(name):
+            raise bad(
+                argument, name,
+                f"names that are Python identifiers and no keywords, of at most {NAME} letters",
+            )  # fmt: skip
     if not names:
         raise bad(argument, given, "at least one name")
     if len(set(names)) < len(names):
@@ -39,41 +42,35 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
         names_of(argument, given)
     values = {}
     for name, value in given.items():
-        if isinstance(value, (bool, np.bool_, str)) or value is None:
+        if isinstance(value, (bool, np.bool_, str)) or value is None or np.ndim(value):
             raise bad(f"{argument}[{name!r}]", value, "a number")
         try:
             values[name] = float(value)
         except (TypeError, ValueError):
             raise bad(f"{argument}[{name!r}]", value, "a number") from None
+        except OverflowError:
+            values[name] = np.inf
         if not np.isfinite(values[name]):
             raise bad(f"{argument}[{name!r}]", value, "a finite number")
     return values
 
 
-def expressions_of(given: Iterable[Any], names: Sequence[str], argument: str) -> list[Any]:
-    """Formulas as sympy expressions of real symbols."""
-    import sympy
+def expressions_of(
+    given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str]
+) -> list[Any]:
+    """Formulas as sympy expressions of real symbols, that there is machine code for.
 
-    from phasekit.bifurcation.continuation.expressions import parse, symbols_of
-
+    Raises
+    ------
+    ParameterError
+        If one cannot be read, or needs a function, or a derivative by the states, that has none.
+    """
     symbols = symbols_of(names)
-    found = []
-    for one in given:
-        if isinstance(one, str):
-            found.append(parse(one, symbols, argument))
-            continue
-        if isinstance(one, bool) or not isinstance(one, (sympy.Basic, int, float, np.number)):
-            raise bad(argument, one, "formulas: strings or sympy expressions")
-        expression = sympy.sympify(one)
-        replaced = {}
-        for symbol in expression.free_symbols:
-            if str(symbol) not in symbols:
-                raise ParameterError(
-                    f"{argument}: got the symbol {symbol} in {expression}, wants one of "
-                    f"{', '.join(symbols)}; declare it in state or parameters"
-                )
-            replaced[symbol] = symbols[str(symbol)]
-        found.append(expression.xreplace(replaced))
+    declare = "declare it in state or parameters"
+    found = [take_formula(one, symbols, argument, declare) for one in given]
+    moving = {symbols[name] for name in states}
+    for expression in found:
+        refuse_uncompiled(expression, moving, argument)
     return found
 
 
@@ -96,7 +93,7 @@ def make_field(
         given = [f] if is_one and not hasattr(f, "tolist") else list(f)
         if len(given) != len(states):
             raise bad("f", given, f"{len(states)} formulas, one for each of {', '.join(states)}")
-        expressions = tuple(expressions_of(given, [*states, *names], "f"))
+        expressions = tuple(expressions_of(given, [*states, *names], "f", states))
         return SymbolicField(expressions, states, names), expressions
     if not callable(f):
         raise bad(

@@ -122,7 +122,7 @@ def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Data
             ds = xr.open_dataset(place.path, engine="h5netcdf", chunks=chunks)
         else:
             source = place.open(read_only=True)
-            ds = xr.open_zarr(source, consolidated=False, chunks=chunks)
+            ds = xr.open_zarr(source, consolidated=False, chunks=chunks, zarr_format=3)
             ds = with_computed(ds, source, place.name, chunks)
         model_name(ds)
         return restore(ds)

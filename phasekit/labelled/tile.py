@@ -121,7 +121,7 @@ def _arrays(tile: Tile) -> tuple[Mapping[str, Any], Any]:
     if _local.__dict__.get("key") != key:
         import zarr
 
-        group = zarr.open_group(tile.place.open(read_only=False), mode="r+")
+        group = zarr.open_group(tile.place.open(read_only=False), mode="r+", zarr_format=3)
         _local.arrays = {row.name: group[row.name] for row in tile.rows}
         _local.marks = group[f"{GROUP}/{tile.part}"]
         _local.key = key

@@ -10,7 +10,6 @@ import sympy
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.expressions import parse, symbols_of
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.machine import compile_expressions
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -23,6 +22,8 @@ from phasekit.errors import ParameterError
 from phasekit.kernels import defining
 from phasekit.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.kernels.newton import refine
+from phasekit.laws.formulas import read_formula as parse
+from phasekit.laws.formulas import symbols_of
 
 FORMULAS = [
     "x + 2*y - 3",

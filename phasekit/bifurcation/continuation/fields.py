@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ParameterError
 from phasekit.kernels.defining import DERIVED
 
 Array = npt.NDArray[np.float64]
@@ -68,6 +69,29 @@ class SymbolicField(Field):
     def third(self, active: tuple[int, ...]) -> int:
         """Machine code for the third derivative along three directions."""
         return _third(self.expressions, self.states, self.parameters, active)
+
+
+def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
+    """Refuse functions that have no machine code, or whose derivatives by the states have none.
+
+    Raises
+    ------
+    ParameterError
+    """
+    import sympy
+
+    from phasekit.bifurcation.continuation.machine import COMPILED, DIFFERENTIABLE
+
+    for part in expression.atoms(sympy.Function):
+        name = type(part).__name__
+        fixed = not part.free_symbols & states
+        if part.free_symbols and name not in (COMPILED if fixed else DIFFERENTIABLE):
+            what = "itself" if name not in COMPILED else "its derivative"
+            raise ParameterError(
+                f"{argument}: got the function {name}, which has no machine code {what}, wants "
+                f"one of {', '.join(sorted(DIFFERENTIABLE))} of the states; a Python or "
+                "numba-compiled f may hold any"
+            )
 
 
 def _unknowns(

@@ -40,6 +40,9 @@ _LIBRARY = {
     "gamma": "tgamma",
     "loggamma": "lgamma",
 }
+#: Functions that have machine code, and those whose derivatives have it as well.
+COMPILED = {*_LIBRARY, "atan2", "Abs", "sign", "Heaviside", "Max", "Min", "Piecewise"}
+DIFFERENTIABLE = COMPILED - {"gamma", "loggamma"}
 _COMPARISONS = {
     sympy.StrictLessThan: "<",
     sympy.LessThan: "<=",

@@ -16,7 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
+from phasekit.laws.formulas import short_formula, symbols_of, take_formula, write_formula
+from phasekit.laws.grammar import FormulaError
 from phasekit.laws.ladder import Conservative
+from phasekit.phase.numerical.code import array_code
 
 Array = npt.NDArray[np.float64]
 Values = Sequence[npt.ArrayLike]
@@ -111,36 +114,19 @@ def make_formula(
     ParameterError
         If the expression cannot be read, has an unknown symbol, or is not smooth and real.
     """
-    import sympy as sp
-
-    symbols = {name: sp.Symbol(name, real=True) for name in (coordinate, *names)}
+    symbols = symbols_of((coordinate, *names))
     x = symbols[coordinate]
-    potential = _read(expression, symbols)
-    unknown = sorted(map(str, potential.free_symbols - set(symbols.values())))
-    if unknown:
-        raise ParameterError(
-            f"expression: got {potential} with the unknown symbol {', '.join(unknown)}, wants the "
-            f"coordinate {coordinate} and parameters that have values"
-            + (f" ({', '.join(names)})" if names else "")
-            + f"; give parameters={{{unknown[0]!r}: ...}}"
-        )
-    slope = sp.diff(potential, x)
-    bend = sp.diff(slope, x)
-    for order in (potential, slope, bend):
-        if order.has(sp.I, sp.Derivative, sp.Subs, sp.DiracDelta, sp.zoo, sp.nan, sp.oo):
-            raise ParameterError(
-                f"expression: got {potential}, wants a real function of {coordinate} that sympy "
-                "can differentiate twice"
-            )
+    declare = "a parameter needs a value: parameters={'name': ...}"
+    potential = take_formula(expression, symbols, "expression", declare)
+    slope, bend = _derivatives(potential, x, symbols)
     arguments = [x, *(symbols[name] for name in names)]
     shape, coefficients = _shape(slope, x, period)
-    lambdify = functools.partial(sp.lambdify, modules="numpy", printer=_numpy_printer())
     values, slopes, bends = (
-        _array_function(lambdify(arguments, f, cse=_shared)) for f in (potential, slope, bend)
+        _array_function(array_code(arguments, f, _shared)) for f in (potential, slope, bend)
     )
-    series = None if coefficients is None else lambdify(arguments[1:], coefficients, cse=True)
+    series = None if coefficients is None else array_code(arguments[1:], coefficients)
     return Formula(
-        _text(potential),
+        write_formula(potential),
         coordinate,
         names,
         period,
@@ -154,53 +140,27 @@ def make_formula(
     )
 
 
-def _read(expression: Any, symbols: dict[str, Any]) -> Any:
+def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[Any, Any]:
+    """V' and V'', if they are functions that can be computed."""
     import sympy as sp
-    from sympy.parsing.sympy_parser import convert_xor, parse_expr, standard_transformations
 
-    if isinstance(expression, str):
-        try:
-            potential = parse_expr(
-                expression,
-                local_dict=dict(symbols),
-                transformations=(*standard_transformations, convert_xor),
-            )
-        except Exception as error:  # whatever Python and sympy make of the text
-            raise ParameterError(
-                f"expression: got {expression!r}, wants a formula that sympy reads, such as "
-                f"'x^4/4 - x^2/2' ({type(error).__name__}: {error})"
-            ) from None
-        if not isinstance(potential, sp.Expr):
-            raise ParameterError(f"expression: got {expression!r}, wants a formula of one value")
-        return potential
-    # Symbols of the caller may have other assumptions; the name is what counts.
-    return expression.xreplace(
-        {s: symbols[s.name] for s in expression.free_symbols if s.name in symbols}
-    )
+    from phasekit.laws.nodes import foreign
 
-
-def _numpy_printer() -> Any:
-    """Return sympy's printer of NumPy code, but with all digits of numbers, where it keeps 15."""
-    from sympy.printing.numpy import NumPyPrinter
-
-    class Exact(NumPyPrinter):  # type: ignore[misc]
-        def _print_Float(self, number: Any) -> str:
-            return repr(float(number))
-
-    return Exact(
-        {"fully_qualified_modules": False, "inline": True, "allow_unknown_functions": True}
-    )
-
-
-def _text(expression: Any) -> str:
-    """Write an expression so that reading it gives the same numbers."""
-    from sympy.printing.str import StrPrinter
-
-    class Exact(StrPrinter):  # type: ignore[misc]
-        def _print_Float(self, number: Any) -> str:
-            return repr(float(number))
-
-    return str(Exact().doprint(expression))
+    try:
+        slope = sp.diff(potential, x)
+        bend = sp.diff(slope, x)
+        strange = foreign(slope, symbols.values()) or foreign(bend, symbols.values())
+    except (RecursionError, FormulaError):
+        raise ParameterError(
+            "expression: got a formula that is nested too deeply, or too long, to differentiate"
+        ) from None
+    if strange is not None or any(o.has(sp.I, sp.zoo, sp.nan, sp.oo) for o in (slope, bend)):
+        held = f"; its derivatives hold {type(strange).__name__}" if strange is not None else ""
+        raise ParameterError(
+            f"expression: got {short_formula(potential)}, wants a real function of {x} that sympy "
+            f"can differentiate twice{held}"
+        )
+    return slope, bend
 
 
 def _shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:

@@ -1,0 +1,216 @@
+"""The grammar of formulas: from text to nodes, without evaluating anything.
+
+What a formula may be is what this parser accepts, and nothing else: numbers, names, ``+ - * /``,
+``**`` or ``^``, calls of named functions, and conditions made of comparisons with ``& | ~``.
+Precedence is Python's, but ``^`` is a power. Python's own parser is not asked, for it takes far
+more, warns, and ends the process on some texts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, NamedTuple, NoReturn, Protocol
+
+#: Deepest nesting of parentheses, calls and powers.
+DEPTH = 64
+
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?)"
+    r"|(?P<name>[^\W\d]\w*)"
+    r"|(?P<sign>\*\*|<=|>=|==|!=|[-+*/^()<>,&|~]))"
+)
+_COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+
+
+class FormulaError(ValueError):
+    """A text is no formula; the message says what is wrong with it."""
+
+
+class Builder(Protocol):
+    """What makes nodes; it refuses what cannot be, or is too large, by a `FormulaError`."""
+
+    def number(self, text: str) -> Any:
+        """A number as it is written."""
+
+    def name(self, name: str) -> Any:
+        """A symbol or constant."""
+
+    def call(self, name: str, arguments: Sequence[Any]) -> Any:
+        """A function of arguments; two values in parentheses are one argument, a tuple."""
+
+    def add(self, terms: Sequence[Any]) -> Any:
+        """A sum."""
+
+    def multiply(self, factors: Sequence[Any]) -> Any:
+        """A product."""
+
+    def power(self, base: Any, exponent: Any) -> Any:
+        """A power."""
+
+    def compare(self, sign: str, left: Any, right: Any) -> Any:
+        """A comparison."""
+
+    def join(self, sign: str, conditions: Sequence[Any]) -> Any:
+        """Conditions joined by ``&`` or ``|``, or one denied by ``~``."""
+
+
+class _Token(NamedTuple):
+    kind: str | None  # None after the last one
+    text: str
+    place: int
+
+
+def _tokens(text: str) -> list[_Token]:
+    tokens, place, end = [], 0, len(text.rstrip())
+    while place < end:
+        match = _TOKEN.match(text, place)
+        if match is None:
+            rest = text[place:].lstrip()
+            raise FormulaError(f"{rest[:1]!r} at character {text.index(rest, place) + 1}")
+        kind = str(match.lastgroup)
+        tokens.append(_Token(kind, match[kind], match.start(kind)))
+        place = match.end()
+    return [*tokens, _Token(None, "", end)]
+
+
+def parse(text: str, build: Builder) -> Any:
+    """Read a formula; the builder makes its nodes from the leaves up.
+
+    Raises
+    ------
+    FormulaError
+        If the text is no formula, or is nested too deeply.
+    """
+    return _Parser(_tokens(text), build).whole()
+
+
+class _Parser:
+    def __init__(self, tokens: list[_Token], build: Builder) -> None:
+        self.tokens, self.build = tokens, build
+        self.place = self.depth = 0
+
+    @property
+    def next(self) -> _Token:
+        return self.tokens[self.place]
+
+    def take(self, *signs: str) -> str | None:
+        """Go past the next token if it is one of some signs, and return it."""
+        token = self.next
+        if token.kind == "sign" and token.text in signs:
+            self.place += 1
+            return token.text
+        return None
+
+    def fail(self, wants: str) -> NoReturn:
+        token = self.next
+        got = "its end" if token.kind is None else f"{token.text[:40]!r}"
+        raise FormulaError(f"{got} at character {token.place + 1} where {wants} belongs")
+
+    def deeper(self) -> None:
+        self.depth += 1
+        if self.depth > DEPTH:
+            raise FormulaError(f"more than {DEPTH} levels of parentheses and powers")
+
+    def whole(self) -> Any:
+        result = self.condition()
+        if self.next.kind is not None:
+            self.fail("an operator")
+        return result
+
+    def condition(self, level: int = 0) -> Any:
+        """A comparison (level 0), conditions joined by | (1) or by & (2), or a sum."""
+        if level == 3:
+            return self.sum()
+        left = self.condition(level + 1)
+        signs = (_COMPARISONS, ("|",), ("&",))[level]
+        sign = self.take(*signs)
+        if sign is None:
+            return left
+        if level == 0:
+            return self.comparison(left, sign)
+        conditions = [left, self.condition(level + 1)]
+        while self.take(sign):
+            conditions.append(self.condition(level + 1))
+        return self.build.join(sign, conditions)
+
+    def comparison(self, left: Any, sign: str | None) -> Any:
+        """A chain of comparisons, ``0 < x < 1``, of which all must hold."""
+        found = []
+        while sign is not None:
+            right = self.condition(1)
+            found.append(self.build.compare(sign, left, right))
+            left, sign = right, self.take(*_COMPARISONS)
+        return found[0] if len(found) == 1 else self.build.join("&", found)
+
+    def sum(self) -> Any:
+        terms = [self.product(1)]
+        while sign := self.take("+", "-"):
+            terms.append(self.product(1 if sign == "+" else -1))
+        return terms[0] if len(terms) == 1 else self.build.add(terms)
+
+    def signs(self) -> int:
+        sign = 1
+        while found := self.take("+", "-"):
+            sign = sign if found == "+" else -sign
+        return sign
+
+    def product(self, sign: int) -> Any:
+        """A term of a sum, with its sign as one of the factors."""
+        sign *= self.signs()
+        factors = [self.power()]
+        while operator := self.take("*", "/"):
+            sign *= self.signs()
+            factor = self.power()
+            if operator == "/":
+                factor = self.build.power(factor, self.build.number("-1"))
+            factors.append(factor)
+        if sign < 0:
+            factors.insert(0, self.build.number("-1"))
+        return factors[0] if len(factors) == 1 else self.build.multiply(factors)
+
+    def power(self) -> Any:
+        if self.take("~"):
+            self.deeper()
+            denied = self.build.join("~", [self.power()])
+            self.depth -= 1
+            return denied
+        base = self.primary()
+        if not self.take("**", "^"):
+            return base
+        self.deeper()
+        sign = self.signs()
+        exponent = self.power()
+        if sign < 0:
+            exponent = self.build.multiply([self.build.number("-1"), exponent])
+        self.depth -= 1
+        return self.build.power(base, exponent)
+
+    def primary(self) -> Any:
+        token = self.next
+        if token.kind == "number":
+            self.place += 1
+            return self.build.number(token.text)
+        if token.kind == "name":
+            self.place += 1
+            if self.take("("):
+                return self.build.call(token.text, self.inside())
+            return self.build.name(token.text)
+        if not self.take("("):
+            self.fail("a number, a name or a parenthesis")
+        values = self.inside()
+        if not 1 <= len(values) <= 2:
+            self.place -= 1
+            self.fail("a formula, or (value, condition) in a Piecewise,")
+        return values[0] if len(values) == 1 else tuple(values)
+
+    def inside(self) -> list[Any]:
+        """What stands between parentheses, the first of which is taken already."""
+        self.deeper()
+        values = []
+        while not self.take(")"):
+            values.append(self.condition())
+            if not self.take(",") and not (self.next.kind == "sign" and self.next.text == ")"):
+                self.fail("an operator or a closing parenthesis")
+        self.depth -= 1
+        return values

@@ -1,0 +1,309 @@
+"""The nodes that formulas are made of: which there are, and how large they may be.
+
+sympy computes with numbers exactly and at once, so that ``9^9^9`` or ``gamma(10^9)`` would never
+end. Here every number must fit in a double, powers and nesting are bounded, and what a node would
+cost is known before it is made.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any
+
+import sympy as sp
+
+from phasekit.laws.grammar import FormulaError
+
+#: Largest exponent that is a number, and most bits of a number: those of the range of doubles.
+POWER, BITS = 1000, 1024
+#: Most arguments of Max and Min, levels of functions with branches, and nodes of a formula.
+ARGUMENTS, LEVELS, NODES = 16, 8, 100_000
+#: Largest constants that a special function takes: as an order, of a gamma function, else.
+ORDER, FACTORIAL, FAR = 20, 171, 1e4
+
+CONSTANTS = {
+    name: getattr(sp, name) for name in ("pi", "E", "EulerGamma", "GoldenRatio", "Catalan")
+}
+_ELEMENTARY = "sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh exp log".split()
+_BRANCHED = "Abs sign Heaviside Max Min Piecewise".split()
+#: Functions of one argument, and of an order and one argument, that SciPy has.
+_SPECIAL = (
+    "erf erfc erfi erfinv gamma loggamma airyai airyaiprime airybi airybiprime LambertW "
+    "Si Ci Ei fresnels fresnelc elliptic_k elliptic_e"
+).split()
+_OF_AN_ORDER = "besselj bessely besseli besselk polygamma".split()
+
+_COMPARISONS = {"<": sp.Lt, "<=": sp.Le, ">": sp.Gt, ">=": sp.Ge, "==": sp.Eq, "!=": sp.Ne}
+_JOINS = {"&": sp.And, "|": sp.Or, "~": sp.Not}
+
+
+def _cbrt(x: Any) -> Any:
+    return sp.sign(x) * sp.Abs(x) ** sp.Rational(1, 3)
+
+
+def _over(one: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda x: 1 / one(x)
+
+
+#: Functions by name: what makes a node, with its least and largest number of arguments.
+FUNCTIONS: dict[str, tuple[Any, int, int]] = {
+    **{n: (getattr(sp, n), 1, 1) for n in (*_ELEMENTARY, *_SPECIAL, "sqrt", "sign", "Heaviside")},
+    **{name: (getattr(sp, name), 2, 2) for name in (*_OF_AN_ORDER, "atan2")},
+    **{name: (sp.Abs, 1, 1) for name in ("Abs", "abs")},
+    **{name: (sp.Max, 1, ARGUMENTS) for name in ("Max", "max")},
+    **{name: (sp.Min, 1, ARGUMENTS) for name in ("Min", "min")},
+    **{f"arc{n}": (getattr(sp, f"a{n}"), 1, 1) for n in ("sin", "cos", "tan")},
+    "arctan2": (sp.atan2, 2, 2),
+    "log": (sp.log, 1, 2),
+    "ln": (sp.log, 1, 1),
+    "cbrt": (_cbrt, 1, 1),
+    "sec": (_over(sp.cos), 1, 1),
+    "csc": (_over(sp.sin), 1, 1),
+    "cot": (_over(sp.tan), 1, 1),
+    "sech": (_over(sp.cosh), 1, 1),
+    "csch": (_over(sp.sinh), 1, 1),
+    "coth": (_over(sp.tanh), 1, 1),
+    "digamma": (lambda x: sp.polygamma(0, x), 1, 1),
+    "trigamma": (lambda x: sp.polygamma(1, x), 1, 1),
+    "Rational": (lambda p, q: p / q, 2, 2),
+    "Piecewise": (sp.Piecewise, 1, 50),
+    **{name: (getattr(sp, name), 2, 2) for name in ("Lt", "Le", "Gt", "Ge", "Eq", "Ne")},
+    **{name: (getattr(sp, name), 2, 50) for name in ("And", "Or")},
+    "Not": (sp.Not, 1, 1),
+}
+_BRANCHES = tuple(getattr(sp, name) for name in _BRANCHED)
+_FAR_CLASSES = tuple(getattr(sp, name) for name in (*_SPECIAL, *_OF_AN_ORDER))
+_CONDITIONS = tuple(getattr(sp, name) for name in ("Lt", "Le", "Gt", "Ge", "Eq", "Ne"))
+_LOGICAL = (sp.And, sp.Or, sp.Not)
+#: Classes whose nodes a formula may hold, beside symbols, numbers and constants.
+CLASSES = {
+    *(getattr(sp, name) for name in (*_ELEMENTARY, *_BRANCHED, *_SPECIAL, *_OF_AN_ORDER)),
+    *(sp.Add, sp.Mul, sp.Pow, sp.atan2, sp.functions.elementary.piecewise.ExprCondPair),
+    *_CONDITIONS,
+    *_LOGICAL,
+}
+_NOT_FINITE = (sp.zoo, sp.nan, sp.oo, -sp.oo)
+_LEAVES = {sp.true, sp.false, sp.I, *_NOT_FINITE, *CONSTANTS.values()}
+
+
+class Nodes:
+    """Makes the nodes of formulas in some symbols; each is checked before it is used."""
+
+    def __init__(self, unknown: Callable[[str, bool], Exception], symbols: Any) -> None:
+        self.unknown, self.symbols = unknown, symbols
+        self.levels: dict[Any, int] = {}  # of branched functions inside each other
+
+    def number(self, text: str) -> Any:
+        """A whole number exactly, any other as a double."""
+        if text.lstrip("-").isdigit():
+            if len(text) > 320:
+                raise FormulaError(f"a number of {len(text)} digits")
+            return checked(sp.Integer(int(text)))
+        value = float(text)
+        if not math.isfinite(value) or (not value and re_nonzero(text)):
+            raise FormulaError(f"the number {text[:40]}, which no double holds")
+        return sp.Float(value)
+
+    def name(self, name: str) -> Any:
+        """A symbol, or else a constant."""
+        if name in self.symbols:
+            return self.symbols[name]
+        if name in ("True", "False"):
+            return sp.true if name == "True" else sp.false
+        if name not in CONSTANTS:
+            raise self.unknown(name, False)
+        return CONSTANTS[name]
+
+    def call(self, name: str, arguments: Sequence[Any]) -> Any:
+        """A function of its arguments."""
+        if name in self.symbols:
+            raise FormulaError(
+                f"{name}(...) although {name} is a symbol; for a product write {name}*(...), for "
+                "the function give the symbol another name"
+            )
+        if name not in FUNCTIONS:
+            raise self.unknown(name, True)
+        make, least, most = FUNCTIONS[name]
+        if not least <= len(arguments) <= most:
+            count = str(least) if least == most else f"{least} to {most}"
+            raise FormulaError(f"{name} with {len(arguments)} arguments; it takes {count}")
+        if make is sp.Piecewise:
+            for pair in arguments:
+                if not isinstance(pair, tuple):
+                    raise FormulaError("a Piecewise of other than (value, condition) pairs")
+                values(pair[:1])
+                conditions(pair[1:])
+        else:
+            (conditions if make in _LOGICAL else values)(arguments)
+        if make in (sp.Max, sp.Min):
+            if sum(len(x.args) if type(x) is make else 1 for x in arguments) > ARGUMENTS:
+                raise FormulaError(f"{name} with more than {ARGUMENTS} arguments")
+        elif make in _FAR_CLASSES or "gamma" in name:
+            if name in _OF_AN_ORDER:
+                _near(name, arguments[0], ORDER)
+            arguments = [_near(name, x, FACTORIAL if name == "gamma" else FAR) for x in arguments]
+        elif name == "Rational" and not all(x.is_Integer for x in arguments):
+            raise FormulaError("Rational of other than two whole numbers")
+        level = self._level(arguments) + 1 if make in _BRANCHES or name == "cbrt" else 0
+        if level > LEVELS:
+            raise FormulaError(f"more than {LEVELS} of {', '.join(_BRANCHED)} in each other")
+        found = checked(make(*arguments))
+        if level:
+            self.levels[found] = level
+        return found
+
+    def _level(self, arguments: Sequence[Any]) -> int:
+        if not self.levels:
+            return 0
+        inner = sp.Tuple(*(sp.Tuple(*x) if isinstance(x, tuple) else x for x in arguments))
+        return max((self.levels.get(x, 1) for x in inner.atoms(*_BRANCHES)), default=0)
+
+    def add(self, terms: Sequence[Any]) -> Any:
+        """A sum, made at once: term by term its cost would be the square."""
+        values(terms)
+        # Sums of fractions multiply their denominators.
+        fractions = (term.as_coeff_Mul()[0] for term in terms)
+        _bounded_bits(f.q.bit_length() for f in fractions if f.is_Rational and f.q > 1)
+        return checked(sp.Add(*terms))
+
+    def multiply(self, factors: Sequence[Any]) -> Any:
+        """A product, made at once."""
+        values(factors)
+        numbers = (factor.as_coeff_Mul()[0] for factor in factors)
+        _bounded_bits(_bits(number) for number in numbers if number not in (1, -1))
+        return checked(sp.Mul(*factors))
+
+    def power(self, base: Any, exponent: Any) -> Any:
+        """A power whose exponent, if it is a number, is bounded."""
+        values((base, exponent))
+        if exponent.is_number:
+            size = abs(float(_approximate(exponent)))
+            if size > POWER:
+                raise FormulaError(f"the exponent {_short(exponent)}, beyond {POWER}")
+            if _bits(base.as_coeff_Mul()[0]) * size > BITS + POWER:
+                raise FormulaError(f"a power of {_short(base)} that no double holds")
+            if base.is_zero and exponent.is_negative:
+                raise FormulaError("a division by zero")
+        return checked(sp.Pow(base, exponent))
+
+    def compare(self, sign: str, left: Any, right: Any) -> Any:
+        """A comparison; ``==`` is of values, not of formulas."""
+        values((left, right))
+        return _COMPARISONS[sign](left, right)
+
+    def join(self, sign: str, operands: Sequence[Any]) -> Any:
+        """Conditions that all hold, one of which holds, or one that does not."""
+        conditions(operands, hint=f"; {sign} joins conditions, each in parentheses")
+        if len(operands) > 50:
+            raise FormulaError("more than 50 conditions in one")
+        return _JOINS[sign](*operands)
+
+
+def re_nonzero(text: str) -> bool:
+    """Whether a number as it is written is other than zero."""
+    return any(digit in "123456789" for digit in text.lower().partition("e")[0])
+
+
+def values(nodes: Iterable[Any]) -> None:
+    """Raise unless all are values, not conditions or pairs."""
+    for node in nodes:
+        if not isinstance(node, sp.Expr):
+            got = "a pair" if isinstance(node, tuple) else f"the condition {_short(node)}"
+            raise FormulaError(f"{got} where a value belongs")
+
+
+def conditions(nodes: Iterable[Any], hint: str = "") -> None:
+    """Raise unless all are conditions."""
+    for node in nodes:
+        if not isinstance(node, sp.logic.boolalg.Boolean) or isinstance(node, sp.Expr):
+            raise FormulaError(f"{_short(node)} where a condition belongs{hint}")
+
+
+def checked(node: Any) -> Any:
+    """Return a node whose parts are checked already, if its own numbers can be used."""
+    if isinstance(node, sp.logic.boolalg.Boolean) and not isinstance(node, sp.Expr):
+        return node
+    if node in _NOT_FINITE:
+        raise FormulaError("a division by zero, or another value that is not finite")
+    if node.is_Rational:
+        _bounded_bits((_bits(node),), BITS)
+    elif node.is_number:
+        _approximate(node)
+    else:
+        for part in (node, *node.args):
+            if part.is_Rational:
+                _bounded_bits((_bits(part),), BITS)
+            elif part.is_Mul and part is not node:
+                _bounded_bits((_bits(part.as_coeff_Mul()[0]),), BITS)
+            elif part.is_Pow and part.exp.is_number and abs(_approximate(part.exp)) > POWER:
+                raise FormulaError(f"the power {_short(part)}, beyond {POWER}")
+    return node
+
+
+def foreign(expression: Any, symbols: Iterable[Any]) -> Any:
+    """Return the first node that no formula in some symbols may hold, or None."""
+    known, seen, queue = set(symbols), set(), [expression]
+    while queue:
+        node = queue.pop()
+        if node in seen:
+            continue
+        seen.add(node)
+        if len(seen) > NODES:
+            raise FormulaError(f"more than {NODES} different parts")
+        if not (
+            node in known
+            or (isinstance(node, sp.Number) and node.is_finite)
+            or node in _LEAVES
+            or (node.args and type(node) in CLASSES)
+        ):
+            return node
+        queue.extend(node.args)
+    return None
+
+
+def _near(name: str, argument: Any, far: float) -> Any:
+    """A constant argument of a special function, as a double where exact arithmetic is costly."""
+    if not argument.is_number:
+        return argument
+    value = _approximate(argument)
+    if abs(value) > far:
+        raise FormulaError(f"{name} of {_short(argument)}; it takes constants to {far:g} there")
+    exact = argument.is_Rational and abs(argument) <= FACTORIAL and argument.q <= 2
+    return argument if exact else value
+
+
+def _approximate(constant: Any) -> Any:
+    """The value of a constant formula; it must fit in a double."""
+    value = constant if constant.is_Float else constant.evalf(17)
+    if value.is_Float or value.is_Rational:
+        try:
+            finite = math.isfinite(float(value))
+        except OverflowError:
+            finite = False
+        if not finite:
+            raise FormulaError(f"the constant {_short(constant)}, which no double holds")
+        return value if value.is_Rational else sp.Float(float(value))
+    raise FormulaError(
+        f"the constant {_short(constant)}, which is not real, where a real function belongs"
+    )
+
+
+def _bits(number: Any) -> int:
+    if number.is_Rational:
+        return int(max(abs(number.p).bit_length(), number.q.bit_length()))
+    return 0
+
+
+def _bounded_bits(sizes: Iterable[int], most: int = 4 * BITS) -> None:
+    if sum(sizes) > most:
+        raise FormulaError("numbers with too many digits to compute with exactly")
+
+
+def _short(node: Any) -> str:
+    if isinstance(node, tuple):
+        return "a pair"
+    if node.is_Integer and abs(node.p).bit_length() > 200:
+        return f"a number of {abs(node.p).bit_length()} bits"
+    text = str(node)
+    return text if len(text) <= 60 else f"{text[:57]}..."
