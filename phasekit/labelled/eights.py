@@ -130,11 +130,11 @@ def _marks(
     ds = separatrices(at)
     count = equilibria(at).n_equilibria.values
     columns = [ds.topology.values, ds.figure_eight.values, count]
-    try:
+    if system.rung.labels_fixed:
         A, B, C = (np.broadcast_to(np.asarray(x), s.shape) for x in at.coefficients())
         side = np.where(A > 0.0, np.sign(B), 2.0 * np.sign(C))
         columns.append(np.where(ds.figure_eight.values, side, 0.0))
-    except ParameterError:  # a potential has no coefficients; its saddles keep their numbers
+    else:  # saddles keep their numbers
         columns.extend(np.moveaxis(ds.loop.transpose("path", "saddle").values, 1, 0))
     return np.stack([np.asarray(column, dtype=float) for column in columns], axis=1)
 

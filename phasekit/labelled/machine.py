@@ -17,7 +17,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import NumberLike, bad, numeric, one_of
 from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.models import GyroRotorDisk
-from phasekit.labelled.quantities import Quantity, select
+from phasekit.labelled.quantities import DISK, Quantity, select
 from phasekit.labelled.states import at_states
 from phasekit.labelled.system import Model, as_system
 
@@ -213,7 +213,7 @@ def _states(
 ) -> tuple[Model, dict[str, tuple[str, Any]]]:
     """The disk, and its states by argument; a motion also tells how the support moves."""
     system = as_system(disk)
-    if not isinstance(system, GyroRotorDisk):
+    if not is_disk(system):
         raise bad("disk", disk, "a GyroRotorDisk")
     if isinstance(phi, xr.Dataset):
         motion = phi
@@ -239,6 +239,11 @@ def _states(
     if not _is_zero(domega1):
         states["domega1"] = ("domega1", domega1)
     return system, states
+
+
+def is_disk(system: Model) -> bool:
+    """Whether a system has all that a machine with a disk has."""
+    return set(DISK) <= {parameter.name for parameter in system.declared}
 
 
 def _is_zero(value: Any) -> bool:
@@ -285,7 +290,7 @@ def on_map(
     if curve != "orbit" and not (phi0 is None and dphi0 is None):
         name = "phi0" if phi0 is not None else "dphi0"
         raise bad(name, phi0 if phi0 is not None else dphi0, "nothing, except with on='orbit'")
-    if not isinstance(system, GyroRotorDisk):
+    if not is_disk(system):
         raise bad("ds", f"a map of {type(system).__name__}", "a map of GyroRotorDisk")
     for name in ("m", "half_span") if what == "forces" else ():
         if name not in system.parameters:

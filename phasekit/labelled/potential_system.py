@@ -233,6 +233,17 @@ class Potential(Model):
         return type(self)(parameters=values, **own)
 
     @property
+    def arguments(self) -> dict[str, Any]:
+        """What makes it again, by keyword."""
+        return {
+            "expression": self.formula.text,
+            "coordinate": self.coordinate,
+            "parameters": self.parameters,
+            "period": self.period,
+            "interval": self.interval,
+        }
+
+    @property
     def definition(self) -> dict[str, str]:
         """What maps store beside the parameters' values."""
         return {

@@ -256,7 +256,7 @@ class Problem:
         }
         if self.system is not None:
             spec["system"] = type(self.system).__name__
-            spec["system_parameters"] = _arguments(self.system)
+            spec["system_parameters"] = self.system.arguments
         return spec
 
     @classmethod
@@ -289,20 +289,6 @@ class Problem:
         notes += [f"{name} modulo {value:.6g}" for name, value in self.periods.items()]
         notes += ["conservative"] * self.conservative
         return f"Problem({equations}{'; ' if notes else ''}{', '.join(notes)})"
-
-
-def _arguments(system: Any) -> dict[str, Any]:
-    """What makes a system with scalar parameters again, as plain values."""
-    values = dict(system.parameters)
-    if not hasattr(system, "formula"):
-        return values
-    return {
-        "expression": system.formula.text,
-        "coordinate": system.coordinate,
-        "parameters": values,
-        "period": system.period,
-        "interval": system.interval,
-    }
 
 
 def _model(name: str) -> Callable[..., Model]:

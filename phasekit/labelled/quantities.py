@@ -429,7 +429,8 @@ ROWS: dict[str, Quantity] = {row.name: row for row in QUANTITIES}
 LAW = "law"
 
 _ABC = ("A", "B", "C")
-_DISK = ("beta", "e", "a", "r", "omega1", "g")
+#: What rotators need of a machine.
+DISK = ("beta", "e", "a", "r", "omega1", "g")
 _HEAVY = ("beta", "e", "a", "r", "omega1", "m", "g")
 _BORNE = (*_HEAVY, "half_span")
 _STATE = ("state_phi", "state_dphi")
@@ -474,7 +475,7 @@ PASSES: tuple[Pass, ...] = (
     Pass("phasekit.phase.asymptotics:near_separatrix", (*_ABC, "state_gap"), ("near_separatrix",)),
     Pass(
         "phasekit.mechanics.rotators:rotators",
-        (*_DISK, *_STATE),
+        (*DISK, *_STATE),
         ("rotators",),
         optional=_MOVED,
     ),
@@ -490,11 +491,11 @@ PASSES: tuple[Pass, ...] = (
         ("fixed_bearing_forces",),
         optional=_MOVED,
     ),
-    Pass("phasekit.phase.loads:equilibrium_rotators", (*_DISK, "phi"), ("equilibrium_rotators",)),
+    Pass("phasekit.phase.loads:equilibrium_rotators", (*DISK, "phi"), ("equilibrium_rotators",)),
     Pass("phasekit.phase.loads:equilibrium_forces", (*_BORNE, "phi"), ("equilibrium_forces",)),
-    Pass("phasekit.phase.loads:separatrix_rotators", (*_DISK, *_LOOPS), ("separatrix_rotators",)),
+    Pass("phasekit.phase.loads:separatrix_rotators", (*DISK, *_LOOPS), ("separatrix_rotators",)),
     Pass("phasekit.phase.loads:separatrix_forces", (*_BORNE, *_LOOPS), ("separatrix_forces",)),
-    Pass("phasekit.phase.loads:orbit_rotators", (*_DISK, *_STATE), ("orbit_rotators",)),
+    Pass("phasekit.phase.loads:orbit_rotators", (*DISK, *_STATE), ("orbit_rotators",)),
     Pass("phasekit.phase.loads:orbit_forces", (*_BORNE, *_STATE), ("orbit_forces",)),
     Pass(
         "phasekit.phase.orbits:orbits_at_energy",

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ParameterError
 from phasekit.labelled.problem import Problem
+from phasekit.laws.trigonometric import Trigonometric
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -74,14 +74,14 @@ def _roots(problem: Problem, changes: dict[str, float]) -> list[float]:
 
 def _critical(problem: Problem, parameter: str, span: tuple[float, float]) -> list[float]:
     """Values of a system's parameter at which equilibria meet: all of them, by exact arithmetic."""
-    if problem.system is None:
+    system = problem.system
+    if system is None or not issubclass(system.rung, Trigonometric):
+        return []
+    if parameter not in system.formula_inputs():
         return []
     from phasekit.labelled.atlas import branches
 
-    try:
-        ds = branches(problem.system, parameter, span)
-    except ParameterError:  # of a potential, which has no atlas
-        return []
+    ds = branches(system, parameter, span)
     return [float(value) for value in ds.special_value.values if np.isfinite(value)]
 
 

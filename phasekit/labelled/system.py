@@ -227,6 +227,11 @@ class Model:
         values = {p.name: getattr(self, p.name) for p in self.declared}
         return {name: value for name, value in values.items() if value is not None}
 
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What makes it again, by keyword."""
+        return dict(self.parameters)
+
     @classmethod
     def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
         """Values of a parameter, NaN where they leave its domain."""

@@ -14,8 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from phasekit.errors import Loop, ParameterError
 from phasekit.labelled.arguments import bad, unknown
 from phasekit.labelled.integral import gradient
-from phasekit.labelled.machine import rotators
-from phasekit.labelled.models import GyroRotorDisk
+from phasekit.labelled.machine import is_disk, rotators
 from phasekit.labelled.system import as_system
 from phasekit.mechanics.rotators import ROTATORS
 from phasekit.phase.potential import gradient as slope
@@ -268,9 +267,9 @@ def _components(
     return first, second
 
 
-def _disk(system: Any) -> GyroRotorDisk:
+def _disk(system: Any) -> Any:
     disk = as_system(system)
-    if not isinstance(disk, GyroRotorDisk):
+    if not is_disk(disk):
         raise bad("system", system, "a GyroRotorDisk, for a rotator along the carrier's axes")
     return disk
 

@@ -10,8 +10,7 @@ from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad
-from phasekit.labelled.machine import on_map
-from phasekit.labelled.models import GyroRotorDisk
+from phasekit.labelled.machine import is_disk, on_map
 from phasekit.labelled.phase_space import equilibria
 from phasekit.plot import labels, style
 from phasekit.plot.maps import parameter_map
@@ -130,7 +129,7 @@ def _with_loads(ds: xr.Dataset, variable: str) -> xr.Dataset:
     if variable in ds and "fold_margin" in ds:
         return ds
     system = labels.system_of(ds, "dataset", "pk.sweep")
-    if not isinstance(system, GyroRotorDisk):
+    if not is_disk(system):
         raise ParameterError(
             f"dataset: got a map of {type(system).__name__}, wants one of GyroRotorDisk"
         )
