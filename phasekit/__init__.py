@@ -17,6 +17,8 @@ import importlib
 import sys
 from typing import TYPE_CHECKING, Any
 
+from phasekit.version import __version__ as __version__
+
 if TYPE_CHECKING:
     from phasekit import plot as plot
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
@@ -69,8 +71,6 @@ if TYPE_CHECKING:
     from phasekit.labelled.sweep import sweep as sweep
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
     from phasekit.mechanics.rigid_body import RigidBody as RigidBody
-
-__version__ = "0.1.0"
 
 #: One degree in radians, one revolution a minute in s^-1: ``30 * pk.deg``, ``24 * pk.rpm``.
 deg: float = 0.017453292519943295

@@ -12,8 +12,8 @@ import sys
 from collections.abc import Sequence
 from typing import NoReturn
 
-from phasekit import __version__
 from phasekit.errors import PhasekitError
+from phasekit.version import __version__
 
 COMMANDS = {
     "demo": "map a real rotor, draw it, store it",

@@ -6,14 +6,13 @@ when it is made.
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable
 from typing import Any
 
 import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import NumberLike
+from phasekit.labelled.pictures import picture
 from phasekit.labelled.schema import model_name
 from phasekit.labelled.system import MODELS, Model
 
@@ -164,43 +163,43 @@ class MapPlots:
 
     def phase_portrait(self, **options: Any) -> Any:
         """Draw the phase portrait of the one selected cell; returns the Axes."""
-        return _plot("phase_portrait")(self._cell(), **options)
+        return picture("phase_portrait")(self._cell(), **options)
 
     def potential_well(self, **options: Any) -> Any:
         """Draw the potential of the one selected cell over its portrait; returns both Axes."""
-        return _plot("potential_well")(self._cell(), **options)
+        return picture("potential_well")(self._cell(), **options)
 
     def period_energy(self, **options: Any) -> Any:
         """Draw period against energy for the one selected cell; returns the Axes."""
-        return _plot("period_energy")(self._cell(), **options)
+        return picture("period_energy")(self._cell(), **options)
 
     def frequency_action(self, **options: Any) -> Any:
         """Draw frequency against action for the one selected cell; returns the Axes."""
-        return _plot("frequency_action")(self._cell(), **options)
+        return picture("frequency_action")(self._cell(), **options)
 
     def bifurcation_diagram(self, **options: Any) -> Any:
         """Draw the equilibria against a swept parameter; returns the Axes."""
-        return _plot("bifurcation_diagram")(self._ds, **options)
+        return picture("bifurcation_diagram")(self._ds, **options)
 
     def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
-        return _plot("parameter_map")(self._ds, variable, **options)
+        return picture("parameter_map")(self._ds, variable, **options)
 
     def hodograph(self, rotator: str = "R022", **options: Any) -> Any:
         """Draw a rotator's hodograph for the one selected cell, or of motions; returns the Axes."""
-        return _plot("hodograph")(self._cell_or_motion(), rotator, **options)
+        return picture("hodograph")(self._cell_or_motion(), rotator, **options)
 
     def bearing_forces(self, **options: Any) -> Any:
         """Draw bearing forces for the one selected cell, or of one motion; returns the Axes."""
-        return _plot("bearing_forces")(self._cell_or_motion(), **options)
+        return picture("bearing_forces")(self._cell_or_motion(), **options)
 
     def force_polygon(self, phi: float, dphi: float, **options: Any) -> Any:
         """Draw the force polygon of the one selected cell in a state; returns the Axes."""
-        return _plot("force_polygon")(self._cell(), phi, dphi, **options)
+        return picture("force_polygon")(self._cell(), phi, dphi, **options)
 
     def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
         """Draw the load on the separatrices over two swept parameters; returns the Axes."""
-        return _plot("bearing_load_map")(self._ds, variable, **options)
+        return picture("bearing_load_map")(self._ds, variable, **options)
 
     def _cell_or_motion(self) -> Model | xr.Dataset:
         along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
@@ -215,9 +214,3 @@ class MapPlots:
                 f"first: ds.sel({axes[0]}=..., method='nearest')"
             )
         return system
-
-
-def _plot(name: str) -> Callable[..., Any]:
-    # Plots stand above this floor and load matplotlib, so they are looked up when one is asked for.
-    function: Callable[..., Any] = getattr(importlib.import_module("phasekit.plot"), name)
-    return function

@@ -22,6 +22,7 @@ from phasekit.errors import ParameterError
 from phasekit.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.labelled.arguments import bad
 from phasekit.labelled.branch_points import LABELS, points_of
+from phasekit.labelled.pictures import picture
 from phasekit.labelled.problem import Problem
 from phasekit.labelled.special_point import SpecialPoint, special_point
 
@@ -127,8 +128,7 @@ class Branch:
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curve with its special points: see `phasekit.plot.branch`."""
-        function = importlib.import_module("phasekit.plot.continued").branch
-        return function(self, ax=ax, **keywords)
+        return picture("branch")(self, ax=ax, **keywords)
 
     def extend(self, points: int | None = None) -> Branch:
         """Go on where the curve ended for its number of points; a new branch.

@@ -19,6 +19,7 @@ from phasekit.labelled.arguments import describe
 from phasekit.labelled.grid import variable
 from phasekit.labelled.quantities import LABELS, ROWS, STATES, Quantity
 from phasekit.labelled.system import Model, Parameter
+from phasekit.version import __version__
 
 SCHEMA_VERSION = "1"
 
@@ -35,8 +36,6 @@ LABEL_DTYPE = np.dtypes.StringDType()
 @functools.cache
 def versions() -> dict[str, str]:
     """Return the versions of the libraries that made a result, as attributes."""
-    from phasekit import __version__
-
     libraries = {name: importlib.metadata.version(name) for name in ("numpy", "numba", "xarray")}
     return {f"{name}_version": v for name, v in {"phasekit": __version__, **libraries}.items()}
 

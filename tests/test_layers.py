@@ -1,0 +1,132 @@
+"""Who may know whom: what import-linter cannot see, modules that are named in strings."""
+
+from __future__ import annotations
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import phasekit
+
+ROOT = Path(phasekit.__file__).parent
+MODULE = re.compile(r"(phasekit(?:\.[a-z_]\w*)+)(?::\w*)?")
+#: The one stair up: results draw themselves.
+STAIRS = {("phasekit.labelled.pictures", "phasekit.plot")}
+#: The package's own table of public names.
+ROOF = "phasekit.__init__"
+
+
+def modules() -> dict[str, Path]:
+    return {
+        ".".join(("phasekit", *path.relative_to(ROOT).with_suffix("").parts)): path
+        for path in ROOT.rglob("*.py")
+    }
+
+
+def known(name: str, all_modules: dict[str, Path]) -> str | None:
+    """The module that a dotted name is, or is in."""
+    while name:
+        for found in (name, f"{name}.__init__"):
+            if found in all_modules:
+                return found
+        name = name.rpartition(".")[0]
+    return None
+
+
+def named(path: Path, all_modules: dict[str, Path]) -> tuple[set[str], set[str]]:
+    """Modules that a file imports, wherever in it; and those that it names in strings."""
+    tree = ast.parse(path.read_text())
+    texts = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
+        and node.body
+        and isinstance(node.body[0], ast.Expr)
+    }
+    imported, quoted = set(), set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            for alias in node.names:
+                found = known(f"{node.module}.{alias.name}", all_modules)
+                imported.add(found)
+        elif isinstance(node, ast.Import):
+            imported.update(known(alias.name, all_modules) for alias in node.names)
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            match = MODULE.fullmatch(node.value.rstrip("."))
+            if match and id(node) not in texts:
+                quoted.add(known(match.group(1), all_modules))
+    return imported - {None, "phasekit.__init__"}, quoted - {None, "phasekit.__init__"}
+
+
+def floors() -> dict[str, int]:
+    """Floor of each top name, the lowest 0, as pyproject.toml has it."""
+    config = tomllib.loads((ROOT.parent / "pyproject.toml").read_text())
+    contracts = config["tool"]["importlinter"]["contracts"]
+    (layers,) = (c["layers"] for c in contracts if c["type"] == "layers")
+    return {
+        name.strip(): height
+        for height, row in enumerate(reversed(layers))
+        for name in row.split("|")
+    }
+
+
+def floor_of(module: str, heights: dict[str, int]) -> int:
+    return next(h for name, h in heights.items() if f"{module}.".startswith(f"{name}."))
+
+
+def test_modules_named_in_strings_obey_the_floors():
+    everything, heights = modules(), floors()
+    seen = 0
+    for module, path in everything.items():
+        if module == ROOF:
+            continue
+        for target in named(path, everything)[1]:
+            seen += 1
+            if (module, target.removesuffix(".__init__")) in STAIRS:
+                continue
+            assert floor_of(target, heights) <= floor_of(module, heights), (module, target)
+    assert seen > 10
+
+
+def test_no_module_is_on_no_floor():
+    heights = floors()
+    for module in modules():
+        if module != ROOF:
+            assert floor_of(module, heights) >= 0, module
+
+
+def test_there_is_no_import_circle():
+    """Imports for types and inside functions count, and so do modules that strings name."""
+    everything = modules()
+    arrows = {
+        module: {
+            target
+            for target in set().union(*named(path, everything))
+            if (module, target.removesuffix(".__init__")) not in STAIRS
+        }
+        for module, path in everything.items()
+        if module != ROOF
+    }
+    circles = [sorted(c) for c in strongly_connected(arrows) if len(c) > 1]
+    assert circles == []
+
+
+def strongly_connected(arrows: dict[str, set[str]]) -> list[set[str]]:
+    """Sets of nodes that reach each other."""
+    reach: dict[str, set[str]] = {}
+    for start in arrows:
+        seen: set[str] = set()
+        stack = [start]
+        while stack:
+            for target in arrows.get(stack.pop(), ()):
+                if target not in seen:
+                    seen.add(target)
+                    stack.append(target)
+        reach[start] = seen
+    found: list[set[str]] = []
+    for node in arrows:
+        circle = {other for other in reach[node] if node in reach.get(other, ())} | {node}
+        if circle not in found:
+            found.append(circle)
+    return found
