@@ -10,7 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, brief, same, unknown
+from phasekit.labelled.arguments import (
+    FloatArray,
+    NumberLike,
+    Value,
+    bad,
+    brief,
+    number,
+    numeric,
+    pair,
+    same,
+    unknown,
+)
 from phasekit.labelled.quantities import LABELS, ROWS, STATES
 from phasekit.labelled.system import MODELS, Model, Parameter, named_arguments
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
@@ -106,7 +117,7 @@ class Potential(Model):
             Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")
             for key in given
         )
-        values = {p.name: p.check(given[p.name]) for p in declared}
+        values = {p.name: p.check(numeric(p.name, given[p.name], None)) for p in declared}
         formula = make_formula(
             _expression(expression),
             name,
@@ -235,6 +246,10 @@ class Potential(Model):
                     raise unknown("parameter of Potential", name, [*self._values, *own])
         return type(self)(parameters=values, **own)
 
+    def unit_of(self, name: str) -> str | None:
+        """Only times have a known unit; V may be one of anything."""
+        return STATES[name][0] if name == "time" else None
+
     @property
     def definition(self) -> dict[str, str]:
         """What maps store beside the parameters' values."""
@@ -351,13 +366,8 @@ def _period(period: Any) -> float | None:
     if period is None:
         return None
     wants = "a number > 0, the length of the circle, or None for a line"
-    if isinstance(period, (bool, str)):
-        raise bad("period", period, wants)
-    try:
-        value = float(period)
-    except (TypeError, ValueError):
-        raise bad("period", period, wants) from None
-    if not 0.0 < value < np.inf:
+    value = number("period", period, wants)
+    if not value > 0.0:
         raise bad("period", period, wants)
     return value
 
@@ -368,10 +378,7 @@ def _interval(interval: Any, period: Any) -> tuple[float, float] | None:
     if period is not None:
         raise bad("interval", interval, "None on a circle, which is looked at as a whole")
     wants = "two finite numbers (low, high), low < high"
-    try:
-        low, high = (float(end) for end in interval)
-    except (TypeError, ValueError):
-        raise bad("interval", interval, wants) from None
-    if not -np.inf < low < high < np.inf:
+    low, high = pair("interval", interval, wants)
+    if not low < high:
         raise bad("interval", interval, wants)
     return low, high

@@ -12,7 +12,7 @@ import numpy as np
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, number, unknown
 
 #: Coefficients (A, B, C) of the models as formulas of their parameters.
 FORMULAS: dict[str, tuple[str, str, str]] = {
@@ -58,14 +58,7 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
         names_of(argument, given)
     values = {}
     for name, value in given.items():
-        if isinstance(value, (bool, np.bool_, str)) or value is None:
-            raise bad(f"{argument}[{name!r}]", value, "a number")
-        try:
-            values[name] = float(value)
-        except (TypeError, ValueError):
-            raise bad(f"{argument}[{name!r}]", value, "a number") from None
-        if not np.isfinite(values[name]):
-            raise bad(f"{argument}[{name!r}]", value, "a finite number")
+        values[name] = number(f"{argument}[{name!r}]", value, "a finite number", None)
     return values
 
 
