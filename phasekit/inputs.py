@@ -9,7 +9,7 @@ import decimal
 import math
 import numbers
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -83,6 +83,40 @@ def bad(argument: str, got: object, wants: str, hint: str = "") -> ParameterErro
 def is_labelled(value: object) -> bool:
     """Whether it is a DataArray, a Variable or a Dataset, whose dims have names."""
     return hasattr(value, "dims") and hasattr(value, "to_dict")
+
+
+def flag(argument: str, value: object) -> None:
+    """Raise a `ParameterError` unless `value` is True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise bad(argument, value, "True or False")
+
+
+def one_of(argument: str, value: object, names: Sequence[str]) -> int:
+    """Return the place of a name among those that an argument may take.
+
+    >>> one_of("side", "right", ("left", "right"))
+    1
+    """
+    if not isinstance(value, str) or value not in names:
+        raise bad(argument, value, f"one of {', '.join(names)}")
+    return list(names).index(value)
+
+
+def whole(argument: str, value: Any, wants: str, low: int = 1) -> int:
+    """Return a whole number that is at least `low`.
+
+    >>> whole("n", np.int64(4), "a number >= 1")
+    4
+    """
+    if isinstance(value, np.ndarray) and value.ndim == 0:
+        value = value[()]
+    if (
+        isinstance(value, (bool, np.bool_, np.timedelta64))
+        or not isinstance(value, (int, np.integer))
+        or not low <= value < 2**63
+    ):
+        raise bad(argument, value, wants)
+    return int(value)
 
 
 def reals(argument: str, value: Any, wants: str) -> FloatArray:

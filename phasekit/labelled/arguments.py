@@ -16,11 +16,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
-from phasekit.inputs import SHOWN, FloatArray, bad, describe, reals
+from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
 from phasekit.labelled.units import factor
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "describe", "flag", "numeric"]
-__all__ += ["number", "one_of", "pair", "same", "unknown", "whole"]
+__all__ += ["named", "number", "one_of", "pair", "reals", "same", "unknown", "whole"]
 
 #: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
 NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
@@ -35,31 +35,22 @@ def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
     axis 'bata' is unknown; did you mean 'beta'? Valid are: beta, e
     """
     names = list(dict.fromkeys(valid))
-    text = f"{what} {name!r} is unknown"
+    text = f"{what} {describe(name)} is unknown"
     near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
     text += f"; did you mean {near[0]!r}? Valid are: " if near else "; valid are: "
     return ParameterError(text + ", ".join(names))
 
 
-def flag(argument: str, value: object) -> None:
-    """Raise a `ParameterError` unless `value` is True or False."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise bad(argument, value, "True or False")
-
-
-def one_of(argument: str, value: object, names: Sequence[str]) -> int:
-    """Return the place of a name among those that an argument may take.
-
-    >>> one_of("side", "right", ("left", "right"))
-    1
-    """
-    if not isinstance(value, str) or value not in names:
-        raise bad(argument, value, f"one of {', '.join(names)}")
-    return list(names).index(value)
-
-
 #: What `numeric` takes.
 WANTS = "a real number, a 1-D list or array of them, or a DataArray"
+
+
+def named(what: str, name: Any, valid: Iterable[str]) -> str:
+    """Return a name that is one of `valid`; otherwise raise what `unknown` returns."""
+    names = list(valid)
+    if not isinstance(name, str) or name not in names:
+        raise unknown(what, name, names)
+    return name
 
 
 def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANTS) -> Value:
@@ -185,23 +176,6 @@ def pair(argument: str, value: Any, wants: str, units: str | None = "") -> tuple
     if ends.shape != (2,) or not np.isfinite(ends).all():
         raise bad(argument, value, wants)
     return float(ends[0]), float(ends[1])
-
-
-def whole(argument: str, value: Any, wants: str, low: int = 1) -> int:
-    """Return a whole number that is at least `low`.
-
-    >>> whole("n", np.int64(4), "a number >= 1")
-    4
-    """
-    if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value[()]
-    if (
-        isinstance(value, (bool, np.bool_, np.timedelta64))
-        or not isinstance(value, (int, np.integer))
-        or not low <= value < 2**63
-    ):
-        raise bad(argument, value, wants)
-    return int(value)
 
 
 def same(left: Value | None, right: Value | None) -> bool:

@@ -119,7 +119,8 @@ def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
     """
     system = as_system(system)
     own = system.formula_inputs()
-    if all(name in ("lam", "psi") for name in names) and not all(name in own for name in names):
+    reduced = all(isinstance(name, str) and name in ("lam", "psi") for name in names)
+    if reduced and not all(name in own for name in names):
         system = system.reduced()
     if type(system).__name__ not in FORMS:
         hint = "pk.continuation follows the equilibria of any other"

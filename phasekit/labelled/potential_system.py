@@ -343,7 +343,7 @@ def _expression(expression: Any) -> Any:
     if isinstance(expression, str):
         return expression
     if isinstance(expression, (int, float)) and not isinstance(expression, bool):
-        return repr(expression)
+        return repr(number("expression", expression, "a string or a sympy expression"))
     try:
         import sympy as sp
     except ImportError:  # pragma: no cover

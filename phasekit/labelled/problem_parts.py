@@ -74,9 +74,13 @@ def expressions_of(given: Iterable[Any], names: Sequence[str], argument: str) ->
         if isinstance(one, str):
             found.append(parse(one, symbols, argument))
             continue
-        if isinstance(one, bool) or not isinstance(one, (sympy.Basic, int, float, np.number)):
-            raise bad(argument, one, "formulas: strings or sympy expressions")
-        expression = sympy.sympify(one)
+        wants = "formulas: strings or sympy expressions"
+        if isinstance(one, sympy.Basic):
+            expression: Any = one
+        else:
+            expression = sympy.sympify(number(argument, one, wants))
+        if not isinstance(expression, sympy.Expr):
+            raise bad(argument, one, wants)
         replaced = {}
         for symbol in expression.free_symbols:
             if str(symbol) not in symbols:
@@ -102,7 +106,7 @@ def make_field(
             raise bad("f", list(f), f"a formula for {', '.join(missing)} as well")
         f = [f[name] for name in states]
     is_one = isinstance(f, str) or hasattr(f, "free_symbols")
-    if is_one or (isinstance(f, (list, tuple, np.ndarray)) or hasattr(f, "tolist")):
+    if is_one or (isinstance(f, (list, tuple)) or (hasattr(f, "tolist") and np.ndim(f) > 0)):
         if jac is not None:
             raise bad("jac", jac, "None with formulas, whose derivatives are exact")
         given = [f] if is_one and not hasattr(f, "tolist") else list(f)
