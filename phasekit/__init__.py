@@ -17,6 +17,8 @@ import importlib
 import sys
 from typing import TYPE_CHECKING, Any
 
+from phasekit.constants import deg as deg
+from phasekit.constants import rpm as rpm
 from phasekit.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -71,10 +73,6 @@ if TYPE_CHECKING:
     from phasekit.labelled.sweep import sweep as sweep
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
     from phasekit.mechanics.rigid_body import RigidBody as RigidBody
-
-#: One degree in radians, one revolution a minute in s^-1: ``30 * pk.deg``, ``24 * pk.rpm``.
-deg: float = 0.017453292519943295
-rpm: float = 0.10471975511965977
 
 _MODULES = {
     "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),

@@ -4,34 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phasekit import deg, rpm
 from phasekit.errors import ParameterError
+from phasekit.labelled.units import UNITS, usual
 
-#: Units by the unit that results carry; each is the number to multiply by. Decimal, so that 1.153mm
-#: becomes the double nearest to 0.001153.
-UNITS: Mapping[str, Mapping[str, Decimal]] = {
-    "rad": {"rad": Decimal(1), "deg": Decimal(deg), "°": Decimal(deg)},
-    "m": {"m": Decimal(1), "cm": Decimal("1e-2"), "mm": Decimal("1e-3"), "um": Decimal("1e-6")},
-    "kg": {"kg": Decimal(1), "g": Decimal("1e-3"), "t": Decimal(1000)},
-    "s-1": {
-        "rad/s": Decimal(1),
-        "1/s": Decimal(1),
-        "s-1": Decimal(1),
-        "deg/s": Decimal(deg),
-        "rpm": Decimal(rpm),
-    },
-    "s-2": {"1/s2": Decimal(1), "s-2": Decimal(1)},
-    "m s-2": {"m/s2": Decimal(1), "m s-2": Decimal(1)},
-    "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "min": Decimal(60)},
-    "1": {},
-}
 #: Most values that a range may have.
 LONGEST = 10_000_000
 
@@ -68,13 +49,12 @@ def number(name: str, text: Any, units: str) -> float:
     wants = f"a number in {' or '.join(known)}" if known else "a number without unit"
     plain = isinstance(text, (int, float)) and not isinstance(text, bool)
     match = _NUMBER.fullmatch(text) if isinstance(text, str) else None
-    if not plain and (match is None or (match[2] and match[2] not in known)):
+    unit = usual(match[2]) if match else ""
+    if not plain and (match is None or (unit and unit not in known)):
         raise ParameterError(f"{name}: got {_short(text)}, wants {wants}")
     try:
         # Decimals have bounds of their own, far beyond those of doubles.
-        value = float(
-            text if match is None else Decimal(match[1]) * known.get(match[2], Decimal(1))
-        )
+        value = float(text if match is None else Decimal(match[1]) * known.get(unit, Decimal(1)))
     except ArithmeticError:
         value = math.inf
     if not math.isfinite(value):

@@ -8,7 +8,6 @@ parameters and states share `numeric`; a parameter's own domain is checked where
 from __future__ import annotations
 
 import difflib
-import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
@@ -17,53 +16,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
+from phasekit.labelled.units import factor
 
-FloatArray: TypeAlias = NDArray[np.float64]
+__all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "describe", "flag", "numeric"]
+__all__ += ["named", "number", "one_of", "pair", "reals", "same", "unknown", "whole"]
+
 #: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
 NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
 #: What is kept of it: a float, a read-only 1-D array, or a DataArray of float64.
 Value: TypeAlias = float | FloatArray | xr.DataArray
-
-#: Largest number of elements that a description or a representation writes out.
-SHOWN = 5
-
-
-def describe(value: object) -> str:
-    """Say what a value is, on one line.
-
-    >>> describe(30), describe([[1, 2], [3, 4]]), describe(None)
-    ('30', 'a 2-D list of shape (2, 2)', 'None')
-    """
-    if isinstance(value, (np.ndarray, xr.DataArray)) and value.ndim == 0:
-        value = value.item()
-    if isinstance(value, xr.DataArray):
-        return f"a DataArray with dims {tuple(value.dims)} and dtype {value.dtype}"
-    if isinstance(value, (list, tuple, range, np.ndarray)) and np.ndim(_plain(value)) > 0:
-        array = _plain(value)
-        if array.ndim == 1 and array.size <= SHOWN:
-            return repr(tuple(array.tolist()) if isinstance(value, tuple) else array.tolist())
-        kind = "array" if isinstance(value, np.ndarray) else type(value).__name__
-        return f"a {array.ndim}-D {kind} of shape {array.shape}"
-    if isinstance(value, np.generic):
-        value = value.item()
-    text = repr(value)
-    if isinstance(value, (numbers.Number, str, type(None), tuple, list)) and len(text) <= 60:
-        return text
-    name = value.__name__ if isinstance(value, type) else type(value).__name__
-    return f"the class {name}" if isinstance(value, type) else f"an object of type {name}"
-
-
-def _plain(value: Any) -> NDArray[Any]:
-    try:
-        return np.asarray(value)
-    except ValueError:  # ragged
-        return np.asarray(value, dtype=object)
-
-
-def bad(argument: str, got: object, wants: str, hint: str = "") -> ParameterError:
-    """Return the error for an unusable argument; the caller raises it."""
-    text = f"{argument}: got {describe(got)}, wants {wants}"
-    return ParameterError(f"{text}; {hint}" if hint else text)
 
 
 def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
@@ -73,30 +35,25 @@ def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
     axis 'bata' is unknown; did you mean 'beta'? Valid are: beta, e
     """
     names = list(dict.fromkeys(valid))
-    text = f"{what} {name!r} is unknown"
+    text = f"{what} {describe(name)} is unknown"
     near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
     text += f"; did you mean {near[0]!r}? Valid are: " if near else "; valid are: "
     return ParameterError(text + ", ".join(names))
 
 
-def flag(argument: str, value: object) -> None:
-    """Raise a `ParameterError` unless `value` is True or False."""
-    if not isinstance(value, (bool, np.bool_)):
-        raise bad(argument, value, "True or False")
+#: What `numeric` takes.
+WANTS = "a real number, a 1-D list or array of them, or a DataArray"
 
 
-def one_of(argument: str, value: object, names: Sequence[str]) -> int:
-    """Return the place of a name among those that an argument may take.
-
-    >>> one_of("side", "right", ("left", "right"))
-    1
-    """
-    if not isinstance(value, str) or value not in names:
-        raise bad(argument, value, f"one of {', '.join(names)}")
-    return list(names).index(value)
+def named(what: str, name: Any, valid: Iterable[str]) -> str:
+    """Return a name that is one of `valid`; otherwise raise what `unknown` returns."""
+    names = list(valid)
+    if not isinstance(name, str) or name not in names:
+        raise unknown(what, name, names)
+    return name
 
 
-def numeric(argument: str, value: Any) -> Value:
+def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANTS) -> Value:
     """Return `value` as a float, a read-only 1-D float64 array or a float64 DataArray.
 
     Parameters
@@ -104,77 +61,121 @@ def numeric(argument: str, value: Any) -> Value:
     argument : str
         Name used in messages.
     value : float, 1-D array_like or xarray.DataArray
-        Real numbers. Bools, strings, None, complex numbers, bare arrays of two and more
+        Real numbers. Bools, strings, None, complex numbers, dates, bare arrays of two and more
         dimensions and empty arrays are refused. A scalar must be finite; an array may hold
-        NaN and infinity, which become invalid cells.
+        NaN, infinity and masked values, which become invalid cells.
+    units : str or None, optional
+        The unit that is wanted; a DataArray whose attribute ``units`` is another one is converted.
+        None: any unit, to SI units; by default units do not matter.
+    wants : str, optional
+        What messages say is wanted.
 
     Raises
     ------
     ParameterError
     """
-    wants = "a real number, a 1-D list or array of them, or a DataArray"
     if isinstance(value, xr.DataArray):
-        return _data_array(argument, value, wants)
-    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in "iuf":
-        value = np.ma.filled(value.astype(np.float64), np.nan)
-    if isinstance(value, (bool, np.bool_, str, bytes)) or value is None:
-        raise bad(argument, value, wants)
-    if isinstance(value, (numbers.Real, np.floating, np.integer)):
-        return _finite(argument, value)
-    if isinstance(value, (complex, np.complexfloating)):
-        raise bad(argument, value, wants)
-    if isinstance(value, (list, tuple)) and any(isinstance(v, (bool, np.bool_)) for v in value):
-        raise bad(argument, value, wants, "it holds a bool")
-    if isinstance(value, (xr.Dataset, Mapping)):
-        raise bad(argument, value, wants, "name one variable of it")
-    array = _plain(value)
-    if array.dtype.kind not in "iuf":
-        raise bad(argument, value, wants)
+        return _data_array(argument, value, wants, units)
+    if isinstance(value, (xr.Dataset, xr.Variable, Mapping)):
+        hint = "name its dims in a DataArray" if isinstance(value, xr.Variable) else ""
+        raise bad(argument, value, wants, hint or "name one variable of it")
+    if isinstance(value, (list, tuple)) and xr.DataArray in set(map(type, value)):
+        value = [_single(argument, item, units) for item in value]
+    array = reals(argument, value, wants)
     if array.ndim == 0:
-        return _finite(argument, array[()])
+        if not np.isfinite(array):
+            raise bad(argument, value, "a finite number")
+        return float(array)
     if array.ndim > 1:
-        raise bad(
-            argument,
-            value,
-            wants,
-            f"name the dimensions: xr.DataArray({argument}, dims=(...))",
-        )
+        hint = f"name the dimensions: xr.DataArray({argument}, dims=(...))"
+        raise bad(argument, value, wants, hint if wants is WANTS else "")
     if array.size == 0:
         raise bad(argument, value, "at least one value")
-    array = array.astype(np.float64)  # a copy, also of float64: the caller may change theirs
     array.flags.writeable = False
     return array
 
 
-def _finite(argument: str, value: Any) -> float:
-    try:
-        number = float(value)
-    except OverflowError:
-        number = np.inf
-    if not np.isfinite(number):
-        raise bad(argument, value, "a finite number")
-    return number
+def _single(argument: str, item: Any, units: str | None) -> Any:
+    """Return an item of a list as a number; what is none is left to be refused."""
+    if not isinstance(item, xr.DataArray) or item.ndim or item.dtype.kind not in "iuf":
+        return item.values if isinstance(item, xr.DataArray) else item
+    return float(_converted(argument, item.variable.astype(np.float64), units).values)
 
 
-def _data_array(argument: str, value: xr.DataArray, wants: str) -> Value:
-    if value.dtype.kind not in "iuf":
+def _data_array(argument: str, value: xr.DataArray, wants: str, units: str | None) -> Value:
+    if value.dtype.kind not in "iuf" or hasattr(value.variable._data, "magnitude"):
         raise bad(argument, value, wants)
-    if value.ndim == 0:
-        return _finite(argument, value.values[()])
     if value.size == 0:
         raise bad(argument, value, "at least one value")
     if not all(isinstance(dim, str) for dim in value.dims):
         raise bad(argument, value, "dims that are strings")
     if len(set(value.dims)) < value.ndim:
         raise bad(argument, value, "dims that differ")
+    with np.errstate(over="ignore"):  # of numbers in extended precision
+        kept = _converted(argument, value.variable.astype(np.float64), units)
+    if value.ndim == 0:
+        number = float(kept.values)
+        if not np.isfinite(number):
+            raise bad(argument, value, "a finite number")
+        return number
     # Only the coordinates of its own dims travel on: others (the fixed parameters of the map
     # that it was taken from, say) would contradict the system that it is put into.
-    keep = {dim: value.coords[dim] for dim in value.dims if _is_plain_axis(value, dim)}
-    return xr.DataArray(value.variable.astype(np.float64), coords=keep, name=argument)
+    coords: dict[Any, Any] = {
+        dim: value.coords[dim] for dim in value.dims if _is_plain_axis(value, dim)
+    }
+    axis = coords.get(value.dims[0])
+    if value.ndim == 1 and kept.chunks is None and axis is not None:
+        # An axis that is its own coordinate stays so in other units.
+        if not kept.equals(value.variable) and value.variable.equals(axis.variable):  # type: ignore[no-untyped-call]
+            coords = {value.dims[0]: kept}
+    return xr.DataArray(kept, coords=coords, name=argument)
+
+
+def _converted(argument: str, value: xr.Variable, units: str | None) -> xr.Variable:
+    """Return numbers in the unit that is wanted, from the one that their attributes name."""
+    given = value.attrs.get("units", units)
+    if given in (None, "", units) or units == "":
+        return value
+    times = factor(argument, given, units)
+    # 1.153 mm divided by 1000 is rounded once.
+    data = value.data / float(1 / times) if 1 / times % 1 == 0 else value.data * float(times)
+    attrs = {key: item for key, item in value.attrs.items() if key != "units"}
+    return xr.Variable(value.dims, data, attrs if units is None else {**attrs, "units": units})
 
 
 def _is_plain_axis(value: xr.DataArray, dim: Any) -> bool:
     return dim in value.xindexes and len(value.xindexes.get_all_coords(dim)) == 1
+
+
+def number(
+    argument: str, value: Any, wants: str = "a finite number", units: str | None = ""
+) -> float:
+    """Return one finite number.
+
+    >>> number("radius", 3)
+    3.0
+    """
+    kept = numeric(argument, value, units, wants)
+    if not isinstance(kept, float):
+        raise bad(argument, value, wants)
+    return kept
+
+
+def pair(argument: str, value: Any, wants: str, units: str | None = "") -> tuple[float, float]:
+    """Return two finite numbers.
+
+    >>> pair("span", [0, 1.5], "two numbers")
+    (0.0, 1.5)
+    """
+    if isinstance(value, (list, tuple)):
+        if len(value) != 2:
+            raise bad(argument, value, wants)
+        first, second = (number(argument, end, wants, units) for end in value)
+        return first, second
+    ends = np.asarray(numeric(argument, value, units, wants))
+    if ends.shape != (2,) or not np.isfinite(ends).all():
+        raise bad(argument, value, wants)
+    return float(ends[0]), float(ends[1])
 
 
 def same(left: Value | None, right: Value | None) -> bool:

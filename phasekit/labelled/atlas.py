@@ -12,7 +12,7 @@ from phasekit.bifurcation.atlas import Curve, atlas
 from phasekit.bifurcation.paths import Path
 from phasekit.bifurcation.survey import Meeting
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.arguments import FloatArray, bad, unknown
+from phasekit.labelled.arguments import FloatArray, bad, pair, unknown
 from phasekit.labelled.grid import variable
 from phasekit.labelled.quantities import FROM_MOTION, LABELS, ROWS
 from phasekit.labelled.schema import LABEL_DTYPE, dataset_attrs, input_attrs
@@ -119,7 +119,8 @@ def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
     """
     system = as_system(system)
     own = system.formula_inputs()
-    if all(name in ("lam", "psi") for name in names) and not all(name in own for name in names):
+    reduced = all(isinstance(name, str) and name in ("lam", "psi") for name in names)
+    if reduced and not all(name in own for name in names):
         system = system.reduced()
     if not issubclass(system.rung, Trigonometric):
         hint = "pk.continuation follows the equilibria of any other"
@@ -143,10 +144,7 @@ def limits(system: Model, parameter: str, argument: str, span: Any) -> tuple[flo
     """
     (declared,) = (p for p in system.declared if p.name == parameter)
     wants = f"two different values of {parameter}, each {declared.wants}"
-    try:
-        low, high = (float(end) for end in span)
-    except (TypeError, ValueError):
-        raise bad(argument, span, wants) from None
+    low, high = pair(argument, span, wants, declared.units)
     if not (declared.valid(low) and declared.valid(high)) or low == high:
         raise bad(argument, (low, high), wants)
     return min(low, high), max(low, high)

@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
 from phasekit.errors import ParameterError
 from phasekit.kernels.defining import EQUILIBRIUM
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, numeric, pair, unknown
 from phasekit.labelled.branch import Branch, make_branch
 from phasekit.labelled.problem import Problem, as_problem
 
@@ -144,21 +144,20 @@ def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter
     return parameter
 
 
-def check_span(span: Any) -> tuple[float, float]:
+def check_span(span: Any, units: str | None = None) -> tuple[float, float]:
     """Two numbers, the lower one first."""
-    try:
-        low, high = (float(value) for value in span)
-    except (TypeError, ValueError):
-        raise bad("span", span, "two numbers (low, high)") from None
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise bad("span", span, "two finite numbers (low, high) with low < high")
+    wants = "two finite numbers (low, high) with low < high"
+    low, high = pair("span", span, wants, units)
+    if not low < high:
+        raise bad("span", span, wants)
     return low, high
 
 
 def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:
     check_parameter(problem, parameter)
-    low, high = check_span(span)
-    for declared in () if problem.system is None else problem.system.declared:
+    system = problem.system
+    low, high = check_span(span, None if system is None else system.unit_of(parameter))
+    for declared in () if system is None else system.declared:
         if declared.name == parameter and not (declared.valid(low) and declared.valid(high)):
             raise bad("span", (low, high), f"values of {parameter}, each {declared.wants}")
     value = problem.parameters[parameter]
@@ -182,12 +181,10 @@ def _start(problem: Problem, x0: Any) -> FloatArray:
         if missing or extra:
             raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
         x0 = [x0[name] for name in problem.state]
-    try:
-        guess = np.atleast_1d(np.array(x0, dtype=float))
-    except (TypeError, ValueError):
-        raise bad("x0", x0, f"{n} numbers: {', '.join(problem.state)}") from None
+    wants = f"{n} finite numbers: {', '.join(problem.state)}"
+    guess = np.atleast_1d(numeric("x0", x0, None, wants))
     if guess.shape != (n,) or not np.isfinite(guess).all():
-        raise bad("x0", x0, f"{n} finite numbers: {', '.join(problem.state)}")
+        raise bad("x0", x0, wants)
     return guess
 
 

@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Path, join
 from phasekit.errors import ConvergenceError
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import bad, reals, whole
 from phasekit.labelled.branch import Branch
 from phasekit.labelled.continuation import check_parameter, check_span, continuation
 from phasekit.labelled.point_curves import switch
@@ -82,9 +82,9 @@ def diagram(
     """
     problem = as_problem(problem)
     check_parameter(problem, parameter)
-    low, high = check_span(span)
-    if isinstance(depth, bool) or not isinstance(depth, (int, np.integer)) or depth < 0:
-        raise bad("depth", depth, "a whole number >= 0")
+    system = problem.system
+    low, high = check_span(span, None if system is None else system.unit_of(parameter))
+    depth = whole("depth", depth, "a whole number >= 0", 0)
     branches: list[Branch] = []
     failures: list[ConvergenceError] = []
     for start, guess in _starts(problem, parameter, x0, (low, high)):
@@ -99,7 +99,7 @@ def diagram(
             continue
         if not _repeats(branches, branch):
             branches.append(branch)
-            _grow(branches, len(branches) - 1, int(depth))
+            _grow(branches, len(branches) - 1, depth)
     if not branches:
         if failures:
             raise failures[0]
@@ -180,13 +180,11 @@ def _starts(
     n = len(problem.state)
     own = problem.parameters[parameter]
     if x0 is not None:
-        try:
-            rows = np.atleast_1d(np.array(x0, dtype=float))
-        except (TypeError, ValueError):
-            raise bad("x0", x0, "states as numbers") from None
+        wants = f"one state of {n} finite numbers, or several as rows"
+        rows = np.atleast_1d(reals("x0", getattr(x0, "values", x0), wants))
         rows = rows.reshape(-1, 1) if n == 1 else np.atleast_2d(rows)
-        if rows.ndim != 2 or rows.shape[1] != n:
-            raise bad("x0", x0, f"one state of {n} numbers, or several as rows")
+        if rows.ndim != 2 or rows.shape[1] != n or not rows.size or not np.isfinite(rows).all():
+            raise bad("x0", x0, wants)
         return [(problem, row) for row in rows]
     from phasekit.labelled.survey import equilibria_at, values_between
 

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import FloatArray, bad, unknown
+from phasekit.labelled.arguments import FloatArray, bad, pair, unknown, whole
 from phasekit.labelled.grid import variable
+from phasekit.labelled.memory import refuse_too_large
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labelled.schema import LABEL_DTYPE
 from phasekit.labelled.system import Model, as_system
@@ -65,10 +66,10 @@ def figure_eights(
     (['fold'], ['death'])
     """
     system = as_system(system)
-    if isinstance(n, (bool, np.bool_)) or not isinstance(n, (int, np.integer)) or n < 2:
-        raise bad("n", n, "a number of places >= 2")
+    n = whole("n", n, "a number of places >= 2", 2)
     ways = _ways(system, path)
-    s = np.linspace(0.0, 1.0, int(n))
+    refuse_too_large({"figure_eights": 8 * n}, {"s": n})
+    s = np.linspace(0.0, 1.0, n)
     ds = separatrices(_at(system, ways, s))
     marks = _marks(system, ways, s)
     invalid = np.flatnonzero(marks[:, 2] < 0)
@@ -93,10 +94,8 @@ def _ways(system: Model, path: Any) -> dict[str, Callable[[FloatArray], FloatArr
         if callable(way):
             ways[name] = functools.partial(_along, way)
             continue
-        try:
-            first, last = (float(value) for value in way)
-        except (TypeError, ValueError):
-            raise bad(f"path[{name!r}]", way, "two numbers (first, last), or a function") from None
+        wants = "two numbers (first, last), or a function"
+        first, last = pair(f"path[{name!r}]", way, wants, system.unit_of(name))
         ways[name] = functools.partial(_straight, first, last)
     for name, value in system.parameters.items():
         if name not in ways and not isinstance(value, float):

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import EquilibriumKind, ParameterError
-from phasekit.labelled.arguments import FloatArray, bad, numeric
+from phasekit.labelled.arguments import FloatArray, number, whole
 from phasekit.labelled.quantities import ROWS, Pass
 from phasekit.labelled.states import at_states
 from phasekit.labelled.system import as_system
@@ -72,11 +72,9 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     True
     """
     system = as_system(system, rung=Trigonometric, what="orbit_families")
-    if isinstance(n, (bool, np.bool_)) or not isinstance(n, (int, np.integer)) or n < 1:
-        raise bad("n", n, "a number of orbits >= 1")
-    top = None if energy_max is None else numeric("energy_max", energy_max)
-    if top is not None and not isinstance(top, float):
-        raise bad("energy_max", energy_max, "one number")
+    n = whole("n", n, "a number of orbits >= 1")
+    wants = "one finite number, in s^-2"
+    top = None if energy_max is None else number("energy_max", energy_max, wants, "s-2")
     for name, value in system.parameters.items():
         if isinstance(value, xr.DataArray) and "level" in value.dims:
             raise ParameterError(

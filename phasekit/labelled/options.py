@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, unknown, whole
 from phasekit.labelled.quantities import Quantity
 
 #: What numbers can be stored as.
@@ -64,15 +64,12 @@ def check_workers(workers: Any, client: Any) -> int | None:
     """Return a number of processes, or None."""
     if workers is None:
         return None
-    if isinstance(workers, (bool, np.bool_)) or not isinstance(workers, (int, np.integer)):
-        raise bad("workers", workers, "a number of processes >= 1")
-    if workers < 1:
-        raise bad("workers", workers, "a number of processes >= 1")
+    number = whole("workers", workers, "a number of processes >= 1")
     if client is not None:
         raise ParameterError(
             "workers: got it together with client=, wants one of them: a cluster has its own"
         )
-    return int(workers)
+    return number
 
 
 def refuse_without_store(**options: Any) -> None:

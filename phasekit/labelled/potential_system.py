@@ -10,7 +10,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, brief, same, unknown
+from phasekit.labelled.arguments import (
+    FloatArray,
+    NumberLike,
+    Value,
+    bad,
+    brief,
+    number,
+    numeric,
+    pair,
+    same,
+    unknown,
+)
 from phasekit.labelled.quantities import LABELS, ROWS, STATES
 from phasekit.labelled.system import MODELS, Model, Parameter, named_arguments
 from phasekit.laws.formulas import NAME, is_name, read_formula
@@ -108,7 +119,7 @@ class Potential(Model):
             Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")
             for key in given
         )
-        values = {p.name: p.check(given[p.name]) for p in declared}
+        values = {p.name: p.check(numeric(p.name, given[p.name], None)) for p in declared}
         formula = make_formula(
             _expression(expression),
             name,
@@ -231,6 +242,10 @@ class Potential(Model):
                 if name not in self._values:
                     raise unknown("parameter of Potential", name, [*self._values, *own])
         return type(self)(parameters=values, **own)
+
+    def unit_of(self, name: str) -> str | None:
+        """Only times have a known unit; V may be one of anything."""
+        return STATES[name][0] if name == "time" else None
 
     @property
     def arguments(self) -> dict[str, Any]:
@@ -363,13 +378,10 @@ def _period(period: Any) -> float | None:
     wants = "a number > 0, the length of the circle, or None for a line"
     if isinstance(period, str):
         period = read_formula(period, {}, "period")
-    if isinstance(period, (bool, np.bool_)) or np.ndim(period):
-        raise bad("period", period, wants)
-    try:
-        value = float(period)
-    except (TypeError, ValueError, OverflowError):
-        raise bad("period", period, wants) from None
-    if not 0.0 < value < np.inf:
+        if period.is_number and period.is_real:
+            period = float(period)
+    value = number("period", period, wants)
+    if not value > 0.0:
         raise bad("period", period, wants)
     return value
 
@@ -380,10 +392,7 @@ def _interval(interval: Any, period: Any) -> tuple[float, float] | None:
     if period is not None:
         raise bad("interval", interval, "None on a circle, which is looked at as a whole")
     wants = "two finite numbers (low, high), low < high"
-    try:
-        low, high = (float(end) for end in interval)
-    except (TypeError, ValueError, OverflowError):
-        raise bad("interval", interval, wants) from None
-    if not -np.inf < low < high < np.inf:
+    low, high = pair("interval", interval, wants)
+    if not low < high:
         raise bad("interval", interval, wants)
     return low, high

@@ -100,7 +100,7 @@ class Problem:
         for name in values:
             if name in states:
                 raise bad("parameters", list(values), f"names that are no states; {name!r} is one")
-        angles = values_of("periods", periods or {})
+        angles = values_of("periods", {} if periods is None else periods)
         for name, value in angles.items():
             if name not in states:
                 raise unknown("periods: state", name, states)

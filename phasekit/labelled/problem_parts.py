@@ -11,7 +11,7 @@ import numpy as np
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, number, unknown
 from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula
 
 
@@ -42,16 +42,7 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
         names_of(argument, given)
     values = {}
     for name, value in given.items():
-        if isinstance(value, (bool, np.bool_, str)) or value is None or np.ndim(value):
-            raise bad(f"{argument}[{name!r}]", value, "a number")
-        try:
-            values[name] = float(value)
-        except (TypeError, ValueError):
-            raise bad(f"{argument}[{name!r}]", value, "a number") from None
-        except OverflowError:
-            values[name] = np.inf
-        if not np.isfinite(values[name]):
-            raise bad(f"{argument}[{name!r}]", value, "a finite number")
+        values[name] = number(f"{argument}[{name!r}]", value, "a finite number", None)
     return values
 
 
@@ -87,7 +78,7 @@ def make_field(
             raise bad("f", list(f), f"a formula for {', '.join(missing)} as well")
         f = [f[name] for name in states]
     is_one = isinstance(f, str) or hasattr(f, "free_symbols")
-    if is_one or (isinstance(f, (list, tuple, np.ndarray)) or hasattr(f, "tolist")):
+    if is_one or (isinstance(f, (list, tuple)) or (hasattr(f, "tolist") and np.ndim(f) > 0)):
         if jac is not None:
             raise bad("jac", jac, "None with formulas, whose derivatives are exact")
         given = [f] if is_one and not hasattr(f, "tolist") else list(f)

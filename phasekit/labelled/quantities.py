@@ -537,6 +537,9 @@ PASSES: tuple[Pass, ...] = (
 )
 
 
+_NO_LISTS = (bytes, Mapping)
+
+
 def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
     """Return the rows that `of` names: groups, quantities, or several of either.
 
@@ -545,9 +548,12 @@ def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
     ParameterError
         If a name is unknown or nothing is named.
     """
-    names = (of,) if isinstance(of, str) else of
     offered = quantities()
-    if not isinstance(names, Iterable) or isinstance(names, (bytes, Mapping)):
+    try:
+        names = (of,) if isinstance(of, str) else () if isinstance(of, _NO_LISTS) else tuple(of)
+    except TypeError:
+        names = ()
+    if not names:
         raise bad("of", of, "a name or a list of names", "pk.quantities() lists them")
     wanted: set[str] = set()
     for name in names:
@@ -559,8 +565,6 @@ def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
         if not isinstance(name, str) or (name not in offered and name not in offered.groups):
             raise unknown("of: the quantity", name, [*offered.groups, *offered])
         wanted.update([name] if name in offered else offered.groups[name])
-    if not wanted:
-        raise bad("of", of, "at least one name", "pk.quantities() lists them")
     return tuple(row for row in QUANTITIES if row.name in wanted)
 
 

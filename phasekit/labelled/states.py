@@ -48,7 +48,7 @@ def at_states(
     kept: dict[str, Value] = {}
     length: dict[str, int] = {}
     for argument, (name, value) in states.items():
-        state = kept[name] = numeric(argument, value)
+        state = kept[name] = numeric(argument, value, system.unit_of(name))
         if isinstance(state, np.ndarray) and name not in AXES:
             length[argument] = state.size
     if len(set(length.values())) > 1:

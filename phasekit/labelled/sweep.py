@@ -201,7 +201,7 @@ def _axes(
     for name, value in given.items():
         if name not in valid:
             raise _unknown_axis(system, name, valid)
-        kept[name] = numeric(name, value)
+        kept[name] = numeric(name, value, system.unit_of(name))
         if isinstance(kept[name], float) and name not in states:
             raise bad(
                 name,

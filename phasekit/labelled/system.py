@@ -142,7 +142,7 @@ class Parameter:
 
         Cells of arrays that lie outside the domain are kept: they give invalid cells.
         """
-        kept = numeric(self.name, value)
+        kept = numeric(self.name, value, self.units)
         if isinstance(kept, float):
             if not self.valid(kept):
                 in_degrees = self.units == "rad" and self.valid(kept * np.pi / 180.0)
@@ -215,6 +215,12 @@ class Model:
     def formula_inputs(cls) -> tuple[str, ...]:
         """Names of the parameters on which the coefficients depend."""
         return cls.trigonometric().parameters
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a parameter or state; None where it may be any."""
+        from phasekit.labelled.schema import input_attrs
+
+        return input_attrs(self, name).get("units")
 
     @property
     def definition(self) -> dict[str, str]:

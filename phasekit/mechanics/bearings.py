@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from phasekit.kernels import machine as kernels
 from phasekit.mechanics.machine import at_states, machine_table
+from phasekit.mechanics.vectors import floats
 
 Array = npt.NDArray[np.float64]
 
@@ -104,7 +105,8 @@ def bearing_forces(
     """
     free = ddphi is None
     body = machine_table(beta, e, a, r, omega1, g, m, half_span)
-    states = (phi, dphi, 0.0 if ddphi is None else ddphi, domega1)
+    given = 0.0 if ddphi is None else ddphi
+    states = {"phi": phi, "dphi": dphi, "ddphi": given, "domega1": domega1}
     tails = ((2, 3), (2, 3), (2, 3), (2,), (), (), (), (2, 4))
     flags = (free, carrier)
     return BearingForces(*at_states(kernels.bearings, body, states, flags, tails, threads))
@@ -155,9 +157,10 @@ def fixed_bearing_forces(
     """
     free = ddphi is None
     body = machine_table(beta, e, a, r, omega1, g, m)
-    with np.errstate(all="ignore"):
-        span = np.where(np.asarray(rho_b1, dtype=float) == 0.0, np.nan, rho_b1)
-    states = (phi, dphi, 0.0 if ddphi is None else ddphi, domega1, span)
+    (place,) = floats(rho_b1=rho_b1)
+    span = np.where(place == 0.0, np.nan, place)
+    given = 0.0 if ddphi is None else ddphi
+    states = {"phi": phi, "dphi": dphi, "ddphi": given, "domega1": domega1, "rho_b1": span}
     tails = ((2, 3), (2, 3), (2, 3))
     flags = (free,)
     return FixedBearingForces(

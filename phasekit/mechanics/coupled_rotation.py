@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import bad
 from phasekit.mechanics.coupled_state import CoupledRotationState
 from phasekit.mechanics.rigid_body import RigidBody
 from phasekit.mechanics.vectors import (
     ROUNDING,
     Frozen,
     apply,
-    bad,
     common_shape,
     cross,
     directions,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.inputs import bad
 from phasekit.mechanics.coupled_rotators import AXES, base_rates, lead_rate, rotator_bases
 from phasekit.mechanics.rigid_body import RigidBody
 from phasekit.mechanics.vectors import (
@@ -15,7 +16,6 @@ from phasekit.mechanics.vectors import (
     Array,
     Frozen,
     apply,
-    bad,
     common_shape,
     cross,
     dot,

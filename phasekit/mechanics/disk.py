@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.trigonometric import Values, turn
+from phasekit.mechanics.vectors import broadcast, floats
 
 Array = npt.NDArray[np.float64]
 
@@ -72,9 +73,7 @@ def disk_coefficients(
     >>> [round(float(x), 6) for x in disk_coefficients(0.3, 0.1, 0.05, 0.1, 10.0)]
     [-39.21169, 80.688856, 41.139867]
     """
-    beta, e, a, r, omega1, g = np.broadcast_arrays(
-        *(np.asarray(value, dtype=float) for value in (beta, e, a, r, omega1, g))
-    )
+    beta, e, a, r, omega1, g = broadcast(beta=beta, e=e, a=a, r=r, omega1=omega1, g=g)
     with np.errstate(all="ignore"):
         values = {"beta": turn(beta), "e": e, "a": a, "r": r, "omega1": omega1, "g": g}
         *products, inertia = disk_products(values)
@@ -96,7 +95,7 @@ def disk_mixing(r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike) -> Arra
     >>> round(float(disk_mixing(0.1, 0.1, 0.3)), 6)
     0.98256
     """
-    r, e, beta = (np.asarray(value, dtype=float) for value in (r, e, beta))
+    r, e, beta = floats(r=r, e=e, beta=beta)
     with np.errstate(all="ignore"):
         s = turn(beta)[0]
         inertia = 4.0 * e * e * s * s + r * r * (1.0 + s * s)
@@ -114,7 +113,8 @@ def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
     >>> float(disk_eccentricity(0.1, np.pi))
     0.0
     """
-    return np.asarray(np.asarray(e, dtype=float) * turn(np.asarray(beta, dtype=float))[0])
+    e, beta = floats(e=e, beta=beta)
+    return np.asarray(e * turn(beta)[0])
 
 
 def disk_inertia(
@@ -136,8 +136,8 @@ def disk_inertia(
     >>> [round(float(x), 6) for x in disk_inertia(2.0, 0.1, 0.1, 0.3)]
     [0.025, 0.027817, 0.007183, 0.007058]
     """
-    m, r, e, beta = (np.asarray(value, dtype=float) for value in (m, r, e, beta))
-    s, c, _ = turn(beta)
+    m, r, e, beta = floats(m=m, r=r, e=e, beta=beta)
+    s, c = turn(beta)[0], np.cos(beta)
     ju = m * (0.25 * r * r + e * e)
     j = 0.25 * m * r * r
     return ju, j + ju * c * c, j + ju * s * s, ju * s * c

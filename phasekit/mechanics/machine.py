@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy.typing as npt
 from phasekit.kernels import machine as kernels
 from phasekit.kernels.launch import Arrays, launch
 from phasekit.mechanics.disk import disk_coefficients, disk_inertia, disk_mixing
+from phasekit.mechanics.vectors import broadcast, common_shape, floats
 
 Array = npt.NDArray[np.float64]
 
@@ -29,8 +30,7 @@ def machine_table(
 
     Columns of what is not a body are NaN.
     """
-    given = (beta, e, a, r, omega1, g, m, half_span)
-    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
+    arrays = broadcast(beta=beta, e=e, a=a, r=r, omega1=omega1, g=g, m=m, half_span=half_span)
     shape = arrays[0].shape
     beta, e, a, r, omega1, g, m, half_span = (array.reshape(-1) for array in arrays)
     with np.errstate(all="ignore"):
@@ -57,7 +57,7 @@ def machine_table(
 def at_states(
     kernel: Callable[..., None],
     body: tuple[Array, tuple[int, ...]],
-    states: tuple[npt.ArrayLike, ...],
+    states: Mapping[str, npt.ArrayLike],
     flags: tuple[bool, ...],
     tails: tuple[tuple[int, ...], ...],
     threads: int | None,
@@ -67,9 +67,10 @@ def at_states(
     All results are NaN in a state of which any number is not finite.
     """
     table, own = body
-    arrays = [np.asarray(state, dtype=float) for state in states]
+    arrays = floats(**states)
     arrays = [np.where(np.isfinite(array), array, np.nan) for array in arrays]
-    shape = np.broadcast_shapes(own, *(array.shape for array in arrays))
+    shapes = {name: array.shape for name, array in zip(states, arrays, strict=True)}
+    shape = common_shape(disk=own, **shapes)
     index = np.broadcast_to(np.arange(table.shape[1]).reshape(own), shape)
     # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
     flat = [np.array(np.broadcast_to(array, shape)).reshape(-1) for array in (index, *arrays)]

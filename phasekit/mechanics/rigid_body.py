@@ -8,12 +8,12 @@ from typing import Any, Self
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.inputs import bad
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
 from phasekit.mechanics.vectors import (
     Array,
     Frozen,
     apply,
-    bad,
     common_shape,
     cross,
     directions,

@@ -80,6 +80,7 @@ def rotators(
     """
     free = ddphi is None
     body = machine_table(beta, e, a, r, omega1, g)
-    states = (phi, dphi, 0.0 if ddphi is None else ddphi, domega1)
+    given = 0.0 if ddphi is None else ddphi
+    states = {"phi": phi, "dphi": dphi, "ddphi": given, "domega1": domega1}
     tails = ((len(ROTATORS), 3), (len(ROTATORS),), (), (), (), ())
     return Rotators(*at_states(kernels.rotators, body, states, (free,), tails, threads))

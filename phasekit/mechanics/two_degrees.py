@@ -15,6 +15,7 @@ import scipy.linalg
 
 from phasekit.errors import EquilibriumKind
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
+from phasekit.mechanics.vectors import floats
 
 Array = npt.NDArray[np.float64]
 
@@ -72,14 +73,14 @@ def two_degrees(
     >>> round(float(machine.rest), 9)
     0.033253356
     """
-    e, a, m, g = (np.asarray(value, dtype=float)[()] for value in (e, a, m, g))
-    angle = np.asarray(beta, dtype=float)
+    e, a, m, g = (value[()] for value in floats(e=e, a=a, m=m, g=g))
+    angle, radius, own = floats(beta=beta, r=r, carrier_inertia=carrier_inertia)
     # Exactly 0 at the double nearest to pi/2: a disk square to its shaft.
     cos = np.where(angle == np.pi / 2, 0.0, np.cos(angle))[()]
     ju, _, jn, _ = disk_inertia(m, r, e, beta)
     sin = disk_eccentricity(1.0, beta)[()]
-    J = 0.25 * m * np.square(np.asarray(r, dtype=float))[()]
-    rest = np.asarray(carrier_inertia, dtype=float) + J + m * (e * cos) ** 2
+    J = 0.25 * m * np.square(radius)[()]
+    rest = own + J + m * (e * cos) ** 2
     weight = m * g * e * sin
     return TwoDegrees(rest[()], J * cos**2, m, a, e * sin, jn[()], ju[()] * sin * cos, weight)
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import bad, is_labelled, reals
 
 Array = npt.NDArray[np.float64]
 
@@ -88,20 +89,46 @@ def rotation(n: Array, angle: npt.ArrayLike) -> Array:
     return np.asarray(np.eye(3) + np.sin(angle) * once + 2.0 * np.sin(angle / 2.0) ** 2 * twice)
 
 
-def bad(argument: str, got: Any, wants: str) -> ParameterError:
-    """Return the error for an unusable argument; the caller raises it.
+def plain(argument: str, value: Any, wants: str = "real numbers, an array_like") -> Array:
+    """Return a new float64 array of real numbers, as `phasekit.inputs.reals` does.
 
-    >>> print(bad("mass", -1.0, "a number > 0"))
-    mass: got -1.0, wants a number > 0
+    Raises
+    ------
+    ParameterError
+        If it is none, or an array with named dims: here arrays pair by the place of their axes.
     """
-    try:
-        array = np.asarray(got)
-        shown = f"an array of shape {array.shape}" if array.size > 9 else repr(array.tolist())
-    except ValueError:  # ragged
-        shown = "a ragged sequence"
-    if len(shown) > 200:
-        shown = f"an object of type {type(got).__name__}"
-    return ParameterError(f"{argument}: got {shown}, wants {wants}")
+    if is_labelled(value):
+        hint = (
+            "dims pair by name in pk.rotators, pk.bearing_forces, pk.fixed_bearing_forces and "
+            "pk.FreeGyroRotor; here give the numbers alone, .values, whose axes pair by place"
+        )
+        raise bad(argument, value, wants, hint)
+    return reals(argument, value, wants)
+
+
+def floats(**values: Any) -> list[Array]:
+    """Return named values as float64 arrays, as `plain` does; what is one already is not copied.
+
+    >>> [x.tolist() for x in floats(e=np.ma.array([0.1, 0.2], mask=[False, True]))]
+    [[0.1, nan]]
+    """
+    return [
+        value if type(value) is np.ndarray and value.dtype == np.float64 else plain(argument, value)
+        for argument, value in values.items()
+    ]
+
+
+def broadcast(**values: Any) -> list[Array]:
+    """Return named values as float64 arrays of one shape, to be read only.
+
+    Raises
+    ------
+    ParameterError
+        If one is no array of real numbers, or they do not broadcast.
+    """
+    arrays = floats(**values)
+    common_shape(**{name: x.shape for name, x in zip(values, arrays, strict=True)})
+    return list(np.broadcast_arrays(*arrays))
 
 
 def numbers(argument: str, value: Any, wants: str = "a finite number or an array of them") -> Array:
@@ -117,20 +144,17 @@ def vectors(argument: str, value: Any, wants: str = "three finite numbers, (...,
 def tensors(argument: str, value: Any, last: tuple[int, ...], wants: str) -> Array:
     """Return a float64 copy of what ends in the axes `last`.
 
-    A single one must be finite; inside a batch the one that is not becomes NaN as a whole.
+    A single one must be finite; inside a batch the one that is not, or of which a number is
+    masked, becomes NaN as a whole.
 
     Raises
     ------
     ParameterError
         If the value is not real numbers of this shape.
     """
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        raise bad(argument, value, wants) from None
-    if array.dtype.kind not in "iuf" or array.shape[array.ndim - len(last) :] != last:
+    array = plain(argument, value, wants)
+    if array.shape[array.ndim - len(last) :] != last:
         raise bad(argument, value, wants)
-    array = array.astype(float)
     own = tuple(range(-len(last), 0))
     finite = np.isfinite(array).all(axis=own, keepdims=True)
     if array.ndim == len(last) and not finite.all():

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, named
 from phasekit.plot import labels, strokes, style
 
 FloatArray = NDArray[np.float64]
@@ -34,13 +34,12 @@ def draw(
     parameter = str(ds.attrs.get("parameter", ""))
     if parameter not in ds.coords or ds[parameter].dims != DIMS:
         raise bad("dataset", ds, "what branches returns, with its attribute 'parameter'")
-    if x not in (None, parameter):
-        raise unknown("x", x, [parameter])
+    if x is not None:
+        named("x", x, [parameter])
     offered = [
         str(name) for name, v in ds.data_vars.items() if v.dims == DIMS and v.dtype.kind == "f"
     ]
-    if y not in offered:
-        raise unknown("y", y, offered)
+    named("y", y, offered)
     axes = style.axes_for(ax, legend=legend)
     along, up = ds[parameter], ds[y]
     stretch = (

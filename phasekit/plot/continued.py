@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.arguments import bad, flag, unknown
+from phasekit.labelled.arguments import bad, flag, named, unknown
 from phasekit.labelled.branch import Branch
 from phasekit.plot import labels as words
 from phasekit.plot import style
@@ -107,8 +107,11 @@ def branch(
     flag("legend", legend)
     several = _several(branches)
     first = several[0]
-    x = x or first.free[0]
-    y = y or (first.free[1] if len(first.free) > 1 else first.problem_state[0])
+    if sel is not None and not isinstance(sel, Mapping):
+        raise bad("sel", sel, "a mapping from dims to labels, such as {'unknown': 'x'}")
+    x = first.free[0] if x is None else x
+    if y is None:
+        y = first.free[1] if len(first.free) > 1 else first.problem_state[0]
     style.angle_factor(angles)
     columns = [(_column(one, "x", x, sel), _column(one, "y", y, sel)) for one in several]
     axes = style.axes_for(ax, legend=legend)
@@ -173,17 +176,15 @@ def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None
         for n, v in points.data_vars.items()
         if v.dims[:1] == ("point",) and v.dtype.kind in "if" and n != "tangent"
     ]
-    if name not in offered:
-        raise unknown(argument, name, offered)
-    column: xr.DataArray = points[name]
+    column: xr.DataArray = points[named(argument, name, offered)]
     for dim in column.dims[1:]:
+        values = column[dim].values.tolist()
         if dim not in (sel or {}):
-            values = column[dim].values.tolist()
             raise bad("sel", sel, f"one of {dim} = {values} for {argument} = {name}")
-        try:
-            column = column.sel({dim: (sel or {})[str(dim)]})
-        except (KeyError, TypeError):
-            raise unknown(f"sel: {dim}", (sel or {})[str(dim)], column[dim].values) from None
+        label = (sel or {})[str(dim)]
+        if isinstance(label, bool) or not isinstance(label, (str, int)) or label not in values:
+            raise unknown(f"sel: {dim}", label, map(str, values))
+        column = column.sel({dim: label})
     return column
 
 

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
-from phasekit.labelled.arguments import unknown
+from phasekit.labelled.arguments import named
 from phasekit.plot import atlas, continued, labels, strands, strokes, style
 
 FloatArray = NDArray[np.float64]
@@ -89,8 +89,7 @@ def bifurcation_diagram(
     if ds["phi"].dims == atlas.DIMS:
         return atlas.draw(ds, x, y, angles=angles, legend=legend, ax=ax)
     offered = _drawable(ds)
-    if y not in offered:
-        raise unknown("y", y, offered)
+    named("y", y, offered)
     columns, along = _columns(ds, x, y)
     # The numbers of a Potential's equilibria are no branches.
     numbered = ds["equilibrium"].dtype.kind in "iu"

@@ -8,7 +8,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import unknown
+from phasekit.labelled.arguments import flag, named
 from phasekit.plot import labels, strokes, style
 
 TIME = "time"
@@ -80,8 +80,8 @@ def time_history(
             "dataset: got a Dataset without numbers along the dim 'time', wants motions over "
             "time, for example pk.flow(system, 0.5, 0.0, np.linspace(0.0, 10.0, 201))"
         )
-    if variable not in offered:
-        raise unknown("variable", variable, offered)
+    named("variable", variable, offered)
+    flag("legend", legend)
     times = ds[TIME]
     labels.monotone(times, "time")
     motions = motions_of(ds[variable], str(times.dims[0]), angles)

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.errors import Loop, ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, flag, unknown
 from phasekit.labelled.integral import gradient
 from phasekit.labelled.machine import is_disk, rotators
 from phasekit.labelled.system import as_system
@@ -103,6 +103,7 @@ def hodograph(
     """
     if not isinstance(rotator, str) or rotator not in ROTATORS:
         raise unknown("rotator", rotator, ROTATORS)
+    flag("legend", legend)
     factor = style.angle_factor(angles)
     pair = _plane_of(rotator, plane)
     if isinstance(system, xr.Dataset):

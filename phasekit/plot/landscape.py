@@ -217,12 +217,12 @@ def is_turn(arc: Arc) -> bool:
 
 def scalar_coefficients(system: Any) -> tuple[float, float, float]:
     """Return A, B, C of a system as floats, or say why they are not single numbers."""
-    coefficients = as_system(system).coefficients()
-    arrays = [c for c in coefficients if not isinstance(c, float)]
+    system = as_system(system)
+    arrays = [name for name, value in system.parameters.items() if not isinstance(value, float)]
     if arrays:
         raise ParameterError(
-            f"system: got array parameters (dims {', '.join(map(str, arrays[0].dims))}), wants a "
-            "single system; select one cell first: ds.isel(...).phasekit.system()"
+            f"system: got array parameters ({', '.join(arrays)}), wants a single system; select "
+            "one cell first: ds.isel(...).phasekit.system()"
         )
-    A, B, C = coefficients
+    A, B, C = system.coefficients()
     return A, B, C

@@ -9,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import one_of
 from phasekit.labelled.machine import is_disk, on_map
 from phasekit.labelled.phase_space import equilibria
 from phasekit.plot import labels, style
@@ -95,12 +95,10 @@ def bearing_load_map(
     ['fold', '$A = 0$']
     """
     ds = labels.dataset(dataset, "dataset", (), "pk.sweep")
-    if variable not in LOADS:
-        raise bad("variable", variable, f"one of {', '.join(LOADS)}")
+    one_of("variable", variable, LOADS)
     chosen = {"saddle": saddle, "side": side, "bearing": bearing}
     for name, value in chosen.items():
-        if value not in ("larger", *CHOICES[name]):
-            raise bad(name, value, f"one of larger, {', '.join(CHOICES[name])}")
+        one_of(name, value, ("larger", *CHOICES[name]))
     ds = _with_loads(ds, variable)
     load, words = ds[variable], []
     for name, value in chosen.items():

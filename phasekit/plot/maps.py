@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, flag, number, unknown
 from phasekit.labelled.schema import model_name
 from phasekit.labelled.system import MODELS
 from phasekit.plot import labels, style
@@ -90,6 +90,7 @@ def parameter_map(
     '$\\lambda$, lambda = B/A'
     """
     style.angle_factor(angles)
+    flag("log", log)
     ds = labels.dataset(dataset, "dataset", ())
     if not isinstance(variable, str) or variable not in ds.data_vars:
         raise unknown("variable", variable, map(str, ds.data_vars))
@@ -116,7 +117,12 @@ def _select(ds: xr.Dataset, variable: str, sel: Mapping[str, Any]) -> xr.Dataset
             raise unknown(f"dim of {variable}", name, map(str, ds[variable].dims))
         if name not in ds.indexes:
             raise ParameterError(f"{name}: got a dim without coordinate; use ds.isel({name}=...)")
-        near = "nearest" if ds[name].dtype.kind in "iuf" else None
+        numbers = ds[name].dtype.kind in "iuf"
+        near = "nearest" if numbers else None
+        if numbers:
+            value = number(name, value, f"one value of {name}", ds[name].attrs.get("units", ""))
+        elif not isinstance(value, str):
+            raise bad(name, value, f"one of {', '.join(map(str, ds[name].values[:6]))}")
         try:
             ds = ds.sel({name: value}, method=near)
         except (KeyError, TypeError, ValueError):

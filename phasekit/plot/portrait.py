@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import bad, reals
 from phasekit.labelled.potential_system import Potential
 from phasekit.plot import potential, strokes, style
 from phasekit.plot.landscape import Arc, Landscape, Level
@@ -198,10 +198,7 @@ def _has_speed(land: Landscape | Terrain, energy: float) -> bool:
 
 def _finite(values: ArrayLike, argument: str, unit: str) -> FloatArray:
     wants = f"finite numbers in {unit}"
-    try:
-        array = np.asarray(values)
-    except (TypeError, ValueError):
-        raise bad(argument, values, wants) from None
-    if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+    array = reals(argument, getattr(values, "values", values), wants)
+    if not np.isfinite(array).all():
         raise bad(argument, values, wants)
-    return array.astype(float)
+    return array

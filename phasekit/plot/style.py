@@ -22,7 +22,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, Multiple
 from matplotlib.transforms import ScaledTranslation
 
 from phasekit.errors import EquilibriumKind, Topology
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import bad, flag
 
 Angles = Literal["rad", "deg"]
 Look = dict[str, Any]
@@ -295,6 +295,7 @@ def new_figure(width: float = 6.4, height: float = 4.8) -> Figure:
 
 def axes_for(ax: object, *, legend: bool, width: float = 6.4) -> Axes:
     """Return the Axes to draw in: the given one, or that of a new figure."""
+    flag("legend", legend)
     if ax is None:
         return new_figure(width).add_subplot()
     return check_axes(ax, legend=legend)
@@ -318,11 +319,10 @@ def check_axes(ax: object, argument: str = "ax", *, legend: bool = False) -> Axe
 
 def angle_factor(angles: object) -> float:
     """Return what radians are multiplied by to be shown in `angles`."""
-    if angles == "rad":
-        return 1.0
-    if angles == "deg":
-        return 180.0 / np.pi
-    raise bad("angles", angles, "'rad' or 'deg'")
+    factors = {"rad": 1.0, "deg": 180.0 / np.pi}
+    if not isinstance(angles, str) or angles not in factors:
+        raise bad("angles", angles, "'rad' or 'deg'")
+    return factors[angles]
 
 
 def multiple_of_pi(value: float, _position: object = None) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from phasekit.bifurcation.surface import equilibrium_surface
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import bad, flag, pair, whole
 from phasekit.labelled.atlas import single
 from phasekit.labelled.loci import bifurcation_set
 from phasekit.plot import labels, style
@@ -90,8 +90,12 @@ def branch_surface(
     '$\\varphi$ (rad)'
     """
     factor = style.angle_factor(angles)
-    if not isinstance(cells, (int, np.integer)) or not LEAST <= cells <= MOST:
-        raise bad("cells", cells, f"a whole number from {LEAST} to {MOST}")
+    flag("legend", legend)
+    wants = f"a whole number from {LEAST} to {MOST}"
+    cells = whole("cells", cells, wants, LEAST)
+    if cells > MOST:
+        raise bad("cells", cells, wants)
+    elevation, azimuth = pair("view", view, "two angles in degrees: elevation and azimuth")
     if ax is not None and not isinstance(ax, Axes3D):
         hint = 'plt.figure().add_subplot(projection="3d") makes one'
         raise bad("ax", ax, "a matplotlib 3-D Axes", hint)
@@ -102,8 +106,9 @@ def branch_surface(
         full = {name: np.full(at_x.shape, value) for name, value in values.items()}
         return type(kind).valid_coefficients({**full, x: at_x, y: at_y})
 
-    grids = [np.linspace(min(ends), max(ends), int(cells) + 1) for ends in (xlim, ylim)]
-    phi = np.linspace(-np.pi, np.pi, 2 * int(cells) + 1)
+    box = [folds.attrs[ends] for ends in ("xlim", "ylim")]
+    grids = [np.linspace(low, high, cells + 1) for low, high in box]
+    phi = np.linspace(-np.pi, np.pi, 2 * cells + 1)
     surface = equilibrium_surface(coefficients, grids[0], grids[1], phi)
 
     axes: Any = ax
@@ -128,7 +133,7 @@ def branch_surface(
     axes.set_zticks(quarters * factor)
     if angles == "rad":
         axes.set_zticklabels([style.multiple_of_pi(q) for q in quarters])
-    axes.view_init(*view)
+    axes.view_init(elevation, azimuth)
     axes.computed_zorder = False  # folds stay in sight
     if legend and handles:
         axes.legend(handles=handles, loc="upper left", frameon=False, fontsize="small")

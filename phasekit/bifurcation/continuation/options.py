@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import bad, one_of, reals, whole
 
 DIRECTIONS = ("both", "forward", "backward")
 DETECTABLE = ("fold", "branch_point", "hopf")
@@ -84,13 +85,11 @@ class ContinuationOptions:
         for name in ("max_step", "min_step", "initial_step", "tolerance", "turn", "max_turn"):
             value = _number(name, getattr(self, name))
             if not value > 0.0:
-                raise ParameterError(f"{name}: got {value!r}, wants a number > 0")
+                raise bad(name, value, "a number > 0")
             object.__setattr__(self, name, value)
         for name in ("max_points", "max_iterations"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < 1:
-                raise ParameterError(f"{name}: got {value!r}, wants a whole number >= 1")
-            object.__setattr__(self, name, int(value))
+            value = whole(name, getattr(self, name), "a whole number >= 1")
+            object.__setattr__(self, name, value)
         if not self.min_step <= self.initial_step:
             raise ParameterError(
                 f"initial_step: got {self.initial_step}, wants at least min_step = {self.min_step}"
@@ -108,33 +107,27 @@ class ContinuationOptions:
                 f"max_turn: got {self.max_turn} with turn = {self.turn}, wants turn <= max_turn "
                 "< 1.5 rad"
             )
-        if self.directions not in DIRECTIONS:
-            raise ParameterError(
-                f"directions: got {self.directions!r}, wants {', '.join(DIRECTIONS)}"
-            )
+        one_of("directions", self.directions, DIRECTIONS)
         given: Any = self.detect
+        if not isinstance(given, (str, Sequence, Set)):
+            raise bad("detect", given, f"names out of {', '.join(DETECTABLE)}")
         detect = (given,) if isinstance(given, str) else tuple(given)
         for name in detect:
-            if name not in DETECTABLE:
-                raise ParameterError(f"detect: got {name!r}, wants {', '.join(DETECTABLE)}")
+            one_of("detect", name, DETECTABLE)
         object.__setattr__(self, "detect", detect)
         bounds = {}
         for name, pair in _mapping("bounds", self.bounds).items():
-            try:
-                low, high = (float(value) for value in pair)
-            except (TypeError, ValueError):
-                raise ParameterError(
-                    f"bounds: got {pair!r} for {name}, wants a pair (low, high)"
-                ) from None
-            if not low < high:
-                raise ParameterError(f"bounds: got {pair!r} for {name}, wants low < high")
-            bounds[name] = (low, high)
+            wants = f"for {name} a pair (low, high) with low < high"
+            ends = reals("bounds", pair, wants)
+            if ends.shape != (2,) or not ends[0] < ends[1]:
+                raise bad("bounds", pair, wants)
+            bounds[name] = (float(ends[0]), float(ends[1]))
         object.__setattr__(self, "bounds", MappingProxyType(bounds))
         scales = {}
         for name, value in _mapping("scales", self.scales).items():
             scales[name] = _number(f"scales[{name!r}]", value)
             if not scales[name] > 0.0:
-                raise ParameterError(f"scales: got {value!r} for {name}, wants a number > 0")
+                raise bad("scales", value, f"for {name} a number > 0")
         object.__setattr__(self, "scales", MappingProxyType(scales))
 
     def as_dict(self) -> dict[str, Any]:
@@ -151,14 +144,13 @@ class ContinuationOptions:
 
 
 def _number(name: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise ParameterError(f"{name}: got {value!r}, wants a number")
-    if not np.isfinite(value):
-        raise ParameterError(f"{name}: got {value!r}, wants a finite number")
-    return float(value)
+    number = reals(name, value, "a finite number")
+    if number.ndim or not np.isfinite(number):
+        raise bad(name, value, "a finite number")
+    return float(number)
 
 
 def _mapping(name: str, value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{name}: got {value!r}, wants a mapping from names")
+        raise bad(name, value, "a mapping from names")
     return dict(value)

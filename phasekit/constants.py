@@ -1,0 +1,6 @@
+"""Units to multiply by: ``30 * pk.deg``, ``24 * pk.rpm``."""
+
+#: One degree in radians.
+deg: float = 0.017453292519943295
+#: One revolution a minute in s^-1.
+rpm: float = 0.10471975511965977

@@ -1,0 +1,103 @@
+"""Units that people write, each with the number that leads to SI units and radians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Any
+
+from phasekit.constants import deg, rpm
+from phasekit.errors import ParameterError
+
+#: Units by the unit that results carry; each is the number to multiply by. Decimal, so that 1.153mm
+#: becomes the double nearest to 0.001153.
+UNITS: Mapping[str, Mapping[str, Decimal]] = {
+    "rad": {"rad": Decimal(1), "deg": Decimal(deg), "°": Decimal(deg)},
+    "m": {"m": Decimal(1), "cm": Decimal("1e-2"), "mm": Decimal("1e-3"), "um": Decimal("1e-6")},
+    "kg": {"kg": Decimal(1), "g": Decimal("1e-3"), "t": Decimal(1000)},
+    "s-1": {
+        "rad/s": Decimal(1),
+        "1/s": Decimal(1),
+        "s-1": Decimal(1),
+        "deg/s": Decimal(deg),
+        "rpm": Decimal(rpm),
+    },
+    "s-2": {
+        "rad/s2": Decimal(1),
+        "1/s2": Decimal(1),
+        "s-2": Decimal(1),
+        "deg/s2": Decimal(deg),
+    },
+    "m s-2": {"m/s2": Decimal(1), "m s-2": Decimal(1)},
+    "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "min": Decimal(60)},
+    "kg m2": {"kg m2": Decimal(1)},
+    "N": {"N": Decimal(1)},
+    "N m": {"N m": Decimal(1)},
+    "1": {},
+}
+
+_ALIASES = {
+    "degree": "deg",
+    "degrees": "deg",
+    "radian": "rad",
+    "radians": "rad",
+    "rad s-1": "rad/s",
+    "deg s-1": "deg/s",
+    "rad s-2": "rad/s2",
+    "deg s-2": "deg/s2",
+    "degree/s": "deg/s",
+    "degrees/s": "deg/s",
+    "rev/min": "rpm",
+    "meter": "m",
+    "meters": "m",
+    "metre": "m",
+    "metres": "m",
+    "millimeter": "mm",
+    "millimeters": "mm",
+    "centimeter": "cm",
+    "centimeters": "cm",
+    "\N{MICRO SIGN}m": "um",
+    "kilogram": "kg",
+    "kilograms": "kg",
+    "gram": "g",
+    "grams": "g",
+    "second": "s",
+    "seconds": "s",
+}
+
+
+def usual(unit: str) -> str:
+    """Return a unit as `UNITS` spells it, where it knows it.
+
+    >>> usual("degrees"), usual("m/s^2"), usual("parsec")
+    ('deg', 'm/s2', 'parsec')
+    """
+    plain = unit.strip().replace("**", "").replace("^", "")
+    return _ALIASES.get(plain, plain)
+
+
+def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:
+    """Return the number by which values in `unit` become values in the unit `wanted`.
+
+    None wants values of any dimension, in SI units.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is not known, or does not fit.
+    """
+    name = usual(str(unit))
+    fits = UNITS.get(wanted, {}) if wanted is not None else {
+        key: value for units in UNITS.values() for key, value in units.items()
+    }  # fmt: skip
+    if name in fits:
+        return fits[name]
+    plain = wanted in (None, "1", "rad") and name in ("", "1")
+    if plain or name == wanted or (wanted == "1" and name == "rad"):
+        return Decimal(1)
+    known = list(dict.fromkeys([*([wanted] if wanted not in (None, "1") else []), *fits]))
+    wants = f"units {' or '.join(known)}" if known else "numbers without units"
+    raise ParameterError(
+        f"{argument}: got the attribute units={str(unit)!r}, wants {wants}; convert it, or drop "
+        "the attribute with .drop_attrs() if the numbers are right"
+    )

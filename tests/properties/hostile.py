@@ -1,0 +1,399 @@
+"""Every public callable with arguments that fit, and a pool of values that mostly do not."""
+
+from __future__ import annotations
+
+import datetime
+import enum
+import functools
+import inspect
+from collections.abc import Callable
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+import phasekit as pk
+from phasekit.cli import main
+
+#: What models share for the rest of the package, and results that only phasekit makes.
+MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
+RESULTS = (pk.Branch, pk.SpecialPoint)
+
+
+class Odd:
+    """A foreign object whose own code fails."""
+
+    def __array__(self, *args: Any, **kwargs: Any) -> Any:
+        raise RuntimeError("no array")
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no name")
+
+
+def _locked(array: Any) -> Any:
+    array.flags.writeable = False
+    return array
+
+
+def _nested(depth: int) -> list[Any]:
+    value: list[Any] = [1.0]
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+def _recursive() -> list[Any]:
+    value: list[Any] = []
+    value.append(value)
+    return value
+
+
+#: Made anew for each call, as some can be used once only.
+POOL: dict[str, Callable[[], Any]] = {
+    "none": lambda: None,
+    "true": lambda: True,
+    "numpy bool": lambda: np.True_,
+    "zero": lambda: 0.0,
+    "minus zero": lambda: -0.0,
+    "one": lambda: 1,
+    "minus one": lambda: -1,
+    "half": lambda: 2.5,
+    "pi": lambda: np.pi,
+    "minus pi": lambda: -np.pi,
+    "nan": lambda: np.nan,
+    "inf": lambda: np.inf,
+    "minus inf": lambda: -np.inf,
+    "1e16": lambda: 1e16,
+    "1e200": lambda: 1e200,
+    "1e300": lambda: 1e300,
+    "-1e300": lambda: -1e300,
+    "1e-320": lambda: 1e-320,
+    "10**400": lambda: 10**400,
+    "10**5000": lambda: -(10**5000),
+    "2**63": lambda: 2**63,
+    "complex": lambda: 1 + 2j,
+    "fraction": lambda: Fraction(1, 3),
+    "decimal": lambda: Decimal("0.5"),
+    "signalling": lambda: Decimal("sNaN"),
+    "float16": lambda: np.float16(0.5),
+    "longdouble": lambda: np.longdouble("1e4000"),
+    "big-endian": lambda: np.array([0.1, 0.2], ">f8"),
+    "word": lambda: "abc",
+    "empty word": lambda: "",
+    "unit": lambda: "30deg",
+    "nul": lambda: "a\0b",
+    "bytes": lambda: b"abc",
+    "date": lambda: datetime.date(2020, 1, 1),
+    "datetime64": lambda: np.datetime64("2020-01-01"),
+    "timedelta64": lambda: np.timedelta64(1, "s"),
+    "timedelta": lambda: datetime.timedelta(seconds=1),
+    "not a time": lambda: np.array(["NaT"], "timedelta64[ns]"),
+    "object": object,
+    "odd object": Odd,
+    "class": lambda: float,
+    "function": lambda: lambda *a, **k: 1.0,
+    "empty list": list,
+    "empty array": lambda: np.empty(0),
+    "empty rows": lambda: np.empty((0, 2)),
+    "empty dict": dict,
+    "list": lambda: [0.1, 0.2],
+    "falling list": lambda: [0.2, 0.1],
+    "equal list": lambda: [0.1, 0.1],
+    "three": lambda: (0.1, 0.2, 0.3),
+    "nan in list": lambda: [0.1, np.nan],
+    "huge in list": lambda: [1e300, -1e300],
+    "10**400 in list": lambda: [0.1, 10**400],
+    "bool in list": lambda: [0.1, True],
+    "none in list": lambda: [None, 0.1],
+    "words": lambda: ["a", "b"],
+    "mixed": lambda: ["a", 1.0, None],
+    "ragged": lambda: [[1.0], [1.0, 2.0]],
+    "deep": lambda: _nested(70),
+    "recursive": _recursive,
+    "set": lambda: {0.1, 0.2},
+    "generator": lambda: (x for x in (0.1, 0.2)),
+    "range": lambda: range(2),
+    "dict": lambda: {"a": 0.1},
+    "dict of numbers": lambda: {1: 2},
+    "slice": lambda: slice(None),
+    "0-d": lambda: np.array(0.3),
+    "bools": lambda: np.array([True, False]),
+    "complexes": lambda: np.array([1j, 2.0]),
+    "objects": lambda: np.array([0.1, "a"], object),
+    "fractions": lambda: [Fraction(1, 3), Decimal("0.5")],
+    "structured": lambda: np.zeros(2, "f8,f8"),
+    "2-D": lambda: np.ones((2, 2)),
+    "reversed": lambda: np.arange(4.0)[::-2],
+    "read-only": lambda: _locked(np.array([0.1, 0.2])),
+    "masked": lambda: np.ma.array([0.1, 0.2], mask=[False, True]),
+    "all masked": lambda: np.ma.masked_all(2),
+    "masked scalar": lambda: np.ma.masked,
+    "masked in list": lambda: [0.1, np.ma.masked],
+    "series": lambda: pd.Series([0.1, 0.2], name="beta"),
+    "missing": lambda: pd.Series([0.1, pd.NA], dtype="Float64"),
+    "index": lambda: pd.Index([0.1, 0.2]),
+    "frame": lambda: pd.DataFrame({"a": [0.1, 0.2]}),
+    "DataArray": lambda: xr.DataArray([0.1, 0.2], dims="x"),
+    "degrees": lambda: xr.DataArray([10.0, 20.0], dims="x", attrs={"units": "deg"}),
+    "furlongs": lambda: xr.DataArray(0.1, attrs={"units": "furlong"}),
+    "odd units": lambda: xr.DataArray([0.1], dims="x", attrs={"units": ["deg"]}),
+    "0-d DataArray": lambda: xr.DataArray(0.3),
+    "nan DataArray": lambda: xr.DataArray(np.nan),
+    "2-D DataArray": lambda: xr.DataArray(np.ones((2, 3)), dims=("x", "y")),
+    "dim of a result": lambda: xr.DataArray([0.1, 0.2], dims="equilibrium"),
+    "numbered dim": lambda: xr.DataArray([0.1, 0.2], dims=[3]),
+    "coordinate of words": lambda: xr.DataArray([0.1, 0.2], {"x": ["a", "b"]}, "x"),
+    "words DataArray": lambda: xr.DataArray(["a", "b"], dims="x"),
+    "lazy": lambda: xr.DataArray([0.1, 0.2], dims="x").chunk(x=1),
+    "Variable": lambda: xr.Variable("x", [0.1, 0.2]),
+    "empty Dataset": xr.Dataset,
+    "Dataset": lambda: xr.Dataset({"phi": ("x", [0.1])}, attrs={"phasekit_model": "Reduced"}),
+    "system": lambda: pk.Coefficients(2.0, 1.0, 0.5),
+    "array system": lambda: pk.Coefficients([2.0, -3.0], 1.0, 0.5),
+    "huge system": lambda: pk.Coefficients(1e300, 1e300, 1e-320),
+    "forceless": lambda: pk.Coefficients(0.0, 0.0, 0.0),
+    "options": lambda: pk.ContinuationOptions(max_points=5),
+    "body": lambda: pk.RigidBody(1.0, [0.0, 0.0, 0.0], np.eye(3)),
+}
+
+DISK = {"beta": 0.3, "e": 0.1, "a": 0.05, "r": 0.1, "omega1": 10.0, "m": 2.0, "half_span": 0.1}
+
+
+@functools.cache
+def disk() -> Any:
+    return pk.GyroRotorDisk(**DISK)
+
+
+@functools.cache
+def dataset() -> xr.Dataset:
+    return pk.sweep(disk(), beta=[0.2, 0.3], a=[0.0, 0.05])
+
+
+@functools.cache
+def problem() -> Any:
+    return pk.Problem("r + x**2 - 0.1*x**4", ("x",), {"r": -0.5})
+
+
+@functools.cache
+def branch() -> Any:
+    few = pk.ContinuationOptions(max_points=40)
+    return pk.continuation(problem(), "r", x0=[0.7], span=(-1.0, 0.5), options=few)
+
+
+@functools.cache
+def rotor() -> Any:
+    body = pk.GyroRotorDisk(**{k: v for k, v in DISK.items() if k != "half_span"})
+    return pk.FreeGyroRotor(body, 0.1)
+
+
+@functools.cache
+def machine() -> Any:
+    return pk.CoupledRotation(
+        pk.RigidBody.disk(2.0, 0.1, 0.1, 0.3), n1=(0, 0, 1), n2=(1, 0, 0), a=1
+    )
+
+
+@functools.cache
+def well() -> Any:
+    return pk.Potential("x^4/4 - mu*x^2/2", "x", {"mu": 1.0})
+
+
+#: Arguments that fit, by the name of the callable's argument ...
+GOOD: dict[str, Callable[[], Any]] = {
+    "system": lambda: pk.Coefficients(2.0, 1.0, 0.3),
+    "disk": disk,
+    "problem": problem,
+    "dataset": dataset,
+    "ds": dataset,
+    "branches": branch,
+    "body": lambda: pk.RigidBody.disk(2.0, 0.1, 0.1, 0.3),
+    "parameter": lambda: "r",
+    "span": lambda: (-1.0, 0.5),
+    "path": lambda: "branch.json",
+    "store": lambda: "map.zarr",
+    "t": lambda: [0.0, 0.5],
+    "phi": lambda: 0.3,
+    "dphi": lambda: 0.2,
+    "phi0": lambda: 0.3,
+    "dphi0": lambda: 0.2,
+    "x": lambda: 0.1,
+    "p": lambda: 1.0,
+    "label": lambda: "LP",
+    "carrier_inertia": lambda: 0.1,
+    "duration": lambda: 1.0,
+    "energy": lambda: 9.0,
+    "gap": lambda: 0.1,
+    "action": lambda: 0.1,
+    "angle": lambda: 0.2,
+    "family": lambda: "lower_well",
+    "rho_b1": lambda: 0.5,
+    "frame": lambda: "disk",
+    "mass": lambda: 2.0,
+    "center": lambda: [0.0, 0.1, 0.0],
+    "inertia": lambda: np.eye(3),
+    "masses": lambda: [1.0, 2.0],
+    "positions": lambda: [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]],
+    "matrix": lambda: np.eye(3),
+    "vector": lambda: [1.0, 0.0, 0.0],
+    "angular_velocity": lambda: [1.0, 0.0, 0.0],
+    "n": lambda: [1.0, 0.0, 0.0],
+    "n1": lambda: [0.0, 0.0, 1.0],
+    "n2": lambda: [1.0, 0.0, 0.0],
+    "G": lambda: [0.0, 0.0, -9.81],
+    "s_A": lambda: 0.1,
+    "s_B": lambda: -0.1,
+    "rho_B1": lambda: 0.5,
+    "f": lambda: ["r + x**2"],
+    "state": lambda: ("x",),
+    "parameters": lambda: {"r": -0.5},
+    "potential": lambda: "x**4/4 - x**2/2",
+    "expression": lambda: "x**4/4 - x**2/2",
+    "coordinate": lambda: "x",
+    "spec": lambda: problem().specification(),
+    "axes": lambda: {"A": [1.0, 2.0]},
+    "on": lambda: "equilibria",
+    **{name: functools.partial(float, value) for name, value in DISK.items()},
+    **dict.fromkeys(("A", "B", "C", "lam", "psi", "radius", "omega", "length"), lambda: 0.7),
+    **dict.fromkeys(("K", "h_x", "h_y"), lambda: 0.7),
+}
+#: ... and where another one fits, by the callable and the argument; and what keeps calls short.
+FITTING: dict[str, dict[str, Callable[[], Any]]] = {
+    "orbits": {"phi0": lambda: 0.3, "dphi0": lambda: 0.2},
+    "branches": {"parameter": lambda: "A"},
+    "critical": {"parameter": lambda: "lam"},
+    "bifurcation_set": {
+        "x": lambda: "B", "y": lambda: "C", "xlim": lambda: (-3, 3), "ylim": lambda: (-3, 3),
+    },
+    "figure_eights": {"path": lambda: {"B": (0.1, 1.0)}, "n": lambda: 5},
+    "orbit_families": {"n": lambda: 3},
+    "continuation": {"options": lambda: pk.ContinuationOptions(max_points=10)},
+    "diagram": {"options": lambda: pk.ContinuationOptions(max_points=10), "depth": lambda: 1},
+    "FreeGyroRotor": {"disk": lambda: rotor().disk},
+    "FreeGyroRotor.trajectory": {"span": lambda: (0.0, 0.5)},
+    "Potential": {"parameters": dict},
+    "Problem.from_potential": {"parameters": dict},
+    "Problem.from_system": {"system": disk},
+    "Problem.derivatives": {"x": lambda: [0.1]},
+    "SpecialPoint.curve": {"parameter": lambda: "r"},
+    "Branch.extend": {"points": lambda: 2},
+    "open_map": {"store": lambda: "map.zarr"},
+    "plot.branch_surface": {
+        "x": lambda: "B", "y": lambda: "C", "xlim": lambda: (-3, 3), "ylim": lambda: (-3, 3),
+        "cells": lambda: 8,
+    },
+    "plot.bifurcation_set": {
+        "dataset": lambda: pk.bifurcation_set(
+            pk.Coefficients(2.0, 1.0, 0.3), "B", "C", xlim=(-3, 3), ylim=(-3, 3)
+        )
+    },
+    "plot.bifurcation_diagram": {"dataset": lambda: dataset().isel(a=0)},
+    "plot.bearing_load_map": {
+        "dataset": lambda: dataset().phasekit.bearing_forces(on="separatrix")
+    },
+    "plot.time_history": {"dataset": lambda: pk.flow(disk(), 0.3, 0.2, [0.0, 0.5])},
+    "plot.hodograph": {"system": disk},
+    "plot.period_energy": {"n": lambda: 5},
+    "plot.frequency_action": {"n": lambda: 5},
+}  # fmt: skip
+#: Instances whose methods are called, by the name of their class.
+INSTANCES: dict[str, Callable[[], Any]] = {
+    "ContinuationOptions": pk.ContinuationOptions,
+    "Branch": branch,
+    "SpecialPoint": lambda: branch().special_points[0],
+    "FreeGyroRotor": rotor,
+    "GyroRotorDisk": disk,
+    "Coefficients": lambda: pk.Coefficients(2.0, 1.0, 0.3),
+    "Reduced": lambda: pk.Reduced(0.3, 0.2),
+    "ParticleOnCircle": lambda: pk.ParticleOnCircle(radius=1.0, omega=3.0),
+    "Pendulum": lambda: pk.Pendulum(length=1.0),
+    "StonerWohlfarth": lambda: pk.StonerWohlfarth(K=1.0, h_x=0.2, h_y=0.1),
+    "Potential": well,
+    "Problem": problem,
+    "RigidBody": lambda: GOOD["body"](),
+    "CoupledRotation": machine,
+    "CoupledRotationState": lambda: machine().at(omega1=1.0, phi2=0.3),
+    "Trajectory": lambda: rotor().trajectory(0.3, 0.2, (0.0, 0.5)),
+    "PhasekitAccessor": lambda: dataset().phasekit,
+    "MapPlots": lambda: dataset().isel(beta=0, a=0).phasekit.plot,
+}
+
+
+def callables() -> dict[str, Callable[..., Any]]:
+    """Return every public callable by its name; methods are of `INSTANCES`."""
+    found: dict[str, Callable[..., Any]] = {}
+    for name in pk.__all__:
+        thing = getattr(pk, name)
+        if inspect.isclass(thing):
+            if issubclass(thing, (enum.Enum, Exception)):
+                continue
+            if thing not in RESULTS:
+                found[name] = thing
+            assert name in INSTANCES, f"{name}: add an instance, so that its methods are called"
+        elif callable(thing):
+            found[name] = thing
+    for name in pk.plot.__all__:
+        found[f"plot.{name}"] = getattr(pk.plot, name)
+    for name, make in INSTANCES.items():
+        owner = type(make())
+        for method in dir(owner):
+            static = inspect.getattr_static(owner, method)
+            plain = inspect.isfunction(static) or isinstance(static, (classmethod, staticmethod))
+            if plain and not method.startswith("_") and method not in MACHINERY:
+                found[f"{name}.{method}"] = functools.partial(_call, make, method)
+        if "__call__" in vars(owner):
+            found[f"{name}.__call__"] = functools.partial(_call, make, "__call__")
+    return found
+
+
+def _call(make: Callable[[], Any], method: str, *args: Any, **kwargs: Any) -> Any:
+    return getattr(make(), method)(*args, **kwargs)
+
+
+def arguments(name: str, function: Callable[..., Any]) -> dict[str, Callable[[], Any]]:
+    """Return the arguments that a callable takes, each with how to make one that fits.
+
+    What has a default and no value here is left out.
+    """
+    if isinstance(function, functools.partial):
+        make, method = function.args
+        function = getattr(make(), method)
+    fitting = FITTING.get(name, {})
+    taken: dict[str, Callable[[], Any]] = {}
+    for parameter in inspect.signature(function).parameters.values():
+        if parameter.kind in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL):
+            continue
+        if parameter.name in fitting:
+            taken[parameter.name] = fitting[parameter.name]
+        elif parameter.default is parameter.empty:
+            assert parameter.name in GOOD, f"{name}: add an argument {parameter.name} that fits"
+            taken[parameter.name] = GOOD[parameter.name]
+        else:
+            taken[parameter.name] = lambda default=parameter.default: default
+    return taken
+
+
+def argv(value: Any) -> list[list[str]]:
+    """Return command lines with a word in each place."""
+    word = value if isinstance(value, str) else repr(value)[:60]
+    disk_options = [f"--{k}={v}" for k, v in DISK.items() if k not in ("m", "half_span")]
+    return [
+        [word],
+        ["portrait", word],
+        ["portrait", f"--beta={word}", *disk_options[1:], "--out=p.png"],
+        ["portrait", *disk_options, f"--out={word}"],
+        ["portrait", *disk_options, f"--model={word}"],
+        ["portrait", *disk_options, f"--energies={word}", "--out=p.png"],
+        ["diagram", *disk_options[1:], f"--beta=0:{word}:5", "--out=d.png"],
+        ["diagram", *disk_options[1:], f"--beta=0:1:{word}", "--out=d.png"],
+        ["sweep", word],
+        ["info", word],
+        ["demo", f"--out={word}/"],
+        ["demo", f"--cells={word}"],
+    ]
+
+
+__all__ = ["POOL", "argv", "arguments", "callables", "main", "plt"]
