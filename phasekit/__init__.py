@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     from phasekit.labelled.free_rotor import FreeGyroRotor as FreeGyroRotor
     from phasekit.labelled.guises import ParticleOnCircle as ParticleOnCircle
     from phasekit.labelled.guises import Pendulum as Pendulum
-    from phasekit.labelled.guises import Reduced as Reduced
     from phasekit.labelled.guises import StonerWohlfarth as StonerWohlfarth
     from phasekit.labelled.integral import curvature as curvature
     from phasekit.labelled.integral import energy as energy
@@ -56,7 +55,6 @@ if TYPE_CHECKING:
     from phasekit.labelled.machine import bearing_forces as bearing_forces
     from phasekit.labelled.machine import fixed_bearing_forces as fixed_bearing_forces
     from phasekit.labelled.machine import rotators as rotators
-    from phasekit.labelled.models import Coefficients as Coefficients
     from phasekit.labelled.models import GyroRotorDisk as GyroRotorDisk
     from phasekit.labelled.motion import flow as flow
     from phasekit.labelled.motion import separatrix_motion as separatrix_motion
@@ -71,6 +69,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.store import open_map as open_map
     from phasekit.labelled.sweep import sweep as sweep
+    from phasekit.labelled.system import Coefficients as Coefficients
+    from phasekit.labelled.system import Reduced as Reduced
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
     from phasekit.mechanics.rigid_body import RigidBody as RigidBody
 
@@ -96,7 +96,7 @@ _MODULES = {
     "phasekit.labelled.eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.labelled.free_rotor": ("FreeGyroRotor",),
-    "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "Reduced", "StonerWohlfarth"),
+    "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
     "phasekit.labelled.integral": (
         "curvature",
         "energy",
@@ -106,7 +106,7 @@ _MODULES = {
     ),
     "phasekit.labelled.loci": ("bifurcation_set",),
     "phasekit.labelled.machine": ("bearing_forces", "fixed_bearing_forces", "rotators"),
-    "phasekit.labelled.models": ("Coefficients", "GyroRotorDisk"),
+    "phasekit.labelled.models": ("GyroRotorDisk",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
@@ -116,6 +116,7 @@ _MODULES = {
     "phasekit.labelled.special_point": ("SpecialPoint",),
     "phasekit.labelled.store": ("open_map",),
     "phasekit.labelled.sweep": ("sweep",),
+    "phasekit.labelled.system": ("Coefficients", "Reduced"),
     "phasekit.mechanics.coupled_rotation": ("CoupledRotation",),
     "phasekit.mechanics.rigid_body": ("RigidBody",),
 }

@@ -12,8 +12,8 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import NumberLike
+from phasekit.labelled.identity import model_name
 from phasekit.labelled.pictures import picture
-from phasekit.labelled.schema import model_name
 from phasekit.labelled.system import MODELS, Model
 
 

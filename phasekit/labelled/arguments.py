@@ -8,7 +8,9 @@ parameters and states share `numeric`; a parameter's own domain is checked where
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Mapping, Sequence
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -205,3 +207,24 @@ def brief(value: Value) -> str:
         return f"<{value.size} values, {value[0]:.6g} to {value[-1]:.6g}>"
     sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
     return f"<{'lazy ' if value.chunks is not None else ''}DataArray ({sizes})>"
+
+
+def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a call with an unknown, missing or surplus argument raise a `ParameterError`."""
+    signature = inspect.signature(function)
+    expected = dict(list(signature.parameters.items())[1:])  # without self or cls
+
+    @functools.wraps(function)
+    def checked(first: Any, *args: Any, **kwargs: Any) -> Any:
+        for name in kwargs:
+            if name not in expected:
+                raise unknown(f"parameter of {title}", name, expected)
+        try:
+            signature.bind(first, *args, **kwargs)
+        except TypeError as error:
+            raise ParameterError(
+                f"{title}: {error}; its parameters are {', '.join(expected)}"
+            ) from None
+        return function(first, *args, **kwargs)
+
+    return checked

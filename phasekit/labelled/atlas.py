@@ -13,10 +13,11 @@ from phasekit.bifurcation.paths import Path
 from phasekit.bifurcation.survey import Meeting
 from phasekit.errors import EquilibriumKind
 from phasekit.labelled.arguments import FloatArray, bad, pair, unknown
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.grid import variable
 from phasekit.labelled.quantities import FROM_MOTION, LABELS, ROWS
 from phasekit.labelled.schema import LABEL_DTYPE, dataset_attrs, input_attrs
-from phasekit.labelled.system import Model, as_system
+from phasekit.labelled.system import Model
 from phasekit.laws.trigonometric import Trigonometric
 
 #: What special points are called in pictures.

@@ -16,8 +16,9 @@ from phasekit.labelled.arguments import bad, flag
 from phasekit.labelled.arrays import reason
 from phasekit.labelled.branch import Branch, make_branch
 from phasekit.labelled.branch_stored import ARRAYS, Stored, damaged
+from phasekit.labelled.identity import MODEL, SCHEMA, SCHEMA_VERSION
 from phasekit.labelled.problem import as_problem
-from phasekit.labelled.schema import MODEL, SCHEMA, SCHEMA_VERSION, versions
+from phasekit.labelled.schema import versions
 from phasekit.labelled.store import WholeTarget, target_of
 
 _NAME = "Branch"

@@ -25,8 +25,8 @@ from phasekit.kernels.state import NUMBERS as STATE_NUMBERS
 from phasekit.kernels.state import VECTORS
 from phasekit.labelled.arguments import bad
 from phasekit.labelled.branch import NUMBERS
+from phasekit.labelled.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.labelled.problem import Problem
-from phasekit.labelled.schema import SCHEMA, SCHEMA_VERSION
 
 Array = npt.NDArray[np.float64]
 

@@ -13,9 +13,10 @@ import xarray as xr
 from phasekit.bifurcation.critical import critical_reduced
 from phasekit.bifurcation.fold_values import fold_values
 from phasekit.labelled.arguments import FloatArray, unknown
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.evaluate import evaluate
 from phasekit.labelled.quantities import ROWS, Pass
-from phasekit.labelled.system import Model, as_system
+from phasekit.labelled.system import Model
 from phasekit.laws.trigonometric import Trigonometric
 
 _CRITICAL = ("critical_fold", "critical_sign_change")

@@ -14,8 +14,9 @@ import numpy as np
 
 from phasekit.labelled import quantities
 from phasekit.labelled.arguments import bad, one_of
+from phasekit.labelled.as_system import stands_on
 from phasekit.labelled.quantities import LABELS, LAW, Pass, Quantity, plan_passes
-from phasekit.labelled.system import Model, stands_on
+from phasekit.labelled.system import Model
 
 CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
 SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]

@@ -11,11 +11,12 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import FloatArray, bad, pair, unknown, whole
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.grid import variable
 from phasekit.labelled.memory import refuse_too_large
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labelled.schema import LABEL_DTYPE
-from phasekit.labelled.system import Model, as_system
+from phasekit.labelled.system import Model
 
 _PARTS = 33
 

@@ -11,9 +11,9 @@ import xarray as xr
 
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labelled.arguments import FloatArray, number, whole
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.quantities import ROWS, Pass
 from phasekit.labelled.states import at_states
-from phasekit.labelled.system import as_system
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.equilibria import equilibria
 from phasekit.phase.orbits import orbits_at_gap

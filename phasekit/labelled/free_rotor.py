@@ -12,11 +12,11 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.amended import Amended, States, on_states
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, numeric
+from phasekit.labelled.arguments import FloatArray, NumberLike, bad, named_arguments, numeric
 from phasekit.labelled.grid import variable
+from phasekit.labelled.identity import MODEL, SCHEMA, SCHEMA_VERSION
 from phasekit.labelled.models import GyroRotorDisk
-from phasekit.labelled.schema import MODEL, SCHEMA, SCHEMA_VERSION, versions
-from phasekit.labelled.system import named_arguments
+from phasekit.labelled.schema import versions
 from phasekit.labelled.trajectory import (
     STATE,
     Motion,

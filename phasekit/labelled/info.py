@@ -12,13 +12,13 @@ import xarray as xr
 from phasekit.labelled.arrays import done_tiles, read_plan, zarr_group
 from phasekit.labelled.estimate import Estimate
 from phasekit.labelled.evaluate import lay_out
+from phasekit.labelled.identity import SCHEMA
 from phasekit.labelled.job import Job, Left
 from phasekit.labelled.memory import human
 from phasekit.labelled.partial import COMPUTED
 from phasekit.labelled.place import Place, place_of
 from phasekit.labelled.plan import Plan
 from phasekit.labelled.quantities import STATES, plan_passes
-from phasekit.labelled.schema import SCHEMA
 from phasekit.labelled.store import open_map
 from phasekit.labelled.system import MODELS
 

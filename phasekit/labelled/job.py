@@ -17,10 +17,10 @@ from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.arrays import done_tiles, read_plan, reason, refuse_damaged, zarr_group
 from phasekit.labelled.estimate import SAMPLES, Estimate, Share, estimate
 from phasekit.labelled.evaluate import Layout, leaves
+from phasekit.labelled.identity import MODEL, model_name
 from phasekit.labelled.parts import Part
 from phasekit.labelled.place import Place
 from phasekit.labelled.plan import Plan, continued, new_plan, with_parts
-from phasekit.labelled.schema import MODEL, model_name
 from phasekit.labelled.tile import Tile
 from phasekit.labelled.tiling import cut
 

@@ -15,11 +15,12 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import NumberLike, bad, numeric, one_of
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.models import GyroRotorDisk
 from phasekit.labelled.quantities import DISK, Quantity, select
 from phasekit.labelled.states import at_states
-from phasekit.labelled.system import Model, as_system
+from phasekit.labelled.system import Model
 
 FRAMES = ("disk", "carrier")
 CURVES = ("equilibria", "separatrix", "orbit")

@@ -3,116 +3,20 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from phasekit.bifurcation.critical import critical_disk
+from phasekit.constants import STANDARD_GRAVITY
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad, same
+from phasekit.labelled.arguments import FloatArray, NumberLike, Value, bad
 from phasekit.labelled.grid import combine
-from phasekit.labelled.system import (
-    MODELS,
-    Model,
-    Parameter,
-    attrs_of,
-    model,
-    named_arguments,
-)
-from phasekit.laws.trigonometric import Values
+from phasekit.labelled.parameter import Parameter, attrs_of
+from phasekit.labelled.system import Model, model
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_products
-
-STANDARD_GRAVITY = 9.80665
-
-
-class _ABC(NamedTuple):
-    A: Any
-    B: Any
-    C: Any
-
-
-class Coefficients(Model, _ABC):
-    """Coefficients of ``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``, in s^-2.
-
-    A system by themselves; every other system reduces to them. Of any sign, zero included.
-
-    Parameters
-    ----------
-    A, B, C : float, 1-D array_like or xarray.DataArray
-        Coefficients of the potential ``V = -B cos phi + (A/2) cos^2 phi - C sin phi``.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not a real, finite number or an array of numbers.
-
-    Notes
-    -----
-    In the papers' notation ``A = Omega^2``, ``B = lambda Omega^2``, ``C = psi Omega^2``
-    ([Veljovic2015] (12)).
-
-    Examples
-    --------
-    >>> import phasekit as pk
-    >>> c = pk.Coefficients(4.0, 1.0, 0.5)
-    >>> c
-    Coefficients(A=4.0, B=1.0, C=0.5)
-    >>> A, B, C = c
-    >>> c.replace(B=[1.0, 2.0])
-    Coefficients(A=4.0, B=[1.0, 2.0], C=0.5)
-    """
-
-    __slots__ = ()
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="A", units="s-2", long_name="coefficient of -sin(phi) cos(phi), Omega^2"),
-        Parameter(name="B", units="s-2", long_name="coefficient of sin(phi), lambda Omega^2"),
-        Parameter(name="C", units="s-2", long_name="coefficient of -cos(phi), psi Omega^2"),
-    )
-
-    def __new__(cls, A: NumberLike, B: NumberLike, C: NumberLike) -> Coefficients:
-        """Check the values and keep them."""
-        kept = [p.check(x) for p, x in zip(cls.declared, (A, B, C), strict=True)]
-        return super().__new__(cls, *kept)
-
-    @classmethod
-    def _make(cls, iterable: Iterable[Any]) -> Coefficients:  # type: ignore[override]
-        """Make coefficients from three values, checked; ``_replace`` comes here as well."""
-        return cls(*iterable)
-
-    def coefficients(self) -> Coefficients:
-        """Return itself: coefficients are a system."""
-        return self
-
-    @staticmethod
-    def products(v: Values) -> tuple[Any, Any, Any, Any]:
-        """The coefficients themselves."""
-        return v["A"], v["B"], v["C"], 1
-
-    def __eq__(self, other: object) -> bool:
-        """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
-        if isinstance(other, Model):
-            return Model.__eq__(self, other)
-        if not isinstance(other, tuple) or len(other) != 3:
-            return NotImplemented
-        return all(same(x, y) for x, y in zip(self, other, strict=True))
-
-    def __ne__(self, other: object) -> bool:
-        """Return the opposite of ``==``, in place of the tuple's."""
-        return not self == other
-
-    def __hash__(self) -> int:
-        """Hash as the tuple that it equals, or by the arrays that it holds."""
-        return (
-            tuple.__hash__(self) if all(isinstance(x, float) for x in self) else super().__hash__()
-        )
-
-
-Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
-MODELS["Coefficients"] = Coefficients
-
 
 INERTIA_NAMES = (
     "moment of inertia about u2",

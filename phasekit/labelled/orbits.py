@@ -14,12 +14,11 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import OrbitFamily, ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric, one_of
+from phasekit.labelled.arguments import NumberLike, bad, describe, numeric, one_of
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.dispatch import SIDES, pass_from
 from phasekit.labelled.quantities import select
 from phasekit.labelled.states import at_states
-from phasekit.labelled.system import as_system
-from phasekit.phase.action_angle import state_of as state_of_codes
 
 #: Families that have orbits of given action.
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
@@ -254,20 +253,3 @@ def _codes(family: Any) -> Any:
     if isinstance(kept, float) and kept not in FAMILIES.values():
         raise ParameterError(f"family: got {describe(family)}, wants {wants}, or its code")
     return kept
-
-
-def states_of(
-    A: FloatArray,
-    B: FloatArray,
-    C: FloatArray,
-    action: FloatArray,
-    angle: FloatArray,
-    family: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """States by action and angle, for codes of families that are kept as floats.
-
-    What is no such code gives NaN.
-    """
-    codes = np.where(np.isin(family, list(FAMILIES.values())), family, OrbitFamily.NONE)
-    phi, dphi = state_of_codes(A, B, C, action, angle, codes.astype(np.int8))
-    return phi, dphi

@@ -16,14 +16,16 @@ from phasekit.labelled.arguments import (
     Value,
     bad,
     brief,
+    named_arguments,
     number,
     numeric,
     pair,
     same,
     unknown,
 )
+from phasekit.labelled.parameter import Parameter
 from phasekit.labelled.quantities import LABELS, ROWS, STATES
-from phasekit.labelled.system import MODELS, Model, Parameter, named_arguments
+from phasekit.labelled.system import MODELS, Model
 from phasekit.laws.formulas import NAME, is_name, read_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
@@ -278,7 +280,7 @@ class Potential(Model):
         ParameterError
             If the map was made with another model, or a parameter's coordinate is gone.
         """
-        from phasekit.labelled.schema import model_name, parameter_values
+        from phasekit.labelled.identity import model_name, parameter_values
 
         if model_name(ds) != cls.__name__:
             raise ParameterError(

@@ -466,7 +466,7 @@ PASSES: tuple[Pass, ...] = (
     ),
     Pass("phasekit.phase.orbits:orbits", (*_ABC, "state_phi", "state_dphi"), ("orbits",)),
     Pass(
-        "phasekit.labelled.orbits:states_of",
+        "phasekit.phase.action_angle:state_of_numbers",
         (*_ABC, "state_action", "state_angle", "state_family"),
         ("state_of",),
     ),

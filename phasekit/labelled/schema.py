@@ -14,18 +14,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import describe
 from phasekit.labelled.grid import variable
+from phasekit.labelled.identity import MODEL, SCHEMA, SCHEMA_VERSION
 from phasekit.labelled.quantities import LABELS, ROWS, STATES, Quantity
-from phasekit.labelled.system import Model, Parameter
+from phasekit.labelled.system import Model
 from phasekit.version import __version__
-
-SCHEMA_VERSION = "1"
-
-MODEL = "phasekit_model"
-SCHEMA = "phasekit_schema"
-
 
 #: Dtype of label coordinates: variable-length strings, the only ones that zarr v3 stores without a
 #: warning. From 2026.9 on xarray reads them back from zarr as they were written; netCDF gives
@@ -69,50 +62,6 @@ def input_attrs(system: Model, name: str) -> dict[str, str]:
     if name in STATES:
         return {"long_name": STATES[name][1], "units": STATES[name][0]}
     return {}
-
-
-def model_name(ds: Any) -> str:
-    """Return the name of the model that made a Dataset.
-
-    Raises
-    ------
-    ParameterError
-        If it was not made by phasekit, or with another version of the schema.
-    """
-    if not isinstance(ds, xr.Dataset):
-        raise ParameterError(f"ds: got {describe(ds)}, wants a Dataset that phasekit made")
-    if MODEL not in ds.attrs:
-        raise ParameterError(
-            f"ds: got a Dataset without the attribute {MODEL!r}, wants one that phasekit made; "
-            "operations that drop attributes need keep_attrs=True"
-        )
-    if ds.attrs.get(SCHEMA) != SCHEMA_VERSION:
-        raise ParameterError(
-            f"ds: got schema {ds.attrs.get(SCHEMA)!r}, wants {SCHEMA_VERSION!r}; "
-            "it was made by another version of phasekit: make it anew or read it with that version"
-        )
-    return str(ds.attrs[MODEL])
-
-
-def parameter_values(ds: xr.Dataset, declared: Iterable[Parameter]) -> dict[str, Any]:
-    """Read a model's parameters from a Dataset: scalars where selected, DataArrays elsewhere.
-
-    Raises
-    ------
-    ParameterError
-        If the coordinate of a parameter that is not optional is gone.
-    """
-    values: dict[str, Any] = {}
-    for parameter in declared:
-        name = parameter.name
-        if name in ds.variables:
-            values[name] = ds[name]
-        elif not parameter.optional:
-            raise ParameterError(
-                f"ds: got no coordinate {name!r}, which the model needs; select cells with .sel or "
-                ".isel without drop=True, and keep the scalar coordinates"
-            )
-    return values
 
 
 def restore(ds: xr.Dataset) -> xr.Dataset:

@@ -14,10 +14,10 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, numeric
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.evaluate import evaluate
 from phasekit.labelled.quantities import AXES, Pass, Quantity
-from phasekit.labelled.system import as_system
 
 
 def at_states(

@@ -16,9 +16,10 @@ import xarray as xr
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.arguments import bad
 from phasekit.labelled.arrays import reason
+from phasekit.labelled.identity import MODEL, model_name
 from phasekit.labelled.partial import with_computed
 from phasekit.labelled.place import NETCDF, ZARR, Place, place_of
-from phasekit.labelled.schema import MODEL, model_name, restore
+from phasekit.labelled.schema import restore
 
 
 class WholeTarget:

@@ -12,6 +12,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.evaluate import Layout, evaluate, lay_out, leaves
 from phasekit.labelled.job import Job, plan_job
@@ -24,7 +25,7 @@ from phasekit.labelled.options import (
 )
 from phasekit.labelled.quantities import STATES, Pass, Quantity, select
 from phasekit.labelled.store import WholeTarget, open_map, target_of
-from phasekit.labelled.system import Model, as_system
+from phasekit.labelled.system import Model
 
 
 def sweep(

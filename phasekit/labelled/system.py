@@ -9,172 +9,39 @@ follow from that declaration.
 from __future__ import annotations
 
 import functools
-import inspect
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import (
     FloatArray,
+    NumberLike,
     Value,
-    bad,
     brief,
-    numeric,
+    named_arguments,
     same,
     unknown,
 )
-from phasekit.laws.ladder import Conservative, Law
+from phasekit.labelled.grid import combine
+from phasekit.labelled.identity import model_name, parameter_values
+from phasekit.labelled.parameter import Parameter, attrs_of
+from phasekit.labelled.quantities import STATES
+from phasekit.laws.ladder import Conservative
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from phasekit.labelled.guises import Reduced
-    from phasekit.labelled.models import Coefficients
 
 #: Every model by its name, as maps store it.
 MODELS: dict[str, type[Model]] = {}
 
 
-def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
-    """Return the system that an argument is.
-
-    Parameters
-    ----------
-    system : Any
-        What was given.
-    rung : type, optional
-        The rung of the ladder on which its law has to stand.
-    what : str, optional
-        What needs that.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a system, with the way from what it is to one.
-    """
-    if isinstance(system, Model):
-        return stands_on(system, rung, what)
-    make: Callable[..., Model] = MODELS["Coefficients"]
-    if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
-        coefficients = system.coefficients()
-        if isinstance(coefficients, tuple) and len(coefficients) == 3:
-            return make(*coefficients)
-    hint = ""
-    if isinstance(system, (tuple, list)) and len(system) == 3:
-        hint = "three coefficients make one: pk.Coefficients(A, B, C)"
-    elif isinstance(system, type):
-        hint = "it is a class: call it with its parameters"
-    elif hasattr(system, "data_vars"):
-        hint = "a map gives its system back by ds.phasekit.system()"
-    raise bad("system", system, f"one of {', '.join(MODELS)}", hint)
-
-
-def stands_on(system: Model, rung: type[Law], what: str) -> Model:
-    """Return a system whose law stands on a rung, or on a more special one.
-
-    Raises
-    ------
-    ParameterError
-        If it does not.
-    """
-    if issubclass(system.rung, rung):
-        return system
-    raise ParameterError(
-        f"system: got {system!r}, wants {rung.called}, because {what} is in closed form"
-    )
-
-
 ModelType = TypeVar("ModelType", bound="Model")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Parameter:
-    """One declared parameter of a model: its name, meaning, unit and domain."""
-
-    name: str
-    units: str
-    long_name: str
-    low: float = -np.inf
-    high: float = np.inf
-    positive: bool = False  # zero is excluded
-    optional: bool = False
-
-    @property
-    def least(self) -> float:
-        """The least value, just above zero where that is excluded."""
-        return max(self.low, math.ulp(0.0)) if self.positive else self.low
-
-    @property
-    def example(self) -> float:
-        """A value of the domain, for where the parameter's own value does not count."""
-        if np.isfinite(self.low) and np.isfinite(self.high):
-            return 0.5 * (self.low + self.high)
-        return max(1.0, self.low)
-
-    @property
-    def wants(self) -> str:
-        """The domain in words."""
-        if self.positive:
-            domain = "a number > 0"
-        elif self.low == 0.0 and self.high == np.inf:
-            domain = "a number >= 0"
-        elif np.isfinite(self.high):
-            domain = f"a number from {self.low:.6g} to {self.high:.6g}"
-        else:
-            domain = "a finite number"
-        units = {"1": "", "rad": " in radians"}.get(self.units, f" in {self.units}")
-        return domain + units
-
-    def valid(self, value: Any) -> NDArray[np.bool_]:
-        """Whether each value lies in the domain; NaN does not."""
-        inside = np.isfinite(value) & (value >= self.low) & (value <= self.high)
-        return np.asarray(inside & (value > 0) if self.positive else inside)
-
-    def check(self, value: Any) -> Value:
-        """Return the value as it is kept, or raise a `ParameterError`.
-
-        Cells of arrays that lie outside the domain are kept: they give invalid cells.
-        """
-        kept = numeric(self.name, value, self.units)
-        if isinstance(kept, float):
-            if not self.valid(kept):
-                in_degrees = self.units == "rad" and self.valid(kept * np.pi / 180.0)
-                hint = f"if it is in degrees: {kept:.15g} * pk.deg" if in_degrees else ""
-                raise bad(self.name, value, self.wants, hint)
-            return kept
-        if isinstance(kept, np.ndarray):
-            return kept
-        return self._plain_axis(kept)
-
-    def _plain_axis(self, kept: xr.DataArray) -> Value:
-        """Keep a DataArray on the parameter's own dim as the 1-D array that it is."""
-        if self.name not in kept.dims:
-            return kept
-        if kept.ndim > 1:
-            wants = f"a dim {self.name!r} only where it is the one dim (it is the axis then)"
-            raise bad(self.name, kept, wants, "rename the dim")
-        if self.name in kept.coords and not np.array_equal(
-            kept.coords[self.name].values, kept.values, equal_nan=True
-        ):
-            wants = f"a coordinate {self.name!r} that equals its values"
-            raise bad(self.name, kept, wants, f"drop it with .drop_vars({self.name!r})")
-        if kept.chunks is not None:  # stays lazy
-            return kept.drop_vars(self.name, errors="ignore")
-        array = np.array(kept.values)
-        array.flags.writeable = False
-        return array
-
-
-def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:
-    """Attributes of the coordinates or results that are named as these parameters."""
-    return {p.name: {"long_name": p.long_name, "units": p.units} for p in parameters}
 
 
 class Model:
@@ -218,9 +85,8 @@ class Model:
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a parameter or state; None where it may be any."""
-        from phasekit.labelled.schema import input_attrs
-
-        return input_attrs(self, name).get("units")
+        units = {parameter.name: parameter.units for parameter in self.declared}
+        return units.get(name) or STATES.get(name, (None,))[0]
 
     @property
     def definition(self) -> dict[str, str]:
@@ -269,9 +135,6 @@ class Model:
         Coefficients
             Floats, or DataArrays on the parameters' dims where a parameter is an array.
         """
-        from phasekit.labelled.grid import combine
-        from phasekit.labelled.models import Coefficients
-
         names = self.formula_inputs()
         used = {name: self.parameters[name] for name in names}
 
@@ -296,8 +159,6 @@ class Model:
         ParameterError
             If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
         """
-        from phasekit.labelled.guises import reduce
-
         return reduce(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -336,8 +197,6 @@ class Model:
         ParameterError
             If the map was made with another model, or a parameter's coordinate is gone.
         """
-        from phasekit.labelled.schema import model_name, parameter_values
-
         name = model_name(ds)
         if name != cls.__name__:
             raise ParameterError(
@@ -372,22 +231,163 @@ def model(cls: type[ModelType]) -> type[ModelType]:
     return cls
 
 
-def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., Any]:
-    """Make a call with an unknown, missing or surplus argument raise a `ParameterError`."""
-    signature = inspect.signature(function)
-    expected = dict(list(signature.parameters.items())[1:])  # without self or cls
+class _ABC(NamedTuple):
+    A: Any
+    B: Any
+    C: Any
 
-    @functools.wraps(function)
-    def checked(first: Any, *args: Any, **kwargs: Any) -> Any:
-        for name in kwargs:
-            if name not in expected:
-                raise unknown(f"parameter of {title}", name, expected)
-        try:
-            signature.bind(first, *args, **kwargs)
-        except TypeError as error:
-            raise ParameterError(
-                f"{title}: {error}; its parameters are {', '.join(expected)}"
-            ) from None
-        return function(first, *args, **kwargs)
 
-    return checked
+class Coefficients(Model, _ABC):
+    """Coefficients of ``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``, in s^-2.
+
+    A system by themselves; every other system reduces to them. Of any sign, zero included.
+
+    Parameters
+    ----------
+    A, B, C : float, 1-D array_like or xarray.DataArray
+        Coefficients of the potential ``V = -B cos phi + (A/2) cos^2 phi - C sin phi``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a real, finite number or an array of numbers.
+
+    Notes
+    -----
+    In the papers' notation ``A = Omega^2``, ``B = lambda Omega^2``, ``C = psi Omega^2``
+    ([Veljovic2015] (12)).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> c = pk.Coefficients(4.0, 1.0, 0.5)
+    >>> c
+    Coefficients(A=4.0, B=1.0, C=0.5)
+    >>> A, B, C = c
+    >>> c.replace(B=[1.0, 2.0])
+    Coefficients(A=4.0, B=[1.0, 2.0], C=0.5)
+    """
+
+    __slots__ = ()
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="A", units="s-2", long_name="coefficient of -sin(phi) cos(phi), Omega^2"),
+        Parameter(name="B", units="s-2", long_name="coefficient of sin(phi), lambda Omega^2"),
+        Parameter(name="C", units="s-2", long_name="coefficient of -cos(phi), psi Omega^2"),
+    )
+
+    def __new__(cls, A: NumberLike, B: NumberLike, C: NumberLike) -> Coefficients:
+        """Check the values and keep them."""
+        kept = [p.check(x) for p, x in zip(cls.declared, (A, B, C), strict=True)]
+        return super().__new__(cls, *kept)
+
+    @classmethod
+    def _make(cls, iterable: Iterable[Any]) -> Coefficients:  # type: ignore[override]
+        """Make coefficients from three values, checked; ``_replace`` comes here as well."""
+        return cls(*iterable)
+
+    def coefficients(self) -> Coefficients:
+        """Return itself: coefficients are a system."""
+        return self
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """The coefficients themselves."""
+        return v["A"], v["B"], v["C"], 1
+
+    def __eq__(self, other: object) -> bool:
+        """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
+        if isinstance(other, Model):
+            return Model.__eq__(self, other)
+        if not isinstance(other, tuple) or len(other) != 3:
+            return NotImplemented
+        return all(same(x, y) for x, y in zip(self, other, strict=True))
+
+    def __ne__(self, other: object) -> bool:
+        """Return the opposite of ``==``, in place of the tuple's."""
+        return not self == other
+
+    def __hash__(self) -> int:
+        """Hash as the tuple that it equals, or by the arrays that it holds."""
+        return (
+            tuple.__hash__(self) if all(isinstance(x, float) for x in self) else super().__hash__()
+        )
+
+
+Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
+MODELS["Coefficients"] = Coefficients
+
+
+@model
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduced(Model):
+    """The papers' reduced form, in lambda and psi.
+
+    ``phi'' + Omega^2 (lam - cos phi) sin phi - Omega^2 psi cos phi = 0``.
+
+    Parameters
+    ----------
+    lam, psi : float, 1-D array_like or xarray.DataArray
+        Gravity and eccentric centrifugal force against the coupling term, of any sign.
+    Omega_sq : float or array_like, default 1.0
+        Omega^2 in s^-2; negative for a disk that is nearly in line with its shaft.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a real, finite number or an array of numbers.
+
+    Notes
+    -----
+    [Veljovic2015] (12): ``A = Omega^2``, ``B = lam Omega^2``, ``C = psi Omega^2``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.Reduced(0.25, 0.125, 4.0).coefficients()
+    Coefficients(A=4.0, B=1.0, C=0.5)
+    """
+
+    lam: NumberLike
+    psi: NumberLike
+    Omega_sq: NumberLike = 1.0
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="lam", units="1", long_name="lambda = B/A"),
+        Parameter(name="psi", units="1", long_name="psi = C/A"),
+        Parameter(name="Omega_sq", units="s-2", long_name="Omega^2 = A"),
+    )
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """[Veljovic2015] (12)."""
+        return v["Omega_sq"], v["lam"] * v["Omega_sq"], v["psi"] * v["Omega_sq"], 1
+
+
+def reduce(system: Model) -> Reduced:
+    """Return a system in the papers' reduced form; cells with ``A = 0`` become NaN.
+
+    Raises
+    ------
+    ParameterError
+        If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
+    """
+    A, B, C = system.coefficients()
+    if isinstance(A, float) and A == 0.0:
+        raise ParameterError(
+            "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "
+            "use .coefficients(), which has no such limit"
+        )
+
+    def divide(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
+        with np.errstate(all="ignore"):
+            return np.where(A == 0, np.nan, B / A), np.where(A == 0, np.nan, C / A), A + 0 * (B + C)
+
+    attrs = attrs_of(*system.declared, *Reduced.declared)
+    values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
+    if not all(np.isfinite(value) for value in values if isinstance(value, float)):
+        raise ParameterError(
+            f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which lambda = B/A and "
+            "psi = C/A are finite; use .coefficients(), which has no such limit"
+        )
+    return Reduced(*values)

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from phasekit.mechanics.vectors import ROUNDING, Array, apply, cross, times
 
-if TYPE_CHECKING:
-    from phasekit.mechanics.coupled_state import CoupledRotationState
-
 #: The rotation that a rotator belongs to; the coupled ones (R012, R12, R12c) belong to both.
 AXES = {"R01": 1, "R011": 1, "R022": 2, "R1": 1, "R2": 2}
 
 
-def rotator_bases(state: CoupledRotationState) -> dict[str, tuple[Array, Array]]:
+#: A body in coupled rotation, `phasekit.mechanics.coupled_state.CoupledRotationState`, which
+#: stands above.
+State: TypeAlias = Any
+
+
+def rotator_bases(state: State) -> dict[str, tuple[Array, Array]]:
     """Base vectors by the rotators' names, and the lengths up to which they count as zero."""
     trace = 2.0 * state.body.polar_moment()
     second = ROUNDING * trace
@@ -33,7 +35,7 @@ def rotator_bases(state: CoupledRotationState) -> dict[str, tuple[Array, Array]]
     }
 
 
-def base_rates(state: CoupledRotationState) -> dict[str, Array]:
+def base_rates(state: State) -> dict[str, Array]:
     """Rates of change of the base vectors; of R022, R2 and R12c relative to the carrier.
 
     The parts along the axis that a rotator is perpendicular to are of no account.

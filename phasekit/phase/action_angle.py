@@ -225,3 +225,18 @@ def _limits(cells: Systems) -> tuple[Array, Array]:
     least[moving, 5:] = top[moving, None]
     most[moving, 5:] = np.inf
     return least, most
+
+
+def state_of_numbers(
+    A: npt.ArrayLike,
+    B: npt.ArrayLike,
+    C: npt.ArrayLike,
+    action: npt.ArrayLike,
+    angle: npt.ArrayLike,
+    family: npt.ArrayLike,
+) -> tuple[Array, Array]:
+    """`state_of` for families that are kept as floats; what is no code of one gives NaN."""
+    known = [family.value for family in OrbitFamily if family > 0]
+    codes = np.where(np.isin(family, known), family, OrbitFamily.NONE)
+    phi, dphi = state_of(A, B, C, action, angle, codes.astype(np.int8))
+    return phi, dphi

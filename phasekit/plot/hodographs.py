@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from phasekit.errors import Loop, ParameterError
 from phasekit.labelled.arguments import bad, flag, unknown
+from phasekit.labelled.as_system import as_system
 from phasekit.labelled.integral import gradient
 from phasekit.labelled.machine import is_disk, rotators
-from phasekit.labelled.system import as_system
 from phasekit.mechanics.rotators import ROTATORS
 from phasekit.phase.potential import gradient as slope
 from phasekit.plot import labels, strokes, style

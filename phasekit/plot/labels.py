@@ -11,7 +11,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad, unknown
-from phasekit.labelled.schema import model_name
+from phasekit.labelled.identity import model_name
 from phasekit.labelled.system import MODELS, Model
 from phasekit.plot.style import Angles, angle_factor, angle_unit
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad
-from phasekit.labelled.system import as_system
+from phasekit.labelled.as_system import as_system
 from phasekit.phase.equilibria import Equilibria
 from phasekit.phase.orbits import orbits
 from phasekit.phase.potential import phase_velocity, potential

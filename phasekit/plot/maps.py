@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad, flag, number, unknown
-from phasekit.labelled.schema import model_name
+from phasekit.labelled.identity import model_name
 from phasekit.labelled.system import MODELS
 from phasekit.plot import labels, style
 from phasekit.plot.strands import relative_gap

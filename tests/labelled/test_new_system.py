@@ -10,7 +10,8 @@ import pytest
 
 import phasekit as pk
 from phasekit.labelled.arguments import NumberLike
-from phasekit.labelled.system import MODELS, Model, Parameter, model
+from phasekit.labelled.parameter import Parameter
+from phasekit.labelled.system import MODELS, Model, model
 
 
 @pytest.fixture(scope="module")
