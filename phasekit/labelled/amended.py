@@ -191,6 +191,8 @@ def on_states(
             results = xr.apply_ufunc(
                 applied, *kept.values(), output_core_dims=[dims] * len(rows), join="exact"
             )
+    except ParameterError:
+        raise
     except ValueError as error:
         shapes = " and ".join(
             f"{name} of {dict(value.sizes) if isinstance(value, xr.DataArray) else np.shape(value)}"

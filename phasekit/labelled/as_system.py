@@ -55,6 +55,5 @@ def stands_on(system: Model, rung: type[Law], what: str) -> Model:
     """
     if issubclass(system.rung, rung):
         return system
-    raise ParameterError(
-        f"system: got {system!r}, wants {rung.called}, because {what} is in closed form"
-    )
+    because = f"because {what} is in closed form" if rung.labels_fixed else f"for {what}"
+    raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}")

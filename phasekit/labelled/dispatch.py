@@ -17,6 +17,7 @@ from phasekit.labelled.arguments import bad, one_of
 from phasekit.labelled.as_system import stands_on
 from phasekit.labelled.quantities import LABELS, LAW, Pass, Quantity, plan_passes
 from phasekit.labelled.system import Model
+from phasekit.laws.ladder import Law
 
 CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
 SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
@@ -46,9 +47,20 @@ def passes_of(
     """
     rows = tuple(rows)
     for group in dict.fromkeys(row.group for row in rows):
-        stands_on(system, lowest_rung(group), group)
-    states = set(given)
+        if not is_offered(system, group):
+            stands_on(system, max(rungs_of(group), key=depth), group)
+    states = {*given, *system.parameters}
     return tuple(bound(one, system, states) for one in plan_passes(rows, system.rung))
+
+
+def rungs_of(group: str) -> set[type[Law]]:
+    """The rungs on which a group is computed."""
+    return {one.of for one in quantities.PASSES if group in one.groups}
+
+
+def is_offered(system: Model, group: str) -> bool:
+    """Whether a group is computed on the rung of a system's law."""
+    return any(issubclass(system.rung, rung) for rung in rungs_of(group))
 
 
 def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
@@ -86,11 +98,6 @@ def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
         for name, value in options.items()
     }
     return bound(one, system, set(), chosen), notes
-
-
-def lowest_rung(group: str) -> Any:
-    """The most general rung on which a group is computed."""
-    return min((one.of for one in quantities.PASSES if group in one.groups), key=depth)
 
 
 def depth(rung: type) -> int:
@@ -154,4 +161,6 @@ def fitted(
         return rows, passes
     from phasekit.labelled import numbered  # loads scipy, which named labels do not need
 
-    return numbered.fitted(system, kept, passes)
+    counts = [one for one in quantities.PASSES if one.groups == ("labels",)]
+    (count,) = (one for one in counts if issubclass(system.rung, one.of))
+    return numbered.fitted(system, kept, passes, bound(count, system, set(system.parameters)))

@@ -5,18 +5,35 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.amended import Amended, States, on_states
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, named_arguments, numeric
+from phasekit.labelled.arguments import (
+    FloatArray,
+    NumberLike,
+    Value,
+    bad,
+    named_arguments,
+    numeric,
+    same,
+    unknown,
+)
 from phasekit.labelled.grid import variable
-from phasekit.labelled.identity import MODEL, SCHEMA, SCHEMA_VERSION
+from phasekit.labelled.identity import (
+    MODEL,
+    SCHEMA,
+    SCHEMA_VERSION,
+    parameter_values,
+    refuse_another,
+)
 from phasekit.labelled.models import GyroRotorDisk
+from phasekit.labelled.parameter import Parameter
 from phasekit.labelled.schema import versions
+from phasekit.labelled.system import MODELS, Model
 from phasekit.labelled.trajectory import (
     STATE,
     Motion,
@@ -31,6 +48,7 @@ from phasekit.labelled.trajectory import (
     strobe,
     trajectory,
 )
+from phasekit.laws.ladder import Law, Routhian
 from phasekit.mechanics import two_degrees as mechanics
 from phasekit.mechanics.two_degrees import TwoDegrees
 
@@ -42,8 +60,8 @@ class Accelerations(NamedTuple):
     ddphi: Any
 
 
-@dataclass(frozen=True)
-class FreeGyroRotor:
+@dataclass(frozen=True, eq=False)
+class FreeGyroRotor(Model):
     """Heavy disk on a support that turns freely about the vertical, or under torques.
 
     The machine of `GyroRotorDisk` with two degrees of freedom: the support's angular velocity
@@ -57,6 +75,10 @@ class FreeGyroRotor:
         at the start, unless told otherwise.
     carrier_inertia : float
         The support's own moment of inertia about the vertical axis, kg m^2, >= 0.
+    momentum : float, optional
+        Angular momentum about the vertical axis in kg m^2/s, at which the machine is a system of
+        one degree of freedom, with equilibria (the steady rotations), maps and portraits; left out,
+        that of the support's omega1 with the disk at rest at phi = 0.
 
     Raises
     ------
@@ -80,7 +102,25 @@ class FreeGyroRotor:
     """
 
     disk: GyroRotorDisk
-    carrier_inertia: float
+    carrier_inertia: NumberLike
+    momentum: NumberLike | None = None
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        *GyroRotorDisk.declared,
+        Parameter(
+            name="carrier_inertia",
+            units="kg m2",
+            long_name="moment of inertia of the support",
+            low=0.0,
+        ),
+        Parameter(
+            name="momentum",
+            units="kg m2 s-1",
+            long_name="angular momentum about the vertical axis",
+            optional=True,
+        ),
+    )
+    rung: ClassVar[type[Law]] = Routhian
 
     def __post_init__(self) -> None:
         """Check that it is one machine, with all of its masses."""
@@ -95,10 +135,93 @@ class FreeGyroRotor:
         wants = "a number >= 0 in kg m2"
         inertia = checked_number("carrier_inertia", self.carrier_inertia, wants, low=0.0)
         object.__setattr__(self, "carrier_inertia", inertia)
+        if self.momentum is not None:
+            wants = "an angular momentum in kg m2 s-1 whose square is finite"
+            momentum = checked_number("momentum", self.momentum, wants)
+            if not np.isfinite(momentum * momentum):
+                raise bad("momentum", momentum, wants)
+            object.__setattr__(self, "momentum", momentum)
+
+    @property
+    def law(self) -> Law:
+        """Equilibria at a momentum that is kept."""
+        return Routhian()
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters of disk and support by name, those that are None left out."""
+        own = {"carrier_inertia": self.carrier_inertia, "momentum": self.momentum}
+        given: dict[str, Any] = {k: v for k, v in own.items() if v is not None}
+        return {**self.disk.parameters, **given}
+
+    @classmethod
+    def formula_inputs(cls) -> tuple[str, ...]:
+        """Names of the parameters on which the equilibria depend."""
+        return ("beta", "e", "a", "r", "omega1", "m", "g", "carrier_inertia", "momentum")
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some parameters changed, of the disk or of the support.
+
+        Arrays make axes of maps; a machine with arrays has equilibria, and no single motion.
+
+        Raises
+        ------
+        ParameterError
+            If a name is not one of the parameters, or a value is unusable.
+        """
+        names = ["disk", *(parameter.name for parameter in self.declared)]
+        for name in changes:
+            if name not in names:
+                raise unknown(f"parameter of {type(self).__name__}", name, names)
+        disk = changes.pop("disk", self.disk)
+        own = {n: changes.pop(n, getattr(self, n)) for n in ("carrier_inertia", "momentum")}
+        return type(self)._of(disk.replace(**changes) if changes else disk, own)
+
+    @classmethod
+    def from_dataset(cls, ds: xr.Dataset) -> Self:
+        """Rebuild the machine from a map, or from any selection of it.
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, or a parameter's coordinate is gone.
+        """
+        refuse_another(ds, cls.__name__)
+        values = parameter_values(ds, cls.declared)
+        own = {n: values.pop(n, None) for n in ("carrier_inertia", "momentum")}
+        return cls._of(GyroRotorDisk(**values), own)
+
+    @classmethod
+    def _of(cls, disk: GyroRotorDisk, own: dict[str, Any]) -> Self:
+        """A machine of parameters some of which may be arrays, cells of a map."""
+        declared = {parameter.name: parameter for parameter in cls.declared}
+        kept = {k: None if v is None else declared[k].check(v) for k, v in own.items()}
+        own_values = (x for x in kept.values() if x is not None)
+        if all(isinstance(x, float) for x in (*disk.parameters.values(), *own_values)):
+            return cls(disk, **own)
+        made = object.__new__(cls)
+        for name, value in {"disk": disk, **kept}.items():
+            object.__setattr__(made, name, value)
+        return made
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same machine; NaN equals NaN."""
+        if not isinstance(other, FreeGyroRotor):
+            return NotImplemented
+        mine, theirs = self.parameters, other.parameters
+        return list(mine) == list(theirs) and all(same(mine[n], theirs[n]) for n in mine)
+
+    def __hash__(self) -> int:
+        """Hash of the parameters; a machine that holds DataArrays has none."""
+        return hash((type(self).__name__, self.disk, self.carrier_inertia, self.momentum))
 
     @functools.cached_property
     def _machine(self) -> TwoDegrees:
         d: Any = self.disk
+        for name, value in self.parameters.items():
+            if not isinstance(value, float) and name != "half_span":
+                hint = "select one cell: ds.isel(...).phasekit.system()"
+                raise bad(name, value, "one number, for a single motion", hint)
         return mechanics.two_degrees(d.beta, d.e, d.a, d.r, d.m, self.carrier_inertia, d.g)
 
     def accelerations(
@@ -516,6 +639,7 @@ class FreeGyroRotor:
 
 
 FreeGyroRotor.__init__ = named_arguments("FreeGyroRotor", FreeGyroRotor.__init__)  # type: ignore[method-assign]
+MODELS["FreeGyroRotor"] = FreeGyroRotor
 
 
 def _times(t: Any, *, two: bool = False) -> FloatArray:

@@ -59,3 +59,13 @@ def parameter_values(ds: xr.Dataset, declared: Iterable[Parameter]) -> dict[str,
                 ".isel without drop=True, and keep the scalar coordinates"
             )
     return values
+
+
+def refuse_another(ds: Any, name: str) -> None:
+    """Raise a `ParameterError` if a Dataset was not made by the model of a name."""
+    made = model_name(ds)
+    if made != name:
+        raise ParameterError(
+            f"ds: got a map of {made}, wants one of {name}; "
+            f"use ds.phasekit.system() or {made}.from_dataset(ds)"
+        )

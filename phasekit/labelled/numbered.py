@@ -15,8 +15,6 @@ from phasekit.labelled.grid import make_grid
 from phasekit.labelled.quantities import LABELS, Labels, Pass, Quantity
 from phasekit.labelled.system import Model
 from phasekit.labelled.tiling import cut, tiles
-from phasekit.phase.numerical import functions
-from phasekit.phase.numerical.formula import Formula, Shape
 
 _POINTWISE = (
     "potential",
@@ -29,24 +27,23 @@ _EMPTY = {"kind": 0, "loop": 0}
 
 
 def fitted(
-    system: Model, rows: Sequence[Quantity], passes: Sequence[Pass]
+    system: Model, rows: Sequence[Quantity], passes: Sequence[Pass], count: Pass
 ) -> tuple[Sequence[Quantity], Sequence[Pass]]:
-    """Return rows and passes with as many numbers on their label dims as there are points.
+    """Return rows and passes with as many numbers on their label dims as `count` finds.
 
     Raises
     ------
     ParameterError
         If what is asked for needs an interval, or loaded parameters.
     """
-    formula: Any = system.law
     if any(row.group not in _POINTWISE for row in rows):
-        need_a_stretch(formula)
+        system.law.check_searchable()
     labels = dict(LABELS)
     if any(dim in ("equilibrium", "saddle") for row in rows for dim in row.dims):
-        equilibria, saddles = _most(system, formula)
+        equilibria, saddles = _most(system, count)
         labels["equilibrium"] = (range(equilibria), "equilibrium, by its coordinate")
         labels["saddle"] = (range(saddles), "saddle, by its coordinate")
-    found = [_worded(row, formula, labels) for row in rows]
+    found = [_worded(row, system, labels) for row in rows]
     shapes = {row.name: row.label_shape for row in found}
     return found, [
         replace(one, function=functools.partial(_padded, one, shapes))
@@ -56,22 +53,7 @@ def fitted(
     ]
 
 
-def need_a_stretch(formula: Formula) -> None:
-    """Refuse to look for the equilibria of a function on the whole line.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if formula.shape is Shape.GENERAL and not formula.bounded:
-        raise ParameterError(
-            f"interval: got None, wants (low, high), the stretch of the line on which the "
-            f"equilibria of {formula.text} are looked for, because it is not a polynomial; or "
-            "give its period, if it has one"
-        )
-
-
-def _most(system: Model, formula: Formula) -> tuple[int, int]:
+def _most(system: Model, count: Pass) -> tuple[int, int]:
     """Greatest numbers of equilibria and saddles over all cells of the parameters."""
     grid = make_grid(system.parameters)
     if grid.lazy:
@@ -80,28 +62,19 @@ def _most(system: Model, formula: Formula) -> tuple[int, int]:
             "of equilibria is not known before they are found"
         )
     dims = tuple(grid.sizes)
-    arrays = [grid.aligned(name, dims) for name in formula.names]
+    arrays = [grid.aligned(name, dims) for name in count.inputs]
     shape = tuple(grid.sizes.values())
     found = [
-        functions.most(formula, *(cut(array, tile) for array in arrays))
+        count.resolved(*(cut(array, tile) for array in arrays))
         for tile in tiles(shape, 4096)
         if prod(shape)
     ]
     return max(n for n, _ in found), max(n for _, n in found)
 
 
-def _worded(row: Quantity, formula: Formula, labels: dict[str, Labels]) -> Quantity:
-    on_angles = formula.period is not None and abs(formula.period - 2.0 * np.pi) < 1e-12
-    words: dict[str, Any] = {"labels": labels, "source": f"V = {formula.text}"}
-    if row.name == "potential":
-        words["equation"] = f"V = {formula.text}"
-    elif row.general:
-        words["equation"] = row.general
-    if row.units == "rad" and not on_angles:
-        words["units"] = "1"
-        words["long_name"] = row.long_name.replace("signed angle", "signed distance").replace(
-            "angle", "coordinate"
-        )
+def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity:
+    words: dict[str, Any] = {"labels": labels, **row.variant(system.rung)}
+    words |= system.law.words(row.name, row.units, row.long_name)
     if row.name == "n_equilibria":
         words["dtype"] = "int16"
     return replace(row, **words)
@@ -109,8 +82,7 @@ def _worded(row: Quantity, formula: Formula, labels: dict[str, Labels]) -> Quant
 
 def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:
     """Call a pass and fill its label axes up to the lengths that the whole map has."""
-    assert callable(one.function)
-    result = one.function(*arrays)
+    result = one.resolved(*arrays)
     filled = []
     for group in result if len(one.groups) > 1 else (result,):
         fields = {}

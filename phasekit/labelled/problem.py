@@ -13,6 +13,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labelled.arguments import bad, flag, unknown
+from phasekit.labelled.as_system import stands_on
 from phasekit.labelled.problem_parts import (
     make_field,
     names_of,
@@ -20,6 +21,7 @@ from phasekit.labelled.problem_parts import (
 )
 from phasekit.labelled.system import MODELS, Model
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
+from phasekit.laws.ladder import Conservative
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -185,7 +187,7 @@ class Problem:
         ParameterError
             If a parameter is an array.
         """
-        law = system.law
+        law: Any = stands_on(system, Conservative, "continuation").law
         names = system.formula_inputs()
         values: dict[str, float] = {}
         for key in names:

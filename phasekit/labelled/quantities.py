@@ -27,7 +27,7 @@ from phasekit.errors import (
     Topology,
 )
 from phasekit.labelled.arguments import bad, unknown
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 
 #: Labels of a dim, names or numbers, and its long name.
@@ -80,6 +80,7 @@ ACTION_ANGLE = f"{FROM_ENERGY}; [LandauLifshitz1976] section 50"
 ROTATORS_OF = "[HedrihVeljovic2011] (5.1), (6.6), corrected"
 PRESSURES = "[HedrihVeljovic2013] (22)-(28), corrected"
 FIXED_PRESSURES = "[HedrihVeljovic2013] (8), (9), corrected"
+ROUTH_OF = "Routh's reduction; [Veljovic2015] (11) with omega1 free, corrected"
 SMALL = f"expansion of {FROM_MOTION}; [LandauLifshitz1976] section 28"
 
 
@@ -97,8 +98,8 @@ class Quantity:
     source: str
     flags: type[IntEnum] | None = None
     #: The most general rung of the ladder of laws on which it is computed.
-    of: type[Conservative] = Conservative
-    #: The equation on that rung, where `equation` is that of (A, B, C).
+    of: type[Law] = Law
+    #: The equation in any potential, where `equation` is that of (A, B, C).
     general: str = ""
     #: Labels of the row's dims where they are not those of the table.
     labels: Mapping[str, Labels] | None = field(default=None, compare=False)
@@ -116,6 +117,12 @@ class Quantity:
             attrs["flag_values"] = np.array([flag.value for flag in self.flags], dtype=np.int8)
             attrs["flag_meanings"] = " ".join(flag.name.lower() for flag in self.flags)
         return attrs
+
+    def variant(self, rung: type[Law]) -> Mapping[str, str]:
+        """What is said of it on a rung below that of (A, B, C): equation, source, units, ..."""
+        if issubclass(rung, Routhian):
+            return ROUTH.get(self.name, {})
+        return {"equation": self.general} if self.general else {}
 
     @property
     def label_shape(self) -> tuple[int, ...]:
@@ -146,7 +153,7 @@ class Pass:
     inputs: tuple[str, ...]
     groups: tuple[str, ...]
     #: The rung of the ladder of laws for which it holds.
-    of: type[Conservative] = Trigonometric
+    of: type[Law] = Trigonometric
     #: Keywords that a call has to say: numbers of a center or saddle, a side.
     options: tuple[str, ...] = ()
     #: States that it can do without, with their keywords.
@@ -423,6 +430,28 @@ QUANTITIES += (
     *_loads("orbit_forces", ("bearing",), *_FORCE_LOADS),
 )
 
+QUANTITIES += (
+    Quantity("support_speed", "steady_rotations", _BRANCHES, "float64", "s-1",
+             "angular velocity of the support in the steady rotation", "p/M11(phi)", ROUTH_OF,
+             of=Routhian),
+)  # fmt: skip
+
+#: Equilibria of the amended potential, which are steady rotations.
+ROUTH: dict[str, dict[str, str]] = {
+    "phi": {"long_name": "angle of the disk in a steady rotation",
+            "equation": "V' = p^2 M11'/(2 M11^2)"},
+    "kind": {"equation": "sign of V_p''"},
+    "energy": {"units": "J", "long_name": "amended potential at the equilibrium",
+               "equation": "V_p = V + p^2/(2 M11)"},
+    "curvature": {"units": "J", "long_name": "curvature of the amended potential",
+                  "equation": "V_p''"},
+    "natural_frequency": {"equation": "sqrt(V_p''/(M22 - M12^2/M11))"},
+    "exponent": {"equation": "sqrt(-V_p''/(M22 - M12^2/M11))"},
+    "n_equilibria": {"equation": "zeros of M11^2 V' - p^2 M11'/2"},
+}  # fmt: skip
+for _words in ROUTH.values():
+    _words["source"] = ROUTH_OF
+
 ROWS: dict[str, Quantity] = {row.name: row for row in QUANTITIES}
 
 #: Among the inputs of a pass: the law, and its parameters.
@@ -437,6 +466,8 @@ _STATE = ("state_phi", "state_dphi")
 _LOOPS = ("saddle_phi", "saddle_exponent", "turning_offset", "loop")
 
 _MOVED = (("state_ddphi", "ddphi"), ("domega1", "domega1"))
+_FREE = ("beta", "e", "a", "r", "m", "g", "carrier_inertia", "omega1")
+_KEPT = (("momentum", "momentum"),)
 _NUMERICAL = "phasekit.phase.numerical.functions:"
 
 #: Passes over the cells, those that compute more groups first; `phasekit.labelled.dispatch` finds
@@ -515,10 +546,20 @@ PASSES: tuple[Pass, ...] = (
         ("motion",),
         options=("saddle", "side"),
     ),
+    # The freely carried disk, at the momentum that it keeps.
+    *(
+        Pass(f"phasekit.mechanics.steady:{name}", (*_FREE, *more), groups, Routhian, (), _KEPT)
+        for name, more, groups in (
+            ("steady", (), ("equilibria",)),
+            ("support_speed", ("phi",), ("steady_rotations",)),
+            ("most", (), ("labels",)),
+        )
+    ),
     # Any potential, numerically.
     *(
         Pass(_NUMERICAL + name, (LAW, *states), groups, Conservative, options)
         for name, states, groups, options in (
+            ("most", (), ("labels",), ()),
             ("phase_space", (), ("equilibria", "separatrices"), ()),
             ("equilibria", (), ("equilibria",), ()),
             ("separatrices", (), ("separatrices",), ()),
@@ -568,9 +609,7 @@ def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
     return tuple(row for row in QUANTITIES if row.name in wanted)
 
 
-def plan_passes(
-    rows: Iterable[Quantity], rung: type[Conservative] = Trigonometric
-) -> tuple[Pass, ...]:
+def plan_passes(rows: Iterable[Quantity], rung: type[Law] = Trigonometric) -> tuple[Pass, ...]:
     """Return the passes that compute the rows on a rung, as few as the table has."""
     missing = {row.group for row in rows}
     chosen: list[Pass] = []
@@ -584,7 +623,7 @@ def plan_passes(
     return tuple(chosen)
 
 
-def fitting(rung: type[Conservative]) -> list[Pass]:
+def fitting(rung: type[Law]) -> list[Pass]:
     """Return the lines of the table for a rung: of each group the most special ones."""
     able = [one for one in PASSES if issubclass(rung, one.of) and not one.options]
     special = {group: max(len(one.of.__mro__) for one in able if group in one.groups)
@@ -594,7 +633,7 @@ def fitting(rung: type[Conservative]) -> list[Pass]:
     ]
 
 
-def pass_of(group: str, chosen: Sequence[Pass], rung: type[Conservative] = Trigonometric) -> Pass:
+def pass_of(group: str, chosen: Sequence[Pass], rung: type[Law] = Trigonometric) -> Pass:
     """Return the pass for a group: one of those chosen, else the one that computes the least."""
     for candidate in (*chosen, *reversed(fitting(rung))):
         if group in candidate.groups:

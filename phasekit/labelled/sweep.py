@@ -13,7 +13,7 @@ import xarray as xr
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labelled.as_system import as_system
-from phasekit.labelled.dispatch import passes_of
+from phasekit.labelled.dispatch import is_offered, passes_of
 from phasekit.labelled.evaluate import Layout, evaluate, lay_out, leaves
 from phasekit.labelled.job import Job, plan_job
 from phasekit.labelled.memory import refuse_too_large
@@ -27,12 +27,15 @@ from phasekit.labelled.quantities import STATES, Pass, Quantity, select
 from phasekit.labelled.store import WholeTarget, open_map, target_of
 from phasekit.labelled.system import Model
 
+#: What is computed where nothing is said, as far as the system's law offers it.
+OFFERED = ("equilibria", "separatrices")
+
 
 def sweep(
     system: Any,
     axes: Mapping[str, Any] | None = None,
     *,
-    of: str | Iterable[str] = ("equilibria", "separatrices"),
+    of: str | Iterable[str] = OFFERED,
     store: str | PathLike[str] | Any | None = None,
     chunks: int | Mapping[str, int] | None = None,
     workers: int | None = None,
@@ -178,6 +181,8 @@ def _read(
     """Return the system with its axes, what to compute and how, the states, the order of dims."""
     system = as_system(system)
     rows = select(of)
+    if of is OFFERED:
+        rows = tuple(row for row in rows if is_offered(system, row.group))
     passes = passes_of(system, rows)
     needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
     kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])

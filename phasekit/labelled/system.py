@@ -26,10 +26,10 @@ from phasekit.labelled.arguments import (
     unknown,
 )
 from phasekit.labelled.grid import combine
-from phasekit.labelled.identity import model_name, parameter_values
+from phasekit.labelled.identity import parameter_values, refuse_another
 from phasekit.labelled.parameter import Parameter, attrs_of
 from phasekit.labelled.quantities import STATES
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.ladder import Law
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 
@@ -53,7 +53,7 @@ class Model:
     #: Parameters for which folds are known in closed form, with the function that solves for each.
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     #: The rung of its law, which says what can be computed of it.
-    rung: ClassVar[type[Conservative]] = Trigonometric
+    rung: ClassVar[type[Law]] = Trigonometric
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -61,7 +61,7 @@ class Model:
         raise NotImplementedError
 
     @property
-    def law(self) -> Conservative:
+    def law(self) -> Law:
         """The law, and what follows from it."""
         return self.trigonometric()
 
@@ -197,12 +197,7 @@ class Model:
         ParameterError
             If the map was made with another model, or a parameter's coordinate is gone.
         """
-        name = model_name(ds)
-        if name != cls.__name__:
-            raise ParameterError(
-                f"ds: got a map of {name}, wants one of {cls.__name__}; "
-                f"use ds.phasekit.system() or {name}.from_dataset(ds)"
-            )
+        refuse_another(ds, cls.__name__)
         return cls(**parameter_values(ds, cls.declared))
 
     def __repr__(self) -> str:

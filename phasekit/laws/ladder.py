@@ -17,23 +17,41 @@ class Law:
     called: ClassVar[str] = "a system"
     #: What is computed of the parameters before anything else, and may be asked for by name.
     derived: ClassVar[tuple[str, ...]] = ()
+    #: Whether equilibria have names, so that all cells have the same; else they are numbered.
+    labels_fixed: ClassVar[bool] = False
+    #: Which center or saddle is meant where none is named.
+    default: ClassVar[Mapping[str, str]] = {"center": "the lowest", "saddle": "the lowest"}
+
+    def check_searchable(self) -> None:
+        """Refuse to look for equilibria where they cannot all be found.
+
+        Raises
+        ------
+        ParameterError
+        """
+
+    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
+        """What is said of a quantity of this law alone: equation, source, units, long_name."""
+        return {}
 
 
 class Autonomous(Law):
     """A law without time in it: ``x' = f(x; p)``."""
 
 
+class Routhian(Autonomous):
+    """One degree of freedom that a kept momentum leaves of two, with an amended potential."""
+
+    called: ClassVar[str] = "a system with a momentum that is kept"
+
+
 class Conservative(Autonomous):
     """One degree of freedom in a potential: ``x'' = -V'(x; p)``."""
 
     called: ClassVar[str] = "a system in a potential"
-    #: Whether equilibria have names, so that all cells have the same; else they are numbered.
-    labels_fixed: ClassVar[bool] = False
     #: Name of the coordinate, and its period where it is an angle.
     coordinate: str
     period: float | None
-    #: Which center or saddle is meant where none is named.
-    default: ClassVar[Mapping[str, str]] = {"center": "the lowest", "saddle": "the lowest"}
 
     def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V' as a sympy expression of real symbols: of the coordinate and the parameters."""

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
-from phasekit.labelled.numbered import need_a_stretch
 from phasekit.labelled.potential_system import Potential
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.equilibria import Equilibria
@@ -58,7 +57,7 @@ class Terrain:
                     f"system: got an array parameter ({name}), wants a single system; select one "
                     "cell first: ds.isel(...).phasekit.system()"
                 )
-        need_a_stretch(system.formula)
+        system.law.check_searchable()
         points, loops = functions.phase_space(system.formula, *values)
         return cls(system, points, loops, _window(system, points, loops))
 

@@ -61,6 +61,26 @@ class Formula(Conservative):
         own = {symbol: symbols[str(symbol)] for symbol in self.expression.free_symbols}
         return self.expression.xreplace(own).diff(symbols[self.coordinate])
 
+    def check_searchable(self) -> None:
+        """Refuse to look for the equilibria of a function on the whole line."""
+        if self.shape is Shape.GENERAL and not self.bounded:
+            raise ParameterError(
+                f"interval: got None, wants (low, high), the stretch of the line on which the "
+                f"equilibria of {self.text} are looked for, because it is not a polynomial; or "
+                "give its period, if it has one"
+            )
+
+    def words(self, name: str, units: str, long_name: str) -> dict[str, str]:
+        """The formula as the source, and a coordinate that need not be an angle."""
+        words = {"source": f"V = {self.text}"}
+        if name == "potential":
+            words["equation"] = f"V = {self.text}"
+        on_angles = self.period is not None and abs(self.period - 2.0 * np.pi) < 1e-12
+        if units == "rad" and not on_angles:
+            distance = long_name.replace("signed angle", "signed distance")
+            words |= {"units": "1", "long_name": distance.replace("angle", "coordinate")}
+        return words
+
     @property
     def bounded(self) -> bool:
         """Whether equilibria are looked for on a finite stretch: a circle or an interval."""

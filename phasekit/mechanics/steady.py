@@ -1,0 +1,132 @@
+"""Steady rotations of the freely carried disk, for many machines: equilibria at fixed momentum."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import EquilibriumKind
+from phasekit.inputs import FloatArray
+from phasekit.mechanics.two_degrees import (
+    TwoDegrees,
+    effective_inertia,
+    relative_equilibria,
+    support_inertia,
+    two_degrees,
+)
+
+#: A trigonometric polynomial of degree five has at most so many zeros.
+MOST = 10
+
+
+class Steady(NamedTuple):
+    """Equilibria of the amended potential on the last axis, by angle, as many as any machine has."""
+
+    phi: FloatArray
+    kind: npt.NDArray[np.int8]
+    energy: FloatArray
+    curvature: FloatArray
+    natural_frequency: FloatArray
+    exponent: FloatArray
+    n_equilibria: npt.NDArray[np.int8]
+
+
+def steady(
+    beta: npt.ArrayLike,
+    e: npt.ArrayLike,
+    a: npt.ArrayLike,
+    r: npt.ArrayLike,
+    m: npt.ArrayLike,
+    g: npt.ArrayLike,
+    carrier_inertia: npt.ArrayLike,
+    omega1: npt.ArrayLike,
+    *,
+    momentum: npt.ArrayLike | None = None,
+) -> Steady:
+    """Equilibria of the amended potential V_p = V + p^2/(2 M11) of each machine.
+
+    Parameters
+    ----------
+    beta, e, a, r, m, g, carrier_inertia : array_like
+        The machines, as in `two_degrees`; they broadcast.
+    omega1 : array_like
+        Angular velocity of the support with the disk at rest at phi = 0, s^-1.
+    momentum : array_like, optional
+        Angular momentum about the vertical axis, kg m^2/s; left out, that of omega1.
+
+    Returns
+    -------
+    Steady
+        Energies and curvatures in J. Machines that are not finite have n_equilibria -1.
+
+    Examples
+    --------
+    >>> found = steady(1.0, 0.1, 0.0, 0.1, 2.0, 9.81, 0.02, 15.0, momentum=0.5)
+    >>> int(found.n_equilibria), found.kind[:4].tolist()
+    (4, [1, 2, 1, 2])
+    """
+    given = (beta, e, a, r, m, g, carrier_inertia, omega1, np.nan if momentum is None else momentum)
+    arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
+    shape = arrays[0].shape
+    beta_, e_, a_, r_, m_, g_, own, speed, fixed = (x.reshape(-1) for x in arrays)
+    with np.errstate(all="ignore"):
+        machines = two_degrees(beta_, e_, a_, r_, m_, own, g_)
+        p = speed * support_inertia(machines, 0.0)[0] if momentum is None else fixed
+        usable = np.isfinite(p * p) & np.isfinite(sum(machines))
+    size = p.size
+    columns = np.full((5, size, MOST), np.nan)
+    kind = np.full((size, MOST), EquilibriumKind.NOT_COMPUTED, np.int8)
+    count = np.full(size, -1, np.int8)
+    for i in np.flatnonzero(usable):
+        one = TwoDegrees(*(float(np.broadcast_to(x, size)[i]) for x in machines))
+        with np.errstate(all="ignore"):
+            one_has = relative_equilibria(one, float(p[i]))
+            n = count[i] = one_has.phi.size
+            kind[i, :n], kind[i, n:] = one_has.kind, EquilibriumKind.ABSENT
+            saddle = one_has.kind == EquilibriumKind.SADDLE
+            fall = np.where(saddle, -one_has.curvature, np.nan)
+            exponent = np.sqrt(fall / effective_inertia(one, one_has.phi))
+            rows = (*one_has[:1], *one_has[2:5], exponent)
+            columns[:, i, :n] = rows
+    n = max(int(count.max(initial=0)), 0)
+    found = columns[:, :, :n].reshape(5, *shape, n)
+    phi, energy, curvature, frequency, exponents = found
+    kinds, counts = kind[:, :n].reshape(*shape, n), count.reshape(shape)
+    return Steady(phi, kinds, energy, curvature, frequency, exponents, counts)
+
+
+def most(*inputs: npt.ArrayLike, momentum: npt.ArrayLike | None = None) -> tuple[int, int]:
+    """Greatest numbers of equilibria and saddles of any machine; arguments as those of `steady`."""
+    found = steady(*inputs, momentum=momentum)
+    saddles = (found.kind == EquilibriumKind.SADDLE).sum(axis=-1)
+    return int(found.n_equilibria.max(initial=0)), int(saddles.max(initial=0))
+
+
+def support_speed(
+    beta: npt.ArrayLike,
+    e: npt.ArrayLike,
+    a: npt.ArrayLike,
+    r: npt.ArrayLike,
+    m: npt.ArrayLike,
+    g: npt.ArrayLike,
+    carrier_inertia: npt.ArrayLike,
+    omega1: npt.ArrayLike,
+    phi: npt.ArrayLike,
+    *,
+    momentum: npt.ArrayLike | None = None,
+) -> FloatArray:
+    """Angular velocity p/M11 of the support in steady rotations at phi, on the last axis, s^-1.
+
+    Examples
+    --------
+    >>> support_speed(1.0, 0.1, 0.0, 0.1, 2.0, 9.81, 0.02, 15.0, [0.0]).round(9)
+    array([15.])
+    """
+    with np.errstate(all="ignore"):
+        machine = two_degrees(beta, e, a, r, m, carrier_inertia, g)
+        lever = np.asarray(support_inertia(machine, 0.0)[0])
+        p = np.asarray(omega1 * lever if momentum is None else momentum)
+        spread = TwoDegrees(*(np.asarray(x)[..., None] for x in machine))
+        return np.asarray(p[..., None] / support_inertia(spread, np.asarray(phi))[0])
