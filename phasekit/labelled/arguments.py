@@ -46,6 +46,8 @@ def describe(value: object) -> str:
         return f"a {array.ndim}-D {kind} of shape {array.shape}"
     if isinstance(value, np.generic):
         value = value.item()
+    if isinstance(value, int) and value.bit_length() > 1024:  # repr refuses thousands of digits
+        return f"a whole number of {value.bit_length()} bits"
     text = repr(value)
     if isinstance(value, (numbers.Number, str, type(None), tuple, list)) and len(text) <= 60:
         return text

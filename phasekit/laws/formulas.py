@@ -113,7 +113,8 @@ def read_formula(
         return _known(found, symbols, argument)
     except FormulaError as error:
         raise ParameterError(
-            f"{argument}: got {_cut(text)}, wants a formula such as 'x^4/4 - x^2/2': {error}"
+            f"{argument}: got {_cut(text)}, wants a formula that sympy reads, such as "
+            f"'x^4/4 - x^2/2': {error}"
         ) from None
     except ParameterError:
         raise
@@ -197,21 +198,23 @@ def _printer() -> Any:
 
 
 def _number(value: Any, argument: str) -> Any:
-    import math
     import numbers
 
     import sympy
 
-    # In this order: repr refuses whole numbers of many digits.
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ParameterError(
             f"{argument}: got {value!r:.80}, wants a formula as a string or a sympy expression"
         )
-    if abs(value) > 1e308 or not math.isfinite(value):
+    try:
+        finite = abs(float(value)) <= 1e308
+    except OverflowError:
+        finite = False
+    if not finite:
         raise ParameterError(f"{argument}: got a number that no double holds, wants a formula")
-    if isinstance(value, numbers.Integral):
-        return sympy.Integer(int(value))
-    return sympy.Float(float(value))
+    number: Any = value
+    whole = isinstance(value, numbers.Integral)
+    return sympy.Integer(int(number)) if whole else sympy.Float(float(number))
 
 
 def _known(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:
