@@ -137,6 +137,8 @@ def take_formula(
     """
     import sympy
 
+    from phasekit.laws.nodes import bounded
+
     if isinstance(expression, str):
         return read_formula(expression, symbols, argument, declare)
     if not isinstance(expression, sympy.Basic):
@@ -156,7 +158,9 @@ def take_formula(
                 f"one of {', '.join(symbols)}{declare and '; ' + declare}"
             )
     try:
-        return _known(expression.xreplace(replaced), symbols, argument)
+        found = _known(expression.xreplace(replaced), symbols, argument)
+        bounded(found)
+        return found
     except FormulaError as error:
         raise ParameterError(f"{argument}: got a sympy expression with {error}") from None
     except RecursionError:
