@@ -273,11 +273,10 @@ PIECES = st.sampled_from(
 def test_any_text_is_a_formula_or_an_error(text):
     try:
         found = read(text)
-    except ParameterError as error:
-        assert str(error).startswith("potential: got")
-    else:
-        assert isinstance(found, sp.Expr)
-        assert read(write_formula(found)) == found
+    except ParameterError:
+        return
+    assert isinstance(found, sp.Expr)
+    assert read(write_formula(found)) == found
 
 
 # --------------------------------------------------------------------- what is read
