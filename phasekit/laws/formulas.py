@@ -90,7 +90,7 @@ def read_formula(
 
     def unknown(name: str, called: bool) -> ParameterError:
         valid = list(FUNCTIONS) if called else [*symbols, *CONSTANTS]
-        near = difflib.get_close_matches(name[:NAME], valid, n=1) or [
+        near = difflib.get_close_matches(name[:NAME], valid, n=1, cutoff=0.5) or [
             one for one in valid if one.lower() == name.lower()
         ]
         if near:
@@ -154,8 +154,8 @@ def take_formula(
             replaced[symbol] = symbols[name]
         else:
             raise ParameterError(
-                f"{argument}: got {_cut(str(expression))} with the unknown symbol {name}; wants "
-                f"one of {', '.join(symbols)}{declare and '; ' + declare}"
+                f"{argument}: got the symbol {name} in {_cut(str(expression))}, wants one of "
+                f"{', '.join(symbols)}{declare and '; ' + declare}"
             )
     try:
         found = _known(expression.xreplace(replaced), symbols, argument)

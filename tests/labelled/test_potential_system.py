@@ -287,7 +287,9 @@ def test_periods_that_are_none(period):
         Potential("x^2", "x", period=period)
 
 
-@pytest.mark.parametrize("name", ["", "x y", "__x", "ｘ", "x" * 200, "x;y", None, 3, b"x", "lambda"])
+@pytest.mark.parametrize(
+    "name", ["", "x y", "__x", "ｘ", "x" * 200, "x;y", None, 3, b"x", "lambda"]
+)
 def test_names_that_are_none(name):
     with pytest.raises(pk.ParameterError, match="^coordinate: got"):
         Potential("1", name)
