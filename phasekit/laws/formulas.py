@@ -101,8 +101,6 @@ def read_formula(
             hint += f" ({name[:NAME]} is written {ascii(name[:NAME])})"
         if called:
             got = f"the unknown function {name}(...), as in {_cut(text, name)}"
-            if name in symbols:  # pragma: no cover
-                hint += f"; for a product write {name}*(...)"
             return ParameterError(f"{argument}: got {got}{hint}")
         got = f"the unknown symbol {name} (the name {name!r} in {_cut(text, name)})"
         return ParameterError(f"{argument}: got {got}{hint}{declare and '; ' + declare}")

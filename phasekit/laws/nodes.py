@@ -101,7 +101,7 @@ class Nodes:
                 raise FormulaError(f"a number of {len(text)} digits")
             return checked(sp.Integer(int(text)))
         value = float(text)
-        if not math.isfinite(value) or (not value and re_nonzero(text)):
+        if not math.isfinite(value) or (not value and _nonzero(text)):
             raise FormulaError(f"the number {text[:40]}, which no double holds")
         return sp.Float(value)
 
@@ -200,7 +200,7 @@ class Nodes:
         return _JOINS[sign](*operands)
 
 
-def re_nonzero(text: str) -> bool:
+def _nonzero(text: str) -> bool:
     """Whether a number as it is written is other than zero."""
     return any(digit in "123456789" for digit in text.lower().partition("e")[0])
 
