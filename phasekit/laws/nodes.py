@@ -247,6 +247,8 @@ def foreign(expression: Any, symbols: Iterable[Any]) -> Any:
         seen.add(node)
         if len(seen) > NODES:
             raise FormulaError(f"more than {NODES} different parts")
+        if type(node) is sp.Heaviside and node.args[1] != sp.S.Half:
+            return node  # there is no writing the value at the jump
         if not (
             node in known
             or (isinstance(node, sp.Number) and node.is_finite)

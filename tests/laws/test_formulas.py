@@ -409,7 +409,7 @@ HOSTILE = sp.Function("__import__('os').system('touch sentinel') or sin")
         sp.oo + x,
         sp.nan * x,
         sp.I * x,
-        sp.Heaviside(x, 0) * HOSTILE(y),
+        sp.Heaviside(x, 0),
         sp.zeta(x),
         float("nan"),
         float("inf"),
