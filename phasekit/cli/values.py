@@ -64,6 +64,8 @@ def number(name: str, text: Any, units: str) -> float:
 
 def _short(value: Any) -> str:
     """Write a value for a message that must stay one readable line."""
+    if isinstance(value, int) and value.bit_length() > 1024:  # repr refuses thousands of digits
+        return f"a whole number of {value.bit_length()} bits"
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:40]}... ({len(text)} letters)"
 

@@ -120,7 +120,7 @@ def _open(place: Path) -> xr.Dataset:
             ds = xr.open_dataset(place, engine="h5netcdf")
     except Exception as error:  # whatever is made of files that are not what they were
         raise StoreError(f"path: {place} cannot be read: {reason(error)}") from error
-    if ds.attrs.get(MODEL) != _NAME or "branch" not in ds.attrs:
+    if str(ds.attrs.get(MODEL)) != _NAME or "branch" not in ds.attrs:
         ds.close()
         raise StoreError(f"path: {place} holds no branch of phasekit")
     return ds

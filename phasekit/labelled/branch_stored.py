@@ -59,9 +59,10 @@ class Stored:
     def __init__(self, ds: xr.Dataset, name: str, size: int) -> None:
         """Take what was opened, what messages call it, and its bytes on the disk."""
         self.ds, self.name, self.size = ds, name, size
-        if ds.attrs.get(SCHEMA) != SCHEMA_VERSION:
+        schema = ds.attrs.get(SCHEMA)
+        if not isinstance(schema, str) or schema != SCHEMA_VERSION:
             raise StoreError(
-                f"path: {name} has the schema {ds.attrs.get(SCHEMA)!r}, wants {SCHEMA_VERSION!r}; "
+                f"path: {name} has the schema {schema!r:.80}, wants {SCHEMA_VERSION!r}; "
                 "read it with the version of phasekit that made it, or trace the branch again"
             )
         with damaged(name, "the attribute 'branch'"):

@@ -32,9 +32,10 @@ def model_name(ds: Any) -> str:
             f"ds: got a Dataset without the attribute {MODEL!r}, wants one that phasekit made; "
             "operations that drop attributes need keep_attrs=True"
         )
-    if ds.attrs.get(SCHEMA) != SCHEMA_VERSION:
+    schema = ds.attrs.get(SCHEMA)
+    if not isinstance(schema, str) or schema != SCHEMA_VERSION:
         raise ParameterError(
-            f"ds: got schema {ds.attrs.get(SCHEMA)!r}, wants {SCHEMA_VERSION!r}; "
+            f"ds: got schema {schema!r:.80}, wants {SCHEMA_VERSION!r}; "
             "it was made by another version of phasekit: make it anew or read it with that version"
         )
     return str(ds.attrs[MODEL])

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.labelled.accessor import PhasekitAccessor
 from phasekit.labelled.arrays import done_tiles, read_plan, zarr_group
 from phasekit.labelled.estimate import Estimate
 from phasekit.labelled.evaluate import lay_out
@@ -115,7 +116,7 @@ def map_info(store: Any) -> MapInfo:
 
 def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:
     """Return the job that would finish a map: all that it takes is in the store."""
-    system = MODELS[plan.model].from_dataset(ds)
+    system = PhasekitAccessor(ds).system()
     rows = [row for one in left for row in one.part.rows]
     states = {name: ds[name] for name in STATES if name in ds.coords}
     values = {name: float(x) if not x.dims else x.load() for name, x in states.items()}

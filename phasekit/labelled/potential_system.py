@@ -104,7 +104,7 @@ class Potential(Model):
         expression: Any,
         coordinate: Any,
         parameters: Mapping[str, NumberLike] | None = None,
-        period: float | None = None,
+        period: float | str | None = None,
         *,
         interval: Sequence[float] | None = None,
     ) -> None:
@@ -278,7 +278,8 @@ class Potential(Model):
         Raises
         ------
         ParameterError
-            If the map was made with another model, or a parameter's coordinate is gone.
+            If the map was made with another model, a parameter's coordinate is gone, or the
+            attributes that hold the formula are damaged.
         """
         from phasekit.labelled.identity import model_name, parameter_values
 
@@ -287,17 +288,24 @@ class Potential(Model):
                 f"ds: got a map of {model_name(ds)}, wants one of {cls.__name__}; "
                 "use ds.phasekit.system()"
             )
-        names = ds.attrs["phasekit_parameters"].split()
-        declared = [Parameter(name=name, units="1", long_name=name) for name in names]
-        period = ds.attrs["phasekit_period"]
-        interval = [float(end) for end in ds.attrs["phasekit_interval"].split()]
-        return cls(
-            ds.attrs["phasekit_expression"],
-            ds.attrs["phasekit_coordinate"],
-            parameter_values(ds, declared),
-            None if period == "None" else float(period),
-            interval=interval or None,
+        expression, coordinate, names, period, ends = (
+            _attribute(ds, name)
+            for name in ("expression", "coordinate", "parameters", "period", "interval")
         )
+        declared = [Parameter(name=name, units="1", long_name=name) for name in names.split()]
+        try:
+            return cls(
+                expression,
+                coordinate,
+                parameter_values(ds, declared),
+                None if period == "None" else period,
+                interval=[float(end) for end in ends.split()] or None,
+            )
+        except ValueError as error:  # as ParameterError is
+            raise ParameterError(
+                f"ds: got a map whose potential cannot be made again: {error}; its attributes "
+                "phasekit_* or its coordinates were changed: make the map again"
+            ) from error
 
     def __reduce__(self) -> Any:
         """Pickle what it was made from; the functions are made anew."""
@@ -347,6 +355,16 @@ def _rebuild(
     text: str, coordinate: str, values: dict[str, Value], period: Any, interval: Any
 ) -> Potential:
     return Potential(text, coordinate, values, period, interval=interval)
+
+
+def _attribute(ds: Any, name: str) -> str:
+    value = ds.attrs.get(f"phasekit_{name}")
+    if not isinstance(value, str):
+        raise bad(
+            f"ds: attribute phasekit_{name}", value, "the string that phasekit stored there",
+            "the Dataset is damaged: make the map again",
+        )  # fmt: skip
+    return value
 
 
 def _expression(expression: Any) -> Any:

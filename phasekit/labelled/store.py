@@ -138,7 +138,9 @@ def _as_store_error(name: str) -> Iterator[None]:
     except StoreError:
         raise
     except FileNotFoundError as error:
-        raise StoreError(f"store: {name} cannot be read: there is no map, or not yet") from error
+        raise StoreError(
+            f"store: {name} cannot be read: there is no map, or not yet; Zarr is read in format 3"
+        ) from error
     except Exception as error:  # whatever is made of files that are not what they were
         raise StoreError(f"store: {name} cannot be read: {reason(error)}") from error
 

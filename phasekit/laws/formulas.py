@@ -90,7 +90,7 @@ def read_formula(
 
     def unknown(name: str, called: bool) -> ParameterError:
         valid = list(FUNCTIONS) if called else [*symbols, *CONSTANTS]
-        near = difflib.get_close_matches(name[:NAME], valid, n=1) or [
+        near = difflib.get_close_matches(name[:NAME], valid, n=1, cutoff=0.5) or [
             one for one in valid if one.lower() == name.lower()
         ]
         if near:
@@ -101,8 +101,6 @@ def read_formula(
             hint += f" ({name[:NAME]} is written {ascii(name[:NAME])})"
         if called:
             got = f"the unknown function {name}(...), as in {_cut(text, name)}"
-            if name in symbols:  # pragma: no cover
-                hint += f"; for a product write {name}*(...)"
             return ParameterError(f"{argument}: got {got}{hint}")
         got = f"the unknown symbol {name} (the name {name!r} in {_cut(text, name)})"
         return ParameterError(f"{argument}: got {got}{hint}{declare and '; ' + declare}")
@@ -113,7 +111,8 @@ def read_formula(
         return _known(found, symbols, argument)
     except FormulaError as error:
         raise ParameterError(
-            f"{argument}: got {_cut(text)}, wants a formula such as 'x^4/4 - x^2/2': {error}"
+            f"{argument}: got {_cut(text)}, wants a formula that sympy reads, such as "
+            f"'x^4/4 - x^2/2': {error}"
         ) from None
     except ParameterError:
         raise
@@ -136,6 +135,8 @@ def take_formula(
     """
     import sympy
 
+    from phasekit.laws.nodes import bounded
+
     if isinstance(expression, str):
         return read_formula(expression, symbols, argument, declare)
     if not isinstance(expression, sympy.Basic):
@@ -151,11 +152,13 @@ def take_formula(
             replaced[symbol] = symbols[name]
         else:
             raise ParameterError(
-                f"{argument}: got {_cut(str(expression))} with the unknown symbol {name}; wants "
-                f"one of {', '.join(symbols)}{declare and '; ' + declare}"
+                f"{argument}: got the symbol {name} in {_cut(str(expression))}, wants one of "
+                f"{', '.join(symbols)}{declare and '; ' + declare}"
             )
     try:
-        return _known(expression.xreplace(replaced), symbols, argument)
+        found = _known(expression.xreplace(replaced), symbols, argument)
+        bounded(found)
+        return found
     except FormulaError as error:
         raise ParameterError(f"{argument}: got a sympy expression with {error}") from None
     except RecursionError:
@@ -197,21 +200,23 @@ def _printer() -> Any:
 
 
 def _number(value: Any, argument: str) -> Any:
-    import math
     import numbers
 
     import sympy
 
-    # In this order: repr refuses whole numbers of many digits.
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise ParameterError(
             f"{argument}: got {value!r:.80}, wants a formula as a string or a sympy expression"
         )
-    if abs(value) > 1e308 or not math.isfinite(value):
+    try:
+        finite = abs(float(value)) <= 1e308
+    except OverflowError:
+        finite = False
+    if not finite:
         raise ParameterError(f"{argument}: got a number that no double holds, wants a formula")
-    if isinstance(value, numbers.Integral):
-        return sympy.Integer(int(value))
-    return sympy.Float(float(value))
+    number: Any = value
+    whole = isinstance(value, numbers.Integral)
+    return sympy.Integer(int(number)) if whole else sympy.Float(float(number))
 
 
 def _known(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:

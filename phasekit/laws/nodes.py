@@ -101,7 +101,7 @@ class Nodes:
                 raise FormulaError(f"a number of {len(text)} digits")
             return checked(sp.Integer(int(text)))
         value = float(text)
-        if not math.isfinite(value) or (not value and re_nonzero(text)):
+        if not math.isfinite(value) or (not value and _nonzero(text)):
             raise FormulaError(f"the number {text[:40]}, which no double holds")
         return sp.Float(value)
 
@@ -140,9 +140,7 @@ class Nodes:
             if sum(len(x.args) if type(x) is make else 1 for x in arguments) > ARGUMENTS:
                 raise FormulaError(f"{name} with more than {ARGUMENTS} arguments")
         elif make in _FAR_CLASSES or "gamma" in name:
-            if name in _OF_AN_ORDER:
-                _near(name, arguments[0], ORDER)
-            arguments = [_near(name, x, FACTORIAL if name == "gamma" else FAR) for x in arguments]
+            arguments = _near(name, arguments)
         elif name == "Rational" and not all(x.is_Integer for x in arguments):
             raise FormulaError("Rational of other than two whole numbers")
         level = self._level(arguments) + 1 if make in _BRANCHES or name == "cbrt" else 0
@@ -177,6 +175,8 @@ class Nodes:
     def power(self, base: Any, exponent: Any) -> Any:
         """A power whose exponent, if it is a number, is bounded."""
         values((base, exponent))
+        if base.is_Rational and exponent == -1 and base.p:
+            return sp.Rational(base.q, base.p)  # as sympy's power would, but at once
         if exponent.is_number:
             size = abs(float(_approximate(exponent)))
             if size > POWER:
@@ -200,7 +200,7 @@ class Nodes:
         return _JOINS[sign](*operands)
 
 
-def re_nonzero(text: str) -> bool:
+def _nonzero(text: str) -> bool:
     """Whether a number as it is written is other than zero."""
     return any(digit in "123456789" for digit in text.lower().partition("e")[0])
 
@@ -226,18 +226,14 @@ def checked(node: Any) -> Any:
         return node
     if node in _NOT_FINITE:
         raise FormulaError("a division by zero, or another value that is not finite")
-    if node.is_Rational:
-        _bounded_bits((_bits(node),), BITS)
-    elif node.is_number:
-        _approximate(node)
-    else:
+    if node.is_Number or not node.is_number:
         for part in (node, *node.args):
-            if part.is_Rational:
-                _bounded_bits((_bits(part),), BITS)
-            elif part.is_Mul and part is not node:
-                _bounded_bits((_bits(part.as_coeff_Mul()[0]),), BITS)
+            if part.is_Mul or part.is_Number:
+                _approximate(part.as_coeff_Mul()[0])
             elif part.is_Pow and part.exp.is_number and abs(_approximate(part.exp)) > POWER:
                 raise FormulaError(f"the power {_short(part)}, beyond {POWER}")
+    else:
+        _approximate(node)
     return node
 
 
@@ -251,6 +247,8 @@ def foreign(expression: Any, symbols: Iterable[Any]) -> Any:
         seen.add(node)
         if len(seen) > NODES:
             raise FormulaError(f"more than {NODES} different parts")
+        if type(node) is sp.Heaviside and node.args[1] != sp.S.Half:
+            return node  # there is no writing the value at the jump
         if not (
             node in known
             or (isinstance(node, sp.Number) and node.is_finite)
@@ -262,31 +260,50 @@ def foreign(expression: Any, symbols: Iterable[Any]) -> Any:
     return None
 
 
-def _near(name: str, argument: Any, far: float) -> Any:
-    """A constant argument of a special function, as a double where exact arithmetic is costly."""
-    if not argument.is_number:
-        return argument
-    value = _approximate(argument)
-    if abs(value) > far:
-        raise FormulaError(f"{name} of {_short(argument)}; it takes constants to {far:g} there")
-    exact = argument.is_Rational and abs(argument) <= FACTORIAL and argument.q <= 2
-    return argument if exact else value
+def bounded(expression: Any) -> None:
+    """Refuse an expression that `Nodes` would not have made, because of the size of its numbers."""
+    for node in set(sp.preorder_traversal(expression)):
+        checked(node)
+        if type(node) in _FAR_CLASSES:
+            _near(type(node).__name__, node.args)
+
+
+def _near(name: str, arguments: Sequence[Any]) -> list[Any]:
+    """Arguments of a special function, as doubles where they make exact arithmetic costly."""
+    found = []
+    for i, argument in enumerate(arguments):
+        if argument.is_number:
+            value = _approximate(argument)
+            is_order = i == 0 and name in _OF_AN_ORDER
+            far = ORDER if is_order else FACTORIAL if name == "gamma" else FAR
+            if abs(value) > far:
+                raise FormulaError(f"{name} of {_short(argument)}; it takes constants to {far:g}")
+            small = abs(value) <= FACTORIAL and (not argument.is_Rational or argument.q <= 2)
+            if "gamma" in name and not small:
+                argument = sp.Float(float(value))
+        found.append(argument)
+    return found
 
 
 def _approximate(constant: Any) -> Any:
     """The value of a constant formula; it must fit in a double."""
+    if constant.is_Rational:
+        _bounded_bits((_bits(constant),), BITS)
+        return constant
     value = constant if constant.is_Float else constant.evalf(17)
-    if value.is_Float or value.is_Rational:
-        try:
-            finite = math.isfinite(float(value))
-        except OverflowError:
-            finite = False
-        if not finite:
-            raise FormulaError(f"the constant {_short(constant)}, which no double holds")
-        return value if value.is_Rational else sp.Float(float(value))
-    raise FormulaError(
-        f"the constant {_short(constant)}, which is not real, where a real function belongs"
-    )
+    if value.is_Rational:
+        return value
+    if not value.is_Float:
+        raise FormulaError(
+            f"the constant {_short(constant)}, which is not real, where a real function belongs"
+        )
+    try:
+        finite = math.isfinite(float(value))
+    except OverflowError:
+        finite = False
+    if not finite:
+        raise FormulaError(f"the constant {_short(constant)}, which no double holds")
+    return value
 
 
 def _bits(number: Any) -> int:

@@ -22,7 +22,7 @@ MOST = 10
 
 
 class Steady(NamedTuple):
-    """Equilibria of the amended potential on the last axis, by angle, as many as any machine has."""
+    """Equilibria of the amended potential on the last axis, by angle; NaN beyond the last."""
 
     phi: FloatArray
     kind: npt.NDArray[np.int8]

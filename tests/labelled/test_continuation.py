@@ -750,3 +750,44 @@ def test_the_figure_eight_along_a_bent_path():
     ):
         with pytest.raises(pk.ParameterError, match=message):
             figure_eights(disk, change)
+
+
+@pytest.mark.parametrize(
+    ("f", "message"),
+    [
+        ("besselj(0, x) - m", "besselj, which has no machine code itself"),
+        ("airyai(m) - x", "airyai, which has no machine code itself"),
+        ("gamma(x) - m", "gamma, which has no machine code its derivative"),
+        (["x - m*__import__('os').getpid()"], "^f: got"),
+        ("9**9**9*x", "exponent"),
+        ("1/0 + x", "division by zero"),
+    ],
+)
+def test_formulas_that_cannot_be_continued_are_refused_at_once(f, message):
+    with pytest.raises(pk.ParameterError, match=message):
+        Problem(f, "x", {"m": 0.0})
+
+
+@pytest.mark.parametrize("name", ["__x", "ｘ", "x" * 200, "x.y", "x)", 3])
+def test_names_of_states_and_parameters(name):
+    with pytest.raises(pk.ParameterError, match="^state: got"):
+        Problem("1", [name], {})
+    with pytest.raises(pk.ParameterError, match="^parameters: got"):
+        Problem("x", "x", {name: 1.0})
+
+
+def test_functions_of_fixed_parameters_need_no_derivative():
+    problem = Problem("gamma(k)*x - m + besselj(0, 2)", "x", {"m": 0.0, "k": 4.0})
+    assert problem([1.0])[0] == pytest.approx(6.0 + 0.22389077914123566805, rel=1e-15)
+
+
+@pytest.mark.parametrize("value", [10**400, [1.0], np.array([1.0])])
+def test_parameters_that_are_no_numbers(value):
+    with pytest.raises(pk.ParameterError, match=r"^parameters\['m'\]: got"):
+        Problem("x - m", "x", {"m": value})
+
+
+def test_the_problem_of_a_potential_of_special_functions_has_their_derivatives():
+    """Si' is sin(x)/x, which has machine code though Si has none."""
+    problem = pk.Potential("Si(x)", "x", interval=(0.1, 3.0)).problem()
+    assert problem([1.5, 0.25]) == pytest.approx([0.25, -np.sin(1.5) / 1.5], rel=1e-15)

@@ -238,3 +238,95 @@ def test_the_problem_of_a_potential_is_its_equation_of_motion():
     np.testing.assert_allclose(problem(np.array([0.7, 0.2])), [0.2, 0.7 - 0.7**3], rtol=1e-15)
     with pytest.raises(pk.ParameterError, match="wants a scalar"):
         WELL.replace(mu=[1.0, 2.0]).problem()
+
+
+# --------------------------------------------------------------------- formulas and names
+
+
+@pytest.mark.parametrize("name", ["x0", "x1", "sin", "select", "array", "pi", "_p0", "float", "z"])
+def test_names_that_generated_code_uses_are_parameters(name):
+    """Common parts of code are called x0, x1, ...; functions by their names."""
+    plain = "cos(x)*exp(k + cos(x)) + k*cos(x)^2"
+    other = plain.replace("k", name)
+    want = Potential(plain, "x", {"k": 0.7}, interval=(-1, 1))
+    for system in (
+        Potential(other, "x", {name: 0.7}, interval=(-1, 1)),
+        Potential(other.replace("x", "#").replace("e#p", "exp").replace("#", "y"), "y",
+                  {name.replace("x", "y"): 0.7}, interval=(-1, 1)),
+    ):  # fmt: skip
+        for function in ("potential", "gradient", "curvature"):
+            got = getattr(system, function)([0.3, -0.8])
+            np.testing.assert_allclose(got, getattr(want, function)([0.3, -0.8]), rtol=1e-14)
+
+
+def test_a_coordinate_that_generated_code_uses():
+    system = Potential("cos(x0)*exp(cos(x0)) + cos(x0)^2", "x0", period=2 * np.pi)
+    x = 0.3
+    want = np.cos(x) * np.exp(np.cos(x)) + np.cos(x) ** 2
+    assert system.potential(x) == pytest.approx(want, rel=1e-15)
+
+
+def test_whole_numbers_beyond_int64_are_numbers():
+    system = Potential("cos(10**30)*x^2 + 10**25*x/10**26 + x*123456789012345678901/3", "x")
+    want = np.cos(1e30) * 4 + 0.2 + 2 * 123456789012345678901 / 3
+    assert system.potential(2.0) == pytest.approx(want, rel=1e-14)
+
+
+@pytest.mark.parametrize("period", ["2*pi", "6.283185307179586", sp.pi * 2, 2 * np.pi])
+def test_periods_as_formulas(period):
+    assert Potential("-cos(q)", "q", period=period).period == 2 * np.pi
+
+
+@pytest.mark.parametrize(
+    "period",
+    ["x", "2*tau", "0", "-pi", "1/0", "", "9**9**9", "__import__('os')", 0, -1.0, np.nan, np.inf,
+     10**400, True, [1.0], np.array([1.0]), 1j, {}],
+)  # fmt: skip
+def test_periods_that_are_none(period):
+    with pytest.raises(pk.ParameterError, match="^period: got"):
+        Potential("x^2", "x", period=period)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "x y", "__x", "ｘ", "x" * 200, "x;y", None, 3, b"x", "lambda"]
+)
+def test_names_that_are_none(name):
+    with pytest.raises(pk.ParameterError, match="^coordinate: got"):
+        Potential("1", name)
+    with pytest.raises(pk.ParameterError, match="^parameters: got"):
+        Potential("x^2", "x", {name: 1.0})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("__import__('os').system('true')*x", "^expression: got"),
+        ("9**9**9*x", "exponent"),
+        ("mo*x", "did you mean 'mu'"),
+        ("zeta(x)", "unknown function zeta"),
+        ("besselj(x, 2)", "real function of x that sympy can differentiate"),
+        ("Abs(x)", "real function of x that sympy can differentiate"),
+        ("*".join(f"(x + {i})" for i in range(300)), "too long, to differentiate"),
+        ("sin(" * 63 + "x" + ")" * 63, "to differentiate"),
+        ("1/(1 + " * 60 + "x" + ")" * 60, "to differentiate"),
+    ],
+)
+def test_formulas_that_are_refused(text, message):
+    with pytest.raises(pk.ParameterError, match=message):
+        Potential(text, "x", {"muu": 1.0, "mu": 2.0})
+
+
+def test_sums_that_multiplying_out_would_blow_up_are_not_multiplied_out():
+    system = Potential("(a + b + c + d + x)^99", "x", dict.fromkeys("abcd", 0.2), interval=(-1, 1))
+    assert system.gradient(0.2) == pytest.approx(99.0, rel=1e-13)
+    with pytest.raises(pk.ParameterError, match="^interval: got None"):
+        pk.equilibria(Potential("(a + b + c + d + x)^99", "x", dict.fromkeys("abcd", 0.2)))
+
+
+def test_special_functions_go_through_the_labelled_functions():
+    """V = -J_0, whose slope J_1 has its zeros where scipy has them."""
+    from scipy.special import jn_zeros
+
+    points = pk.equilibria(Potential("-besselj(0, x)", "x", interval=(-5.0, 9.0)))
+    first = jn_zeros(1, 2)
+    np.testing.assert_allclose(points.phi, [-first[0], 0.0, *first], atol=1e-13)

@@ -141,7 +141,7 @@ class _Writer:
         if e.is_Symbol:
             which, index = self.inputs[e]
             return b.load(self.place(self.arrays[which], index))
-        if e.is_number and e.is_real and not e.free_symbols:
+        if e.is_number and e.is_real is not False:  # sympy does not know it of besselj(0, 2)
             return ir.Constant(_DOUBLE, float(e))
         if e.is_Add:
             # Products with a negative coefficient are subtracted.

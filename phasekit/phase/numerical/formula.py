@@ -19,6 +19,7 @@ from phasekit.errors import ParameterError
 from phasekit.laws.formulas import short_formula, symbols_of, take_formula, write_formula
 from phasekit.laws.grammar import FormulaError
 from phasekit.laws.ladder import Conservative
+from phasekit.laws.size import derived_nodes, expanded_terms
 from phasekit.phase.numerical.code import array_code
 
 Array = npt.NDArray[np.float64]
@@ -26,6 +27,9 @@ Values = Sequence[npt.ArrayLike]
 
 #: Points at which a formula is tried: no special angles or integers among them.
 _TRIALS = np.array([-0.4871, -0.2713, 0.0931, 0.3197, 0.4439])
+
+#: Most terms that a formula is multiplied out to, and most nodes of its second derivative.
+_TERMS, _NODES = 5000, 50_000
 
 
 class Shape(Enum):
@@ -167,6 +171,8 @@ def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[An
     from phasekit.laws.nodes import foreign
 
     try:
+        if derived_nodes(potential, x) > _NODES:
+            raise FormulaError
         slope = sp.diff(potential, x)
         bend = sp.diff(slope, x)
         strange = foreign(slope, symbols.values()) or foreign(bend, symbols.values())
@@ -214,6 +220,8 @@ def _shape(slope: Any, x: Any, period: float | None) -> tuple[Shape, list[Any] |
     """Tell what V' is, with its coefficients if it has such."""
     import sympy as sp
 
+    if expanded_terms(slope) > _TERMS:
+        return Shape.GENERAL, None
     if slope.is_polynomial(x):
         return Shape.POLYNOMIAL, sp.Poly(sp.expand(slope), x).all_coeffs()[::-1]
     harmonics = None if period is None else _harmonics(slope, x, period)
