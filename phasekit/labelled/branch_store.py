@@ -116,6 +116,8 @@ def _functions(kept: dict[str, bool], given: Any) -> dict[str, Any]:
 
 
 def _open(path: str | PathLike[str]) -> xr.Dataset:
+    if not isinstance(path, (str, PathLike)) or "\0" in str(path):
+        raise bad("path", path, "the path of a saved branch")
     place = Path(fspath(path)).expanduser()
     if not place.exists():
         raise StoreError(f"path: {place} does not exist")

@@ -12,7 +12,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.amended import Amended, States, on_states
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, numeric
+from phasekit.labelled.arguments import FloatArray, NumberLike, bad, numeric, whole
 from phasekit.labelled.grid import variable
 from phasekit.labelled.models import GyroRotorDisk
 from phasekit.labelled.schema import MODEL, SCHEMA, SCHEMA_VERSION, versions
@@ -31,6 +31,7 @@ from phasekit.labelled.trajectory import (
     strobe,
     trajectory,
 )
+from phasekit.labelled.units import UNITS_OF
 from phasekit.mechanics import two_degrees as mechanics
 from phasekit.mechanics.two_degrees import TwoDegrees
 
@@ -40,6 +41,10 @@ class Accelerations(NamedTuple):
 
     domega1: Any
     ddphi: Any
+
+
+#: Most states that a section may have.
+MOST = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -435,8 +440,10 @@ class FreeGyroRotor:
                 f"period, section: got {period!r} and {section!r}, wants exactly one of them: the "
                 "period of a torque in s, or an angle of the disk in rad"
             )
-        if isinstance(direction, bool) or direction not in (1, -1, 0):
-            raise bad("direction", direction, "1 (rising), -1 (falling) or 0 (both)")
+        senses = "1 (rising), -1 (falling) or 0 (both)"
+        direction = whole("direction", direction, senses, -1)
+        if direction > 1:
+            raise bad("direction", direction, senses)
         state = (phi1, phi0, omega1, dphi0)
         motion = self._motion(state, (torque1, torque2), 0.0, rtol, atol, max_step)
         times: FloatArray
@@ -444,11 +451,13 @@ class FreeGyroRotor:
             period = checked_number("period", period, wants, low=np.nextafter(0, 1))
             if period > duration:
                 raise bad("period", period, f"at most the duration, {duration!r} s")
+            if duration / period > MOST:
+                raise bad("period", period, f"at least the duration over {MOST:.0e}")
             times = period * np.arange(np.floor(duration / period) + 1)
             states = strobe(motion, times)
         else:
             angle = checked_number("section", section, "an angle in rad: one finite number")
-            times, states = crossings(motion, duration, angle, int(direction))
+            times, states = crossings(motion, duration, angle, direction)
         states[:2] = np.pi - np.mod(np.pi - states[:2], 2.0 * np.pi)
         data = {
             "section_time": labelled(
@@ -521,7 +530,7 @@ FreeGyroRotor.__init__ = named_arguments("FreeGyroRotor", FreeGyroRotor.__init__
 def _times(t: Any, *, two: bool = False) -> FloatArray:
     argument = "span" if two else "t"
     wants = "(start, stop), two times in s" if two else "two times in s, (start, stop), or more"
-    kept = numeric(argument, t)
+    kept = numeric(argument, t, UNITS_OF[argument], wants)
     times = np.asarray(kept.values if isinstance(kept, xr.DataArray) else kept)
     if times.ndim != 1 or times.size < 2 or (two and times.size > 2):
         raise bad(argument, t, wants)

@@ -88,8 +88,9 @@ class RigidBody(Frozen):
             raise bad("inertia", self.inertia, wants)
         common_shape(mass=mass.shape, center=center.shape[:-1], inertia=inertia.shape[:-2])
         inertia = 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
-        excess = _excess(mass, center, inertia)
-        if excess.ndim == 0 and excess > TOLERANCE:
+        with np.errstate(all="ignore"):  # beyond the largest double nothing is a body
+            excess = _excess(mass, center, inertia)
+        if excess.ndim == 0 and not excess <= TOLERANCE:
             wants = (
                 "the tensor about the pole of a body of this mass and center; about the center "
                 f"one principal moment exceeds the sum of the others (by {excess:.1e}, relative)"

@@ -112,7 +112,8 @@ def _panels(ax: Axes | Sequence[Axes] | None) -> list[Axes]:
     if ax is None:
         figure = style.new_figure(6.4, 7.2)
         return list(figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.5)))
-    if isinstance(ax, Sequence | np.ndarray) and len(ax) == 2:
+    several = isinstance(ax, Sequence) or (isinstance(ax, np.ndarray) and ax.ndim == 1)
+    if several and len(ax) == 2:
         return [style.check_axes(panel) for panel in ax]
     return [style.check_axes(ax, "ax (or each of a pair)")]
 

@@ -174,6 +174,27 @@ def dataset() -> xr.Dataset:
 
 
 @functools.cache
+def loads() -> xr.Dataset:
+    return dataset().phasekit.bearing_forces(on="separatrix")
+
+
+@functools.cache
+def loci() -> xr.Dataset:
+    plane = {"xlim": (-3.0, 3.0), "ylim": (-3.0, 3.0)}
+    return pk.bifurcation_set(pk.Coefficients(2.0, 1.0, 0.3), "B", "C", **plane)
+
+
+@functools.cache
+def motion() -> xr.Dataset:
+    return pk.flow(disk(), 0.3, 0.2, [0.0, 0.5])
+
+
+@functools.cache
+def trajectory() -> Any:
+    return rotor().trajectory(0.3, 0.2, (0.0, 0.5))
+
+
+@functools.cache
 def problem() -> Any:
     return pk.Problem("r + x**2 - 0.1*x**4", ("x",), {"r": -0.5})
 
@@ -192,7 +213,9 @@ def rotor() -> Any:
 
 @functools.cache
 def machine() -> Any:
-    return pk.CoupledRotation(pk.RigidBody.disk(2.0, 0.1, 0.1, 0.3), n1=(0, 0, 1), n2=(1, 0, 0), a=1)
+    return pk.CoupledRotation(
+        pk.RigidBody.disk(2.0, 0.1, 0.1, 0.3), n1=(0, 0, 1), n2=(1, 0, 0), a=1
+    )
 
 
 @functools.cache
@@ -268,7 +291,13 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     },
     "figure_eights": {"path": lambda: {"B": (0.1, 1.0)}, "n": lambda: 5},
     "orbit_families": {"n": lambda: 3},
-    "continuation": {"options": lambda: pk.ContinuationOptions(max_points=10)},
+    "continuation": {
+        "x0": lambda: [0.7], "options": lambda: pk.ContinuationOptions(max_points=10),
+    },
+    "bearing_forces": {"dphi": lambda: 0.2},
+    "fixed_bearing_forces": {"dphi": lambda: 0.2},
+    "rotators": {"dphi": lambda: 0.2},
+    "sweep": {"axes": lambda: {"A": [1.0, 2.0]}, "workers": lambda: None},
     "diagram": {"options": lambda: pk.ContinuationOptions(max_points=10), "depth": lambda: 1},
     "FreeGyroRotor": {"disk": lambda: rotor().disk},
     "FreeGyroRotor.trajectory": {"span": lambda: (0.0, 0.5)},
@@ -283,16 +312,11 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
         "x": lambda: "B", "y": lambda: "C", "xlim": lambda: (-3, 3), "ylim": lambda: (-3, 3),
         "cells": lambda: 8,
     },
-    "plot.bifurcation_set": {
-        "dataset": lambda: pk.bifurcation_set(
-            pk.Coefficients(2.0, 1.0, 0.3), "B", "C", xlim=(-3, 3), ylim=(-3, 3)
-        )
-    },
+    "plot.bifurcation_set": {"dataset": loci},
+    "plot.bearing_forces": {"orbit": lambda: (0.3, 0.2)},
     "plot.bifurcation_diagram": {"dataset": lambda: dataset().isel(a=0)},
-    "plot.bearing_load_map": {
-        "dataset": lambda: dataset().phasekit.bearing_forces(on="separatrix")
-    },
-    "plot.time_history": {"dataset": lambda: pk.flow(disk(), 0.3, 0.2, [0.0, 0.5])},
+    "plot.bearing_load_map": {"dataset": loads},
+    "plot.time_history": {"dataset": motion},
     "plot.hodograph": {"system": disk},
     "plot.period_energy": {"n": lambda: 5},
     "plot.frequency_action": {"n": lambda: 5},
@@ -314,10 +338,14 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "RigidBody": lambda: GOOD["body"](),
     "CoupledRotation": machine,
     "CoupledRotationState": lambda: machine().at(omega1=1.0, phi2=0.3),
-    "Trajectory": lambda: rotor().trajectory(0.3, 0.2, (0.0, 0.5)),
+    "Trajectory": trajectory,
     "PhasekitAccessor": lambda: dataset().phasekit,
     "MapPlots": lambda: dataset().isel(beta=0, a=0).phasekit.plot,
 }
+
+
+#: Calls that are right, and take longer than a test should: spans over hundreds of decades.
+LONG = {("branches", "huge in list"), ("bifurcation_set", "huge in list")}
 
 
 def callables() -> dict[str, Callable[..., Any]]:
