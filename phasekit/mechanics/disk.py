@@ -99,7 +99,8 @@ def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
     0.0
     """
     e, beta = floats(e=e, beta=beta)
-    return np.asarray(e * _sine(beta))
+    with np.errstate(all="ignore"):
+        return np.asarray(e * _sine(beta))
 
 
 def disk_inertia(
@@ -122,10 +123,11 @@ def disk_inertia(
     [0.025, 0.027817, 0.007183, 0.007058]
     """
     m, r, e, beta = floats(m=m, r=r, e=e, beta=beta)
-    s, c = _sine(beta), np.cos(beta)
-    ju = m * (0.25 * r * r + e * e)
-    j = 0.25 * m * r * r
-    return ju, j + ju * c * c, j + ju * s * s, ju * s * c
+    with np.errstate(all="ignore"):
+        s, c = _sine(beta), np.cos(beta)
+        ju = m * (0.25 * r * r + e * e)
+        j = 0.25 * m * r * r
+        return ju, j + ju * c * c, j + ju * s * s, ju * s * c
 
 
 def _sine(beta: Array) -> Array:

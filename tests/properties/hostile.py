@@ -306,6 +306,8 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
     "SpecialPoint.curve": {"parameter": lambda: "r"},
+    "Branch.save": {"path": lambda: "branch.zarr"},
+    "FreeGyroRotor.poincare": {"section": lambda: 0.5},
     "Branch.extend": {"points": lambda: 2},
     "open_map": {"store": lambda: "map.zarr"},
     "plot.branch_surface": {
@@ -344,8 +346,16 @@ INSTANCES: dict[str, Callable[[], Any]] = {
 }
 
 
-#: Calls that are right, and take longer than a test should: spans over hundreds of decades.
-LONG = {("branches", "huge in list"), ("bifurcation_set", "huge in list")}
+#: Calls that take longer than a test should: spans over hundreds of decades, and motions of
+#: 10^15 turns.
+LONG = {
+    *((name, "huge in list") for name in ("branches", "bifurcation_set", "plot.branch_surface")),
+    *(
+        (f"FreeGyroRotor.{name}", value)
+        for name in ("simulate", "trajectory", "poincare")
+        for value in ("zero", "minus zero", "1e-320", "1e16", "2**63", "1e200", "1e300", "-1e300")
+    ),
+}
 
 
 def callables() -> dict[str, Callable[..., Any]]:
