@@ -12,7 +12,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.amended import Amended, States, on_states
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, numeric, whole
+from phasekit.labelled.arguments import FloatArray, NumberLike, bad, describe, numeric, whole
 from phasekit.labelled.grid import variable
 from phasekit.labelled.models import GyroRotorDisk
 from phasekit.labelled.schema import MODEL, SCHEMA, SCHEMA_VERSION, versions
@@ -359,7 +359,8 @@ class FreeGyroRotor:
         0.0
         """
         start, stop = _times(span, two=True)
-        named = events if isinstance(events, Mapping) else {"event": events} if events else {}
+        given = {} if events is None else {"event": events}
+        named = events if isinstance(events, Mapping) else given
         for name, event in named.items():
             if not isinstance(name, str):
                 raise bad("events", name, "names that are strings")
@@ -437,8 +438,8 @@ class FreeGyroRotor:
         duration = checked_number("duration", duration, wants, low=np.nextafter(0, 1))
         if (period is None) == (section is None):
             raise ParameterError(
-                f"period, section: got {period!r} and {section!r}, wants exactly one of them: the "
-                "period of a torque in s, or an angle of the disk in rad"
+                f"period, section: got {describe(period)} and {describe(section)}, wants exactly "
+                "one of them: the period of a torque in s, or an angle of the disk in rad"
             )
         senses = "1 (rising), -1 (falling) or 0 (both)"
         direction = whole("direction", direction, senses, -1)
@@ -494,7 +495,7 @@ class FreeGyroRotor:
             "atol": checked_number("atol", atol, "a number >= 0", low=0.0),
             "max_step": np.inf,
         }
-        if max_step != np.inf:
+        if not (isinstance(max_step, float) and max_step == np.inf):
             wants = "a time in s, > 0"
             solver["max_step"] = checked_number("max_step", max_step, wants, low=np.nextafter(0, 1))
         torque1, torque2 = (

@@ -76,11 +76,12 @@ def period_energy(
     axes = style.axes_for(ax, legend=legend)
 
     natural, bottom = points.natural_frequency.values, points.energy.values
-    with np.errstate(divide="ignore"):  # of frequencies below the smallest double
-        ends = (bottom, 2.0 * np.pi / natural)
+    with np.errstate(all="ignore"):  # of frequencies below the smallest double
+        periods = 2.0 * np.pi / natural
+    ends = (bottom, periods)
     handles = _draw_families(axes, families, points, "energy_level", "period", ends)
     handles += _draw_walls(axes, points, loops)
-    handles += _draw_centers(axes, bottom, 2.0 * np.pi / natural)
+    handles += _draw_centers(axes, bottom, periods)
 
     energies = families.energy_level
     low = min(float(energies.min()), *bottom[np.isfinite(natural)])

@@ -427,7 +427,6 @@ def argv(value: Any) -> list[list[str]]:
         ["diagram", *disk_options[1:], f"--beta=0:1:{word}", "--out=d.png"],
         ["sweep", word],
         ["info", word],
-        ["demo", f"--out={word}/"],
         ["demo", f"--cells={word}"],
     ]
 
