@@ -212,5 +212,5 @@ def on_states(
 def _state(argument: str, value: States) -> float | NDArray[np.float64] | xr.DataArray:
     if isinstance(value, np.ndarray) and value.ndim > 1:
         return reals(argument, value, "numbers")
-    kept = numeric(argument, value, UNITS_OF[argument])
+    kept = numeric(argument, value, UNITS_OF.get(argument, ""))
     return kept.compute() if isinstance(kept, xr.DataArray) else kept

@@ -359,8 +359,10 @@ class FreeGyroRotor:
         0.0
         """
         start, stop = _times(span, two=True)
-        given = {} if events is None else {"event": events}
-        named = events if isinstance(events, Mapping) else given
+        if isinstance(events, Mapping):
+            named: Mapping[str, StateFunction] = events
+        else:
+            named = {} if events is None else {"event": events}
         for name, event in named.items():
             if not isinstance(name, str):
                 raise bad("events", name, "names that are strings")

@@ -34,6 +34,7 @@ UNITS: Mapping[str, Mapping[str, Decimal]] = {
     "kg m2 s-1": {"kg m2 s-1": Decimal(1)},
     "N": {"N": Decimal(1)},
     "N m": {"N m": Decimal(1)},
+    "J": {"J": Decimal(1)},
     "1": {},
 }
 
@@ -45,6 +46,7 @@ UNITS_OF: Mapping[str, str] = {
     **dict.fromkeys(("torque1", "torque2"), "N m"),
     "carrier_inertia": "kg m2",
     "p": "kg m2 s-1",
+    "energy": "J",
 }
 
 _ALIASES = {

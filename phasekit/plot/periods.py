@@ -90,7 +90,8 @@ def period_energy(
     # A family too narrow to be seen must not take the height.
     seen = energies.max("level") - energies.min("level") > 0.02 * (high - low)
     middle = families.period.median("level").where(seen).values
-    axes.set_ylim(0.0, float(np.nanmax([*(1.8 * middle), *(4.0 * np.pi / natural)])))
+    heights = np.array([*(1.8 * middle), *(2.0 * periods)])
+    axes.set_ylim(0.0, float(np.max(heights, where=np.isfinite(heights), initial=0.0)) or None)
     axes.set_xlabel("energy $h$ (s$^{-2}$)")
     axes.set_ylabel("period $T$ (s)")
     if legend:

@@ -18,6 +18,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.cli import main
+from phasekit.inputs import describe
 
 #: What models share for the rest of the package, and results that only phasekit makes.
 MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
@@ -414,7 +415,7 @@ def arguments(name: str, function: Callable[..., Any]) -> dict[str, Callable[[],
 
 def argv(value: Any) -> list[list[str]]:
     """Return command lines with a word in each place."""
-    word = value if isinstance(value, str) else repr(value)[:60]
+    word = value if isinstance(value, str) else describe(value)
     disk_options = [f"--{k}={v}" for k, v in DISK.items() if k not in ("m", "half_span")]
     return [
         [word],

@@ -20,7 +20,7 @@ import phasekit as pk
 matplotlib.use("Agg")
 
 #: How many values of the pool are tried for each argument; PHASEKIT_FUZZ overrides it.
-EACH = int(os.environ.get("PHASEKIT_FUZZ", "2"))
+EACH = int(os.environ.get("PHASEKIT_FUZZ", "1"))
 DOCUMENTED = (pk.ParameterError, pk.ConvergenceError, pk.StoreError)
 CALLABLES = hostile.callables()
 
