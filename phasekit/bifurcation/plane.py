@@ -75,7 +75,7 @@ class Plane:
         sin, cos = np.sin(phi), np.cos(phi)
         sin2, cos2 = 2.0 * sin * cos, (cos - sin) * (cos + sin)
         rows = np.array([[-sin * cos, sin, -cos], [-cos2, cos, sin]])
-        force = np.sqrt(A * A + B * B + C * C)
+        force = np.hypot(np.hypot(A, B), C)  # squares of large ones overflow
         if force == 0.0:  # no direction: the curve ends here
             return np.zeros(2), np.zeros((2, 3))
         scale = 1.0 / force

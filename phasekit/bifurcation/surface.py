@@ -34,7 +34,7 @@ def equilibrium_surface(
         Axes of the grid.
     """
     A, B, C = (c[..., None] for c in coefficients(*np.meshgrid(x, y, indexing="ij")))
-    force = np.sqrt(A * A + B * B + C * C)
+    force = np.hypot(np.hypot(A, B), C)  # squares of large ones overflow
     scale = np.divide(1.0, force, out=np.zeros_like(force), where=force > 0.0)
     slope = gradient(A, B, C, phi) * scale
     # A zero on a corner would belong to no edge, or to many.

@@ -11,8 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
-from phasekit.labelled.arguments import bad, numeric
+from phasekit.labelled.arguments import bad, numeric, reals
 from phasekit.labelled.grid import variable
+from phasekit.labelled.units import UNITS_OF
 from phasekit.mechanics import two_degrees as mechanics
 from phasekit.mechanics.two_degrees import TwoDegrees
 
@@ -183,7 +184,8 @@ def on_states(
             )
 
     def applied(*arrays: Any) -> Any:
-        results = function(*arrays)
+        # Python's own floats would raise on overflow.
+        results = function(*(np.asarray(array)[()] for array in arrays))
         return results if len(rows) > 1 else results[0]
 
     try:
@@ -210,7 +212,7 @@ def on_states(
 
 
 def _state(argument: str, value: States) -> float | NDArray[np.float64] | xr.DataArray:
-    if isinstance(value, np.ndarray) and value.ndim != 1 and value.dtype.kind in "iuf":
-        return value.astype(np.float64) if value.ndim else numeric(argument, value)
-    kept = numeric(argument, value)
+    if isinstance(value, np.ndarray) and value.ndim > 1:
+        return reals(argument, value, "numbers")
+    kept = numeric(argument, value, UNITS_OF.get(argument, ""))
     return kept.compute() if isinstance(kept, xr.DataArray) else kept

@@ -20,7 +20,7 @@ from phasekit.bifurcation.continuation.specials import Placed, find
 from phasekit.bifurcation.continuation.start import go_on
 from phasekit.errors import ParameterError
 from phasekit.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.arguments import bad, whole
 from phasekit.labelled.branch_points import LABELS, points_of
 from phasekit.labelled.pictures import picture
 from phasekit.labelled.problem import Problem
@@ -121,10 +121,9 @@ class Branch:
 
     def special(self, label: str) -> tuple[SpecialPoint, ...]:
         """The special points of one label (LP, BP, H, ...) or kind (fold, pitchfork, ...)."""
-        found = tuple(s for s in self.special_points if label in (s.label, s.kind))
-        if not found and label not in {*LABELS, *LABELS.values()}:
+        if not isinstance(label, str) or label not in {*LABELS, *LABELS.values()}:
             raise bad("label", label, f"one of {', '.join(dict.fromkeys(LABELS.values()))}")
-        return found
+        return tuple(s for s in self.special_points if label in (s.label, s.kind))
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curve with its special points: see `phasekit.plot.branch`."""
@@ -152,9 +151,8 @@ class Branch:
                 f"extend: the branch ended for other reasons than max_points: {reasons}"
             )
         count = curve.options.max_points if points is None else points
-        if isinstance(count, bool) or not isinstance(count, (int, np.integer)) or count < 1:
-            raise bad("points", count, "a whole number >= 1")
-        backward, forward = (go_on(curve, track, int(count)) for track in self.tracks)
+        count = whole("points", count, "a whole number >= 1")
+        backward, forward = (go_on(curve, track, count) for track in self.tracks)
         if forward is not None and forward.stop.reason == "closed":
             backward = None
         return make_branch(problem, curve, self.start, backward, forward, self.record)

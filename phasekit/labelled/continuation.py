@@ -146,7 +146,7 @@ def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter
 
 def check_span(span: Any, units: str | None = None) -> tuple[float, float]:
     """Two numbers, the lower one first."""
-    wants = "two finite numbers (low, high) with low < high"
+    wants = "two numbers (low, high), finite, with low < high"
     low, high = pair("span", span, wants, units)
     if not low < high:
         raise bad("span", span, wants)
@@ -181,10 +181,10 @@ def _start(problem: Problem, x0: Any) -> FloatArray:
         if missing or extra:
             raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
         x0 = [x0[name] for name in problem.state]
-    wants = f"{n} finite numbers: {', '.join(problem.state)}"
-    guess = np.atleast_1d(numeric("x0", x0, None, wants))
+    names = ", ".join(problem.state)
+    guess = np.atleast_1d(numeric("x0", x0, None, f"{n} numbers: {names}"))
     if guess.shape != (n,) or not np.isfinite(guess).all():
-        raise bad("x0", x0, wants)
+        raise bad("x0", x0, f"{n} finite numbers: {names}")
     return guess
 
 

@@ -73,7 +73,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     """
     system = as_system(system, rung=Trigonometric, what="orbit_families")
     n = whole("n", n, "a number of orbits >= 1")
-    wants = "one finite number, in s^-2"
+    wants = "one number, finite, in s^-2"
     top = None if energy_max is None else number("energy_max", energy_max, wants, "s-2")
     for name, value in system.parameters.items():
         if isinstance(value, xr.DataArray) and "level" in value.dims:

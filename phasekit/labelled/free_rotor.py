@@ -17,10 +17,12 @@ from phasekit.labelled.arguments import (
     NumberLike,
     Value,
     bad,
+    describe,
     named_arguments,
     numeric,
     same,
     unknown,
+    whole,
 )
 from phasekit.labelled.grid import variable
 from phasekit.labelled.identity import (
@@ -48,6 +50,7 @@ from phasekit.labelled.trajectory import (
     strobe,
     trajectory,
 )
+from phasekit.labelled.units import UNITS_OF
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.mechanics import two_degrees as mechanics
 from phasekit.mechanics.two_degrees import TwoDegrees
@@ -58,6 +61,10 @@ class Accelerations(NamedTuple):
 
     domega1: Any
     ddphi: Any
+
+
+#: Most states that a section may have.
+MOST = 10_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -477,7 +484,10 @@ class FreeGyroRotor(Model):
         0.0
         """
         start, stop = _times(span, two=True)
-        named = events if isinstance(events, Mapping) else {"event": events} if events else {}
+        if isinstance(events, Mapping):
+            named: Mapping[str, StateFunction] = events
+        else:
+            named = {} if events is None else {"event": events}
         for name, event in named.items():
             if not isinstance(name, str):
                 raise bad("events", name, "names that are strings")
@@ -555,11 +565,13 @@ class FreeGyroRotor(Model):
         duration = checked_number("duration", duration, wants, low=np.nextafter(0, 1))
         if (period is None) == (section is None):
             raise ParameterError(
-                f"period, section: got {period!r} and {section!r}, wants exactly one of them: the "
-                "period of a torque in s, or an angle of the disk in rad"
+                f"period, section: got {describe(period)} and {describe(section)}, wants exactly "
+                "one of them: the period of a torque in s, or an angle of the disk in rad"
             )
-        if isinstance(direction, bool) or direction not in (1, -1, 0):
-            raise bad("direction", direction, "1 (rising), -1 (falling) or 0 (both)")
+        senses = "1 (rising), -1 (falling) or 0 (both)"
+        direction = whole("direction", direction, senses, -1)
+        if direction > 1:
+            raise bad("direction", direction, senses)
         state = (phi1, phi0, omega1, dphi0)
         motion = self._motion(state, (torque1, torque2), 0.0, rtol, atol, max_step)
         times: FloatArray
@@ -567,11 +579,13 @@ class FreeGyroRotor(Model):
             period = checked_number("period", period, wants, low=np.nextafter(0, 1))
             if period > duration:
                 raise bad("period", period, f"at most the duration, {duration!r} s")
+            if duration / period > MOST:
+                raise bad("period", period, f"at least the duration over {MOST:.0e}")
             times = period * np.arange(np.floor(duration / period) + 1)
             states = strobe(motion, times)
         else:
             angle = checked_number("section", section, "an angle in rad: one finite number")
-            times, states = crossings(motion, duration, angle, int(direction))
+            times, states = crossings(motion, duration, angle, direction)
         states[:2] = np.pi - np.mod(np.pi - states[:2], 2.0 * np.pi)
         data = {
             "section_time": labelled(
@@ -608,7 +622,7 @@ class FreeGyroRotor(Model):
             "atol": checked_number("atol", atol, "a number >= 0", low=0.0),
             "max_step": np.inf,
         }
-        if max_step != np.inf:
+        if not (isinstance(max_step, float) and max_step == np.inf):
             wants = "a time in s, > 0"
             solver["max_step"] = checked_number("max_step", max_step, wants, low=np.nextafter(0, 1))
         torque1, torque2 = (
@@ -645,7 +659,7 @@ MODELS["FreeGyroRotor"] = FreeGyroRotor
 def _times(t: Any, *, two: bool = False) -> FloatArray:
     argument = "span" if two else "t"
     wants = "(start, stop), two times in s" if two else "two times in s, (start, stop), or more"
-    kept = numeric(argument, t)
+    kept = numeric(argument, t, UNITS_OF[argument], wants)
     times = np.asarray(kept.values if isinstance(kept, xr.DataArray) else kept)
     if times.ndim != 1 or times.size < 2 or (two and times.size > 2):
         raise bad(argument, t, wants)

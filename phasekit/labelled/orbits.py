@@ -241,7 +241,8 @@ def _codes(family: Any) -> Any:
     data = (
         family.values if isinstance(family, xr.DataArray) and family.dtype.kind in "OTU" else family
     )
-    if isinstance(data, (str, list, tuple, np.ndarray)):
+    several = isinstance(data, (list, tuple)) and all(isinstance(name, str) for name in data)
+    if several or isinstance(data, (str, np.ndarray)):
         array = np.asarray(data, dtype=object)
         if array.size and all(isinstance(name, str) for name in array.flat):
             wrong = [name for name in array.flat if name not in FAMILIES]

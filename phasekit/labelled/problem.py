@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
-from phasekit.labelled.arguments import bad, flag, unknown
+from phasekit.labelled.arguments import bad, flag, reals, unknown
 from phasekit.labelled.as_system import stands_on
 from phasekit.labelled.problem_parts import (
     make_field,
@@ -169,14 +169,14 @@ class Problem:
         >>> Problem.from_potential("x**4/4 - x**2/2")
         Problem(x' = dx, dx' = -x**3 + x; conservative)
         """
-        velocity = f"d{coordinate}"
-        states = names_of("coordinate", (coordinate,)) + (velocity,)
-        values = values_of("parameters", parameters or {})
+        states = names_of("coordinate", (coordinate,))
+        states += (f"d{coordinate}",)
+        values = values_of("parameters", {} if parameters is None else parameters)
         symbols = symbols_of([*states, *values])
         V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
         force = -V.diff(symbols[coordinate])
         periods = {} if period is None else {coordinate: period}
-        return cls([symbols[velocity], force], states, values, periods=periods, conservative=True)
+        return cls([symbols[states[1]], force], states, values, periods=periods, conservative=True)
 
     @classmethod
     def from_system(cls, system: Model) -> Problem:
@@ -226,18 +226,19 @@ class Problem:
     def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:
         """Value of f at a state, with some parameters changed."""
         problem = self.replace(**changes) if changes else self
-        x = np.atleast_1d(np.asarray(x, dtype=float))
-        if x.shape != (len(self.state),):
-            raise bad("x", x, f"{len(self.state)} numbers: {', '.join(self.state)}")
         return problem.derivatives(x)[0]
 
-    def derivatives(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def derivatives(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Value of f and its matrix of derivatives by the states."""
         from phasekit.bifurcation.continuation.curve import Curve
         from phasekit.bifurcation.continuation.options import ContinuationOptions
         from phasekit.kernels.defining import EQUILIBRIUM
 
         n = len(self.state)
+        wants = f"{n} numbers: {', '.join(self.state)}"
+        x = np.atleast_1d(reals("x", x, wants))
+        if x.shape != (n,):
+            raise bad("x", x, wants)
         infinite = np.full(n, np.inf)
         par = np.array(list(self.parameters.values()))
         curve = Curve(
@@ -264,6 +265,9 @@ class Problem:
     @classmethod
     def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
         """Make a problem of what `specification` gave; None where f was code."""
+        keys = ("f", "state", "parameters", "periods", "conservative")
+        if not isinstance(spec, Mapping) or not spec.keys() >= set(keys):
+            raise bad("spec", spec, "what Problem.specification returns")
         if spec.get("system"):
             return cls.from_system(_model(spec["system"])(**spec["system_parameters"]))
         if spec["f"] is None:

@@ -42,7 +42,7 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
         names_of(argument, given)
     values = {}
     for name, value in given.items():
-        values[name] = number(f"{argument}[{name!r}]", value, "a finite number", None)
+        values[name] = number(f"{argument}[{name!r}]", value, "a number, finite", None)
     return values
 
 

@@ -13,9 +13,10 @@ from scipy.integrate import DOP853, OdeSolution, solve_ivp
 from scipy.optimize import brentq
 
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.labelled.arguments import FloatArray, NumberLike, bad, numeric
+from phasekit.labelled.arguments import FloatArray, NumberLike, bad, number, numeric
 from phasekit.labelled.grid import variable
 from phasekit.labelled.schema import LABEL_DTYPE
+from phasekit.labelled.units import UNITS_OF
 from phasekit.mechanics import two_degrees as mechanics
 from phasekit.mechanics.two_degrees import TwoDegrees
 
@@ -161,7 +162,7 @@ class Trajectory:
         ParameterError
             If a time lies outside.
         """
-        kept = numeric("t", t)
+        kept = numeric("t", t, UNITS_OF["t"])
         times = np.asarray(kept.values if isinstance(kept, xr.DataArray) else kept)
         low, high = sorted((self.start, self.stop))
         if times.ndim > 1 or not np.all((times >= low) & (times <= high)):
@@ -339,11 +340,8 @@ def checked_torque(
 
 def checked_number(argument: str, value: Any, wants: str, *, low: float = -np.inf) -> float:
     """Return one finite number, at least `low`."""
-    try:
-        kept = numeric(argument, value)
-    except ParameterError:
-        raise bad(argument, value, wants) from None
-    if not isinstance(kept, float) or kept < low:
+    kept = number(argument, value, wants, UNITS_OF.get(argument, ""))
+    if kept < low:
         raise bad(argument, value, wants)
     return kept
 

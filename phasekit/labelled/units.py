@@ -31,9 +31,22 @@ UNITS: Mapping[str, Mapping[str, Decimal]] = {
     "m s-2": {"m/s2": Decimal(1), "m s-2": Decimal(1)},
     "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "min": Decimal(60)},
     "kg m2": {"kg m2": Decimal(1)},
+    "kg m2 s-1": {"kg m2 s-1": Decimal(1)},
     "N": {"N": Decimal(1)},
     "N m": {"N m": Decimal(1)},
+    "J": {"J": Decimal(1)},
     "1": {},
+}
+
+#: Units of the arguments of motions with two degrees of freedom.
+UNITS_OF: Mapping[str, str] = {
+    **dict.fromkeys(("phi", "phi0", "phi1", "section"), "rad"),
+    **dict.fromkeys(("dphi", "dphi0", "omega1"), "s-1"),
+    **dict.fromkeys(("t", "span", "duration", "period", "max_step"), "s"),
+    **dict.fromkeys(("torque1", "torque2"), "N m"),
+    "carrier_inertia": "kg m2",
+    "p": "kg m2 s-1",
+    "energy": "J",
 }
 
 _ALIASES = {

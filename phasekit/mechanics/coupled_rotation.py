@@ -20,6 +20,7 @@ from phasekit.mechanics.vectors import (
     cross,
     directions,
     numbers,
+    quiet,
     read_only,
     rotation,
     times,
@@ -98,6 +99,7 @@ class CoupledRotation(Frozen):
         shapes = self.body.shape, self.n1.shape[:-1], self.n2.shape[:-1], np.shape(self.a)
         return np.broadcast_shapes(*shapes)
 
+    @quiet
     def at(
         self,
         phi1: npt.ArrayLike = 0.0,

@@ -20,6 +20,7 @@ from phasekit.mechanics.vectors import (
     cross,
     dot,
     numbers,
+    quiet,
     times,
     unit,
     vectors,
@@ -94,46 +95,55 @@ class CoupledRotationState(Frozen):
         return np.shape(self.omega1)
 
     @property
+    @quiet
     def rho_C(self) -> Array:
         """Vector from O2 to the mass center, in m."""
         return np.asarray(self.body.center)
 
     @property
+    @quiet
     def angular_velocity(self) -> Array:
         """Angular velocity ``omega1 n1 + omega2 n2`` of the body, in rad/s."""
         return times(self.omega1, self.n1) + times(self.omega2, self.n2)
 
     @property
+    @quiet
     def linear_moment_1(self) -> Array:
         """Linear mass moment vector S_n1 in kg m."""
         return self.body.linear_moment(self.n1)
 
     @property
+    @quiet
     def linear_moment_2(self) -> Array:
         """Linear mass moment vector S_n2 in kg m."""
         return self.body.linear_moment(self.n2)
 
     @property
+    @quiet
     def inertia_moment_1(self) -> Array:
         """Mass inertia moment vector J_n1 in kg m^2."""
         return self.body.inertia_moment(self.n1)
 
     @property
+    @quiet
     def inertia_moment_2(self) -> Array:
         """Mass inertia moment vector J_n2 in kg m^2."""
         return self.body.inertia_moment(self.n2)
 
     @property
+    @quiet
     def deviation_moment_1(self) -> Array:
         """Deviation moment vector D_n1 in kg m^2."""
         return self.body.deviation_moment(self.n1)
 
     @property
+    @quiet
     def deviation_moment_2(self) -> Array:
         """Deviation moment vector D_n2 in kg m^2."""
         return self.body.deviation_moment(self.n2)
 
     @property
+    @quiet
     def coupling_vector(self) -> Array:
         """Coupling vector ``C12 = [n1, J_n2] + [n2, J_n1] + I [n1, n2]`` in kg m^2.
 
@@ -145,6 +155,7 @@ class CoupledRotationState(Frozen):
         return cross(self.n1, second) + cross(self.n2, first) + mixed
 
     @property
+    @quiet
     def linear_momentum(self) -> Array:
         """Linear momentum ``K = omega1 [n1, r0] M + omega1 S_n1 + omega2 S_n2`` in kg m/s.
 
@@ -154,6 +165,7 @@ class CoupledRotationState(Frozen):
         return times(self.body.mass, self._pole_velocity + swept)
 
     @property
+    @quiet
     def angular_momentum(self) -> Array:
         """Angular momentum about O1 in kg m^2/s.
 
@@ -165,6 +177,7 @@ class CoupledRotationState(Frozen):
         return cross(self.r0, self.linear_momentum) + own + turning
 
     @property
+    @quiet
     def linear_momentum_rate(self) -> Array:
         """Rate of change dK/dt of the linear momentum in N.
 
@@ -180,6 +193,7 @@ class CoupledRotationState(Frozen):
         )
 
     @property
+    @quiet
     def angular_momentum_rate(self) -> Array:
         """Rate of change ``dL_O1/dt = [r0, dK/dt] + M_O2`` of the angular momentum in N m.
 
@@ -188,6 +202,7 @@ class CoupledRotationState(Frozen):
         return cross(self.r0, self.linear_momentum_rate) + self.moment_about_O2
 
     @property
+    @quiet
     def moment_about_O2(self) -> Array:
         """Moment ``M_O2 = sum [rho, m d^2r/dt^2]`` of the inertial accelerations, in N m.
 
@@ -202,6 +217,7 @@ class CoupledRotationState(Frozen):
         )
 
     @property
+    @quiet
     def kinetic_energy(self) -> Array:
         """Kinetic energy of the body in J."""
         omega, velocity = self.angular_velocity, self._pole_velocity
@@ -210,12 +226,14 @@ class CoupledRotationState(Frozen):
         return np.asarray(self.body.mass * coupled + 0.5 * turning)[()]
 
     @property
+    @quiet
     def kinetic_energy_rate(self) -> Array:
         """Rate of change of the kinetic energy in W, ``(v_O2, dK/dt) + (omega, M_O2)``."""
         through_pole = dot(self._pole_velocity, self.linear_momentum_rate)
         return through_pole + dot(self.angular_velocity, self.moment_about_O2)
 
     @property
+    @quiet
     def rotators(self) -> dict[str, Array]:
         """Rotators by their names R01 R011 R022 R012 R1 R2 R12 R12c, in s^-2.
 
@@ -236,6 +254,7 @@ class CoupledRotationState(Frozen):
         return found
 
     @property
+    @quiet
     def intensities(self) -> dict[str, Array]:
         """Lengths of the rotators in s^-2, NaN where they are undefined.
 
@@ -252,6 +271,7 @@ class CoupledRotationState(Frozen):
             found[name] = np.where(defined, size[AXES.get(name)], np.nan)[()]
         return found
 
+    @quiet
     def angular_velocities(
         self, ddomega1: npt.ArrayLike = 0.0, ddomega2: npt.ArrayLike = 0.0
     ) -> dict[str, Array]:
@@ -281,6 +301,7 @@ class CoupledRotationState(Frozen):
             found[name] = np.asarray(own + (lead[AXES[name]] if name in AXES else coupled))[()]
         return found
 
+    @quiet
     def self_bearings(
         self, G: npt.ArrayLike, s_A: npt.ArrayLike, s_B: npt.ArrayLike
     ) -> SelfBearings:
@@ -316,6 +337,7 @@ class CoupledRotationState(Frozen):
         at_B = times(s_A / span, across) - times(1.0 / span, cross(moment, self.n2))
         return SelfBearings(force - at_B, at_B)
 
+    @quiet
     def fixed_bearings(self, G: npt.ArrayLike, rho_B1: npt.ArrayLike) -> FixedBearings:
         """Forces of the bearings of the shaft n1 on the carrier, in N.
 
@@ -347,6 +369,7 @@ class CoupledRotationState(Frozen):
         at_B = times(1.0 / np.where(position == 0.0, np.nan, position), cross(about_O1, self.n1))
         return FixedBearings(force - at_B, at_B)
 
+    @quiet
     def drive_torque(self, G: npt.ArrayLike) -> Array:
         """Couple about n1 with which the drive keeps the motion of phi1, in N m.
 
@@ -355,6 +378,7 @@ class CoupledRotationState(Frozen):
         force, moment = self._loads(G)
         return dot(self.n1, cross(self.r0, force) + moment)
 
+    @quiet
     def power(self, G: npt.ArrayLike) -> Array:
         """Power ``omega1 (n1, W)`` of the drive in W; G as of `drive_torque`.
 
@@ -362,6 +386,7 @@ class CoupledRotationState(Frozen):
         """
         return np.asarray(self.omega1 * self.drive_torque(G))[()]
 
+    @quiet
     def self_torque(self, G: npt.ArrayLike) -> Array:
         """Couple ``Q2 = (n2, M_O2 - [rho_C, G])`` from the carrier on the body about n2, in N m.
 
@@ -369,6 +394,7 @@ class CoupledRotationState(Frozen):
         """
         return dot(self.n2, self._loads(G)[1])
 
+    @quiet
     def free_acceleration(self, G: npt.ArrayLike, torque: npt.ArrayLike = 0.0) -> Array:
         """Acceleration domega2 of a body that turns freely about n2, in rad/s^2.
 

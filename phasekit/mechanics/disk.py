@@ -114,7 +114,8 @@ def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:
     0.0
     """
     e, beta = floats(e=e, beta=beta)
-    return np.asarray(e * turn(beta)[0])
+    with np.errstate(all="ignore"):
+        return np.asarray(e * turn(beta)[0])
 
 
 def disk_inertia(
@@ -137,7 +138,8 @@ def disk_inertia(
     [0.025, 0.027817, 0.007183, 0.007058]
     """
     m, r, e, beta = floats(m=m, r=r, e=e, beta=beta)
-    s, c = turn(beta)[0], np.cos(beta)
-    ju = m * (0.25 * r * r + e * e)
-    j = 0.25 * m * r * r
-    return ju, j + ju * c * c, j + ju * s * s, ju * s * c
+    with np.errstate(all="ignore"):
+        s, c = turn(beta)[0], np.cos(beta)
+        ju = m * (0.25 * r * r + e * e)
+        j = 0.25 * m * r * r
+        return ju, j + ju * c * c, j + ju * s * s, ju * s * c

@@ -19,6 +19,7 @@ from phasekit.mechanics.vectors import (
     directions,
     dot,
     numbers,
+    quiet,
     read_only,
     tensors,
     times,
@@ -88,8 +89,9 @@ class RigidBody(Frozen):
             raise bad("inertia", self.inertia, wants)
         common_shape(mass=mass.shape, center=center.shape[:-1], inertia=inertia.shape[:-2])
         inertia = 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
-        excess = _excess(mass, center, inertia)
-        if excess.ndim == 0 and excess > TOLERANCE:
+        with np.errstate(all="ignore"):  # beyond the largest double nothing is a body
+            excess = _excess(mass, center, inertia)
+        if excess.ndim == 0 and not excess <= TOLERANCE:
             wants = (
                 "the tensor about the pole of a body of this mass and center; about the center "
                 f"one principal moment exceeds the sum of the others (by {excess:.1e}, relative)"
@@ -118,6 +120,7 @@ class RigidBody(Frozen):
         return body
 
     @classmethod
+    @quiet
     def from_points(cls, masses: npt.ArrayLike, positions: npt.ArrayLike) -> Self:
         """Return the body that particles make.
 
@@ -156,6 +159,7 @@ class RigidBody(Frozen):
         return cls._make(total, center, _steiner(m, points).sum(axis=-3), good)
 
     @classmethod
+    @quiet
     def disk(
         cls, m: npt.ArrayLike, r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike
     ) -> Self:
@@ -205,6 +209,7 @@ class RigidBody(Frozen):
         """Shape of the batch; () for a single body."""
         return np.shape(self.mass)
 
+    @quiet
     def linear_moment(self, n: npt.ArrayLike) -> Array:
         """Linear mass moment vector ``S_n = M [n, rho_C]`` in kg m.
 
@@ -217,6 +222,7 @@ class RigidBody(Frozen):
         """
         return times(self.mass, cross(self._axis(n), self.center))
 
+    @quiet
     def inertia_moment(self, n: npt.ArrayLike) -> Array:
         """Mass inertia moment vector ``J_n = sum m [rho, [n, rho]]`` in kg m^2.
 
@@ -229,6 +235,7 @@ class RigidBody(Frozen):
         """
         return apply(self.inertia, self._axis(n))
 
+    @quiet
     def deviation_moment(self, n: npt.ArrayLike) -> Array:
         """Deviation moment vector ``D_n = [n, [J_n, n]]``, the part of J_n across n, in kg m^2.
 
@@ -242,6 +249,7 @@ class RigidBody(Frozen):
         n = self._axis(n)
         return cross(n, cross(apply(self.inertia, n), n))
 
+    @quiet
     def axial_moment(self, n: npt.ArrayLike) -> Array:
         """Moment of inertia ``(n, J_n)`` about the axis, in kg m^2.
 
@@ -253,6 +261,7 @@ class RigidBody(Frozen):
         n = self._axis(n)
         return dot(n, apply(self.inertia, n))
 
+    @quiet
     def polar_moment(self) -> Array:
         """Polar moment ``J_O = sum m rho^2`` of the pole, half the trace of the tensor, in kg m^2.
 
@@ -263,6 +272,7 @@ class RigidBody(Frozen):
         """
         return np.asarray(0.5 * np.trace(self.inertia, axis1=-2, axis2=-1))[()]
 
+    @quiet
     def spherical_moment(self, n: npt.ArrayLike) -> Array:
         """Spherical part ``(2/3) J_O n`` of the inertia moment vector, in kg m^2.
 
@@ -273,6 +283,7 @@ class RigidBody(Frozen):
         """
         return times(self.polar_moment() / 1.5, self._axis(n))
 
+    @quiet
     def deviatoric_moment(self, n: npt.ArrayLike) -> Array:
         """Deviatoric part ``J_n - (2/3) J_O n`` of the inertia moment vector, in kg m^2.
 
@@ -283,6 +294,7 @@ class RigidBody(Frozen):
         """
         return self.inertia_moment(n) - self.spherical_moment(n)
 
+    @quiet
     def linear_moment_rate(
         self,
         n: npt.ArrayLike,
@@ -312,6 +324,7 @@ class RigidBody(Frozen):
         first = cross(turning, cross(n, self.center)) + cross(slip, self.center)
         return times(self.mass, first)
 
+    @quiet
     def inertia_moment_rate(
         self,
         n: npt.ArrayLike,
@@ -332,6 +345,7 @@ class RigidBody(Frozen):
         n, turning, slip = self._turning(n, angular_velocity, axis_velocity)
         return cross(turning, apply(self.inertia, n)) + apply(self.inertia, slip)
 
+    @quiet
     def deviation_moment_rate(
         self,
         n: npt.ArrayLike,
@@ -354,6 +368,7 @@ class RigidBody(Frozen):
         along = dot(turning, moment) + dot(axis, rate)
         return rate - times(dot(axis, moment), turning) - times(along, axis)
 
+    @quiet
     def shifted(self, vector: npt.ArrayLike) -> Self:
         """Return the body with another pole, at `vector` from this one, in m.
 
@@ -372,6 +387,7 @@ class RigidBody(Frozen):
         change = -_product(self.mass, step, self.center + center)
         return self._make(np.asarray(self.mass), center, self.inertia + change)
 
+    @quiet
     def centroidal(self) -> Self:
         """Return the body with its mass center as the pole.
 
@@ -382,6 +398,7 @@ class RigidBody(Frozen):
         """
         return self.shifted(self.center)
 
+    @quiet
     def rotated(self, matrix: npt.ArrayLike) -> Self:
         """Return the body turned about the pole, or mirrored.
 

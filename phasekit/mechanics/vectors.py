@@ -16,6 +16,9 @@ from phasekit.inputs import bad, is_labelled, reals
 
 Array = npt.NDArray[np.float64]
 
+#: Decorator: what overflows becomes infinite or NaN, without a warning.
+quiet = np.errstate(all="ignore")
+
 #: What counts as rounding, relative to the size of what was rounded.
 ROUNDING = 32 * float(np.finfo(float).eps)
 

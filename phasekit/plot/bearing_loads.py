@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.errors import OrbitKind, ParameterError
-from phasekit.labelled.arguments import bad, unknown
+from phasekit.labelled.arguments import bad, named
 from phasekit.labelled.machine import FRAMES
 from phasekit.labelled.machine import bearing_forces as forces_of
 from phasekit.labelled.motion import flow
@@ -234,12 +234,11 @@ def _lines(
         along = "n2" if frame == "disk" else "u01"
         some = [name for name in offered if bearing == "A2" or name != along]
         components = "magnitude" if bearing is None else some
-    names = [components] if isinstance(components, str) else list(components)
-    if not names:
+    names = [components] if isinstance(components, str) else components
+    if not isinstance(names, Sequence) or not names:
         raise bad("components", components, f"some of {', '.join(offered)}")
     for name in names:
-        if name not in offered:
-            raise unknown("component", name, offered)
+        named("component", name, offered)
     lines = []
     for i, which in enumerate(bearings):
         for k, name in enumerate(names):

@@ -138,7 +138,8 @@ def _plane_of(rotator: str, plane: Sequence[str] | None) -> Plane | None:
     if plane is None:
         return PLANES[rotator]
     names = list(plane) if isinstance(plane, Sequence) and not isinstance(plane, str) else []
-    if len(names) != 2 or not set(names) <= set(CARRIER_AXES) or names[0] == names[1]:
+    known = all(isinstance(name, str) and name in CARRIER_AXES for name in names)
+    if len(names) != 2 or not known or names[0] == names[1]:
         raise bad("plane", plane, f"a pair of {', '.join(CARRIER_AXES)}")
     return names[0], names[1]
 

@@ -76,11 +76,12 @@ def period_energy(
     axes = style.axes_for(ax, legend=legend)
 
     natural, bottom = points.natural_frequency.values, points.energy.values
-    handles = _draw_families(
-        axes, families, points, "energy_level", "period", (bottom, 2.0 * np.pi / natural)
-    )
+    with np.errstate(all="ignore"):  # of frequencies below the smallest double
+        periods = 2.0 * np.pi / natural
+    ends = (bottom, periods)
+    handles = _draw_families(axes, families, points, "energy_level", "period", ends)
     handles += _draw_walls(axes, points, loops)
-    handles += _draw_centers(axes, bottom, 2.0 * np.pi / natural)
+    handles += _draw_centers(axes, bottom, periods)
 
     energies = families.energy_level
     low = min(float(energies.min()), *bottom[np.isfinite(natural)])
@@ -89,7 +90,8 @@ def period_energy(
     # A family too narrow to be seen must not take the height.
     seen = energies.max("level") - energies.min("level") > 0.02 * (high - low)
     middle = families.period.median("level").where(seen).values
-    axes.set_ylim(0.0, float(np.nanmax([*(1.8 * middle), *(4.0 * np.pi / natural)])))
+    heights = np.array([*(1.8 * middle), *(2.0 * periods)])
+    axes.set_ylim(0.0, float(np.max(heights, where=np.isfinite(heights), initial=0.0)) or None)
     axes.set_xlabel("energy $h$ (s$^{-2}$)")
     axes.set_ylabel("period $T$ (s)")
     if legend:

@@ -92,10 +92,13 @@ def force_polygon(
         raise ParameterError(
             f"disk, phi, dphi: got {dict(loads.sizes)}, wants one disk in one state"
         )
-    parts = _parts(loads.force_component.values, loads.force_weight.values[:2], phi, dphi, disk)
     total = np.asarray(loads.force.values[:2], dtype=float)
-    if not np.isfinite(total).all():
+    speed = float(loads.state_dphi) ** 2 if abs(float(loads.state_dphi)) < 1e150 else np.inf
+    if not np.isfinite([*total, speed]).all():
         raise bad("disk", disk, "a state whose forces are finite")
+    angle = float(loads.state_phi)
+    weight = loads.force_weight.values[:2]
+    parts = _parts(loads.force_component.values, weight, angle, speed, disk)
     axes = style.axes_for(ax, legend=legend)
 
     corners = np.concatenate([[np.zeros(2)], np.cumsum(list(parts.values()), axis=0)])
@@ -119,12 +122,15 @@ def force_polygon(
 
 
 def _parts(
-    components: FloatArray, weight: FloatArray, phi: float, dphi: float, disk: Any
+    components: FloatArray, weight: FloatArray, phi: float, speed: float, disk: Any
 ) -> dict[str, FloatArray]:
-    """Return the parts of the force in the plane (u2, v2), in the order of the polygon."""
+    """Return the parts of the force in the plane (u2, v2), in the order of the polygon.
+
+    `speed` is the square of the angular velocity.
+    """
     s, c = np.sin(phi), np.cos(phi)
     A, B, C = disk.coefficients()
-    rotator = np.array([-((B - A * c) * s - C * c), dphi * dphi])
+    rotator = np.array([-((B - A * c) * s - C * c), speed])
     length = float(np.hypot(*rotator))
     directions = [
         np.array([s, c]),

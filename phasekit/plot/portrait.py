@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
-from phasekit.labelled.arguments import bad, reals
+from phasekit.labelled.arguments import bad, one_of, reals
 from phasekit.labelled.potential_system import Potential
 from phasekit.plot import potential, strokes, style
 from phasekit.plot.landscape import Arc, Landscape, Level
@@ -86,8 +86,8 @@ def phase_portrait(
     >>> ax.get_xlabel()
     '$\\varphi$ (rad)'
     """
-    if color_by is not None and color_by not in tuple(COLORED):
-        raise bad("color_by", color_by, f"one of {', '.join(COLORED)}")
+    if color_by is not None:
+        one_of("color_by", color_by, tuple(COLORED))
     if isinstance(system, Potential):
         return _of_potential(system, energies, orbits, color_by, angles, legend, ax)
     land = Landscape.of(system)

@@ -108,11 +108,13 @@ def _draw_well(
     well.set_xlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
 
 
-def _panels(ax: Axes | Sequence[Axes] | None) -> list[Axes]:
+def _panels(ax: Any) -> list[Axes]:
     if ax is None:
         figure = style.new_figure(6.4, 7.2)
         return list(figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.5)))
-    if isinstance(ax, Sequence | np.ndarray) and len(ax) == 2:
+    if isinstance(ax, np.ndarray) and ax.ndim == 1:
+        ax = ax.tolist()
+    if isinstance(ax, Sequence) and len(ax) == 2:
         return [style.check_axes(panel) for panel in ax]
     return [style.check_axes(ax, "ax (or each of a pair)")]
 

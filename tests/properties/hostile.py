@@ -18,6 +18,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.cli import main
+from phasekit.inputs import describe
 
 #: What models share for the rest of the package, and results that only phasekit makes.
 MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
@@ -174,6 +175,27 @@ def dataset() -> xr.Dataset:
 
 
 @functools.cache
+def loads() -> xr.Dataset:
+    return dataset().phasekit.bearing_forces(on="separatrix")
+
+
+@functools.cache
+def loci() -> xr.Dataset:
+    plane = {"xlim": (-3.0, 3.0), "ylim": (-3.0, 3.0)}
+    return pk.bifurcation_set(pk.Coefficients(2.0, 1.0, 0.3), "B", "C", **plane)
+
+
+@functools.cache
+def motion() -> xr.Dataset:
+    return pk.flow(disk(), 0.3, 0.2, [0.0, 0.5])
+
+
+@functools.cache
+def trajectory() -> Any:
+    return rotor().trajectory(0.3, 0.2, (0.0, 0.5))
+
+
+@functools.cache
 def problem() -> Any:
     return pk.Problem("r + x**2 - 0.1*x**4", ("x",), {"r": -0.5})
 
@@ -270,7 +292,13 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     },
     "figure_eights": {"path": lambda: {"B": (0.1, 1.0)}, "n": lambda: 5},
     "orbit_families": {"n": lambda: 3},
-    "continuation": {"options": lambda: pk.ContinuationOptions(max_points=10)},
+    "continuation": {
+        "x0": lambda: [0.7], "options": lambda: pk.ContinuationOptions(max_points=10),
+    },
+    "bearing_forces": {"dphi": lambda: 0.2},
+    "fixed_bearing_forces": {"dphi": lambda: 0.2},
+    "rotators": {"dphi": lambda: 0.2},
+    "sweep": {"axes": lambda: {"A": [1.0, 2.0]}, "workers": lambda: None},
     "diagram": {"options": lambda: pk.ContinuationOptions(max_points=10), "depth": lambda: 1},
     "FreeGyroRotor": {"disk": lambda: rotor().disk},
     "FreeGyroRotor.trajectory": {"span": lambda: (0.0, 0.5)},
@@ -279,22 +307,19 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
     "SpecialPoint.curve": {"parameter": lambda: "r"},
+    "Branch.save": {"path": lambda: "branch.zarr"},
+    "FreeGyroRotor.poincare": {"section": lambda: 0.5},
     "Branch.extend": {"points": lambda: 2},
     "open_map": {"store": lambda: "map.zarr"},
     "plot.branch_surface": {
         "x": lambda: "B", "y": lambda: "C", "xlim": lambda: (-3, 3), "ylim": lambda: (-3, 3),
         "cells": lambda: 8,
     },
-    "plot.bifurcation_set": {
-        "dataset": lambda: pk.bifurcation_set(
-            pk.Coefficients(2.0, 1.0, 0.3), "B", "C", xlim=(-3, 3), ylim=(-3, 3)
-        )
-    },
+    "plot.bifurcation_set": {"dataset": loci},
+    "plot.bearing_forces": {"orbit": lambda: (0.3, 0.2)},
     "plot.bifurcation_diagram": {"dataset": lambda: dataset().isel(a=0)},
-    "plot.bearing_load_map": {
-        "dataset": lambda: dataset().phasekit.bearing_forces(on="separatrix")
-    },
-    "plot.time_history": {"dataset": lambda: pk.flow(disk(), 0.3, 0.2, [0.0, 0.5])},
+    "plot.bearing_load_map": {"dataset": loads},
+    "plot.time_history": {"dataset": motion},
     "plot.hodograph": {"system": disk},
     "plot.period_energy": {"n": lambda: 5},
     "plot.frequency_action": {"n": lambda: 5},
@@ -316,9 +341,21 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "RigidBody": lambda: GOOD["body"](),
     "CoupledRotation": machine,
     "CoupledRotationState": lambda: machine().at(omega1=1.0, phi2=0.3),
-    "Trajectory": lambda: rotor().trajectory(0.3, 0.2, (0.0, 0.5)),
+    "Trajectory": trajectory,
     "PhasekitAccessor": lambda: dataset().phasekit,
     "MapPlots": lambda: dataset().isel(beta=0, a=0).phasekit.plot,
+}
+
+
+#: Calls that take longer than a test should: spans over hundreds of decades, and motions of
+#: 10^15 turns.
+LONG = {
+    *((name, "huge in list") for name in ("branches", "bifurcation_set", "plot.branch_surface")),
+    *(
+        (f"FreeGyroRotor.{name}", value)
+        for name in ("simulate", "trajectory", "poincare")
+        for value in ("zero", "minus zero", "1e-320", "1e16", "2**63", "1e200", "1e300", "-1e300")
+    ),
 }
 
 
@@ -378,7 +415,7 @@ def arguments(name: str, function: Callable[..., Any]) -> dict[str, Callable[[],
 
 def argv(value: Any) -> list[list[str]]:
     """Return command lines with a word in each place."""
-    word = value if isinstance(value, str) else repr(value)[:60]
+    word = value if isinstance(value, str) else describe(value)
     disk_options = [f"--{k}={v}" for k, v in DISK.items() if k not in ("m", "half_span")]
     return [
         [word],
@@ -391,7 +428,6 @@ def argv(value: Any) -> list[list[str]]:
         ["diagram", *disk_options[1:], f"--beta=0:1:{word}", "--out=d.png"],
         ["sweep", word],
         ["info", word],
-        ["demo", f"--out={word}/"],
         ["demo", f"--cells={word}"],
     ]
 

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import reals
 from phasekit.laws.formulas import short_formula, symbols_of, take_formula, write_formula
 from phasekit.laws.grammar import FormulaError
 from phasekit.laws.ladder import Conservative
@@ -205,7 +206,8 @@ def _shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:
 def _array_function(function: Callable[..., Any]) -> Callable[..., Array]:
     @functools.wraps(function)
     def called(x: npt.ArrayLike, *parameters: npt.ArrayLike) -> Array:
-        x = np.asarray(x, dtype=float)
+        if type(x) is not np.ndarray or x.dtype != np.float64:
+            x = reals("x", x, "real numbers, array_like")
         with np.errstate(all="ignore"):
             result = np.asarray(function(x, *parameters))
         shape = np.broadcast_shapes(x.shape, *(np.shape(value) for value in parameters))
