@@ -18,6 +18,7 @@ from phasekit.labelled.arrays import prepare, write_plan
 from phasekit.labelled.clusters import connected, on_cluster
 from phasekit.labelled.estimate import SAMPLE_CELLS, refuse_too_large_for
 from phasekit.labelled.evaluate import Layout
+from phasekit.labelled.interrupts import noted
 from phasekit.labelled.job import Job, plan_job
 from phasekit.labelled.place import Place
 from phasekit.labelled.tile import Tile, finish_writing, is_marked, release_buffers
@@ -132,9 +133,11 @@ def _told(tally: Tally) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        tally.settle()
-        if tally.under_way:
-            tally.job.place.sweep_leftovers()
+        with contextlib.suppress(KeyboardInterrupt):  # a second one ends this, too
+            with noted():
+                tally.settle()
+            if tally.under_way:
+                tally.job.place.sweep_leftovers()
         total = tally.job.total
         raise KeyboardInterrupt(
             f"{total - tally.left} of {total} tiles are done; the same call goes on"

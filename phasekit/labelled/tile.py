@@ -33,7 +33,7 @@ GROUP = "sweep"
 PIECE = 1 << 14
 
 #: Seconds at most to wait for files that are being written.
-WRITING = 5.0
+WRITING = 2.0
 
 _local = threading.local()
 
