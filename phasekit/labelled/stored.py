@@ -27,6 +27,9 @@ from phasekit.labelled.tiling import progress_bar
 #: Seconds of work for which worker processes are not worth their start.
 FEW_SECONDS = 4.0
 
+#: Cells from which on they are started before it is known how long the work takes.
+MANY_CELLS = 10_000_000
+
 
 def sweep_into(
     place: Place,
@@ -55,18 +58,21 @@ def sweep_into(
             stack.enter_context(_told(tally))
             if client is not None:
                 client = stack.enter_context(connected(client))
-            processes = _weigh(job, workers, client, force)
+            most = _most(job, workers, client)
+            early = most > 1 and (workers is not None or job.cells > MANY_CELLS)
+            staff = stack.enter_context(run.hired(most)) if early else None
+            processes = _weigh(job, most, workers, force)
             with _written(place):
                 if job.old is None:
                     place.clear()
                 if job.plan != job.old:
                     prepare(place, job.old, job.plan, layout)
-                _compute(tally, processes, client, progress)
+                _compute(tally, staff or processes, client, progress)
                 _finish(job)
 
 
-def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
-    """Refuse what will not fit or cannot run, and return how many processes the work is worth."""
+def _most(job: Job, workers: int | None, client: Any) -> int:
+    """Return how many processes there may be; refuse what cannot run in others."""
     from phasekit.kernels.launch import cpus
 
     most = 1 if client is not None else min(workers or cpus(), job.count)
@@ -83,6 +89,11 @@ def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
                     "workers=1 and no client=, or choose another store"
                 )
             most = 1
+    return most
+
+
+def _weigh(job: Job, most: int, workers: int | None, force: bool) -> int:
+    """Refuse what will not fit, and return how many processes the work is worth."""
     freed = (job.place.size() or 0) if job.old is None and not job.place.empty else 0
     free = job.place.free_bytes()
     most_bytes = sum(share.raw + share.overhead for share in job.shares(0))
@@ -144,7 +155,7 @@ def _told(tally: Tally) -> Iterator[None]:
         ) from None
 
 
-def _compute(tally: Tally, processes: int, client: Any, progress: bool | None) -> None:
+def _compute(tally: Tally, processes: int | run.Staff, client: Any, progress: bool | None) -> None:
     """Compute the tiles that are left."""
     job = tally.job
     if not job.count:
@@ -152,6 +163,8 @@ def _compute(tally: Tally, processes: int, client: Any, progress: bool | None) -
     tiles = tally.tiles()
     if client is not None:
         results = on_cluster(tiles, client)
+    elif isinstance(processes, run.Staff):
+        results = processes.compute(tiles)
     elif processes > 1:
         results = run.in_processes(tiles, processes)
     else:

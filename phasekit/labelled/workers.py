@@ -45,29 +45,55 @@ def in_this_process(tiles: Iterable[Tile]) -> Generator[Tile, None, None]:
 
 
 def in_processes(tiles: Iterable[Tile], workers: int) -> Generator[Tile, None, None]:
-    """Compute tiles in processes of their own; one that is killed is replaced.
+    """Compute tiles in processes of their own, as `Staff` does."""
+    with hired(workers) as staff:
+        yield from staff.compute(tiles)
 
-    After an error, the tiles under way are finished; after an interrupt, they are lost.
 
-    Raises
-    ------
-    StoreError
-        If a tile fails, or processes end again and again before it is done.
-    """
-    source = iter(tiles)
-    again: list[Tile] = []
-    losses: Counter[object] = Counter()
-    error = ""
-    staff: dict[Any, _Worker] = {}
+@contextlib.contextmanager
+def hired(workers: int) -> Iterator[Staff]:
+    """Start worker processes, which load what they need while the caller is not ready."""
+    staff = Staff()
+    try:
+        for _ in range(workers):
+            staff.hire()
+        yield staff
+    finally:
+        with noted():
+            staff.dismiss()
 
-    def hire() -> None:
+
+class Staff:
+    """Worker processes."""
+
+    def __init__(self) -> None:
+        self._workers: dict[Any, _Worker] = {}
+
+    def hire(self) -> None:
+        """Start one."""
         worker = _Worker()
-        staff[worker.pipe] = worker
+        self._workers[worker.pipe] = worker
 
-    with noted() as interrupts:
-        try:
-            for _ in range(workers):
-                hire()
+    def dismiss(self) -> None:
+        """End them all."""
+        for pipe in list(self._workers):
+            self._workers.pop(pipe).end()
+
+    def compute(self, tiles: Iterable[Tile]) -> Generator[Tile, None, None]:
+        """Compute tiles, once; processes that are killed are replaced.
+
+        After an error, the tiles under way are finished; after an interrupt, they are lost.
+
+        Raises
+        ------
+        StoreError
+            If a tile fails, or processes end again and again before it is done.
+        """
+        source, staff = iter(tiles), self._workers
+        again: list[Tile] = []
+        losses: Counter[object] = Counter()
+        error = ""
+        with noted() as interrupts:
             while staff:
                 interrupts.act()
                 for pipe in wait(list(staff), LOOK):
@@ -82,7 +108,7 @@ def in_processes(tiles: Iterable[Tile], workers: int) -> Generator[Tile, None, N
                         if losses[key] > RESTARTS:
                             error = error or _ended(losses[key])
                         if not error:
-                            hire()
+                            self.hire()
                         continue
                     losses.pop(key, None)
                     error = error or answer
@@ -93,11 +119,8 @@ def in_processes(tiles: Iterable[Tile], workers: int) -> Generator[Tile, None, N
                         staff.pop(pipe).end()
                     else:
                         worker.begin(tile)
-        finally:
-            for worker in staff.values():
-                worker.end()
-    if error:
-        raise StoreError(error)
+        if error:
+            raise StoreError(error)
 
 
 def _ended(times: int) -> str:
@@ -150,6 +173,10 @@ def _work(pipe: Connection) -> None:
         multiprocessing.set_start_method("fork", force=True)
     parent = multiprocessing.parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    import zarr  # noqa: F401  # loaded while the parent is not ready, as are the kernels
+
+    import phasekit.kernels.launch  # noqa: F401
+
     with contextlib.suppress(EOFError, OSError):
         pipe.send("")
         while True:
