@@ -219,6 +219,32 @@ def test_daemonic_processes_work_alone(tmp_path, monkeypatch):
     assert "computed" not in SHAPE.sweep(tmp_path / "map.zarr")
 
 
+def test_the_same_command_says_how_much_is_left(tmp_path, third, capsys):
+    recipe = tmp_path / "map.toml"
+    axes = "\n".join(f"{name} = {axis.tolist()}" for name, axis in SHAPE.axes.items())
+    recipe.write_text(
+        f"store = {str(tmp_path / 'map.zarr')!r}\nworkers = 1\nchunks = {{ beta = 2, a = 3 }}\n"
+        f"[parameters]\ne = 0.0115\nr = 0.21\nomega1 = 2.5\n[axes]\n{axes}\n"
+    )
+    command = ["sweep", str(recipe)]
+    assert cli.main(command) == 130
+    said = capsys.readouterr()
+    assert said.err == ("phasekit: interrupted: 3 of 8 tiles are done; the same call goes on\n")
+    assert said.out == ""
+    assert cli.main(command) == 0
+    assert capsys.readouterr().out.startswith("5 of 8 tiles are left\n")
+
+
+def test_bars_do_not_flood_logs(capfd):
+    with tiling.progress_bar(10_000, True) as bar:
+        for _ in range(20):
+            time.sleep(0.11)  # longer than a terminal's bar waits
+            bar.update(500)
+    err = capfd.readouterr().err
+    assert "10.0k/10.0k" in err
+    assert err.count("\r") <= 3
+
+
 def test_commands_are_interrupted_in_one_line(monkeypatch, capsys):
     def interrupted(_):
         raise KeyboardInterrupt
