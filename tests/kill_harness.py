@@ -14,6 +14,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -23,7 +24,9 @@ from typing import Any
 import numpy as np
 
 import phasekit as pk
+from phasekit import cli
 from phasekit.labelled import models
+from phasekit.labelled.system import MODELS
 
 LOG, DELAY, FAIL = "PHASEKIT_TEST_LOG", "PHASEKIT_TEST_DELAY", "PHASEKIT_TEST_FAIL"
 TESTS = Path(__file__).parent
@@ -143,6 +146,33 @@ def main() -> None:
     shape.sweep(Path(given["store"]), **given["options"])
 
 
+def command() -> None:
+    """Run the command line, with the model that takes its time."""
+    MODELS["GyroRotorDisk"] = GyroRotorDisk
+    sys.exit(cli.main())
+
+
+def clustered() -> None:
+    """Make a sweep, as the argument says, on a cluster of processes of its own."""
+    import distributed
+
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0"
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        given = json.loads(sys.argv[1])
+        Map().sweep(Path(given["store"]), client=client)
+
+
+def in_a_thread() -> None:
+    """Make a sweep, as the argument says, in a thread that an interrupt does not reach."""
+    thread = threading.Thread(target=main, daemon=True)
+    thread.start()
+    thread.join()
+
+
 class Group:
     """Processes in a process group of their own."""
 
@@ -167,11 +197,26 @@ class Group:
         self.members.append(process)
         return process
 
-    def sweep(self, shape: Map, store: Path, **options: Any) -> subprocess.Popen[bytes]:
+    def sweep(
+        self, shape: Map, store: Path, call: str = "main", **options: Any
+    ) -> subprocess.Popen[bytes]:
         """Start a sweep."""
         given = {"store": str(store), "options": options}
         given.update(sizes=shape.sizes, chunks=shape.chunks)
-        return self.start("-c", "import kill_harness; kill_harness.main()", json.dumps(given))
+        return self.start("-c", f"import kill_harness; kill_harness.{call}()", json.dumps(given))
+
+    def command(self, shape: Map, store: Path, **options: Any) -> subprocess.Popen[bytes]:
+        """Start a sweep from the command line."""
+        chunks = dict(zip(shape.axes, shape.chunks, strict=True))
+        axes = {name: axis.tolist() for name, axis in shape.axes.items()}
+        fixed = {name: value for name, value in FIXED.items() if name not in axes}
+        lines = [f"store = {json.dumps(str(store))}"]
+        lines += [f"{name} = {value}" for name, value in options.items()]
+        for table, values in {"chunks": chunks, "parameters": fixed, "axes": axes}.items():
+            lines += [f"[{table}]", *(f"{name} = {value}" for name, value in values.items())]
+        recipe = store.with_suffix(".toml")
+        recipe.write_text("\n".join(lines))
+        return self.start("-c", "import kill_harness; kill_harness.command()", "sweep", str(recipe))
 
     def cluster(self, workers: int = 2) -> tuple[str, list[subprocess.Popen[bytes]]]:
         """Start a scheduler and workers; return its address, and them with the scheduler first."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import signal
 import sys
 from collections.abc import Sequence
 from typing import NoReturn
@@ -22,6 +23,10 @@ COMMANDS = {
     "sweep": "make a map from a TOML file, or go on with it",
     "info": "say what a stored map is and how complete",
 }
+
+
+#: Exit code after Ctrl-C, as shells have it.
+INTERRUPTED = 128 + 2
 
 
 class Parser(argparse.ArgumentParser):
@@ -43,7 +48,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        Exit code: 0, or 2 after an error that the user can mend.
+        Exit code: 0, 2 after an error that the user can mend, or 130 after Ctrl-C.
 
     Examples
     --------
@@ -71,13 +76,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 0
     if options.command not in COMMANDS:
         parser.error(f"unknown command {options.command!r}; wants one of {', '.join(COMMANDS)}")
-    command = importlib.import_module(f"phasekit.cli.{options.command}")
     try:
+        command = importlib.import_module(f"phasekit.cli.{options.command}")
         command.run(options.rest)
     except (PhasekitError, OSError) as error:
         return _complain(str(error))
-    except KeyboardInterrupt:
-        return _complain("interrupted") + 128
+    except KeyboardInterrupt as interrupt:
+        if argv is None:  # what is left is to end the process: another Ctrl-C does so at once
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+        _complain(": ".join(("interrupted", *map(str, interrupt.args))))
+        return INTERRUPTED
     return 0
 
 

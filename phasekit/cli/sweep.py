@@ -110,6 +110,8 @@ def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], optio
             _say_estimate(job, 1 if "scheduler" in recipe else recipe.get("workers"))
         if options.estimate:
             return
+        if 0 < job.count < job.total:
+            common.say(f"{job.count} of {job.total} tiles are left")
     ds = sweep(
         system,
         axes,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextvars import ContextVar
@@ -15,11 +16,15 @@ import numpy.typing as npt
 from phasekit.errors import ParameterError
 
 # A kernel takes seconds to compile when it is not in numba's cache, and half a millisecond a
-# system when interpreted. So small inputs are interpreted, until a process has interpreted so
-# many systems by one kernel that compiling it has paid.
+# system when interpreted, but some systems take a thousand times as long as most. So small inputs
+# are interpreted, until a process has interpreted so many systems by one kernel, or for so long,
+# that compiling it has paid.
 INTERPRETED_AT_MOST = 4_000
+INTERPRETED_SECONDS = 2.0
+AT_A_TIME = 32
 THREADS_FROM = 100_000
 _interpreted: dict[Callable[..., None], int] = {}
+_seconds: dict[Callable[..., None], float] = {}
 
 Arrays = tuple[npt.NDArray[Any], ...]
 
@@ -56,17 +61,14 @@ def launch(
     ``weight`` says how many times the usual work a cell takes.
     """
     check_threads(threads)
-    spent = _interpreted.get(kernel, 0) + size * weight
-    if spent <= INTERPRETED_AT_MOST and hasattr(kernel, "py_func"):
-        _interpreted[kernel] = spent
-        with np.errstate(all="ignore"):
-            kernel.py_func(*arrays, 0, size, *groups)
+    first = _interpret(kernel, arrays, size, groups, weight)
+    if first == size:
         return
     workers = (threads or _default_threads.get() or cpus()) if size * weight >= THREADS_FROM else 1
     if workers == 1:
-        kernel(*arrays, 0, size, *groups)
+        kernel(*arrays, first, size, *groups)
         return
-    edges = [size * part // workers for part in range(workers + 1)]
+    edges = [first + (size - first) * part // workers for part in range(workers + 1)]
     with ThreadPoolExecutor(workers) as pool:
         jobs = [
             pool.submit(kernel, *arrays, start, stop, *groups)
@@ -74,6 +76,28 @@ def launch(
         ]
     for job in jobs:
         job.result()
+
+
+def _interpret(
+    kernel: Callable[..., None],
+    arrays: tuple[Any, ...],
+    size: int,
+    groups: Sequence[Arrays],
+    weight: int,
+) -> int:
+    """Run a kernel by the interpreter while that pays; return the first cell that is left."""
+    spent = _interpreted.get(kernel, 0) + size * weight
+    if spent > INTERPRETED_AT_MOST or not hasattr(kernel, "py_func"):
+        return 0
+    _interpreted[kernel] = spent
+    for start in range(0, size, AT_A_TIME):
+        if _seconds.get(kernel, 0.0) > INTERPRETED_SECONDS:
+            return start
+        began = time.perf_counter()
+        with np.errstate(all="ignore"):
+            kernel.py_func(*arrays, start, min(start + AT_A_TIME, size), *groups)
+        _seconds[kernel] = _seconds.get(kernel, 0.0) + time.perf_counter() - began
+    return size
 
 
 def check_threads(threads: int | None) -> None:

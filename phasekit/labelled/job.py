@@ -81,6 +81,11 @@ class Job:
         """Number of tiles that are left."""
         return sum(len(left.indices) for left in self.left)
 
+    @property
+    def total(self) -> int:
+        """Number of tiles, done or left, of all parts that are not complete."""
+        return sum(prod(left.part.grid(left.sizes)) for left in self.left)
+
     def tiles(self) -> Iterator[Tile]:
         """Return the tiles that are left."""
         return itertools.chain.from_iterable(

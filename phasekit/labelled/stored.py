@@ -7,6 +7,7 @@ arrays, the data of a tile before its mark, the marks before the plan says that 
 from __future__ import annotations
 
 import contextlib
+import multiprocessing
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
@@ -14,14 +15,20 @@ from typing import Any
 from phasekit.errors import StoreError
 from phasekit.labelled import workers as run
 from phasekit.labelled.arrays import prepare, write_plan
+from phasekit.labelled.clusters import connected, on_cluster
 from phasekit.labelled.estimate import SAMPLE_CELLS, refuse_too_large_for
 from phasekit.labelled.evaluate import Layout
+from phasekit.labelled.interrupts import noted
 from phasekit.labelled.job import Job, plan_job
 from phasekit.labelled.place import Place
+from phasekit.labelled.tile import Tile, finish_writing, is_marked, release_buffers
 from phasekit.labelled.tiling import progress_bar
 
 #: Seconds of work for which worker processes are not worth their start.
 FEW_SECONDS = 4.0
+
+#: Cells from which on they are started before it is known how long the work takes.
+MANY_CELLS = 10_000_000
 
 
 def sweep_into(
@@ -46,21 +53,26 @@ def sweep_into(
     place.refuse_unwritable()
     with place.locked():
         job = plan_job(place, layout, chunks=chunks, dtypes=dtypes, overwrite=overwrite)
+        tally = Tally(job)
         with contextlib.ExitStack() as stack:
+            stack.enter_context(_told(tally))
             if client is not None:
-                client = stack.enter_context(run.connected(client))
-            processes = _weigh(job, workers, client, force)
+                client = stack.enter_context(connected(client))
+            most = _most(job, workers, client)
+            early = most > 1 and (workers is not None or job.cells > MANY_CELLS)
+            staff = stack.enter_context(run.hired(most)) if early else None
+            processes = _weigh(job, most, workers, force)
             with _written(place):
                 if job.old is None:
                     place.clear()
                 if job.plan != job.old:
                     prepare(place, job.old, job.plan, layout)
-                _compute(job, processes, client, progress)
+                _compute(tally, staff or processes, client, progress)
                 _finish(job)
 
 
-def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
-    """Refuse what will not fit or cannot run, and return how many processes the work is worth."""
+def _most(job: Job, workers: int | None, client: Any) -> int:
+    """Return how many processes there may be; refuse what cannot run in others."""
     from phasekit.kernels.launch import cpus
 
     most = 1 if client is not None else min(workers or cpus(), job.count)
@@ -68,6 +80,8 @@ def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
         here = run.keeps_here(next(job.tiles())) if job.count else None
         if not job.place.shared:
             here = f"{job.place.name} lies in the memory of this process"
+        elif client is None and multiprocessing.current_process().daemon:
+            here = "this process is daemonic and may not start others"
         if here is not None:
             if workers is not None or client is not None:
                 raise StoreError(
@@ -75,6 +89,11 @@ def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
                     "workers=1 and no client=, or choose another store"
                 )
             most = 1
+    return most
+
+
+def _weigh(job: Job, most: int, workers: int | None, force: bool) -> int:
+    """Refuse what will not fit, and return how many processes the work is worth."""
     freed = (job.place.size() or 0) if job.old is None and not job.place.empty else 0
     free = job.place.free_bytes()
     most_bytes = sum(share.raw + share.overhead for share in job.shares(0))
@@ -88,29 +107,80 @@ def _weigh(job: Job, workers: int | None, client: Any, force: bool) -> int:
     return 1 if workers is None and needed.seconds < FEW_SECONDS else most
 
 
-def _compute(job: Job, processes: int, client: Any, progress: bool | None) -> None:
+class Tally:
+    """How far a job is."""
+
+    def __init__(self, job: Job) -> None:
+        self.job, self.finished = job, 0
+        self.under_way: dict[tuple[str, tuple[int, ...]], Tile] = {}
+
+    def tiles(self) -> Iterator[Tile]:
+        """Return the tiles that are left."""
+        for tile in self.job.tiles():
+            self.under_way[tile.part, tile.index] = tile
+            yield tile
+
+    def finish(self, tile: Tile) -> None:
+        """Count a tile."""
+        self.finished += self.under_way.pop((tile.part, tile.index), None) is not None
+
+    def settle(self) -> None:
+        """Count those that were finished when an error or an interrupt came."""
+        finish_writing()
+        for tile in list(self.under_way.values()):
+            if is_marked(tile):
+                self.finish(tile)
+        release_buffers()
+
+    @property
+    def left(self) -> int:
+        """Number of tiles that are left."""
+        return self.job.count - self.finished
+
+
+@contextlib.contextmanager
+def _told(tally: Tally) -> Iterator[None]:
+    """Say how far a job is when it is interrupted."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        with contextlib.suppress(KeyboardInterrupt):  # a second one ends this, too
+            with noted():
+                tally.settle()
+            if tally.under_way:
+                tally.job.place.sweep_leftovers()
+        total = tally.job.total
+        raise KeyboardInterrupt(
+            f"{total - tally.left} of {total} tiles are done; the same call goes on"
+        ) from None
+
+
+def _compute(tally: Tally, processes: int | run.Staff, client: Any, progress: bool | None) -> None:
     """Compute the tiles that are left."""
+    job = tally.job
     if not job.count:
         return
-    tiles = job.tiles()
+    tiles = tally.tiles()
     if client is not None:
-        results = run.on_cluster(tiles, client)
+        results = on_cluster(tiles, client)
+    elif isinstance(processes, run.Staff):
+        results = processes.compute(tiles)
     elif processes > 1:
         results = run.in_processes(tiles, processes)
     else:
         results = run.in_this_process(tiles)
     total = sum(left.part.cells(job.plan.sizes) for left in job.left)
-    finished = 0
-    with progress_bar(total, progress, total - job.cells) as bar, contextlib.closing(results):
-        try:
+    try:
+        with progress_bar(total, progress, total - job.cells) as bar, contextlib.closing(results):
             for tile in results:
-                finished += 1
+                tally.finish(tile)
                 bar.update(tile.cells)
-        except StoreError as error:
-            raise StoreError(
-                f"store: {job.place.name}: {error}; {job.count - finished} of {job.count} tiles "
-                "are left; what is done is kept, and the same call goes on from there"
-            ) from error
+    except StoreError as error:
+        tally.settle()
+        raise StoreError(
+            f"store: {job.place.name}: {error}; {tally.left} of {job.count} tiles "
+            "are left; what is done is kept, and the same call goes on from there"
+        ) from error
 
 
 def _finish(job: Job) -> None:

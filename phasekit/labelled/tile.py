@@ -6,6 +6,8 @@ cells and the place of the store, and leaves nothing but what it wrote there.
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -29,6 +31,9 @@ GROUP = "sweep"
 #: Cells that are computed at a time: their results stay in the processor's cache, and memory for
 #: them is used again.
 PIECE = 1 << 14
+
+#: Seconds at most to wait for files that are being written.
+WRITING = 2.0
 
 _local = threading.local()
 
@@ -81,6 +86,25 @@ def compute(tile: Tile) -> None:
             f"the tile [{where}] of {', '.join(row.name for row in tile.rows[:3])}"
             f"{', ...' if len(tile.rows) > 3 else ''} failed: {type(error).__name__}: {error}"
         ) from error
+
+
+def is_marked(tile: Tile) -> bool:
+    """Whether the store says that a tile is done."""
+    with contextlib.suppress(Exception):  # it is not, where the store cannot be read
+        return bool(_arrays(tile)[1][tile.index] == 1)
+    return False
+
+
+def finish_writing() -> None:
+    """Wait for what zarr still writes in its own thread after an error or an interrupt."""
+    from zarr.core.sync import sync
+
+    async def others() -> None:
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        if tasks:
+            await asyncio.wait(tasks, timeout=WRITING)
+
+    sync(others())
 
 
 def compute_cells(

@@ -13,6 +13,9 @@ from phasekit.labelled.arguments import FloatArray
 #: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
 TILE_CELLS = 1 << 16
 
+#: Seconds between two states of a progress bar in a log.
+LOG_SECONDS = 30.0
+
 
 def cut(array: FloatArray, tile: tuple[slice, ...]) -> FloatArray:
     """Return a tile of an array whose axes of length 1 stand for whole dims."""
@@ -81,7 +84,14 @@ def progress_bar(cells: int, progress: bool | None, done: int = 0) -> Any:
         return _NoBar()
     from tqdm import tqdm
 
-    delay = 1.0 if progress is None else 0.0
+    # A log gets a line in a while; a notebook, which is no terminal either, is kept up to date.
+    quick = sys.stderr.isatty() or "ipykernel" in sys.modules
     return tqdm(
-        total=cells, initial=done, unit="cell", unit_scale=True, delay=delay, desc="phasekit"
+        total=cells,
+        initial=done,
+        unit="cell",
+        unit_scale=True,
+        delay=1.0 if progress is None else 0.0,
+        mininterval=0.1 if quick else LOG_SECONDS,
+        desc="phasekit",
     )

@@ -1,4 +1,4 @@
-"""Running tiles: in this process, in worker processes, or on the workers of a dask cluster.
+"""Running tiles: in this process, or in worker processes.
 
 Each takes tiles from an iterator as workers come free, so that a map of any number of tiles needs
 no list of them, and yields each tile that is done.
@@ -6,7 +6,6 @@ no list of them, and yields each tile that is done.
 
 from __future__ import annotations
 
-import concurrent.futures
 import contextlib
 import multiprocessing
 import os
@@ -15,18 +14,21 @@ import signal
 import sys
 import threading
 import types
+from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
-from concurrent.futures.process import BrokenProcessPool
-from itertools import islice
-from multiprocessing.context import SpawnContext, SpawnProcess
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from phasekit.errors import StoreError
-from phasekit.labelled.arguments import bad
+from phasekit.labelled.interrupts import noted, unheard
 from phasekit.labelled.tile import Tile, compute, release_buffers
 
-#: How often worker processes are started again without a tile done in between.
+#: How often a tile is begun again whose worker process ended, or a process that did not get to one.
 RESTARTS = 3
+
+#: Seconds between two looks for Ctrl-C.
+LOOK = 0.2
 
 
 def in_this_process(tiles: Iterable[Tile]) -> Generator[Tile, None, None]:
@@ -43,63 +45,148 @@ def in_this_process(tiles: Iterable[Tile]) -> Generator[Tile, None, None]:
 
 
 def in_processes(tiles: Iterable[Tile], workers: int) -> Generator[Tile, None, None]:
-    """Compute tiles in processes of their own; one that is killed is replaced.
+    """Compute tiles in processes of their own, as `Staff` does."""
+    with hired(workers) as staff:
+        yield from staff.compute(tiles)
 
-    Raises
-    ------
-    StoreError
-        If processes end again and again before a tile is done.
-    """
-    source = iter(tiles)
-    again: list[Tile] = []
-    broken = 0
-    while True:
-        pool = concurrent.futures.ProcessPoolExecutor(workers, _Context(), initializer=_start)
-        running: dict[concurrent.futures.Future[None], Tile] = {}
-        try:
-            while True:
-                while len(running) < 2 * workers:
-                    tile = again.pop() if again else next(source, None)
+
+@contextlib.contextmanager
+def hired(workers: int) -> Iterator[Staff]:
+    """Start worker processes, which load what they need while the caller is not ready."""
+    staff = Staff()
+    try:
+        for _ in range(workers):
+            staff.hire()
+        yield staff
+    finally:
+        with noted():
+            staff.dismiss()
+
+
+class Staff:
+    """Worker processes."""
+
+    def __init__(self) -> None:
+        self._workers: dict[Any, _Worker] = {}
+
+    def hire(self) -> None:
+        """Start one."""
+        worker = _Worker()
+        self._workers[worker.pipe] = worker
+
+    def dismiss(self) -> None:
+        """End them all."""
+        for pipe in list(self._workers):
+            self._workers.pop(pipe).end()
+
+    def compute(self, tiles: Iterable[Tile]) -> Generator[Tile, None, None]:
+        """Compute tiles, once; processes that are killed are replaced.
+
+        After an error, the tiles under way are finished; after an interrupt, they are lost.
+
+        Raises
+        ------
+        StoreError
+            If a tile fails, or processes end again and again before it is done.
+        """
+        source, staff = iter(tiles), self._workers
+        again: list[Tile] = []
+        losses: Counter[object] = Counter()
+        error = ""
+        with noted() as interrupts:
+            while staff:
+                interrupts.act()
+                for pipe in wait(list(staff), LOOK):
+                    worker = staff[pipe]
+                    tile, answer = worker.tile, worker.answer()
+                    key = None if tile is None else (tile.part, tile.index)
+                    if answer is None:
+                        staff.pop(pipe).end()
+                        losses[key] += 1
+                        if tile is not None:
+                            again.append(tile)
+                        if losses[key] > RESTARTS:
+                            error = error or _ended(losses[key])
+                        if not error:
+                            self.hire()
+                        continue
+                    losses.pop(key, None)
+                    error = error or answer
+                    if tile is not None and not answer:
+                        yield tile
+                    tile = None if error else again.pop() if again else next(source, None)
                     if tile is None:
-                        break
-                    try:
-                        running[pool.submit(compute, tile)] = tile
-                    except BrokenProcessPool:
-                        again.append(tile)
-                        raise
-                if not running:
-                    return
-                for future in sorted(_first(running), key=_failed):
-                    future.result()
-                    broken = 0
-                    yield running.pop(future)
-        except BrokenProcessPool as error:
-            again.extend(running.values())
-            broken += 1
-            if broken > RESTARTS:
-                raise StoreError(
-                    f"worker processes ended {broken} times before a tile was done; they were "
-                    "killed, or there was no memory left: take fewer workers= or smaller chunks="
-                ) from error
-        finally:
-            pool.shutdown(cancel_futures=True)  # tiles under way are finished
+                        staff.pop(pipe).end()
+                    else:
+                        worker.begin(tile)
+        if error:
+            raise StoreError(error)
 
 
-def _first(running: Iterable[concurrent.futures.Future[None]]) -> Any:
-    wait = concurrent.futures.wait
-    return wait(running, return_when=concurrent.futures.FIRST_COMPLETED).done
+def _ended(times: int) -> str:
+    return (
+        f"worker processes ended {times} times before a tile was done; they were killed, or there "
+        "was no memory left: take fewer workers= or smaller chunks="
+    )
 
 
-def _failed(future: concurrent.futures.Future[None]) -> bool:
-    return future.exception() is not None
+class _Worker:
+    """A process that computes a tile at a time, seen from here."""
+
+    def __init__(self) -> None:
+        self.pipe, theirs = multiprocessing.Pipe()
+        self.tile: Tile | None = None
+        self.process = SpawnProcess(target=_work, args=(theirs,), daemon=True)
+        with theirs, unheard(), _no_main():
+            self.process.start()
+
+    def begin(self, tile: Tile) -> None:
+        """Hand it a tile."""
+        self.tile = tile
+        with contextlib.suppress(OSError):  # it has ended: `answer` will say so
+            self.pipe.send(tile)
+
+    def answer(self) -> str | None:
+        """Return what failed, nothing if nothing did, None if the process has ended."""
+        try:
+            answer: str = self.pipe.recv()
+        except (EOFError, OSError):
+            return None
+        self.tile = None
+        return answer
+
+    def end(self) -> None:
+        """Kill it; what it has not answered for is lost."""
+        self.process.kill()
+        self.process.join()
+        self.pipe.close()
 
 
-def _start() -> None:
-    """Prepare a worker: it ends with its parent, however that ends, and leaves Ctrl-C to it."""
+def _work(pipe: Connection) -> None:
+    """Compute the tiles that come, and answer for each; the first answer says that it can begin.
+
+    It ends with its parent, however that ends.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if "fork" in multiprocessing.get_all_start_methods():
+        # Then locks, as those of codecs, have no names, which the system kept after a kill.
+        multiprocessing.set_start_method("fork", force=True)
     parent = multiprocessing.parent_process()
-    if parent is not None:
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    import zarr  # noqa: F401  # loaded while the parent is not ready, as are the kernels
+
+    import phasekit.kernels.launch  # noqa: F401
+
+    with contextlib.suppress(EOFError, OSError):
+        pipe.send("")
+        while True:
+            tile = pipe.recv()
+            try:
+                compute(tile)
+            except StoreError as error:
+                pipe.send(str(error))
+            else:
+                pipe.send("")
 
 
 def _end_with(parent: Any) -> None:
@@ -107,25 +194,13 @@ def _end_with(parent: Any) -> None:
     os._exit(1)
 
 
-class _Process(SpawnProcess):
-    """A process that does not run the caller's script again.
+@contextlib.contextmanager
+def _no_main() -> Iterator[None]:
+    """Start processes that do not run the caller's script again.
 
     Python's own would import it, so that each script that makes a map needed a guard
     ``if __name__ == "__main__"``. Tiles need nothing of it.
     """
-
-    @staticmethod
-    def _Popen(process_obj: Any) -> Any:
-        with _no_main():
-            return SpawnProcess._Popen(process_obj)
-
-
-class _Context(SpawnContext):
-    Process = _Process
-
-
-@contextlib.contextmanager
-def _no_main() -> Iterator[None]:
     kept = sys.modules["__main__"]
     sys.modules["__main__"] = types.ModuleType("__main__")
     try:
@@ -143,67 +218,3 @@ def keeps_here(tile: Tile) -> str | None:
     if b"__main__" in data:
         return "it needs something that is defined in the script that runs; move it into a module"
     return None
-
-
-# ------------------------------------------------------------------------------ clusters
-
-
-@contextlib.contextmanager
-def connected(client: Any) -> Iterator[Any]:
-    """Give a dask client for a client or the address of a scheduler."""
-    try:
-        import distributed
-    except ImportError:
-        raise StoreError(
-            "client: clusters need dask: pip install 'phasekit[distributed]'"
-        ) from None
-    if isinstance(client, distributed.Client):
-        if client.status != "running":
-            raise StoreError(f"client: it is {client.status}, wants one that is connected")
-        yield client
-        return
-    if not isinstance(client, str) or not client:
-        raise bad("client", client, "a dask.distributed.Client or the address of a scheduler")
-    try:
-        made: Any = distributed.Client(client, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
-    except (OSError, ValueError) as error:
-        raise StoreError(f"client: no scheduler answers at {client}: {error}") from error
-    try:
-        yield made
-    finally:
-        made.close()
-
-
-def on_cluster(tiles: Iterable[Tile], client: Any) -> Generator[Tile, None, None]:
-    """Compute tiles on the workers of a dask cluster, which gives those of a lost one to others."""
-    import distributed
-
-    source = iter(tiles)
-    running: dict[str, tuple[Any, Tile]] = {}
-    finished: Any = distributed.as_completed(loop=client.loop)  # type: ignore[no-untyped-call]
-
-    def feed() -> None:
-        enough = 2 * max(sum(client.nthreads().values()), 1)
-        for tile in islice(source, max(enough - len(running), 0)):
-            future = client.submit(compute, tile, pure=False)
-            running[future.key] = future, tile
-            finished.add(future)
-
-    try:
-        feed()
-        for future in finished:
-            future.result()
-            yield running.pop(future.key)[1]
-            feed()
-    except StoreError:  # of a tile
-        raise
-    except (concurrent.futures.CancelledError, OSError) as error:
-        raise StoreError(f"the connection to the scheduler was lost: {error}") from error
-    except distributed.KilledWorker as error:
-        raise StoreError(
-            f"workers of the cluster were killed, or had no memory left: {error}; take smaller "
-            "chunks= or workers with more memory"
-        ) from error
-    finally:
-        with contextlib.suppress(Exception):  # the scheduler may be gone
-            client.cancel([future for future, _ in running.values()])

@@ -283,8 +283,10 @@ def _sampled(
     values = measured(step * np.arange(count))[0]
     mean = values.mean(axis=1)
     # Of rotators, the mean of the second, |phi'| but for a factor, has a closed form.
-    change = np.abs(values[:, ::2].mean(axis=1) - mean)[:, : 1 if of_rotators else 2]
+    with np.errstate(invalid="ignore"):  # of infinite forces
+        change = np.abs(values[:, ::2].mean(axis=1) - mean)[:, : 1 if of_rotators else 2]
     settled = (change <= TOLERANCE * mean[:, : change.shape[1]]).all(axis=1)
+    settled |= ~np.isfinite(mean).all(axis=1)  # nor would more samples be
     top = _highest(values)  # (orbits, measures, candidates)
     measure = np.repeat(np.arange(2), CANDIDATES)
 

@@ -33,6 +33,7 @@ def test_compiled_and_interpreted_agree_to_the_last_bit(states, monkeypatch):
     found = []
     for most in (10**9, 0):
         monkeypatch.setattr(launch, "INTERPRETED_AT_MOST", most)
+        monkeypatch.setattr(launch, "INTERPRETED_SECONDS", np.inf)
         monkeypatch.setattr(launch, "_interpreted", {})
         with np.errstate(all="ignore"):
             found.append(
