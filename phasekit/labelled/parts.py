@@ -28,6 +28,13 @@ class Part:
     chunks: tuple[int, ...]
     quantities: dict[str, str]  # name -> dtype
     complete: bool = False
+    #: Parameters and states from which it is computed; None in stores that have no checksums.
+    inputs: tuple[str, ...] | None = None
+
+    @property
+    def checked(self) -> bool:
+        """Whether its chunks carry checksums, and the marks of its tiles record them."""
+        return self.inputs is not None
 
     @property
     def rows(self) -> tuple[Quantity, ...]:
@@ -85,7 +92,8 @@ def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str,
         pieces = -(-sizes[dim] // step)
         found[dim] = -(-sizes[dim] // pieces)
         room = max(room // found[dim], 1)
-    part = Part(name, box.dims, tuple(found[dim] for dim in box.dims), quantities)
+    chunks_of = tuple(found[dim] for dim in box.dims)
+    part = Part(name, box.dims, chunks_of, quantities, inputs=tuple(sorted(box.names)))
     _refuse_large_tiles(part)
     return part
 

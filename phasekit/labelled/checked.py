@@ -1,0 +1,122 @@
+"""Zarr stores that look at what passes through them: what was written, and whether it is read.
+
+What is written is recorded with its checksum, in the mark of its tile. What is read is compared
+with that, so that a file that is gone, was changed or stands in the place of another raises, and
+never gives values.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import AsyncIterator, Iterable, Mapping
+from typing import Any
+
+from zarr.storage import WrapperStore
+
+from phasekit.errors import StoreError
+from phasekit.labelled.damage import AGAIN, damage, place
+from phasekit.labelled.marks import Chunk, Index, Mark
+from phasekit.labelled.plan import Plan
+from phasekit.labelled.plan_file import GROUP
+
+
+class Recording(WrapperStore[Any]):
+    """A store that remembers size and checksum of each file that is written."""
+
+    def __init__(self, store: Any) -> None:
+        super().__init__(store)
+        self.written: dict[str, Chunk] = {}
+
+    async def set(self, key: str, value: Any) -> None:
+        """Write, and remember."""
+        await super().set(key, value)
+        self.written[key] = Chunk.of(value.as_numpy_array())
+
+
+class Checked(WrapperStore[Any]):
+    """A store for reading a map, which raises a `StoreError` where it is not what was written.
+
+    Parameters
+    ----------
+    store
+        The zarr store.
+    plan : Plan
+        Files that it knows as they were before a change are given as they were.
+    name : str
+        What messages call the store.
+    """
+
+    def __init__(self, store: Any, plan: Plan, name: str) -> None:
+        super().__init__(store)
+        self.plan, self.name = plan, name
+        self.parts = plan.quantities
+        self.marks: dict[str, Mapping[Index, Mark]] = {}  # by part
+        self.known = {key.split("/")[0] for key in plan.documents} | {GROUP, "zarr.json"}
+
+    def with_read_only(self, read_only: bool = False) -> Checked:
+        """Return itself: it only reads."""
+        return self
+
+    async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
+        """Return what is stored, if it is what was written."""
+        if prototype is None:
+            from zarr.core.buffer import default_buffer_prototype
+
+            prototype = default_buffer_prototype()
+        if key in self.plan.before:
+            kept = self.plan.before[key]
+            found = None if kept is None else prototype.buffer.from_bytes(kept)
+        elif (chunk := self._chunk(key)) is not None:
+            return await self._result(key, *chunk, prototype)
+        else:
+            found = await self._store.get(key, prototype, byte_range)
+        expected = self.plan.documents.get(key)
+        if expected is not None and byte_range is None:
+            wrong = None
+            if found is None:
+                wrong = "is gone"
+            elif hashlib.sha256(found.to_bytes()).hexdigest() != expected:
+                wrong = "is not what it was when it was written"
+            if wrong is not None:
+                raise StoreError(
+                    f"store: {self.name} is damaged: {key} {wrong}; put the file back, choose "
+                    "another name, or pass overwrite=True"
+                )
+        return found
+
+    def _chunk(self, key: str) -> tuple[str, Index] | None:
+        """Return the quantity and the tile of a chunk's file."""
+        name, _, file = key.partition("/")
+        part = self.parts.get(name)
+        if part is None or not (file == "c" or file.startswith("c.")):
+            return None
+        return name, tuple(map(int, file.split(".")[1 : 1 + len(part.dims)]))
+
+    async def _result(self, key: str, name: str, index: Index, prototype: Any) -> Any:
+        part = self.parts[name]
+        mark = self.marks.get(part.name, {}).get(index)
+        if mark is None:
+            return None  # not computed: it may be half written
+        found = await self._store.get(key, prototype)
+        wrong = await damage(found, mark, name, prototype)
+        if wrong is not None:
+            raise StoreError(
+                f"store: {self.name} is damaged, or was changed after it was opened: {name} in "
+                f"the tile {place(part, index, self.plan.sizes)} {wrong}; {AGAIN}, and open the "
+                "map again"
+            )
+        return found
+
+    async def _get_many(self, requests: Iterable[Any]) -> Any:
+        for key, prototype, byte_range in requests:
+            yield key, await self.get(key, prototype, byte_range)
+
+    def list_dir(self, prefix: str) -> AsyncIterator[str]:
+        """List what belongs to the map."""
+        listed = super().list_dir(prefix)
+        return listed if prefix.strip("/") or not self.plan.documents else self._own(listed)
+
+    async def _own(self, listed: AsyncIterator[str]) -> AsyncIterator[str]:
+        async for name in listed:
+            if name in self.known:
+                yield name
