@@ -20,6 +20,9 @@ from phasekit.labelled.parts import Part
 
 AGAIN = "make the sweep's call again, which computes these tiles anew"
 
+#: Bytes of the header of what blosc compressed, whose last number is the length of all.
+_BLOSC = 16
+
 #: Files that are read at a time, and tiles that a message names.
 AT_ONCE = 8
 NAMED = 3
@@ -45,6 +48,13 @@ async def damage(found: Any, mark: Mark, name: str, prototype: Any) -> str | Non
 
 
 async def _undecodable(found: Any, prototype: Any) -> str | None:
+    if found is None:  # nothing is written where all is the fill value
+        return None
+    data = found.as_numpy_array()
+    if len(data) < _BLOSC or int.from_bytes(bytes(data[_BLOSC - 4 : _BLOSC]), "little") != len(
+        data
+    ):
+        return "is not as long as it says"
     spec: Any = SimpleNamespace(prototype=prototype)
     try:
         await codec().decode([(found, spec)])

@@ -39,6 +39,17 @@ class MapInfo:
         """Whether all is computed."""
         return COMPUTED not in self.ds
 
+    @property
+    def verdict(self) -> str:
+        """What is known of a map in which no damage was found."""
+        without = "all files can be read; they have no checksums"
+        if self.plan is None or not any(part.checked for part in self.plan.parts):
+            return f"verified: {without}"
+        some = [name for part in self.plan.parts if not part.checked for name in part.quantities]
+        tiles = sum(self.done[part.name][0] for part in self.plan.parts if part.checked)
+        more = f"; of {', '.join(some)} {without}" if some else ""
+        return f"verified: {tiles:,} tiles are as they were written{more}"
+
     def __str__(self) -> str:
         """Write it in lines."""
         return "\n".join(self._lines())

@@ -194,7 +194,7 @@ def plan_job(
         if old is not None and old.parts:
             with opened(place.open(read_only=True), old, place.name) as (ds, group):
                 refuse_damaged(ds, group, old, place.name)
-    base = new_plan(layout) if old is None else continued(old, layout, place.name)
+    base = new_plan(layout) if old is None else continued(old, layout, place.name, chunks)
     plan = replace(with_parts(base, layout, chunks, dtypes, place.name), ready=True)
     asked = {row.name for row in layout.rows}
     left, damaged, parts = [], [], []

@@ -9,6 +9,7 @@ refused, and named.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
@@ -20,7 +21,7 @@ import xarray as xr
 
 from phasekit.errors import StoreError
 from phasekit.labelled.evaluate import Layout
-from phasekit.labelled.parts import Part, new_part
+from phasekit.labelled.parts import Part, cut_again, new_part
 from phasekit.labelled.quantities import STATES
 
 #: Version of the layout of stores. In layout 1 nothing had checksums.
@@ -83,8 +84,10 @@ def fingerprint(values: xr.Variable) -> str:
     return hashlib.sha256(kind.str.encode() + repr(array.shape).encode() + data).hexdigest()
 
 
-def continued(stored: Plan, layout: Layout, name: str) -> Plan:
+def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]) -> Plan:
     """Return the plan of a stored map that a call continues: the same, or with longer axes.
+
+    Tiles that are far too small for longer axes are chosen anew, unless the call names `chunks`.
 
     Raises
     ------
@@ -109,15 +112,20 @@ def continued(stored: Plan, layout: Layout, name: str) -> Plan:
                 f"not name {', '.join(left)}; what makes an axis longer names all quantities of "
                 "the map in of="
             )
+    parts = []
+    for part in stored.parts:
+        if not set(grown).isdisjoint(part.dims):
+            boxes = (b for b in layout.boxes() if any(r.name in part.quantities for r in b.rows))
+            names = {input for box in boxes for input in box.names}
+            part = replace(part, complete=False)
+            part = cut_again(part, names, stored.sizes, sizes, chunks)
+        parts.append(part)
     return replace(
         stored,
         scalars={**stored.scalars, **wanted.scalars},
         arrays={**stored.arrays, **wanted.arrays},
         sizes=sizes,
-        parts=tuple(
-            replace(part, complete=part.complete and set(grown).isdisjoint(part.dims))
-            for part in stored.parts
-        ),
+        parts=tuple(parts),
         ready=True,
         earlier=stored.earlier if not grown else (*stored.earlier, stored.sizes),
         before={},
@@ -219,5 +227,7 @@ def with_parts(
             if row.name not in held
         )
         if rows:
-            parts.append(new_part(f"part{len(parts)}", replace(box, rows=rows), plan.sizes, chunks))
+            taken = {part.name for part in parts}
+            free = next(n for n in map("part{}".format, itertools.count()) if n not in taken)
+            parts.append(new_part(free, replace(box, rows=rows), plan.sizes, chunks))
     return replace(plan, parts=tuple(parts))
