@@ -6,6 +6,7 @@ the arrays are not ready, then they are changed, then it says that they are.
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import re
 from collections.abc import Mapping, Sequence, Set
@@ -178,14 +179,17 @@ def _damaged(name: str, what: str) -> StoreError:
 
 def refuse_strange(store: Any, name: str) -> None:
     """Raise a `StoreError` where files are not the map's own, which would be lost with it."""
-    own = {GROUP, *zarr_group(store).attrs.get(_NAMED, "").split(), *ROWS, *STATES, *LABELS}
+    keys = files.every_key(store)
+    own = {GROUP, *str(zarr_group(store).attrs.get(_NAMED, "")).split()}
+    own |= {*ROWS, *STATES, *LABELS}
     own |= {parameter.name for model in MODELS.values() for parameter in model.declared}
-    try:
+    with contextlib.suppress(ParameterError):  # a plan that is damaged
         plan = read_plan(store)
-        own |= set() if plan is None else plan.arrays.keys()
-    except ParameterError:  # damaged
-        pass
-    strange = sorted(key for key in files.every_key(store) if not _is_own(key.split("/"), own))
+        if plan is None:  # written in one go, with any arrays
+            own |= {key.split("/")[0] for key in keys if key.endswith("/zarr.json")}
+        else:
+            own |= plan.arrays.keys()
+    strange = sorted(key for key in keys if not _is_own(key.split("/"), own))
     if strange:
         more = f" and {len(strange) - 3} more" if strange[3:] else ""
         raise StoreError(

@@ -105,8 +105,11 @@ def put(store: Any, documents: Mapping[str, bytes | None]) -> None:
 
 
 def remove(store: Any, keys: Iterable[str]) -> None:
-    """Remove files, where they are there."""
-    put(store, dict.fromkeys(keys))
+    """Remove files, where they are there, and folders that have taken their places."""
+    from zarr.core.sync import sync
+
+    for key in keys:
+        sync(store.delete(key))
 
 
 def remove_folder(store: Any, folder: str) -> None:

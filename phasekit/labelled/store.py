@@ -16,7 +16,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.arguments import bad, flag
-from phasekit.labelled.arrays import read_plan, reason, zarr_group
+from phasekit.labelled.arrays import read_plan, reason, refuse_strange, zarr_group
 from phasekit.labelled.partial import open_stored
 from phasekit.labelled.place import NETCDF, ZARR, Place, place_of
 from phasekit.labelled.schema import MODEL, model_name, restore
@@ -50,6 +50,10 @@ class WholeTarget:
             raise StoreError(
                 f"store: {self.path} exists and is not a map, so it is not overwritten; "
                 "choose another name"
+            )
+        if self.path.is_dir():
+            refuse_strange(
+                Place(str(self.path), path=self.path).open(read_only=True), str(self.path)
             )
 
     def write(self, ds: xr.Dataset) -> None:
