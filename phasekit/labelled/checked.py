@@ -8,12 +8,13 @@ never gives values.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import AsyncIterator, Iterable, Mapping
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
 from typing import Any
 
 from zarr.storage import WrapperStore
 
 from phasekit.errors import StoreError
+from phasekit.labelled import files
 from phasekit.labelled.damage import AGAIN, damage, place
 from phasekit.labelled.marks import Chunk, Index, Mark
 from phasekit.labelled.plan import Plan
@@ -51,6 +52,7 @@ class Checked(WrapperStore[Any]):
         self.plan, self.name = plan, name
         self.parts = plan.quantities
         self.marks: dict[str, Mapping[Index, Mark]] = {}  # by part
+        self.kept = dict(self._documents())
         self.known = {key.split("/")[0] for key in plan.documents} | {GROUP, "zarr.json"}
 
     def with_read_only(self, read_only: bool = False) -> Checked:
@@ -63,26 +65,26 @@ class Checked(WrapperStore[Any]):
             from zarr.core.buffer import default_buffer_prototype
 
             prototype = default_buffer_prototype()
-        if key in self.plan.before:
-            kept = self.plan.before[key]
-            found = None if kept is None else prototype.buffer.from_bytes(kept)
-        elif (chunk := self._chunk(key)) is not None:
+        if key in self.kept:
+            kept = self.kept[key]
+            return None if kept is None else prototype.buffer.from_bytes(kept)
+        chunk = self._chunk(key)
+        if chunk is not None:
             return await self._result(key, *chunk, prototype)
-        else:
-            found = await self._store.get(key, prototype, byte_range)
-        expected = self.plan.documents.get(key)
-        if expected is not None and byte_range is None:
-            wrong = None
-            if found is None:
-                wrong = "is gone"
-            elif hashlib.sha256(found.to_bytes()).hexdigest() != expected:
-                wrong = "is not what it was when it was written"
-            if wrong is not None:
+        return await self._store.get(key, prototype, byte_range)
+
+    def _documents(self) -> Iterator[tuple[str, bytes | None]]:
+        """Read what is known beforehand, here: what zarr's tasks raise is told twice."""
+        yield from self.plan.before.items()
+        expected = self.plan.documents
+        for key, data in files.read_all(self._store, expected.keys() - self.plan.before.keys()):
+            wrong = "is gone" if data is None else "is not what it was when it was written"
+            if data is None or hashlib.sha256(data).hexdigest() != expected[key]:
                 raise StoreError(
                     f"store: {self.name} is damaged: {key} {wrong}; put the file back, choose "
                     "another name, or pass overwrite=True"
                 )
-        return found
+            yield key, data
 
     def _chunk(self, key: str) -> tuple[str, Index] | None:
         """Return the quantity and the tile of a chunk's file."""
