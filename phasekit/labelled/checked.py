@@ -19,6 +19,7 @@ from phasekit.labelled.damage import AGAIN, damage, place
 from phasekit.labelled.marks import Chunk, Index, Mark
 from phasekit.labelled.plan import Plan
 from phasekit.labelled.plan_file import GROUP
+from phasekit.labelled.quantities import LABELS
 
 
 class Recording(WrapperStore[Any]):
@@ -54,6 +55,7 @@ class Checked(WrapperStore[Any]):
         self.marks: dict[str, Mapping[Index, Mark]] = {}  # by part
         self.kept = dict(self._documents())
         self.known = {key.split("/")[0] for key in plan.documents} | {GROUP, "zarr.json"}
+        self.known |= {*plan.quantities, *plan.arrays, *plan.scalars, *LABELS}
 
     def with_read_only(self, read_only: bool = False) -> Checked:
         """Return itself: it only reads."""
@@ -99,7 +101,10 @@ class Checked(WrapperStore[Any]):
         mark = self.marks.get(part.name, {}).get(index)
         if mark is None:
             return None  # not computed: it may be half written
-        found = await self._store.get(key, prototype)
+        try:
+            found = await self._store.get(key, prototype)
+        except OSError as error:  # of the disk
+            raise StoreError(f"store: {self.name}: {key} cannot be read: {error}") from error
         wrong = await damage(found, mark, name, prototype)
         if wrong is not None:
             raise StoreError(

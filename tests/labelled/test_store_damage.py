@@ -644,6 +644,18 @@ def test_stores_without_checksums(kind, tmp_path, capsys):
         xr.testing.assert_equal(old_sweep(path, longer, of=of).load(), expected)
 
 
+def test_an_older_store_goes_on_without_its_states(tmp_path):
+    """A call that does not name a state leaves its coordinate as it was."""
+    path = unpacked(tmp_path) / "double.zarr"
+    states = {**OLD, "state_phi": [0.1, 0.2], "state_dphi": 0.0}
+    old_sweep(path, states, of=["period"])
+    plan = json.loads((path / "sweep" / "zarr.json").read_text())
+    assert "state_phi/zarr.json" in plan["attributes"]["plan"]["documents"]
+    ds = old_sweep(path, of=["phi", "energy"])
+    assert list(ds.state_phi.values) == [0.1, 0.2]
+    xr.testing.assert_equal(ds.period.load(), pk.sweep(DISK, states, of="period").period)
+
+
 def test_damage_of_stores_without_checksums(tmp_path):
     """What cannot be decoded is noticed."""
     path = unpacked(tmp_path) / "double.zarr"
