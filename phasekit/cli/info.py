@@ -14,9 +14,17 @@ def run(argv: Sequence[str]) -> None:
         description="Say what a stored map is, how complete, how large, and what is left to do.",
     )
     parser.add_argument("store", metavar="STORE", help="a map: a folder, a file or a URL")
+    parser.add_argument(
+        "--verify",
+        action="store_true",
+        help="read all files and compare their checksums; damage is named, and the exit code is 2",
+    )
     options = parser.parse_args(argv)
     if "://" not in options.store:
         common.path_called("STORE", options.store)
     from phasekit.labelled.info import map_info
 
-    common.say(str(map_info(options.store)))
+    found = map_info(options.store, verify=options.verify)
+    common.say(str(found))
+    if options.verify:
+        common.say(found.verdict)

@@ -134,12 +134,12 @@ def _say_estimate(job: Any, workers: Any) -> None:
         common.say("nothing is left to compute")
         return
     number = workers if isinstance(workers, int) and workers > 0 else cpus()
-    common.say(
-        f"left: {job.cells:,} cells in {job.count:,} tiles, {job.estimate().describe(number)}"
-    )
+    needed = job.estimate()
+    common.say(f"left: {job.cells:,} cells in {job.count:,} tiles, {needed.describe(number)}")
     free = job.place.free_bytes()
     if free is not None:
-        common.say(f"the disk has {human(free)} left")
+        fits = "" if needed.stored <= free else ": the map does not fit"
+        common.say(f"the disk has {human(free)} left{fits}")
 
 
 def read_recipe(path: Path) -> dict[str, Any]:

@@ -7,24 +7,29 @@ the arrays are not ready, then they are changed, then it says that they are.
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+import hashlib
+import re
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import PhasekitError, StoreError
+from phasekit.errors import ParameterError, PhasekitError, StoreError
+from phasekit.labelled import files
 from phasekit.labelled.evaluate import Layout, assemble
+from phasekit.labelled.marks import key_of, marks_of
 from phasekit.labelled.parts import Part
 from phasekit.labelled.place import Place
 from phasekit.labelled.plan import Plan, fingerprint
-from phasekit.labelled.quantities import Quantity
-from phasekit.labelled.schema import LABEL_DTYPE
-from phasekit.labelled.tile import GROUP
+from phasekit.labelled.plan_file import GROUP, PLAN_KEY, plan_bytes, plan_from
+from phasekit.labelled.quantities import LABELS, ROWS, STATES, Quantity
+from phasekit.labelled.schema import LABEL_DTYPE, label_coords
+from phasekit.labelled.system import MODELS
 
-#: The attribute of the group that holds the plan.
-PLAN = "plan"
+#: Names of files in a Zarr v3 store: metadata, chunks, and what a killed process left.
+_OWN = re.compile(r"zarr\.json|c?(\.?\d+)*|part\d+|.*\.[0-9a-f]{32}\.partial")
 
 #: The attribute in which xarray names coordinates that are no axes.
 _NAMED = "coordinates"
@@ -38,58 +43,72 @@ def zarr_group(store: Any) -> Any:
     return zarr.open_group(store, mode="r" if store.read_only else "r+", zarr_format=3)
 
 
-def read_plan(group: Any) -> Plan | None:
-    """Return the plan in a store, None where it was written in one go."""
-    if GROUP not in group:
-        return None
-    return Plan.from_json(group[GROUP].attrs[PLAN])
+def read_plan(store: Any) -> Plan | None:
+    """Return the plan in a store, None where it was written in one go.
+
+    Raises
+    ------
+    ParameterError
+        If it is damaged, or gone.
+    """
+    data = files.read(store, PLAN_KEY)
+    if data is not None:
+        return plan_from(data)
+    if GROUP in zarr_group(store) or files.sizes(store, f"{GROUP}/part0"):
+        raise ParameterError("its plan, sweep/zarr.json, is gone")
+    return None
 
 
 def write_plan(place: Place, plan: Plan) -> None:
     """Write the plan, in one piece."""
-    _put(place, _documents_of_plan(plan))
+    files.put(place.open(read_only=False), {PLAN_KEY: plan_bytes(plan)})
 
 
 def prepare(place: Place, old: Plan | None, plan: Plan, layout: Layout) -> None:
     """Make the store's arrays those of the plan; done again in whole if it is interrupted.
 
     Each document is written in one piece, and those that are there as they should be are left.
+    Until the last one the plan keeps what there was, so that the map can be read meanwhile.
     """
+    store = place.open(read_only=False)
     ds = assemble(layout, {})
-    root: dict[str, Any] = {}
+    kept: dict[str, Part] = {}
+    before: dict[str, bytes | None] = {}
+    known: dict[str, str] = {}
     if old is None:
+        documents = _documents(ds, plan, {})
         # What says that this is a map comes first, then what it will be.
-        _put(place, {"zarr.json": _documents(ds, plan, root)["zarr.json"]})
-        old = replace(plan, parts=())
+        files.put(store, {"zarr.json": documents["zarr.json"]})
+        write_plan(place, replace(plan, parts=()))
     else:
-        root = dict(zarr_group(place.open(read_only=True)).attrs)
-    complete = {part.name: part.complete for part in plan.parts}
-    parts = tuple(replace(part, complete=complete[part.name]) for part in old.parts)
-    write_plan(place, replace(old, parts=parts, ready=False))
-    _forget_marks(place, old, plan)
-    _put(place, _documents(ds, plan, root))
-    write_plan(place, plan)
+        documents = _documents(ds, plan, dict(zarr_group(place.open(read_only=True)).attrs))
+        kept = {part.name: part for part in old.parts if _same_tiles(part, plan)}
+        dropped = {row for part in old.parts if part.name not in kept for row in part.quantities}
+        known = {k: v for k, v in old.documents.items() if k.split("/")[0] not in dropped}
+        before = dict(old.before)
+        for key in documents.keys() - before.keys():
+            if (there := files.read(store, key)) != documents[key]:
+                before[key] = there
+        if before:
+            parts = tuple(kept.values())
+            write_plan(
+                place,
+                replace(old, parts=parts, ready=False, before=before, documents=known),
+            )
+        _forget_marks(store, old, plan)
+        for part in plan.parts:
+            if part.name not in kept:  # of a change that was given up, or of other tiles
+                for folder in (*part.quantities, f"{GROUP}/{part.name}"):
+                    files.remove_folder(store, folder)
+    files.put(store, {**before, **documents})
+    digests = {key: hashlib.sha256(data).hexdigest() for key, data in documents.items()}
+    del digests["zarr.json"]  # names versions of libraries, which change
+    write_plan(place, replace(plan, documents={**known, **digests}, before={}))
 
 
-def _put(place: Place, documents: Mapping[str, bytes]) -> None:
-    """Write documents under their keys, each in one piece, where they are not there already."""
-    from zarr.core.buffer import default_buffer_prototype
-    from zarr.core.sync import sync
-
-    store, prototype = place.open(read_only=False), default_buffer_prototype()
-    for key, document in documents.items():
-        there = sync(store.get(key, prototype))
-        if there is None or there.to_bytes() != document:
-            sync(store.set(key, prototype.buffer.from_bytes(document)))
-
-
-def _documents_of_plan(plan: Plan) -> dict[str, bytes]:
-    import zarr
-    from zarr.storage import MemoryStore
-
-    kept: dict[str, Any] = {}
-    zarr.create_group(MemoryStore(kept), attributes={PLAN: plan.to_json()}, zarr_format=3)
-    return {f"{GROUP}/zarr.json": kept["zarr.json"].to_bytes()}
+def _same_tiles(part: Part, plan: Plan) -> bool:
+    """Whether a part of the old plan is in the new one, cut as it was."""
+    return any((part.name, part.chunks) == (other.name, other.chunks) for other in plan.parts)
 
 
 def _documents(ds: xr.Dataset, plan: Plan, root: Mapping[str, Any]) -> dict[str, bytes]:
@@ -115,38 +134,75 @@ def _documents(ds: xr.Dataset, plan: Plan, root: Mapping[str, Any]) -> dict[str,
     attrs = {**group.attrs, **root}
     group.attrs.put({**attrs, _NAMED: " ".join(sorted(named))} if named else attrs)
     for part in plan.parts:
-        _create_marks(group, f"{GROUP}/{part.name}", part.grid(plan.sizes))
+        _create_marks(group, part, part.grid(plan.sizes))
         for row in part.rows:
             shape = tuple(plan.sizes[dim] for dim in part.dims) + row.label_shape
             _create(group, part, row, shape)
-    kept.pop(f"{GROUP}/zarr.json", None)  # holds the plan, and is written last
+    kept.pop(PLAN_KEY, None)  # is written last
     return {key: value.to_bytes() for key, value in kept.items()}
 
 
-def refuse_damaged(place: Place, plan: Plan) -> None:
-    """Raise a `StoreError` where arrays are not those of the plan."""
-    store = place.open(read_only=True)
-    group = zarr_group(store)
-    with xr.open_zarr(store, consolidated=False, chunks=None, zarr_format=3) as ds:
-        for name, array in plan.arrays.items():
-            if fingerprint(ds[name].variable) != array["sha256"]:
-                raise _damaged(place, name)
+def refuse_damaged(ds: xr.Dataset, group: Any, plan: Plan, name: str) -> None:
+    """Raise a `StoreError` where arrays or coordinates are not those of the plan."""
+    missing = {*plan.quantities, *plan.arrays, *plan.scalars} - ds.variables.keys()
+    if missing:
+        raise StoreError(
+            f"store: {name} cannot be read: {', '.join(sorted(missing))} is not there; put it "
+            "back, choose another name, or pass overwrite=True"
+        )
+    for scalar, value in plan.scalars.items():
+        variable = ds[scalar].variable
+        if variable.dims or variable.dtype != np.float64 or float(variable) != value:
+            raise _damaged(name, scalar)
+    for coord, array in plan.arrays.items():
+        variable = ds[coord].variable
+        if list(variable.dims) != array["dims"] or fingerprint(variable) != array["sha256"]:
+            raise _damaged(name, coord)
+    for label, expected in label_coords(row for part in plan.parts for row in part.rows).items():
+        if label not in ds.variables or not np.array_equal(ds[label].values, expected.values):
+            raise _damaged(name, label)
     for part in plan.parts:
-        if group[f"{GROUP}/{part.name}"].shape != part.grid(plan.sizes):
-            raise _damaged(place, part.name)
         for row in part.rows:
             array = group[row.name]
             shape = tuple(plan.sizes[dim] for dim in part.dims) + row.label_shape
-            if (array.shape, array.dtype, array.chunks) != (
-                shape, np.dtype(row.dtype), part.chunks + row.label_shape
+            if (array.shape, array.dtype, array.chunks, ds[row.name].dims) != (
+                shape, np.dtype(row.dtype), part.chunks + row.label_shape, part.dims + row.dims
             ):  # fmt: skip
-                raise _damaged(place, row.name)
+                raise _damaged(name, row.name)
 
 
-def _damaged(place: Place, name: str) -> StoreError:
+def _damaged(name: str, what: str) -> StoreError:
     return StoreError(
-        f"store: {place.name} is damaged: {name} is not what it was when it was written; choose "
-        "another name, or pass overwrite=True"
+        f"store: {name} is damaged: {what} is not what it was when it was written; put its files "
+        "back, choose another name, or pass overwrite=True"
+    )
+
+
+def refuse_strange(store: Any, name: str) -> None:
+    """Raise a `StoreError` where files are not the map's own, which would be lost with it."""
+    keys = files.every_key(store)
+    own = {GROUP, *str(zarr_group(store).attrs.get(_NAMED, "")).split()}
+    own |= {*ROWS, *STATES, *LABELS}
+    own |= {parameter.name for model in MODELS.values() for parameter in model.declared}
+    with contextlib.suppress(ParameterError):  # a plan that is damaged
+        plan = read_plan(store)
+        if plan is None:  # written in one go, with any arrays
+            own |= {key.split("/")[0] for key in keys if key.endswith("/zarr.json")}
+        else:
+            own |= plan.arrays.keys()
+    strange = sorted(key for key in keys if not _is_own(key.split("/"), own))
+    if strange:
+        more = f" and {len(strange) - 3} more" if strange[3:] else ""
+        raise StoreError(
+            f"store: {name} holds files that are not the map's, so it is not removed: "
+            f"{', '.join(strange[:3])}{more}; move them, or choose another name"
+        )
+
+
+def _is_own(key: Sequence[str], names: Set[str]) -> bool:
+    """Whether a file belongs to an array or group with one of these names, or to the root."""
+    return (len(key) == 1 or key[0] in names) and (
+        _OWN.fullmatch(key[-1]) is not None or key[-1] in names
     )
 
 
@@ -155,63 +211,27 @@ def reason(error: Exception) -> str:
     return str(error) if isinstance(error, PhasekitError) else f"{type(error).__name__}: {error}"
 
 
-def done_tiles(place: Place, old: Plan | None, plan: Plan, part: Part) -> Any:
-    """Return which tiles of a part are done; those that get new cells are not."""
-    done = np.zeros(part.grid(plan.sizes), bool)
-    if old is not None and part.name in {known.name for known in old.parts}:
-        group = zarr_group(place.open(read_only=True))
-        if f"{GROUP}/{part.name}" in group:
-            marks = read_marks(group[f"{GROUP}/{part.name}"])
-            marks &= ~_stale(marks.shape, part, old, plan)
-            there = tuple(slice(min(both)) for both in zip(done.shape, marks.shape, strict=True))
-            done[there] = marks[there]
-    return done
-
-
-def _forget_marks(place: Place, old: Plan, plan: Plan) -> None:
-    """Forget the tiles that get new cells."""
-    group = zarr_group(place.open(read_only=False))
+def _forget_marks(store: Any, old: Plan, plan: Plan) -> None:
+    """Forget tiles that get new cells, where marks do not say of which cells they are."""
     for part in old.parts:
-        array = group[f"{GROUP}/{part.name}"]
-        marks = read_marks(array)
-        for index in np.argwhere(marks & _stale(marks.shape, part, old, plan)).tolist():
-            array[tuple(index)] = 0
+        if not part.checked and _same_tiles(part, plan):
+            others = marks_of(store, plan, part, {}, old).others
+            files.put(store, {f"{GROUP}/{part.name}/{key_of(i)}": None for i in sorted(others)})
 
 
-def _stale(shape: tuple[int, ...], part: Part, old: Plan, plan: Plan) -> Any:
-    """Return which tiles lie at the end of dims that grow, or beyond."""
-    stale = np.zeros(shape, bool)
-    for axis, (dim, n) in enumerate(zip(part.dims, part.chunks, strict=True)):
-        if plan.sizes[dim] > old.sizes[dim]:
-            stale[(slice(None),) * axis + (slice(old.sizes[dim] // n, None),)] = True
-    return stale
-
-
-def _create_marks(group: Any, name: str, shape: tuple[int, ...]) -> None:
+def _create_marks(group: Any, part: Part, shape: tuple[int, ...]) -> None:
     from zarr.codecs import Crc32cCodec
 
     group.create_array(
-        name,
+        f"{GROUP}/{part.name}",
         shape=shape,
         chunks=(1,) * len(shape),
-        dtype="uint8",
-        fill_value=0,
+        dtype="string" if part.checked else "uint8",
+        fill_value="" if part.checked else 0,
         compressors=[Crc32cCodec()],  # a mark that is half written is none
         chunk_key_encoding={"name": "default", "separator": "."},
         config={"write_empty_chunks": False},
     )
-
-
-def read_marks(array: Any) -> Any:
-    """Return which tiles are done; a mark that cannot be read says no."""
-    try:
-        return np.asarray(array[...]) == 1
-    except Exception:
-        done = np.zeros(array.shape, bool)
-        for index in np.ndindex(*array.shape):
-            with contextlib.suppress(Exception):
-                done[index] = array[index] == 1
-        return done
 
 
 def fill_value(row: Quantity) -> Any:
@@ -233,7 +253,7 @@ def _create(group: Any, part: Part, row: Quantity, shape: tuple[int, ...]) -> No
         chunks=part.chunks + row.label_shape,
         dtype=row.dtype,
         fill_value=fill_value(row),
-        compressors=[codec()],
+        compressors=codecs() if part.checked else [codec()],
         chunk_key_encoding={"name": "default", "separator": "."},
         dimension_names=(*part.dims, *row.dims),
         attributes=attrs,
@@ -242,7 +262,14 @@ def _create(group: Any, part: Part, row: Quantity, shape: tuple[int, ...]) -> No
 
 
 def codec() -> Any:
-    """Return the codec of stored results."""
+    """Return the codec that compresses stored results."""
     from zarr.codecs import BloscCodec
 
     return BloscCodec(cname="lz4", clevel=5, shuffle="shuffle")
+
+
+def codecs() -> list[Any]:
+    """Return the codecs of stored results: compression, then a checksum."""
+    from zarr.codecs import Crc32cCodec
+
+    return [codec(), Crc32cCodec()]

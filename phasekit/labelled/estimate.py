@@ -9,7 +9,7 @@ from math import prod
 from typing import Any
 
 from phasekit.errors import StoreError
-from phasekit.labelled.arrays import codec
+from phasekit.labelled.arrays import codecs
 from phasekit.labelled.memory import human
 from phasekit.labelled.place import Place
 from phasekit.labelled.quantities import Quantity
@@ -154,7 +154,7 @@ def _written(row: Quantity, result: Any) -> tuple[int, float]:
         shape=result.shape,
         chunks=result.shape,
         dtype=row.dtype,
-        compressors=[codec()],
+        compressors=codecs(),
         config={"write_empty_chunks": True},
     )
     before = sum(len(value) for value in kept.values())

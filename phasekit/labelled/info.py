@@ -6,15 +6,15 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from phasekit.labelled.accessor import PhasekitAccessor
-from phasekit.labelled.arrays import done_tiles, read_plan, zarr_group
+from phasekit.labelled.arrays import read_plan
 from phasekit.labelled.estimate import Estimate
 from phasekit.labelled.evaluate import lay_out
 from phasekit.labelled.identity import SCHEMA
 from phasekit.labelled.job import Job, Left
+from phasekit.labelled.marks import marks_of
 from phasekit.labelled.memory import human
 from phasekit.labelled.partial import COMPUTED
 from phasekit.labelled.place import Place, place_of
@@ -39,6 +39,17 @@ class MapInfo:
     def complete(self) -> bool:
         """Whether all is computed."""
         return COMPUTED not in self.ds
+
+    @property
+    def verdict(self) -> str:
+        """What is known of a map in which no damage was found."""
+        without = "all files can be read; they have no checksums"
+        if self.plan is None or not any(part.checked for part in self.plan.parts):
+            return f"verified: {without}"
+        some = [name for part in self.plan.parts if not part.checked for name in part.quantities]
+        tiles = sum(self.done[part.name][0] for part in self.plan.parts if part.checked)
+        more = f"; of {', '.join(some)} {without}" if some else ""
+        return f"verified: {tiles:,} tiles are as they were written{more}"
 
     def __str__(self) -> str:
         """Write it in lines."""
@@ -85,31 +96,32 @@ class MapInfo:
         return lines
 
 
-def map_info(store: Any) -> MapInfo:
+def map_info(store: Any, *, verify: bool = False) -> MapInfo:
     """Return what a stored map is; cells that are left are estimated from samples.
 
     Raises
     ------
     StoreError
-        If there is no map.
+        If there is no map, or it is damaged; with `verify` all files are read.
     """
     place = place_of(store)
-    with open_map(store) as ds:
+    with open_map(store, verify=verify) as ds:
         size = place.size() if not place.is_netcdf else None
         if place.path is not None and place.path.is_file():
             size = place.path.stat().st_size
             return MapInfo(place.name, ds, None, {}, size, None)
-        plan = read_plan(zarr_group(place.open(read_only=True)))
+        source = place.open(read_only=True)
+        plan = read_plan(source)
         if plan is None:
             return MapInfo(place.name, ds, None, {}, size, None)
         done, left = {}, []
+        values = {name: ds[name].variable for name in (*plan.arrays, *plan.scalars)}
         for part in plan.parts:
-            tiles = prod(part.grid(plan.sizes))
-            marks = np.True_ if part.complete else done_tiles(place, plan, plan, part)
-            indices = np.argwhere(~marks) if not part.complete else np.empty((0, len(part.dims)))
-            done[part.name] = tiles - len(indices), tiles
-            if len(indices):
-                left.append(Left(part, indices, plan.sizes))
+            one = Left(plan, part, marks_of(source, plan, part, values))
+            tiles = prod(one.grid)
+            done[part.name] = tiles - len(one), tiles
+            if len(one):
+                left.append(one)
         estimate = _job(place, ds, plan, left).estimate() if left else None
         return MapInfo(place.name, ds, plan, done, size, estimate)
 

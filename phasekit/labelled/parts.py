@@ -18,6 +18,11 @@ FEWEST_CELLS = 1 << 16
 FEWEST_TILES = 16
 MOST_BYTES = 1 << 27
 
+#: A map that is made longer is cut again if its tiles are more than so many, and than so many
+#: times those that it would have if it were new, and at most a quarter of it is there.
+MANY_TILES = 1 << 10
+TOO_SMALL = 16
+
 
 @dataclass(frozen=True)
 class Part:
@@ -28,6 +33,13 @@ class Part:
     chunks: tuple[int, ...]
     quantities: dict[str, str]  # name -> dtype
     complete: bool = False
+    #: Parameters and states from which it is computed; None in stores that have no checksums.
+    inputs: tuple[str, ...] | None = None
+
+    @property
+    def checked(self) -> bool:
+        """Whether its chunks carry checksums, and the marks of its tiles record them."""
+        return self.inputs is not None
 
     @property
     def rows(self) -> tuple[Quantity, ...]:
@@ -66,10 +78,16 @@ def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str,
     Raises
     ------
     ParameterError
-        If the call asks for tiles that do not fit into memory.
+        If the call asks for tiles that do not fit into memory, or arrays have no room.
     """
     quantities = {row.name: row.dtype for row in box.rows}
     whole = prod(sizes[dim] for dim in box.dims)
+    if whole * max(prod(row.label_shape) for row in box.rows) >= 2**63:
+        axes = " x ".join(f"{dim} {sizes[dim]}" for dim in box.dims)
+        raise ParameterError(
+            f"axes: got {axes} = {whole:.3g} cells, wants fewer than 2^63 numbers in an array "
+            "(9.2e18): such a map fits nowhere; take coarser axes or fewer of them"
+        )
     cells = min(
         MOST_CELLS,
         MOST_BYTES // sum(row.cell_bytes for row in box.rows),
@@ -85,9 +103,37 @@ def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str,
         pieces = -(-sizes[dim] // step)
         found[dim] = -(-sizes[dim] // pieces)
         room = max(room // found[dim], 1)
-    part = Part(name, box.dims, tuple(found[dim] for dim in box.dims), quantities)
+    chunks_of = tuple(found[dim] for dim in box.dims)
+    part = Part(name, box.dims, chunks_of, quantities, inputs=tuple(sorted(box.names)))
     _refuse_large_tiles(part)
     return part
+
+
+def cut_again(
+    part: Part,
+    names: Iterable[str],
+    before: Mapping[str, int],
+    sizes: Mapping[str, int],
+    chunks: Mapping[str, int],
+) -> Part:
+    """Return a part of a map that is made longer, cut as if it were new if its tiles are too small.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The inputs on which it depends.
+    before, sizes : mapping of str to int
+        Sizes of the dims, as they were and as they will be.
+    chunks : mapping of str to int
+        Sizes of tiles that the call asks for; what it names stays as it is.
+    """
+    tiles = prod(part.grid(sizes))
+    if tiles <= MANY_TILES or 4 * part.cells(before) > part.cells(sizes):
+        return part
+    if not chunks.keys().isdisjoint(part.dims):
+        return part
+    fresh = new_part(part.name, Box(part.dims, (), part.rows, tuple(names)), sizes, {})
+    return fresh if tiles > TOO_SMALL * prod(fresh.grid(sizes)) else part
 
 
 def _refuse_large_tiles(part: Part) -> None:

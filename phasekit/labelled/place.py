@@ -11,7 +11,7 @@ import os
 import re
 import shutil
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from urllib.parse import urlsplit
 from urllib.request import url2pathname
 
 from phasekit.errors import StoreError
+from phasekit.labelled import files
 from phasekit.labelled.arguments import bad
 
 if TYPE_CHECKING:
@@ -84,11 +85,18 @@ class Place:
 
     @property
     def empty(self) -> bool:
-        """Whether nothing is there; only a local folder can tell before it is opened."""
+        """Whether nothing is there; only a local folder can tell before it is opened.
+
+        Empty folders are nothing, nor is what a killed process left half written.
+        """
         if self.path is None:
             return False
         return not os.path.lexists(self.path) or (
-            self.path.is_dir() and not any(self.path.iterdir())
+            self.path.is_dir()
+            and all(
+                _PARTIAL.search(entry.name) or (entry.is_dir() and not entry.is_symlink())
+                for entry in files.walk(self.path)
+            )
         )
 
     def free_bytes(self) -> int | None:
@@ -102,22 +110,29 @@ class Place:
         """Return the bytes that the store takes, None where that is not known."""
         if self.path is None:
             return None
-        return sum(entry.stat().st_size for entry in _files(self.path))
+        return sum(entry.lstat().st_size for entry in files.walk(self.path))
 
-    def refuse_unwritable(self) -> None:
-        """Raise a `StoreError` where nothing can be written."""
-        if self.path is None:
-            return
-        if self.path.exists() and not self.path.is_dir():
+    def refuse_file(self) -> None:
+        """Raise a `StoreError` where a file is in the way."""
+        if self.path is not None and self.path.exists() and not self.path.is_dir():
             raise StoreError(
                 f"store: {self.name} is a file, not a folder of Zarr; choose another name"
             )
-        there = self.path.is_dir()
-        folder = self.path if there else self.path.parent
+
+    def unwritable(self) -> str | None:
+        """Return why nothing can be written, or None where it can."""
+        if self.path is None:
+            try:
+                self.open(read_only=False)
+            except StoreError as error:
+                return str(error)
+            return None
+        folder = self.path if self.path.is_dir() else self.path.parent
         if not folder.is_dir():
-            raise StoreError(f"store: the folder {folder} does not exist; make it first")
+            return f"store: the folder {folder} does not exist; make it first"
         if not os.access(folder, os.W_OK | os.X_OK):
-            raise StoreError(f"store: the folder {folder} cannot be written to")
+            return f"store: the folder {folder} cannot be written to"
+        return None
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -140,29 +155,53 @@ class Place:
                 if made and self.path.is_dir() and not any(self.path.iterdir()):
                     self.path.rmdir()
 
-    def clear(self) -> None:
-        """Remove the map that is there; what says that it is a map goes last."""
+    def clear(self, instead: Mapping[str, bytes]) -> None:
+        """Remove the map that is there; what says that it is a map goes last.
+
+        Parameters
+        ----------
+        instead : mapping of str to bytes
+            Files that say that it is being removed, which are written first.
+        """
         if self.path is None:
             import zarr
 
+            store = self.open(read_only=False)
             with contextlib.suppress(FileNotFoundError):
-                group = zarr.open_group(self.open(read_only=False), mode="r+", zarr_format=3)
-                for name in list(group):
+                group = zarr.open_group(store, mode="r+", zarr_format=3)
+                files.put(store, instead)
+                for name in sorted(group, key=instead.__contains__):
                     del group[name]
             return
-        for entry in sorted(self.path.iterdir(), key=lambda entry: entry.name == "zarr.json"):
+        if not self.empty:
+            for key, document in instead.items():
+                self._write(self.path / key, document)
+        last = [*(key.split("/")[0] for key in instead), "zarr.json"]
+        for entry in sorted(
+            self.path.iterdir(), key=lambda e: last.index(e.name) + 1 if e.name in last else 0
+        ):
             if entry.is_dir() and not entry.is_symlink():
                 shutil.rmtree(entry)
             else:
                 entry.unlink()
 
+    @staticmethod
+    def _write(path: Path, document: bytes) -> None:
+        path.parent.mkdir(exist_ok=True)
+        fresh = path.with_suffix(f".{uuid.uuid4().hex}.partial")
+        try:
+            fresh.write_bytes(document)
+            fresh.replace(path)
+        finally:
+            fresh.unlink(missing_ok=True)
+
     def sweep_leftovers(self) -> None:
         """Remove what killed processes left half written."""
         if self.path is None:
             return
-        for entry in _files(self.path):
+        for entry in files.walk(self.path):
             if _PARTIAL.search(entry.name):
-                Path(entry.path).unlink(missing_ok=True)
+                entry.unlink(missing_ok=True)
 
 
 def place_of(store: Any) -> Place:
@@ -181,9 +220,12 @@ def place_of(store: Any) -> Place:
     if not isinstance(text, str) or not text or "\0" in text:
         raise bad("store", text, "a path that ends in .zarr or .nc, without null bytes")
     if "://" in text or "::" in text:
-        if urlsplit(text).scheme != "file":
+        parts = urlsplit(text)
+        if parts.scheme != "file":
             return Place(text, url=text, key=text)
-        text = url2pathname(urlsplit(text).path)
+        if parts.netloc not in ("", "localhost"):
+            raise bad("store", text, "file:///path, with three slashes: a file of this machine")
+        text = url2pathname(parts.path)
     try:
         path = Path(text).expanduser()
     except RuntimeError as error:  # no such user
@@ -204,15 +246,6 @@ def _in_memory(store: Any) -> bool:
     from zarr.storage import MemoryStore
 
     return isinstance(store, MemoryStore) or isinstance(getattr(store, "_store", None), MemoryStore)
-
-
-def _files(folder: Path) -> Iterator[os.DirEntry[str]]:
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            if entry.is_dir(follow_symlinks=False):
-                yield from _files(Path(entry.path))
-            else:
-                yield entry
 
 
 @contextlib.contextmanager

@@ -1,28 +1,31 @@
 """What a stored map consists of, and whether a sweep may continue it.
 
-A plan is written into the store as JSON, in one piece: the model, its fixed parameters,
-fingerprints of its axes, and the parts. A part is a set of quantities on the same dims, computed
-by one call, tile by tile. A call that asks for more quantities adds parts; one with longer axes
-makes its arrays longer; any other difference is refused, and named.
+A plan says the model, its fixed parameters, fingerprints of its axes, and the parts. A part is a
+set of quantities on the same dims, computed by one call, tile by tile. A call that asks for more
+quantities adds parts; one with longer axes makes its arrays longer; any other difference is
+refused, and named.
 """
 
 from __future__ import annotations
 
 import hashlib
+import itertools
+import json
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import ParameterError, StoreError
+from phasekit.errors import StoreError
 from phasekit.labelled.evaluate import Layout
-from phasekit.labelled.parts import Part, new_part
+from phasekit.labelled.parts import Part, cut_again, new_part
 from phasekit.labelled.quantities import STATES
 
-#: Version of the layout of stores.
-LAYOUT = 1
+#: Version of the layout of stores. In layout 1 nothing had checksums.
+LAYOUT = 2
 
 
 @dataclass(frozen=True)
@@ -35,60 +38,25 @@ class Plan:
     sizes: dict[str, int]
     parts: tuple[Part, ...]
     ready: bool = False  # whether all arrays are in place
-
-    def to_json(self) -> dict[str, Any]:
-        """Return it as what JSON can hold."""
-        parts = [
-            {
-                "name": part.name,
-                "dims": list(part.dims),
-                "chunks": list(part.chunks),
-                "quantities": part.quantities,
-                "complete": part.complete,
-            }
-            for part in self.parts
-        ]
-        return {
-            "layout": LAYOUT,
-            "model": self.model,
-            "scalars": self.scalars,
-            "arrays": self.arrays,
-            "sizes": self.sizes,
-            "parts": parts,
-            "ready": self.ready,
-        }
-
-    @classmethod
-    def from_json(cls, stored: Mapping[str, Any]) -> Plan:
-        """Read what `to_json` gave."""
-        if stored.get("layout") != LAYOUT:
-            raise ParameterError(
-                f"got a store of layout {stored.get('layout')!r}, wants {LAYOUT}; it was made by "
-                "another version of phasekit: make it anew or use that version"
-            )
-        parts = tuple(
-            Part(
-                part["name"],
-                tuple(part["dims"]),
-                tuple(part["chunks"]),
-                dict(part["quantities"]),
-                part["complete"],
-            )
-            for part in stored["parts"]
-        )
-        return cls(
-            stored["model"],
-            dict(stored["scalars"]),
-            {name: dict(array) for name, array in stored["arrays"].items()},
-            dict(stored["sizes"]),
-            parts,
-            stored["ready"],
-        )
+    earlier: tuple[dict[str, int], ...] = ()  # sizes of which tiles at the end may be left
+    #: SHA-256 of each file that describes the arrays or holds a coordinate.
+    documents: dict[str, str] = field(default_factory=dict)
+    #: Where the arrays are being changed: these files as they were, None for those that were not.
+    before: dict[str, bytes | None] = field(default_factory=dict, compare=False)
 
     @property
     def quantities(self) -> dict[str, Part]:
         """The part of each quantity."""
         return {name: part for part in self.parts for name in part.quantities}
+
+    @cached_property
+    def generation(self) -> str:
+        """A digest of all that decides what is in the arrays: that of another map is another."""
+        parts = [
+            [part.name, part.dims, part.chunks, part.quantities, part.inputs] for part in self.parts
+        ]
+        made_of = [self.model, self.scalars, self.arrays, self.sizes, parts]
+        return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
 
 
 def new_plan(layout: Layout) -> Plan:
@@ -116,8 +84,10 @@ def fingerprint(values: xr.Variable) -> str:
     return hashlib.sha256(kind.str.encode() + repr(array.shape).encode() + data).hexdigest()
 
 
-def continued(stored: Plan, layout: Layout, name: str) -> Plan:
+def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]) -> Plan:
     """Return the plan of a stored map that a call continues: the same, or with longer axes.
+
+    Tiles that are far too small for longer axes are chosen anew, unless the call names `chunks`.
 
     Raises
     ------
@@ -142,16 +112,23 @@ def continued(stored: Plan, layout: Layout, name: str) -> Plan:
                 f"not name {', '.join(left)}; what makes an axis longer names all quantities of "
                 "the map in of="
             )
+    parts = []
+    for part in stored.parts:
+        if not set(grown).isdisjoint(part.dims):
+            boxes = (b for b in layout.boxes() if any(r.name in part.quantities for r in b.rows))
+            names = {input for box in boxes for input in box.names}
+            part = replace(part, complete=False)
+            part = cut_again(part, names, stored.sizes, sizes, chunks)
+        parts.append(part)
     return replace(
         stored,
         scalars={**stored.scalars, **wanted.scalars},
         arrays={**stored.arrays, **wanted.arrays},
         sizes=sizes,
-        parts=tuple(
-            replace(part, complete=part.complete and set(grown).isdisjoint(part.dims))
-            for part in stored.parts
-        ),
+        parts=tuple(parts),
         ready=True,
+        earlier=stored.earlier if not grown else (*stored.earlier, stored.sizes),
+        before={},
     )
 
 
@@ -192,7 +169,7 @@ def _array_differences(stored: Plan, wanted: Plan, layout: Layout, name: str) ->
     values = {**layout.grid.coords, **layout.grid.inputs}[name]
     if (
         fingerprint(values.isel({dim: slice(stored.sizes[dim]) for dim in dims}))
-        != (stored.arrays[name]["sha256"])
+        != stored.arrays[name]["sha256"]
     ):
         grown = any(wanted.sizes[dim] > stored.sizes[dim] for dim in dims)
         hint = ", which may only be longer at its end" if grown else ""
@@ -250,5 +227,7 @@ def with_parts(
             if row.name not in held
         )
         if rows:
-            parts.append(new_part(f"part{len(parts)}", replace(box, rows=rows), plan.sizes, chunks))
+            taken = {part.name for part in parts}
+            free = next(n for n in map("part{}".format, itertools.count()) if n not in taken)
+            parts.append(new_part(free, replace(box, rows=rows), plan.sizes, chunks))
     return replace(plan, parts=tuple(parts))

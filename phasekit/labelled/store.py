@@ -11,15 +11,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.arguments import bad
-from phasekit.labelled.arrays import reason
+from phasekit.labelled.arguments import bad, flag
+from phasekit.labelled.arrays import read_plan, reason, refuse_strange, zarr_group
 from phasekit.labelled.identity import MODEL, model_name
-from phasekit.labelled.partial import with_computed
+from phasekit.labelled.partial import open_stored
 from phasekit.labelled.place import NETCDF, ZARR, Place, place_of
 from phasekit.labelled.schema import restore
+from phasekit.labelled.tiling import tiles
 
 
 class WholeTarget:
@@ -50,6 +52,10 @@ class WholeTarget:
                 f"store: {self.path} exists and is not a map, so it is not overwritten; "
                 "choose another name"
             )
+        if self.path.is_dir():
+            refuse_strange(
+                Place(str(self.path), path=self.path).open(read_only=True), str(self.path)
+            )
 
     def write(self, ds: xr.Dataset) -> None:
         """Write a Dataset in one go; the name appears only when it is complete."""
@@ -79,8 +85,13 @@ def target_of(store: Any) -> Place:
     return place
 
 
-def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Dataset:
+def open_map(
+    store: str | PathLike[str] | Any, *, chunks: Any = None, verify: bool = False
+) -> xr.Dataset:
     """Open a stored map as it was when it was written, dtypes and attributes included.
+
+    Of a Zarr store, coordinates and metadata are compared with what was written, and of each
+    finished tile the presence and size of its files; values when they are read, by checksums.
 
     Parameters
     ----------
@@ -90,6 +101,9 @@ def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Data
     chunks : optional
         Chunks of dask arrays, as in `xarray.open_dataset`. Default: no dask; values are read
         when they are used.
+    verify : bool, default False
+        Read all files at once and compare their checksums. Stores of phasekit before checksums
+        and netCDF files are only read through.
 
     Returns
     -------
@@ -97,12 +111,13 @@ def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Data
         The map; `xarray.Dataset.load` reads it whole, `xarray.Dataset.close` closes the file.
         A map that `sweep` has not finished, or is writing now, has a variable ``computed`` on its
         dims: whether all quantities of a cell are there. Where they are not, floats are NaN and
-        codes not_computed; cells that are done after the map was opened may hold their values.
+        codes not_computed; it is the map as it was when it was opened.
 
     Raises
     ------
     StoreError
-        If there is nothing, or what is there is not a map of phasekit.
+        If there is nothing, what is there is not a map of phasekit, or it is damaged: with what
+        and where. Values of a Dataset that is open raise it as well, when they are read.
 
     Examples
     --------
@@ -114,6 +129,7 @@ def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Data
     ...     pk.open_map(f"{folder}/map.zarr").identical(ds)
     True
     """
+    flag("verify", verify)
     place = place_of(store)
     if place.path is not None and not place.path.exists():
         raise StoreError(f"store: {place.name} does not exist")
@@ -121,12 +137,38 @@ def open_map(store: str | PathLike[str] | Any, *, chunks: Any = None) -> xr.Data
         if place.path is not None and not place.path.is_dir():
             _need_h5netcdf()
             ds = xr.open_dataset(place.path, engine="h5netcdf", chunks=chunks)
+            plan = None
         else:
             source = place.open(read_only=True)
-            ds = xr.open_zarr(source, consolidated=False, chunks=chunks, zarr_format=3)
-            ds = with_computed(ds, source, place.name, chunks)
+            plan = read_plan(source)
+            if plan is None:
+                ds = _whole(source, place.name, chunks)
+            else:
+                ds = open_stored(source, plan, place.name, chunks, verify=verify)
         model_name(ds)
+        if verify and plan is None:
+            for variable in ds.variables.values():
+                for tile in tiles(variable.shape, 1 << 24):
+                    np.asarray(variable[tile])
         return restore(ds)
+
+
+def _whole(source: Any, name: str, chunks: Any) -> xr.Dataset:
+    """Open a store that was written in one go."""
+    ds: xr.Dataset = xr.open_zarr(source, consolidated=False, chunks=chunks, zarr_format=3)
+    group = zarr_group(source)
+    encodings = (group[name].metadata.chunk_key_encoding for name in ds.data_vars)
+    if any(getattr(encoding, "separator", "/") == "." for encoding in encodings):
+        raise StoreError(
+            f"store: {name} is damaged: its group sweep is gone, which says what is computed; put "
+            "it back, or pass overwrite=True to sweep"
+        )
+    if not ds.variables:
+        raise StoreError(
+            f"store: {name} cannot be opened: its arrays are being made, or that was interrupted; "
+            "wait, or make the sweep's call again"
+        )
+    return ds
 
 
 @contextlib.contextmanager

@@ -8,19 +8,22 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
 from phasekit.errors import StoreError
 from phasekit.labelled import workers as run
-from phasekit.labelled.arrays import prepare, write_plan
+from phasekit.labelled.arrays import prepare, read_plan, write_plan
 from phasekit.labelled.clusters import connected, on_cluster
+from phasekit.labelled.damage import describe
 from phasekit.labelled.estimate import SAMPLE_CELLS, refuse_too_large_for
 from phasekit.labelled.evaluate import Layout
 from phasekit.labelled.interrupts import noted
 from phasekit.labelled.job import Job, plan_job
 from phasekit.labelled.place import Place
+from phasekit.labelled.plan_file import CLEARED, PLAN_KEY, plan_bytes
 from phasekit.labelled.tile import Tile, finish_writing, is_marked, release_buffers
 from phasekit.labelled.tiling import progress_bar
 
@@ -50,9 +53,17 @@ def sweep_into(
     StoreError
         If the store holds something else, cannot be written, is too small, or a tile fails.
     """
-    place.refuse_unwritable()
+    place.refuse_file()
+    refused = place.unwritable()
+    if refused is not None:
+        if overwrite or _to_do(place, layout, chunks, dtypes):
+            raise StoreError(refused)
+        return  # complete, so that nothing is to be written
     with place.locked():
-        job = plan_job(place, layout, chunks=chunks, dtypes=dtypes, overwrite=overwrite)
+        job = plan_job(
+            place, layout, chunks=chunks, dtypes=dtypes, overwrite=overwrite, verify=True
+        )
+        _say_damaged(job)
         tally = Tally(job)
         with contextlib.ExitStack() as stack:
             stack.enter_context(_told(tally))
@@ -64,7 +75,7 @@ def sweep_into(
             processes = _weigh(job, most, workers, force)
             with _written(place):
                 if job.old is None:
-                    place.clear()
+                    place.clear({PLAN_KEY: plan_bytes(CLEARED)})
                 if job.plan != job.old:
                     prepare(place, job.old, job.plan, layout)
                 _compute(tally, staff or processes, client, progress)
@@ -186,13 +197,38 @@ def _compute(tally: Tally, processes: int | run.Staff, client: Any, progress: bo
 def _finish(job: Job) -> None:
     """Say that what was computed is complete, after removing what killed processes left."""
     complete = {left.part.name for left in job.left}
-    if complete:
-        job.place.sweep_leftovers()
-        parts = tuple(
-            replace(part, complete=part.complete or part.name in complete)
-            for part in job.plan.parts
+    plan = read_plan(job.place.open(read_only=True))
+    if plan is None or plan.generation != job.plan.generation:
+        raise StoreError(
+            f"store: {job.place.name} was removed or replaced while the map was being made; make "
+            "the call again"
         )
-        write_plan(job.place, replace(job.plan, parts=parts))
+    parts = tuple(
+        replace(part, complete=part.complete or part.name in complete) for part in plan.parts
+    )
+    earlier = () if all(part.complete for part in parts) else plan.earlier
+    if (parts, earlier) != (plan.parts, plan.earlier):
+        job.place.sweep_leftovers()
+        write_plan(job.place, replace(plan, parts=parts, earlier=earlier))
+
+
+def _to_do(
+    place: Place, layout: Layout, chunks: Mapping[str, int], dtypes: Mapping[str, str]
+) -> bool:
+    """Whether a call has anything to write."""
+    if place.path is not None and not place.path.is_dir():
+        return True
+    job = plan_job(place, layout, chunks=chunks, dtypes=dtypes)
+    return job.plan != job.old or job.count > 0
+
+
+def _say_damaged(job: Job) -> None:
+    if job.damaged:
+        warnings.warn(
+            f"store: {job.place.name} is damaged: {describe(job.damaged, job.plan.sizes)}; what "
+            "is damaged is computed anew",
+            stacklevel=4,
+        )
 
 
 @contextlib.contextmanager

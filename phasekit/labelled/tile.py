@@ -17,16 +17,15 @@ from typing import Any
 import numpy as np
 
 from phasekit.errors import StoreError
+from phasekit.labelled import files
 from phasekit.labelled.arguments import FloatArray
 from phasekit.labelled.evaluate import fill
+from phasekit.labelled.marks import Mark, key_of
 from phasekit.labelled.place import Place
+from phasekit.labelled.plan_file import GROUP, PLAN_KEY, plan_from
 from phasekit.labelled.quantities import Pass, Quantity
 from phasekit.labelled.system import Model
 from phasekit.labelled.tiling import tiles
-
-#: The group of a store that holds the plan, and for each part an array with a 1 for each tile that
-#: is done, each in a file of its own.
-GROUP = "sweep"
 
 #: Cells that are computed at a time: their results stay in the processor's cache, and memory for
 #: them is used again.
@@ -43,9 +42,11 @@ class Tile:
     """What is needed to compute one tile, anywhere."""
 
     place: Place
-    generation: str  # of the store's arrays: another one has other shapes
+    generation: str  # of the plan: what is computed for one is not written into another
     part: str
     index: tuple[int, ...]
+    made_of: str  # digest of its inputs, for its mark
+    marked: bool  # whether there is a mark, which does not hold
     region: tuple[slice, ...]
     model: type[Model]
     passes: tuple[Pass, ...]
@@ -76,23 +77,13 @@ def compute(tile: Tile) -> None:
     try:
         with one_thread():
             results = compute_cells(tile.model, tile.passes, tile.rows, tile.inputs, tile.shape)
-        arrays, marks = _arrays(tile)
-        for name, result in results.items():
-            arrays[name][(*tile.region, ...)] = result
-        marks[tile.index] = 1
+        _write(tile, results)
     except Exception as error:
         where = ", ".join(f"{part.start}:{part.stop}" for part in tile.region)
         raise StoreError(
             f"the tile [{where}] of {', '.join(row.name for row in tile.rows[:3])}"
             f"{', ...' if len(tile.rows) > 3 else ''} failed: {type(error).__name__}: {error}"
         ) from error
-
-
-def is_marked(tile: Tile) -> bool:
-    """Whether the store says that a tile is done."""
-    with contextlib.suppress(Exception):  # it is not, where the store cannot be read
-        return bool(_arrays(tile)[1][tile.index] == 1)
-    return False
 
 
 def finish_writing() -> None:
@@ -139,14 +130,62 @@ def release_buffers() -> None:
     _local.__dict__.clear()
 
 
-def _arrays(tile: Tile) -> tuple[Mapping[str, Any], Any]:
-    """Return the store's arrays, opened once a thread: each tile takes the same ones."""
+def _write(tile: Tile, results: Mapping[str, Any]) -> None:
+    """Write a tile's chunks, then its mark, unless the map is another one by now."""
+    store, arrays, marks = _arrays(tile)
+    store.written.clear()
+    _refuse_other(store, tile)
+    if tile.marked:  # nothing of what it says is to be trusted, nor to be read and merged
+        files.remove(store, [f"{GROUP}/{tile.part}/{key_of(tile.index)}", *_keys(tile)])
+    for name, result in results.items():
+        arrays[name][(*tile.region, ...)] = result
+    try:
+        _refuse_other(store, tile)
+    except StoreError:
+        if files.read(store, PLAN_KEY) is None:  # removed meanwhile: nothing is left of it
+            files.remove(store, store.written)
+        raise
+    chunks = {
+        row.name: store.written.get(key) for row, key in zip(tile.rows, _keys(tile), strict=True)
+    }
+    marks[tile.index] = Mark(tile.made_of, chunks).text() if tile.made_of else 1
+
+
+def _keys(tile: Tile) -> list[str]:
+    """Return the files of a tile's chunks, one for each row."""
+    return [f"{row.name}/{key_of((*tile.index, *(0,) * len(row.dims)))}" for row in tile.rows]
+
+
+def _refuse_other(store: Any, tile: Tile) -> None:
+    data = files.read(store, PLAN_KEY)
+    if data is None:
+        raise StoreError("the map was removed while it was being made; nothing is written any more")
+    if data != _local.__dict__.get("plan"):  # read only where it is not what it was
+        if plan_from(data).generation != tile.generation:
+            raise StoreError("the map was replaced, or made longer, by another sweep meanwhile")
+        _local.plan = data
+
+
+def is_marked(tile: Tile) -> bool:
+    """Whether the store says that a tile is done."""
+    with contextlib.suppress(Exception):  # it is not, where the store cannot be read
+        found = _arrays(tile)[2][tile.index]
+        return bool(found == 1 if not tile.made_of else tile.made_of in str(found))
+    return False
+
+
+def _arrays(tile: Tile) -> tuple[Any, Mapping[str, Any], Any]:
+    """Return the store and its arrays, opened once a thread: each tile takes the same ones."""
     key = (tile.place.key, tile.generation, tile.part)
     if _local.__dict__.get("key") != key:
         import zarr
 
-        group = zarr.open_group(tile.place.open(read_only=False), mode="r+", zarr_format=3)
+        from phasekit.labelled.checked import Recording
+
+        _local.__dict__.pop("plan", None)
+        _local.store = Recording(tile.place.open(read_only=False))
+        group = zarr.open_group(_local.store, mode="r+", zarr_format=3)
         _local.arrays = {row.name: group[row.name] for row in tile.rows}
         _local.marks = group[f"{GROUP}/{tile.part}"]
         _local.key = key
-    return _local.arrays, _local.marks
+    return _local.store, _local.arrays, _local.marks

@@ -30,7 +30,7 @@ from zarr.storage import LocalStore, MemoryStore
 
 import phasekit as pk
 from phasekit.kernels.launch import one_thread
-from phasekit.labelled.arrays import codec
+from phasekit.labelled.arrays import codec, codecs
 from phasekit.labelled.quantities import plan_passes, select
 from phasekit.labelled.tile import PIECE, compute_cells
 
@@ -286,6 +286,40 @@ def test_where_the_time_of_a_tile_goes(
         f"{size / cells:.1f} of {sum(row.cell_bytes for row in tile.rows)} bytes a cell"
     )
     table(capsys, f"One tile of 2^20 cells, one process, {subject}", rows)
+
+
+@pytest.mark.parametrize("side", [1024, 256])
+@pytest.mark.parametrize("subject", SUBJECTS)
+def test_checksums(
+    subject: str, side: int, scratch: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Writing and reading a tile without and with them, alternately, and looking at them alone."""
+    from phasekit.labelled.marks import sound
+
+    tile = OneTile(subject)
+    cells = prod(tile.shape)
+    compute = best(tile.compute)
+    took: dict[str, list[float]] = {}
+    for _ in range(3):
+        for name, compressors in {"without": [codec()], "with": codecs()}.items():
+            tile.write(LocalStore(scratch / f"{name}.zarr"), compressors, (side, side))
+            write = best(tile.written, 3)
+            read = best(lambda: [array[...] for array in tile.arrays.values()], 3)
+            took.setdefault(f"{name}: write", []).append(write)
+            took.setdefault(f"{name}: read", []).append(read)
+    least = {name: min(times) for name, times in took.items()}
+    files = (file for file in (scratch / "with.zarr").rglob("*") if file.is_file())
+    data = [file.read_bytes() for file in files if file.name != "zarr.json"]
+    assert data
+    assert all(map(sound, data))
+    alone = best(lambda: [sound(one) for one in data], 3)
+    rows = {name: f"{t / cells * 1e9:6.1f} ns a cell" for name, t in least.items()}
+    more = least["with: write"] - least["without: write"]
+    rows["checksums alone"] = (
+        f"{alone / cells * 1e9:6.1f} ns a cell, {sum(map(len, data)) / alone / 1e9:.1f} GB/s"
+    )
+    rows["cost"] = f"{more / (compute + least['without: write']):6.1%} of computing and writing"
+    table(capsys, f"Checksums, {side} x {side} cells a chunk, {subject}", rows)
 
 
 CODECS: dict[str, Any] = {
