@@ -22,8 +22,8 @@ from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.ground import Ground, survey
+from phasekit.phase.numerical.orbits import Orbits
 from phasekit.phase.numerical.systems import make_systems
-from phasekit.phase.orbits import Orbits
 from phasekit.phase.separatrices import Separatrices
 
 Array = npt.NDArray[np.float64]

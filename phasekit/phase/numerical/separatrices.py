@@ -10,7 +10,9 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.phase.numerical.arcs import End, distances, find_end
 from phasekit.phase.numerical.ground import Anchor, Ground
-from phasekit.phase.numerical.pieces import between, integrate
+from phasekit.phase.numerical.panels import integrate
+from phasekit.phase.numerical.periods import WORST
+from phasekit.phase.numerical.pieces import between
 from phasekit.phase.separatrices import Separatrices
 
 Array = npt.NDArray[np.float64]
@@ -84,15 +86,17 @@ def branch_of(ground: Ground, column: npt.NDArray[np.intp], side: float) -> Bran
     return Branch(ground, saddle, side, length, joins, winds, near, end, excess)
 
 
-def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> Array:
-    """Integral of |v| over the finite branches of some rows."""
+def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
+    """Integral of v over the finite branches of some rows, NaN if not known; and its error."""
     ground, length = branch.ground.take(rows), branch.length[rows]
     near, far = branch.near.take(rows), branch.far.take(rows)
     start = branch.saddle[rows] - (length if branch.side < 0.0 else 0.0)
     ends = (near, far) if branch.side > 0.0 else (far, near)
     pieces = between(ground, start, length, branch.excess[rows], *ends)
     with np.errstate(all="ignore"):
-        return integrate(ground, pieces, timed=False)[1]
+        found = integrate(ground, pieces, timed=False)
+        known = found.area_error <= WORST * found.area
+    return np.where(known, found.area, np.nan), found.area_error
 
 
 def separatrices(ground: Ground) -> Separatrices:
@@ -118,7 +122,7 @@ def separatrices(ground: Ground) -> Separatrices:
         branch = branch_of(few, columns, side)
         finite = np.flatnonzero(np.isfinite(branch.length))
         area = np.full(len(rows), np.inf)
-        area[finite] = areas(branch, finite)
+        area[finite], _ = areas(branch, finite)
         place = branch.far.anchor.at + branch.far.u
         place = np.where(np.isfinite(branch.length), place, side * np.inf)
         if period is not None:
