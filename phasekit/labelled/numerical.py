@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import prod
@@ -14,7 +15,14 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad, one_of
 from phasekit.labelled.grid import make_grid
 from phasekit.labelled.methods import SIDES, Noted
-from phasekit.labelled.quantities import LABELS, Labels, Pass, Quantity
+from phasekit.labelled.quantities import (
+    FROM_ENERGY,
+    FROM_MOTION,
+    LABELS,
+    Labels,
+    Pass,
+    Quantity,
+)
 from phasekit.labelled.tiling import cut, tiles
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.formula import Shape
@@ -31,7 +39,7 @@ _STATES: dict[str, tuple[str, tuple[str, ...]]] = {
     "equilibria": ("equilibria", ()),
     "separatrices": ("separatrices", ()),
     "orbits": ("orbits", ("state_phi", "state_dphi")),
-    "motion": ("flow", ("state_phi", "state_dphi", "time")),
+    "motion": ("flow_with_errors", ("state_phi", "state_dphi", "time")),
 }
 _POINTWISE = ("potential", "potential_gradient", "potential_curvature", "energy_integral")
 
@@ -48,6 +56,37 @@ _EQUATIONS = {
     "period": "T = closed integral of dphi/phi' (rotation: over the circle)",
     "action": "J = (1/2 pi) closed integral of phi' dphi (rotation: over the circle)",
 }
+#: Rows that numerical results have besides those of the table, by group.
+_BESIDE: dict[str, tuple[Quantity, ...]] = {
+    "equilibria": (
+        Quantity("complete", "equilibria", (), "bool", "1",
+                 "whether it is proved that there are these equilibria and no others",
+                 "bounds of V' and V'' over all pieces; disjoint discs; exact isolation of roots",
+                 "[MooreKearfottCloud2009]; [Smith1970]"),
+    ),
+    "separatrices": (
+        Quantity("winding_area_error", "separatrices", ("saddle",), "float64", "s-1",
+                 "estimated error of the area under one branch", "of its quadrature", FROM_ENERGY),
+        Quantity("lobe_area_error", "separatrices", ("saddle", "side"), "float64", "s-1",
+                 "estimated error of the area inside the separatrix", "of its quadrature",
+                 FROM_ENERGY),
+    ),
+    "orbits": (
+        Quantity("period_error", "orbits", (), "float64", "s",
+                 "estimated error of the period", "of its quadrature", FROM_ENERGY),
+        Quantity("action_error", "orbits", (), "float64", "s-1",
+                 "estimated error of the action", "of its quadrature", FROM_ENERGY),
+    ),
+    "motion": (
+        Quantity("motion_phi_error", "motion", (), "float64", "rad",
+                 "estimated error of the angle", "change of the energy, error of the period",
+                 FROM_MOTION),
+        Quantity("motion_dphi_error", "motion", (), "float64", "s-1",
+                 "estimated error of the angular velocity",
+                 "change of the energy, error of the period", FROM_MOTION),
+    ),
+}  # fmt: skip
+BESIDE = tuple(row.name for rows in _BESIDE.values() for row in rows)
 _ABSENT = ("fold_margin",)  # of a cubic in the coefficients, which only those have
 _EMPTY = {"kind": 0, "loop": 0}
 
@@ -101,16 +140,20 @@ class Numerical:
             raise bad("of", rows[0].name, "quantities that a Potential has")
         if any(row.group not in (*_POINTWISE, "phase_velocity") for row in kept):
             self.need_a_stretch()
-        labels = dict(LABELS)
+        formula, labels = self.system.formula, dict(LABELS)
         if any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims):
             equilibria, saddles = self._most()
             labels["equilibrium"] = (range(equilibria), "equilibrium, by its coordinate")
             labels["saddle"] = (range(saddles), "saddle, by its coordinate")
+        groups = dict.fromkeys(row.group for row in kept)
+        kept += [row for group in groups for row in _BESIDE.get(group, ())]
         fitted = [self._worded(row, labels) for row in kept]
         shapes = {row.name: row.label_shape for row in fitted}
         return fitted, [
             replace(one, function=functools.partial(_padded, one, shapes))
             if set(one.groups) & {"equilibria", "separatrices"}
+            else replace(one, function=functools.partial(_told, one, formula.text))
+            if set(one.groups) & {"orbits", "motion"}
             else one
             for one in passes
         ]
@@ -127,7 +170,7 @@ class Numerical:
 
     def on_separatrix(self, saddle: str | int | None, side: str) -> Noted:
         """Return the pass for motion on the separatrix of a saddle."""
-        return self._of_saddle("separatrix_motion", "time", "motion", saddle, side)
+        return self._of_saddle("separatrix_motion_with_errors", "time", "motion", saddle, side)
 
     def _of_saddle(self, name: str, state: str, group: str, saddle: Any, side: str) -> Noted:
         number = _number("saddle", saddle, "a number on the dim saddle")
@@ -173,7 +216,17 @@ class Numerical:
             for tile in tiles(shape, 4096)
             if prod(shape)
         ]
-        return max(n for n, _ in found), max(n for _, n in found)
+        gaps = np.concatenate([open_ for *_, open_ in found])
+        if len(gaps):
+            low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
+            of = f", in {len(gaps)} of {prod(shape)} systems" if shape else ""
+            warnings.warn(
+                f"equilibria of {formula.text}: it is not proved that there are no others between "
+                f"{low:.6g} and {high:.6g}{of}; there `complete` is False",
+                RuntimeWarning,
+                stacklevel=2,
+            )
+        return max(n for n, *_ in found), max(n for _, n, _ in found)
 
     def _worded(self, row: Quantity, labels: dict[str, Labels]) -> Quantity:
         formula = self.system.formula
@@ -191,6 +244,29 @@ class Numerical:
         if row.name == "n_equilibria":
             words["dtype"] = "int16"
         return replace(row, **words)
+
+
+def _told(one: Pass, text: str, *arrays: Any) -> Any:
+    """Call a pass, and say how many results it could not compute, and why."""
+    assert callable(one.function)
+    result = one.function(*arrays)
+    fields = result._asdict()
+    for name in ("period", "motion_phi"):
+        if name in fields:
+            error = fields[f"{name}_error"]
+            unknown = np.isnan(fields[name]) & ~np.isnan(error)
+            if unknown.any():
+                worst = np.max(error[unknown])
+                why = f"their error may be as large as {worst:.2g}"
+                if np.isinf(worst):
+                    why = "they take too many steps" if name == "motion_phi" else "V is too rough"
+                warnings.warn(
+                    f"{name} of {text}: {unknown.sum()} of {unknown.size} values are NaN, because "
+                    f"{why}",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+    return result
 
 
 def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:

@@ -96,11 +96,13 @@ class Potential(Model):
         name = _name("coordinate", coordinate)
         if parameters is not None and not isinstance(parameters, Mapping):
             raise bad("parameters", parameters, "a mapping of names to values, {'mu': 1.0}")
+        from phasekit.labelled.numerical import BESIDE  # here: it loads the numerical methods
+
         given = {_name("parameters", key): value for key, value in (parameters or {}).items()}
         for key in given:
             if key == name:
                 raise bad("parameters", key, "names other than the coordinate's")
-            if key in _TAKEN:
+            if key in _TAKEN or key in BESIDE:
                 raise bad("parameters", key, f"another name, because results have {key!r}")
         declared = tuple(
             Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")

@@ -131,7 +131,7 @@ def _replaced(zeros: Zeros, rows: Index, others: Zeros) -> Zeros:
         fields.append(field)
     complete, gaps = zeros.complete.copy(), zeros.gaps.copy()
     complete[rows], gaps[rows] = others.complete, others.gaps
-    return Zeros(*fields, complete, gaps)
+    return Zeros(fields[0], fields[1], complete, gaps)
 
 
 def _wrapped(systems: Systems, x: Array) -> Array:

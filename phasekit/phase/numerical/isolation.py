@@ -140,7 +140,9 @@ def _isolate(systems: Systems) -> Isolated:
 # ------------------------------------------------------------------------- pieces
 
 
-def bounds_on(systems: Systems, row: Index, low: Array, high: Array) -> tuple[Array, ...]:
+def bounds_on(
+    systems: Systems, row: Index, low: Array, high: Array
+) -> tuple[Array, Array, Array, Array, Flags]:
     """Bounds of V' and V'' on pieces: low and high of each, and where they may be undefined."""
     bounds = slope_bounds(systems.formula)
     assert bounds is not None
@@ -191,13 +193,15 @@ def _judge(systems: Systems, row: Index, low: Array, high: Array) -> tuple[_Piec
     start, stop = formula.ends
     span, n = stop - start, row.size
     middle = low + 0.5 * (high - low)
-    *ends, undefined = bounds_on(
+    slope_low, slope_high, bend_low, bend_high, undefined = bounds_on(
         systems,
         np.tile(row, 4),
         np.concatenate([low, middle, low, high]),
         np.concatenate([high, middle, low, high]),
     )
-    slope_low, slope_high, bend_low, bend_high = (end.reshape(4, n) for end in ends)
+    slope_low, slope_high, bend_low, bend_high = (
+        end.reshape(4, n) for end in (slope_low, slope_high, bend_low, bend_high)
+    )
     nowhere = undefined[n : 2 * n]
     undefined = undefined[:n]
     with np.errstate(all="ignore"):
@@ -308,7 +312,7 @@ def _widen(system: Systems, runs: list[_Run], k: int) -> None:
             beside = runs[k + step]
             at, end = (run.low, beside.low) if side == 0 else (run.high, beside.high)
             width = max(run.high - run.low, 4.0 * float(np.spacing(abs(at))))
-            places = at + step * width * 2.0 ** np.arange(64)
+            places: Array = at + step * width * 2.0 ** np.arange(64.0)
             places = np.append(places[np.abs(places - at) < abs(end - at)], end)
             low, high, *_ = bounds_on(system, np.zeros(places.size, np.intp), places, places)
             known = np.where(low > 0.0, 1, np.where(high < 0.0, -1, 0))

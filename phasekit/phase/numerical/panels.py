@@ -244,7 +244,7 @@ def _sums(halves: _Halves, panels: _Panels, timed: bool) -> tuple[Array, Array, 
             poor |= ~(rest <= _LOOSE * most) & ~stuck
             np.add.at(sums[k], panels.half, part)
             np.add.at(sums[k + 2], panels.half, error)
-    meeting = halves.start + np.bincount(panels.half, gain, count)
+    meeting = np.asarray(halves.start + np.bincount(panels.half, gain, count), dtype=float)
     return sums, meeting, np.asarray(poor)
 
 

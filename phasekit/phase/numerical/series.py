@@ -128,9 +128,8 @@ def of_fourier_sums(systems: Systems) -> Roots:
         slack = 2.0 * radius * (period / (2.0 * np.pi))
         found.clear[rows] = clear
         order = np.argsort(np.where(on_circle, angle, np.nan), axis=1)
-        angle, slack, there = (
-            np.take_along_axis(a, order, axis=1) for a in (angle, slack, on_circle & clear[:, None])
-        )
+        angle, slack = (np.take_along_axis(a, order, axis=1) for a in (angle, slack))
+        there = np.take_along_axis(on_circle & clear[:, None], order, axis=1)
         # Between neighboring zeros V' has one sign.
         following = np.take_along_axis(angle, _next(there), axis=1)
         following = np.where(following <= angle, following + period, following)
@@ -147,8 +146,8 @@ def _next(there: Flags) -> npt.NDArray[np.intp]:
 
 
 def _none(rows: int, columns: int) -> Roots:
-    empty = [np.full((rows, columns), np.nan) for _ in range(3)]
-    return Roots(*empty, np.zeros(rows, dtype=bool), {})
+    phi, sign, radius = np.full((3, rows, columns), np.nan)
+    return Roots(phi, sign, radius, np.zeros(rows, dtype=bool), {})
 
 
 def _enter(
@@ -156,7 +155,8 @@ def _enter(
 ) -> None:
     """Write down real roots; V' passes 0 upward at the last if its leading power does."""
     order = np.argsort(np.where(real, place, np.nan), axis=1)
-    place, radius, real = (np.take_along_axis(a, order, axis=1) for a in (place, radius, real))
+    place, radius = (np.take_along_axis(a, order, axis=1) for a in (place, radius))
+    real = np.take_along_axis(real, order, axis=1)
     behind = real.sum(axis=1, keepdims=True) - 1 - np.arange(real.shape[1])
     sign = leading[:, None] * np.where(behind % 2 == 0, 1.0, -1.0)
     columns = np.arange(real.shape[1])
@@ -264,7 +264,7 @@ def _middle(a: float, b: float) -> float:
 def exact_sign(numbers: list[int], x: Fraction) -> int:
     """Sign of a polynomial, highest coefficient first, at a fraction."""
     value = exact_value(numbers, x)
-    return (value > 0) - (value < 0)
+    return int(value > 0) - int(value < 0)
 
 
 def exact_value(numbers: list[Any], x: Fraction) -> Any:
