@@ -22,6 +22,8 @@ Values = Sequence[npt.ArrayLike]
 
 #: Points at which a formula is tried: no special angles or integers among them.
 _TRIALS = np.array([-0.4871, -0.2713, 0.0931, 0.3197, 0.4439])
+#: Harmonics up to which a Fourier sum is treated as one.
+_MOST_HARMONICS = 128
 
 
 class Shape(Enum):
@@ -270,6 +272,8 @@ def _harmonics(slope: Any, x: Any, period: float) -> list[Any] | None:
             return None
         found[int(exponent)] = coefficient
     highest = max(map(abs, found), default=0)
+    if highest > _MOST_HARMONICS:
+        return None  # the companion matrix would outgrow what isolation on the circle takes
     return [found.get(k, sp.Integer(0)) for k in range(highest + 1)]
 
 

@@ -7,7 +7,7 @@ arrays of all stretches at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -28,92 +28,13 @@ class NoRule(Exception):
     """A formula holds a function of which no bounds are known; the argument names it."""
 
 
-class Bounds:
-    """Bounds of some expressions over boxes of their symbols.
-
-    Parameters
-    ----------
-    expressions : sequence of sympy expressions
-    symbols : sequence of sympy symbols
-
-    Raises
-    ------
-    NoRule
-        If an expression holds a function that has no rule here.
-    """
-
-    def __init__(self, expressions: Sequence[Any], symbols: Sequence[Any]) -> None:
-        self._steps: list[tuple[Callable[..., Interval], tuple[int, ...]]] = []
-        self._place: dict[Any, int] = {symbol: i for i, symbol in enumerate(symbols)}
-        self._inputs = len(symbols)
-        self._outputs = [self._compile(expression) for expression in expressions]
-
-    def __call__(self, *inputs: Interval) -> tuple[list[Interval], Flags]:
-        """Return the bounds of each expression, and where one may be undefined or have a pole.
-
-        Bounds of infinite size stand for any value.
-        """
-        shape = np.broadcast_shapes(*(np.shape(low) for low, _ in inputs))
-        undefined = np.zeros(shape, dtype=bool)
-        values: list[Any] = list(inputs)
-        with np.errstate(all="ignore"):
-            for step, arguments in self._steps:
-                values.append(step(undefined, *(values[i] for i in arguments)))
-        found = []
-        for i in self._outputs:
-            low, high = (np.broadcast_to(end, shape) for end in values[i])
-            low, high = (
-                np.where(np.isnan(low), -np.inf, low),
-                np.where(np.isnan(high), np.inf, high),
-            )
-            found.append((low, high))
-        return found, undefined
-
-    def _add(self, step: Callable[..., Interval], *arguments: int) -> int:
-        self._steps.append((step, arguments))
-        return self._inputs + len(self._steps) - 1
-
-    def _compile(self, expression: Any) -> int:
-        if expression not in self._place:
-            self._place[expression] = self._lay_out(expression)
-        return self._place[expression]
-
-    def _lay_out(self, expression: Any) -> int:
-        import sympy as sp
-
-        if not expression.free_symbols:
-            constant = _constant(expression)
-            return self._add(lambda _: constant)
-        if expression.is_Symbol:
-            raise NoRule(str(expression))
-        arguments = expression.args
-        name = type(expression).__name__
-        if expression.is_Add or expression.is_Mul:
-            join = _add if expression.is_Add else _multiply
-            place = self._compile(arguments[0])
-            for argument in arguments[1:]:
-                place = self._add(join, place, self._compile(argument))
-            return place
-        if expression.is_Pow:
-            base, exponent = arguments
-            if exponent.is_Integer:
-                return self._add(_whole_power(int(exponent)), self._compile(base))
-            if not exponent.free_symbols:
-                return self._add(_real_power(_constant(exponent)), self._compile(base))
-            return self._compile(sp.exp(exponent * sp.log(base), evaluate=False))
-        if name in _RULES and len(arguments) == 1:
-            return self._add(_RULES[name], self._compile(arguments[0]))
-        if name in _REWRITTEN and len(arguments) == 1:
-            return self._compile(_REWRITTEN[name](sp, arguments[0]))
-        raise NoRule(name)
-
-
 def point(x: npt.ArrayLike) -> Interval:
     """The interval of one number."""
     return x, x
 
 
-def _constant(expression: Any) -> Interval:
+def constant_bounds(expression: Any) -> Interval:
+    """Bounds of an expression without symbols."""
     if expression.is_Float:
         return point(float(expression))
     value = float(expression)
@@ -142,11 +63,13 @@ def _wide(low: Array, high: Array) -> Interval:
     )
 
 
-def _add(_: Flags, a: Interval, b: Interval) -> Interval:
+def add(_: Flags, a: Interval, b: Interval) -> Interval:
+    """Bounds of a sum."""
     return _outward(a[0] + b[0], a[1] + b[1])
 
 
-def _multiply(_: Flags, a: Interval, b: Interval) -> Interval:
+def multiply(_: Flags, a: Interval, b: Interval) -> Interval:
+    """Bounds of a product."""
     for one, other in ((a, b), (b, a)):
         if isinstance(one[0], float) and one[0] == one[1]:
             if abs(one[0]) == 1.0:  # exact
@@ -168,9 +91,10 @@ def _reciprocal(undefined: Flags, a: Interval) -> Interval:
     return left, right
 
 
-def _whole_power(n: int) -> Callable[..., Interval]:
+def whole_power(n: int) -> Callable[..., Interval]:
+    """Rule for a power with a whole exponent, not 0."""
+
     def power(undefined: Flags, a: Interval) -> Interval:
-        low, high = a
         if n < 0:
             return _reciprocal(undefined, positive(undefined, a))
         return positive(undefined, a)
@@ -189,7 +113,9 @@ def _whole_power(n: int) -> Callable[..., Interval]:
     return power
 
 
-def _real_power(exponent: Interval) -> Callable[..., Interval]:
+def real_power(exponent: Interval) -> Callable[..., Interval]:
+    """Rule for a power with a real exponent, of a base that is not negative."""
+
     def power(undefined: Flags, a: Interval) -> Interval:
         undefined |= np.asarray(a[0]) < 0.0
         low, high = np.maximum(a[0], 0.0), np.maximum(a[1], 0.0)
@@ -280,7 +206,7 @@ def _erfc(x: Any) -> Any:
     return erfc(-np.asarray(x))
 
 
-_RULES: dict[str, Callable[..., Interval]] = {
+RULES: dict[str, Callable[..., Interval]] = {
     "exp": _rising(np.exp, image=(0.0, np.inf)),
     "log": _rising(np.log, domain=(0.0, np.inf)),
     "sin": _wave(np.sin, 0.5 * np.pi),
@@ -307,3 +233,90 @@ _REWRITTEN: dict[str, Callable[[Any, Any], Any]] = {
     "csch": lambda sp, x: 1 / sp.sinh(x),
     "coth": lambda sp, x: sp.cosh(x) / sp.sinh(x),
 }
+
+
+class Bounds:
+    """Bounds of some expressions over boxes of their symbols.
+
+    Parameters
+    ----------
+    expressions : sequence of sympy expressions
+    symbols : sequence of sympy symbols
+
+    Raises
+    ------
+    NoRule
+        If an expression holds a function that has no rule here.
+    """
+
+    _constant: Callable[[Any], Any] = staticmethod(constant_bounds)
+    _sum: Callable[..., Any] = staticmethod(add)
+    _product: Callable[..., Any] = staticmethod(multiply)
+    _whole_power: Callable[[int], Callable[..., Any]] = staticmethod(whole_power)
+    _real_power: Callable[[Interval], Callable[..., Any]] = staticmethod(real_power)
+    _rules: Mapping[str, Callable[..., Any]] = RULES
+
+    def __init__(self, expressions: Sequence[Any], symbols: Sequence[Any]) -> None:
+        self._steps: list[tuple[Callable[..., Interval], tuple[int, ...]]] = []
+        self._place: dict[Any, int] = {symbol: i for i, symbol in enumerate(symbols)}
+        self._inputs = len(symbols)
+        self._outputs = [self._compile(expression) for expression in expressions]
+
+    def __call__(self, *inputs: Interval) -> tuple[list[Interval], Flags]:
+        """Return the bounds of each expression, and where one may be undefined or have a pole.
+
+        Bounds of infinite size stand for any value.
+        """
+        shape = np.broadcast_shapes(*(np.shape(low) for low, _ in inputs))
+        undefined = np.zeros(shape, dtype=bool)
+        values: list[Any] = list(inputs)
+        with np.errstate(all="ignore"):
+            for step, arguments in self._steps:
+                values.append(step(undefined, *(values[i] for i in arguments)))
+        found = []
+        for i in self._outputs:
+            low, high = (np.broadcast_to(end, shape) for end in values[i])
+            low, high = (
+                np.where(np.isnan(low), -np.inf, low),
+                np.where(np.isnan(high), np.inf, high),
+            )
+            found.append((low, high))
+        return found, undefined
+
+    def _add(self, step: Callable[..., Interval], *arguments: int) -> int:
+        self._steps.append((step, arguments))
+        return self._inputs + len(self._steps) - 1
+
+    def _compile(self, expression: Any) -> int:
+        if expression not in self._place:
+            self._place[expression] = self._lay_out(expression)
+        return self._place[expression]
+
+    def _lay_out(self, expression: Any) -> int:
+        import sympy as sp
+
+        if not expression.free_symbols:
+            constant = self._constant(expression)
+            return self._add(lambda _: constant)
+        if expression.is_Symbol:
+            raise NoRule(str(expression))
+        arguments = expression.args
+        name = type(expression).__name__
+        if expression.is_Add or expression.is_Mul:
+            join = self._sum if expression.is_Add else self._product
+            place = self._compile(arguments[0])
+            for argument in arguments[1:]:
+                place = self._add(join, place, self._compile(argument))
+            return place
+        if expression.is_Pow:
+            base, exponent = arguments
+            if exponent.is_Integer:
+                return self._add(self._whole_power(int(exponent)), self._compile(base))
+            if not exponent.free_symbols:
+                return self._add(self._real_power(constant_bounds(exponent)), self._compile(base))
+            return self._compile(sp.exp(exponent * sp.log(base), evaluate=False))
+        if name in self._rules and len(arguments) == 1:
+            return self._add(self._rules[name], self._compile(arguments[0]))
+        if name in _REWRITTEN and len(arguments) == 1:
+            return self._compile(_REWRITTEN[name](sp, arguments[0]))
+        raise NoRule(name)

@@ -166,7 +166,8 @@ def _divide(systems: Systems) -> _Pieces:
     while row.size:
         if row.size > _WAITING and np.max(np.bincount(row)) > _WAITING:
             raise ConvergenceError(
-                f"{formula.text} is not smooth enough between {start:.6g} and {stop:.6g}: between "
+                f"{formula.text} has too many equilibria between {start:.6g} and {stop:.6g}, or is "
+                "not smooth enough: between "
                 f"{np.min(low):.6g} and {np.max(high):.6g} there are {row.size} pieces for which "
                 "it is not known how many equilibria they have; take a shorter interval"
             )

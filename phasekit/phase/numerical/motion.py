@@ -18,6 +18,7 @@ from phasekit.phase.numerical.collocation import integrate
 from phasekit.phase.numerical.ground import Ground
 from phasekit.phase.numerical.orbits import orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.pieces import speeds
+from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.separatrices import Branch, branch_of
 
 Array = npt.NDArray[np.float64]
@@ -75,11 +76,16 @@ def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motio
         def rate(few: Index, y: Array) -> Array:
             return np.stack([y[..., 1], -systems.take(few).slope(y[..., 0])], axis=-1)
 
+        def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+            x = stages[..., 0]
+            size = np.max(np.abs(systems.take(few).slope(x)), axis=1)
+            return smooth(systems, few, np.min(x, axis=1), np.max(x, axis=1), size)
+
         bend = np.abs(systems.bend(out_x[rows]))
         pace = np.sqrt(bend) + 1.0 / np.where(turning[rows], period[rows], 1e3)
         start = np.stack([out_x[rows], out_v[rows]], axis=-1)
         with np.errstate(all="ignore"):
-            end = integrate(rate, start, rest[rows], 0.5 / pace)
+            end = integrate(rate, start, rest[rows], 0.5 / pace, trusted)
         out_x[rows], out_v[rows] = end.T
     turn = ground.systems.formula.period or 0.0
     rotating = kind == OrbitKind.ROTATION

@@ -4,8 +4,8 @@ Each half of an arc runs from its end inward: from a turning point in s = sqrt(d
 the root of v there is smooth, or from a maximum of V that is passed. The kinetic energy is the
 integral of -V' from that end, so it has all its digits next to it, and panels crowd toward the end
 geometrically, down to the scale that V has there. On each panel the decay of Legendre series tells
-how well V', 1/v and v are known; for a formula of any kind, bounds of V'' tell whether a feature
-fell between the nodes.
+how well V', 1/v and v are known, and bounds of V' about it whether anything narrow fell between
+the nodes.
 """
 
 from __future__ import annotations
@@ -16,10 +16,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.ground import Anchor, Ground
-from phasekit.phase.numerical.isolation import bounds_on, slope_bounds
 from phasekit.phase.numerical.pieces import Pieces
+from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.systems import Index
 
 Array = npt.NDArray[np.float64]
@@ -98,8 +97,6 @@ class _Halves:
         exact = np.array(pieces.reach).reshape(-1)
         self.reach = np.where(np.isnan(exact), reach, exact)
         self.stop = np.where(self.turning, np.sqrt(self.reach), self.reach)
-        formula = ground.systems.formula
-        self.guarded = formula.shape is Shape.GENERAL and slope_bounds(formula) is not None
 
     def first(self) -> tuple[Index, Array, Array]:
         """Panels that shrink by 4 toward the end, down to the scale of V there."""
@@ -137,22 +134,10 @@ class _Halves:
 
     def _rough(self, half: Index, y: Array, force: Array) -> Flags:
         """Whether V' may do on a panel what its nodes do not show."""
-        if not self.guarded:
-            return np.zeros(half.size, dtype=bool)
-        spread = 0.03 * (y[:, -1] - y[:, 0])
-        ends = [
-            self.anchor.at[half] + self.u[half] + self.way[half] * place
-            for place in (np.maximum(y[:, 0] - spread, 0.0), y[:, -1] + spread)
-        ]
+        ends = [self.anchor.at[half] + self.u[half] + self.way[half] * y[:, k] for k in (0, -1)]
         low, high = np.minimum(*ends), np.maximum(*ends)
-        with np.errstate(all="ignore"):
-            slope_low, slope_high, bend_low, bend_high, _ = bounds_on(self.systems, half, low, high)
-            sway = np.maximum(np.abs(bend_low), np.abs(bend_high)) * (high - low)
-            most = np.fmin(slope_high - slope_low, sway)
-            shown = np.max(force, axis=1) - np.min(force, axis=1)
-            size = np.max(np.abs(force), axis=1)
-            narrow = high - low <= 64.0 * np.spacing(np.abs(high))
-            return np.asarray(~(most <= 16.0 * shown + 1e-6 * size) & ~narrow)
+        narrow = high - low <= 64.0 * np.spacing(np.abs(high))
+        return ~smooth(self.systems, half, low, high, np.max(np.abs(force), axis=1)) & ~narrow
 
 
 def integrate(ground: Ground, pieces: Pieces, *, timed: bool = True) -> Integrals:
