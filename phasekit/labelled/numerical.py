@@ -145,6 +145,8 @@ class Numerical:
             equilibria, saddles = self._most()
             labels["equilibrium"] = (range(equilibria), "equilibrium, by its coordinate")
             labels["saddle"] = (range(saddles), "saddle, by its coordinate")
+        elif formula.shape is Shape.GENERAL and any(row.group in _BESIDE for row in kept):
+            self._most()  # orbits and motion rest on the equilibria as well
         groups = dict.fromkeys(row.group for row in kept)
         kept += [row for group in groups for row in _BESIDE.get(group, ())]
         fitted = [self._worded(row, labels) for row in kept]

@@ -7,6 +7,7 @@ broadcast against it.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -25,11 +26,14 @@ from phasekit.phase.numerical.ground import Ground, survey
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.orbits import Orbits
 from phasekit.phase.numerical.separatrices import Separatrices
-from phasekit.phase.numerical.systems import make_systems
+from phasekit.phase.numerical.systems import Systems, make_systems
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Shape = tuple[int, ...]
+
+#: Systems up to which a survey is kept for the next call.
+_KEPT = 256
 
 
 def potential(formula: Formula, *inputs: npt.ArrayLike) -> Array:
@@ -64,7 +68,11 @@ def phase_velocity(formula: Formula, *inputs: npt.ArrayLike) -> Array:
 def equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Equilibria:
     """All equilibria, from left to right on the last axis."""
     systems, shape = make_systems(formula, parameters)
-    return Equilibria._make(f.reshape(shape + f.shape[1:]) for f in find_equilibria(systems))
+    if systems.size <= _KEPT:
+        points = _survey(formula, parameters)[0].points
+    else:
+        points = find_equilibria(systems)
+    return Equilibria._make(np.array(f).reshape(shape + f.shape[1:]) for f in points)
 
 
 def separatrices(formula: Formula, *parameters: npt.ArrayLike) -> Separatrices:
@@ -201,7 +209,16 @@ def separatrix_motion_with_errors(
 
 def _survey(formula: Formula, parameters: Sequence[npt.ArrayLike]) -> tuple[Ground, Shape]:
     systems, shape = make_systems(formula, tuple(parameters))
-    return survey(systems), shape
+    if systems.size > _KEPT:
+        return survey(systems), shape
+    return _surveyed(formula, systems.size, tuple(p.tobytes() for p in systems.parameters)), shape
+
+
+@functools.lru_cache(maxsize=32)
+def _surveyed(formula: Formula, size: int, parameters: tuple[bytes, ...]) -> Ground:
+    """The ground of a few systems, which calls in a row ask for again."""
+    arrays = tuple(np.frombuffer(values) for values in parameters)
+    return survey(Systems(formula, arrays, size))
 
 
 def _cells(

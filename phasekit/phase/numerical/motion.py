@@ -150,7 +150,15 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
 
     exponent = branch.ground.systems.take(own).bend(branch.saddle[own])
     step = 0.25 / (np.sqrt(np.abs(exponent)) + 1e-3)
-    w = integrate(rate, start[rows, None], time[rows], step)[:, 0]
+
+    def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+        near, _, _ = _place(branch, own[few], stages[..., 0])
+        x = branch.saddle[own[few], None] + branch.side * near
+        systems = branch.ground.systems
+        size = np.max(np.abs(systems.take(own[few]).slope(x)), axis=1)
+        return smooth(systems, own[few], np.min(x, axis=1), np.max(x, axis=1), size)
+
+    w = integrate(rate, start[rows, None], time[rows], step, trusted)[:, 0]
     near, far, slope = _place(branch, own, w[:, None])
     pace = _pace(branch, own, w[:, None])
     u, d = near[:, 0], far[:, 0]

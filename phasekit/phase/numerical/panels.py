@@ -137,7 +137,8 @@ class _Halves:
         ends = [self.anchor.at[half] + self.u[half] + self.way[half] * y[:, k] for k in (0, -1)]
         low, high = np.minimum(*ends), np.maximum(*ends)
         narrow = high - low <= 64.0 * np.spacing(np.abs(high))
-        return ~smooth(self.systems, half, low, high, np.max(np.abs(force), axis=1)) & ~narrow
+        shown = smooth(self.systems, half, low, high, np.max(np.abs(force), axis=1))
+        return np.asarray(~shown & ~narrow)
 
 
 def integrate(ground: Ground, pieces: Pieces, *, timed: bool = True) -> Integrals:

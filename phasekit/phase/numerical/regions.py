@@ -133,12 +133,13 @@ def _odd(rule: Callable[..., Box]) -> Callable[..., Box]:
 
     def whole(undefined: Flags, a: Box) -> Box:
         left = np.asarray(a[0][0]) + np.asarray(a[0][1]) < 0.0
-        flip = lambda part: tuple(  # noqa: E731
-            np.where(left, -np.asarray(other), one)
-            for one, other in zip(part, part[::-1], strict=True)
-        )
-        found = rule(undefined, (flip(a[0]), flip(a[1])))
-        return flip(found[0]), flip(found[1])
+
+        def flip(part: Interval) -> Interval:
+            low, high = np.asarray(part[0]), np.asarray(part[1])
+            return np.where(left, -high, low), np.where(left, -low, high)
+
+        re, im = rule(undefined, (flip(a[0]), flip(a[1])))
+        return flip(re), flip(im)
 
     return whole
 
