@@ -92,6 +92,11 @@ class _Halves:
         self.anchor = Anchor(self.systems, ends[:, 0], ends[:, 1])
         self.u, self.way = ends[:, 2], np.tile([1.0, -1.0], len(pieces.orbit))
         self.turning = self.u != 0.0
+        # What rounding has done to the energy of turning points that are known by difference.
+        with np.errstate(all="ignore"):
+            heights = [self.systems.potential(ends[:, 0] + u) for u in (0.0, self.u)]
+        away = self.turning & (np.abs(self.u) > ends[:, 1])
+        self.blur = np.where(away, 2.0 * _EPS * np.abs(heights).sum(axis=0), 0.0)
         self.start = np.where(self.turning, 0.0, ends[:, 3])
         reach = np.stack([cut, length - cut], axis=1).reshape(-1)
         exact = np.array(pieces.reach).reshape(-1)
@@ -227,6 +232,7 @@ def _sums(halves: _Halves, panels: _Panels, timed: bool) -> tuple[Array, Array, 
             rest = np.max(np.abs((values @ _TO_SERIES.T)[:, -2:]), axis=1)
             error = width * rest * np.minimum(rest / most, 1.0)
             error += width * ((values * 0.5 * unsure) @ _WEIGHTS)
+            error += 0.5 * part * halves.blur[panels.half] / scale
             poor |= ~(rest <= _LOOSE * most) & ~stuck
             np.add.at(sums[k], panels.half, part)
             np.add.at(sums[k + 2], panels.half, error)
