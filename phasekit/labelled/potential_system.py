@@ -57,12 +57,12 @@ class Potential(Model):
     Equilibria are proved, not sampled: those of polynomials and of finite Fourier sums over the
     period by disjoint discs about the roots of companion matrices ([Boyd2013], [Smith1970]) or by
     exact isolation of roots, those of any other function in the interval, or on the circle, by
-    interval arithmetic [MooreKearfottCloud2009]. The interval is closed: an equilibrium at one of its ends, or within
-    rounding of it, counts. They are numbered from left to right, from 0; on a circle from
-    -period/2. Equilibria that have merged within rounding are one, degenerate. The variable
-    ``complete`` of results is False where it is not proved that there are no others: where some
-    have merged, where rounding hides V', and for functions of which no bounds are known; what was
-    not excluded, and stands for no equilibrium, is named in a RuntimeWarning.
+    interval arithmetic [MooreKearfottCloud2009]. The interval is closed: an equilibrium at one of
+    its ends, or within rounding of it, counts. They are numbered from left to right, from 0; on a
+    circle from -period/2. Equilibria that have merged within rounding are one, degenerate. The
+    variable ``complete`` of results is False where it is not proved that there are no others: where
+    some have merged, where rounding hides V', and for functions of which no bounds are known; what
+    was not excluded, and stands for no equilibrium, is named in a RuntimeWarning.
 
     Periods, actions, areas and motions come with estimates of their errors (``period_error`` and so
     on). A period, an action or an area whose error may exceed 1e-8 of it is NaN, and a
