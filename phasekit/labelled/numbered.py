@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from math import prod
@@ -12,9 +13,10 @@ import numpy as np
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.grid import make_grid
-from phasekit.labelled.quantities import LABELS, Labels, Pass, Quantity
+from phasekit.labelled.quantities import LABELS, NUMERICAL_ROWS, Labels, Pass, Quantity
 from phasekit.labelled.system import Model
 from phasekit.labelled.tiling import cut, tiles
+from phasekit.laws.ladder import Conservative
 
 _POINTWISE = (
     "potential",
@@ -43,11 +45,18 @@ def fitted(
         equilibria, saddles = _most(system, count)
         labels["equilibrium"] = (range(equilibria), "equilibrium, by its coordinate")
         labels["saddle"] = (range(saddles), "saddle, by its coordinate")
+    elif any(row.group in ("orbits", "motion") for row in rows) and system.law.may_be_incomplete:
+        _most(system, count)  # says what is not proved, on which orbits and motion rest as well
+    if issubclass(system.rung, Conservative):
+        groups = dict.fromkeys(row.group for row in rows)
+        rows = [*rows, *(row for group in groups for row in NUMERICAL_ROWS.get(group, ()))]
     found = [_worded(row, system, labels) for row in rows]
     shapes = {row.name: row.label_shape for row in found}
     return found, [
         replace(one, function=functools.partial(_padded, one, shapes))
         if set(one.groups) & {"equilibria", "separatrices"}
+        else replace(one, function=functools.partial(_told, one, repr(system)))
+        if set(one.groups) & {"orbits", "motion"}
         else one
         for one in passes
     ]
@@ -69,7 +78,17 @@ def _most(system: Model, count: Pass) -> tuple[int, int]:
         for tile in tiles(shape, 4096)
         if prod(shape)
     ]
-    return max(n for n, _ in found), max(n for _, n in found)
+    gaps = np.concatenate([open_ for *_, open_ in found])
+    if len(gaps):
+        low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
+        of = f", in {len(gaps)} of {prod(shape)} systems" if shape else ""
+        warnings.warn(
+            f"equilibria of {system!r}: it is not proved that there are no others between "
+            f"{low:.6g} and {high:.6g}{of}; there `complete` is False",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return max(n for n, *_ in found), max(n for _, n, _ in found)
 
 
 def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity:
@@ -78,6 +97,28 @@ def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity
     if row.name == "n_equilibria":
         words["dtype"] = "int16"
     return replace(row, **words)
+
+
+def _told(one: Pass, text: str, *arrays: Any) -> Any:
+    """Call a pass, and say how many results it could not compute, and why."""
+    result = one.resolved(*arrays)
+    fields = result._asdict()
+    for name in ("period", "motion_phi"):
+        if name in fields:
+            error = fields[f"{name}_error"]
+            unknown = np.isnan(fields[name]) & ~np.isnan(error)
+            if unknown.any():
+                worst = np.max(error[unknown])
+                why = f"their error may be as large as {worst:.2g}"
+                if np.isinf(worst):
+                    why = "they take too many steps" if name == "motion_phi" else "V is too rough"
+                warnings.warn(
+                    f"{name} of {text}: {unknown.sum()} of {unknown.size} values are NaN, because "
+                    f"{why}",
+                    RuntimeWarning,
+                    stacklevel=2,
+                )
+    return result
 
 
 def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:

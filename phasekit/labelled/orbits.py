@@ -69,6 +69,8 @@ def orbits(
         floating point, and asymptotic if its energy is a saddle's within the rounding of the
         state; so the double next to a center is a libration of almost no action. An orbit of a
         `Potential` that leaves the line, or its interval, is unbounded; its period is infinite.
+        Results of a `Potential` have estimates of their errors, ``period_error`` and
+        ``action_error``.
 
     Raises
     ------

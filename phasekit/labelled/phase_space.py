@@ -44,7 +44,8 @@ def equilibria(system: Any) -> xr.Dataset:
     kind degenerate. Angles are wrapped to (-pi, pi].
 
     Those of a `Potential` are numbered from left to right instead, 0 to one less than the most
-    that a cell has; there is no ``fold_margin``, which belongs to the coefficients (A, B, C).
+    that a cell has; there is no ``fold_margin``, which belongs to the coefficients (A, B, C), but
+    ``complete``: whether it is proved that there are no others.
 
     Examples
     --------
@@ -84,7 +85,8 @@ def separatrices(system: Any) -> xr.Dataset:
     -----
     From the energy integral [Veljovic2015] (14) at the saddles' energies, in closed form. The
     saddles of a `Potential` are numbered from left to right; a separatrix that goes to infinity,
-    or out of the interval, has an infinite turning point and area.
+    or out of the interval, has an infinite turning point and area; its areas have estimates of
+    their errors, ``lobe_area_error`` and ``winding_area_error``.
 
     Examples
     --------

@@ -24,7 +24,7 @@ from phasekit.labelled.arguments import (
     unknown,
 )
 from phasekit.labelled.parameter import Parameter
-from phasekit.labelled.quantities import LABELS, ROWS, STATES
+from phasekit.labelled.quantities import LABELS, NUMERICAL_ROWS, ROWS, STATES
 from phasekit.labelled.system import MODELS, Model
 from phasekit.laws.formulas import NAME, is_name, read_formula
 from phasekit.laws.ladder import Conservative
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 
 #: Names that parameters cannot have, because results have them.
 _TAKEN = {*ROWS, *LABELS, *STATES, "point"}
+_TAKEN |= {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
 
 
 class Potential(Model):
@@ -69,11 +70,19 @@ class Potential(Model):
 
     Notes
     -----
-    All equilibria of polynomials and of finite Fourier sums over the period are found, from the
-    eigenvalues of companion matrices [Boyd2013]; those of any other function in the interval, or
-    on the circle, as far as Chebyshev polynomials on pieces represent it, which they do to
-    rounding or refuse. They are numbered from left to right, from 0; on a circle from
-    -period/2. Equilibria that have merged within rounding are one, degenerate.
+    Equilibria are proved, not sampled: those of polynomials and of finite Fourier sums over the
+    period by disjoint discs about the roots of companion matrices ([Boyd2013], [Smith1970]) or by
+    exact isolation of roots, those of any other function in the interval, or on the circle, by
+    interval arithmetic [MooreKearfottCloud2009]. The interval is closed: an equilibrium at one of
+    its ends, or within rounding of it, counts. They are numbered from left to right, from 0; on a
+    circle from -period/2. Equilibria that have merged within rounding are one, degenerate. The
+    variable ``complete`` of results is False where it is not proved that there are no others: where
+    some have merged, where rounding hides V', and for functions of which no bounds are known; what
+    was not excluded, and stands for no equilibrium, is named in a RuntimeWarning.
+
+    Periods, actions, areas and motions come with estimates of their errors (``period_error`` and so
+    on). A period, an action or an area whose error may exceed 1e-8 of it is NaN, and a
+    RuntimeWarning says how many and why.
 
     Examples
     --------
@@ -398,8 +407,8 @@ def _period(period: Any) -> float | None:
     wants = "a number > 0, the length of the circle, or None for a line"
     if isinstance(period, str):
         period = read_formula(period, {}, "period")
-        if period.is_number and period.is_real:
-            period = float(period)
+    if getattr(period, "is_number", False) and period.is_real:  # a sympy number
+        period = float(period)
     value = number("period", period, wants)
     if not value > 0.0:
         raise bad("period", period, wants)

@@ -452,6 +452,37 @@ ROUTH: dict[str, dict[str, str]] = {
 for _words in ROUTH.values():
     _words["source"] = ROUTH_OF
 
+#: What results in any potential say besides, by group: how sure they are.
+NUMERICAL_ROWS: dict[str, tuple[Quantity, ...]] = {
+    "equilibria": (
+        Quantity("complete", "equilibria", (), "bool", "1",
+                 "whether it is proved that there are these equilibria and no others",
+                 "bounds of V' and V'' over all pieces; disjoint discs; exact isolation of roots",
+                 "[MooreKearfottCloud2009]; [Smith1970]"),
+    ),
+    "separatrices": (
+        Quantity("winding_area_error", "separatrices", ("saddle",), "float64", "s-1",
+                 "estimated error of the area under one branch", "of its quadrature", FROM_ENERGY),
+        Quantity("lobe_area_error", "separatrices", ("saddle", "side"), "float64", "s-1",
+                 "estimated error of the area inside the separatrix", "of its quadrature",
+                 FROM_ENERGY),
+    ),
+    "orbits": (
+        Quantity("period_error", "orbits", (), "float64", "s",
+                 "estimated error of the period", "of its quadrature", FROM_ENERGY),
+        Quantity("action_error", "orbits", (), "float64", "s-1",
+                 "estimated error of the action", "of its quadrature", FROM_ENERGY),
+    ),
+    "motion": (
+        Quantity("motion_phi_error", "motion", (), "float64", "rad",
+                 "estimated error of the angle", "change of the energy, error of the period",
+                 FROM_MOTION),
+        Quantity("motion_dphi_error", "motion", (), "float64", "s-1",
+                 "estimated error of the angular velocity",
+                 "change of the energy, error of the period", FROM_MOTION),
+    ),
+}  # fmt: skip
+
 ROWS: dict[str, Quantity] = {row.name: row for row in QUANTITIES}
 
 #: Among the inputs of a pass: the law, and its parameters.
@@ -569,10 +600,10 @@ PASSES: tuple[Pass, ...] = (
             ("energy", _STATE, ("energy_integral",), ()),
             ("phase_velocity", ("state_phi", "state_energy"), ("phase_velocity",), ()),
             ("orbits", _STATE, ("orbits",), ()),
-            ("flow", (*_STATE, "time"), ("motion",), ()),
+            ("flow_with_errors", (*_STATE, "time"), ("motion",), ()),
             ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
             ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
-            ("separatrix_motion", ("time",), ("motion",), ("saddle", "side")),
+            ("separatrix_motion_with_errors", ("time",), ("motion",), ("saddle", "side")),
         )
     ),
 )

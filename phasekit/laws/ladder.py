@@ -22,6 +22,11 @@ class Law:
     #: Which center or saddle is meant where none is named.
     default: ClassVar[Mapping[str, str]] = {"center": "the lowest", "saddle": "the lowest"}
 
+    @property
+    def may_be_incomplete(self) -> bool:
+        """Whether equilibria may be missed, which results then say."""
+        return False
+
     def check_searchable(self) -> None:
         """Refuse to look for equilibria where they cannot all be found.
 

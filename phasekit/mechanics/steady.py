@@ -97,11 +97,16 @@ def steady(
     return Steady(phi, kinds, energy, curvature, frequency, exponents, counts)
 
 
-def most(*inputs: npt.ArrayLike, momentum: npt.ArrayLike | None = None) -> tuple[int, int]:
-    """Greatest numbers of equilibria and saddles of any machine; arguments as those of `steady`."""
+def most(
+    *inputs: npt.ArrayLike, momentum: npt.ArrayLike | None = None
+) -> tuple[int, int, FloatArray]:
+    """Greatest numbers of equilibria and saddles of any machine; arguments as those of `steady`.
+
+    The third, stretches in which some may be missed, is empty: none is.
+    """
     found = steady(*inputs, momentum=momentum)
     saddles = (found.kind == EquilibriumKind.SADDLE).sum(axis=-1)
-    return int(found.n_equilibria.max(initial=0)), int(saddles.max(initial=0))
+    return int(found.n_equilibria.max(initial=0)), int(saddles.max(initial=0)), np.empty((0, 2))
 
 
 def support_speed(

@@ -15,7 +15,7 @@ from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labelled.potential_system import Potential
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.equilibria import Equilibria
-from phasekit.phase.separatrices import Separatrices
+from phasekit.phase.numerical.separatrices import Separatrices
 
 FloatArray = NDArray[np.float64]
 Arc = tuple[float, float]

@@ -327,6 +327,49 @@ def test_special_functions_go_through_the_labelled_functions():
     """V = -J_0, whose slope J_1 has its zeros where scipy has them."""
     from scipy.special import jn_zeros
 
-    points = pk.equilibria(Potential("-besselj(0, x)", "x", interval=(-5.0, 9.0)))
+    with pytest.warns(
+        RuntimeWarning, match="not proved"
+    ):  # no bounds are known of Bessel functions
+        points = pk.equilibria(Potential("-besselj(0, x)", "x", interval=(-5.0, 9.0)))
+    assert not points.complete
     first = jn_zeros(1, 2)
     np.testing.assert_allclose(points.phi, [-first[0], 0.0, *first], atol=1e-13)
+
+
+# --------------------------------------------------------------------- what is not proved
+
+
+def test_results_say_how_sure_they_are():
+    well = Potential("x^2/2 + 1/x^2", "x", interval=(1e-3, 3000.0))
+    points = pk.equilibria(well)
+    assert points.complete.item()
+    assert points.complete.attrs["long_name"]
+    orbit = pk.orbits(well, 300.0, 0.0)
+    assert abs(orbit.period.item() - np.pi) <= orbit.period_error.item() + 1e-15
+    assert orbit.period_error.attrs["units"] == "s"
+    assert 0.0 < orbit.action_error < 1e-12 * orbit.action
+    motion = pk.flow(well, 300.0, 0.0, [0.5 * np.pi, 10.0 * np.pi])
+    late = np.abs(motion.motion_phi - [np.sqrt(2.0) / 300.0, 300.0])
+    assert np.all(late <= motion.motion_phi_error + 1e-12)
+    loops = pk.separatrices(WELL)
+    assert np.all(np.abs(loops.lobe_area - 4 / 3) <= loops.lobe_area_error + 1e-15)
+
+
+def test_what_is_not_proved_is_said():
+    hidden = Potential("-exp(-((x - 3.3)/0.05)^2)", "x", interval=(-10.0, 10.0))
+    with pytest.warns(RuntimeWarning, match="not proved that there are no others between -10 and"):
+        points = pk.equilibria(hidden)
+    assert not points.complete
+    merged = pk.equilibria(Potential("exp(-x^4)", "x", interval=(-3.0, 2.5)))
+    assert merged.kind.values.tolist() == [pk.EquilibriumKind.DEGENERATE]
+    assert not merged.complete
+
+
+def test_a_period_over_which_rounding_hides_everything_is_refused():
+    with pytest.raises(pk.ParameterError, match="period: got 1e\\+300"):
+        Potential("cos(x)", "x", period=1e300)
+
+
+def test_names_of_error_estimates_are_taken():
+    with pytest.raises(pk.ParameterError, match="results have 'complete'"):
+        Potential("complete*x^2", "x", {"complete": 1.0})

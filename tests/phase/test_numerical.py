@@ -196,7 +196,8 @@ def test_without_force_there_is_no_isolated_equilibrium():
 
 
 @pytest.mark.parametrize(
-    ("text", "interval"), [("1/x", (-1.0, 1.5)), ("(x^2 + 1e-30)^(3/4)", (-1.0, 2.0))]
+    ("text", "interval"),
+    [("1/x", (-1.0, 1.5)), ("sqrt(x)", (-1.0, 2.0)), ("tan(x)", (0.0, 3.0)), ("sin(1/x)", (-1, 1))],
 )
 def test_functions_that_are_not_smooth_are_refused(text, interval):
     with pytest.raises(ConvergenceError, match="not smooth"):

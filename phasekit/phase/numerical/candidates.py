@@ -1,18 +1,21 @@
 """Points between which V' is monotone: the zeros of V'', as eigenvalues of companion matrices.
 
-All that is asked of them is that no zero of V'' is missing. So the real parts of complex ones are
-kept as well, and no tolerance decides what counts as real.
+For what `series` and `isolation` do not prove: equilibria that have merged within the rounding of
+irrational coefficients, and functions of which no bounds are known. All that is asked of the points
+is that no zero of V'' is missing. So the real parts of complex ones are kept as well, and no
+tolerance decides what counts as real.
 """
 
 from __future__ import annotations
 
-from typing import Any
+import itertools
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
 from phasekit.phase.numerical.formula import Shape
+from phasekit.phase.numerical.series import companion_roots, degrees
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
@@ -22,6 +25,7 @@ DEGREE = 24
 MOST_PIECES = 4096
 _SHORTEST = 1e-9
 _TINY = 1e-18
+_ROUNDING = 8.0 * float(np.finfo(float).eps)
 
 
 def partition(systems: Systems) -> tuple[Array, Array]:
@@ -36,7 +40,17 @@ def partition(systems: Systems) -> tuple[Array, Array]:
         points, sizes = _of_polynomials(systems)
     else:
         points, sizes = _of_fourier_sums(systems)
-    return points, 8.0 * np.finfo(float).eps * sizes
+    return points, _ROUNDING * sizes
+
+
+def noise_at(systems: Systems, x: Array, left: Array, right: Array) -> Array:
+    """Bound of rounding of V' at x, between points where it is `left` and `right`."""
+    if systems.formula.shape is Shape.POLYNOMIAL:
+        slope = np.abs(np.asarray(systems.coefficients(), dtype=float))
+        return np.asarray(
+            _ROUNDING * np.sum(slope * np.abs(x)[:, None] ** np.arange(slope.shape[1]), axis=1)
+        )
+    return np.fmin(left, right)
 
 
 def _of_polynomials(systems: Systems) -> tuple[Array, Array]:
@@ -57,7 +71,7 @@ def _of_polynomials(systems: Systems) -> tuple[Array, Array]:
 
 def _reach(coefficients: Array) -> Array:
     """Return a number beyond all roots of each polynomial (Fujiwara's bound), shape (n, 1)."""
-    degree = _degrees(coefficients)
+    degree = degrees(coefficients)
     rows = np.arange(len(degree))
     leading = coefficients[rows, degree]
     with np.errstate(all="ignore"):
@@ -68,30 +82,15 @@ def _reach(coefficients: Array) -> Array:
     return np.asarray(2.0625 * np.max(bound, axis=1, initial=0.0)[:, None] + 1.0)
 
 
-def _degrees(coefficients: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
-    powers = np.arange(coefficients.shape[1])
-    return np.asarray(np.max(np.where(coefficients != 0.0, powers, 0), axis=1, initial=0))
-
-
 def _polynomial_roots(coefficients: Array) -> Array:
     """Real parts of all roots of polynomials, lowest coefficient first, NaN beyond the degree."""
     count = max(coefficients.shape[1] - 1, 0)
     found = np.full((len(coefficients), count), np.nan)
-    degrees = np.where(np.isfinite(coefficients).all(axis=1), _degrees(coefficients), 0)
-    for degree in np.unique(degrees[degrees > 0]):
-        rows = np.flatnonzero(degrees == degree)
-        found[rows, :degree] = _companion(coefficients[rows, : degree + 1]).real
+    count = np.where(np.isfinite(coefficients).all(axis=1), degrees(coefficients), 0)
+    for degree in np.unique(count[count > 0]):
+        rows = np.flatnonzero(count == degree)
+        found[rows, :degree] = companion_roots(coefficients[rows, : degree + 1]).real
     return found
-
-
-def _companion(coefficients: npt.NDArray[np.number]) -> npt.NDArray[np.complex128]:
-    """Roots of polynomials whose highest coefficient, the last, is not 0."""
-    degree = coefficients.shape[1] - 1
-    matrix = np.zeros((len(coefficients), degree, degree), dtype=coefficients.dtype)
-    matrix[:, np.arange(1, degree), np.arange(degree - 1)] = 1.0
-    matrix[:, :, -1] = -coefficients[:, :-1] / coefficients[:, -1:]
-    matrix = np.where(np.isfinite(matrix).all(axis=(1, 2), keepdims=True), matrix, 0.0)
-    return np.asarray(np.linalg.eigvals(matrix), dtype=complex)
 
 
 def _of_fourier_sums(systems: Systems) -> tuple[Array, Array]:
@@ -103,14 +102,14 @@ def _of_fourier_sums(systems: Systems) -> tuple[Array, Array]:
     sizes = 2.0 * np.sum(np.abs(slope) * (1.0 + harmonics), axis=1)
     # Harmonics that rounding cannot see do not move the zeros of V''.
     seen = np.abs(bend) > _TINY * np.max(np.abs(bend), axis=1, keepdims=True)
-    degrees = np.where(np.isfinite(sizes), _degrees(np.where(seen, 1.0, 0.0)), 0)
+    count = np.where(np.isfinite(sizes), degrees(np.where(seen, 1.0, 0.0)), 0)
     points = np.full((systems.size, max(2 * slope.shape[1] - 2, 1)), np.nan)
-    for degree in np.unique(degrees[degrees > 0]):
-        rows = np.flatnonzero(degrees == degree)
+    for degree in np.unique(count[count > 0]):
+        rows = np.flatnonzero(count == degree)
         upper = bend[rows, 1 : degree + 1]
         middle = np.zeros((len(rows), 1), dtype=complex)
         whole = np.concatenate([np.conj(upper[:, ::-1]), middle, upper], axis=1)
-        points[rows, : 2 * degree] = np.angle(_companion(whole)) * (period / (2.0 * np.pi))
+        points[rows, : 2 * degree] = np.angle(companion_roots(whole)) * (period / (2.0 * np.pi))
     points = np.sort(points, axis=1)
     return points, np.broadcast_to(sizes[:, None], points.shape)
 
@@ -125,17 +124,20 @@ def _interpolated(systems: Systems) -> tuple[Array, Array]:
         one = systems.take(np.array([i]))
         if not all(np.isfinite(p[0]) for p in one.parameters):
             rows.append(np.empty(0))
-            sizes.append(np.nan)
+            sizes.append(np.empty(0))
             continue
         zeros, size = _zeros(one, low, high)
         if systems.formula.period is None:
             zeros = np.concatenate([[low], zeros, [high]])
-        rows.append(np.sort(zeros))
-        sizes.append(size)
+            size = np.concatenate([size[:1], size, size[-1:]])
+        order = np.argsort(zeros)
+        rows.append(zeros[order])
+        sizes.append(size[order])
     points = np.full((systems.size, max(map(len, rows), default=0)), np.nan)
-    for i, zeros in enumerate(rows):
-        points[i, : len(zeros)] = zeros
-    return points, np.broadcast_to(np.array(sizes)[:, None], points.shape)
+    bounds = np.full(points.shape, np.nan)
+    for i, (zeros, size) in enumerate(zip(rows, sizes, strict=True)):
+        points[i, : len(zeros)], bounds[i, : len(zeros)] = zeros, size
+    return points, bounds
 
 
 _NODES = np.cos(np.pi * (np.arange(DEGREE + 1) + 0.5) / (DEGREE + 1))
@@ -145,12 +147,15 @@ _TO_SERIES = (2.0 / (DEGREE + 1)) * np.cos(
 _TO_SERIES[0] *= 0.5
 
 
-def _zeros(system: Systems, low: float, high: float) -> tuple[Array, float]:
-    """Zeros of V'' by Chebyshev series on pieces so short that the series has converged."""
+def _zeros(system: Systems, low: float, high: float) -> tuple[Array, Array]:
+    """Zeros of V'' by Chebyshev series on pieces so short that the series has converged.
+
+    With the size of V' on the piece of each.
+    """
     from numpy.polynomial import chebyshev
 
     waiting = [(low, high)]
-    done: list[tuple[float, float, Array]] = []
+    done: list[tuple[float, float, float, Array]] = []
     size = 0.0
     while waiting:
         middle = np.array([0.5 * (a + b) for a, b in waiting])
@@ -169,7 +174,11 @@ def _zeros(system: Systems, low: float, high: float) -> tuple[Array, float]:
         size = max(size, float(np.max(sizes[good], initial=0.0)))
         # A piece whose bend is lost beside that of others may be as rough as rounding makes it.
         good |= tail * half <= 4.0 * np.finfo(float).eps * size
-        done += [(m, h, s) for m, h, s, g in zip(middle, half, series, good, strict=True) if g]
+        done += [
+            (m, h, z, s)
+            for m, h, z, s, g in zip(middle, half, sizes, series, good, strict=True)
+            if g
+        ]
         waiting = [
             part
             for (a, b), g in zip(waiting, good, strict=True)
@@ -183,11 +192,15 @@ def _zeros(system: Systems, low: float, high: float) -> tuple[Array, float]:
                 f"pieces of degree {DEGREE} do not resolve it, however short; take a shorter "
                 "interval, or one without kinks and poles"
             )
-    found = [np.array([m + h for m, h, _ in done[:-1]])]
-    for m, h, series in done:
+    done.sort(key=lambda piece: piece[0])
+    found = [np.array([m + h for m, h, *_ in done[:-1]])]
+    bounds = [np.array([max(a[2], b[2]) for a, b in itertools.pairwise(done)])]
+    for m, h, z, series in done:
         largest = np.max(np.abs(series))
         keep = np.flatnonzero(np.abs(series) > 1e-16 * largest)
         if keep.size and keep[-1] > 0:
             roots = np.real(chebyshev.chebroots(series[: keep[-1] + 1]))
-            found.append(m + h * roots[np.abs(roots) <= 1.0])
-    return np.concatenate(found), size
+            roots = roots[np.abs(roots) <= 1.0]
+            found.append(m + h * roots)
+            bounds.append(np.full(roots.size, z))
+    return np.concatenate(found), np.concatenate(bounds)

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.numerical.candidates import partition
+from phasekit.phase.numerical.candidates import noise_at, partition
 from phasekit.phase.numerical.formula import Shape
-from phasekit.phase.numerical.systems import Systems
+from phasekit.phase.numerical.isolation import bracketed, isolate, slope_bounds
+from phasekit.phase.numerical.series import Roots, exact_heights, of_fourier_sums, of_polynomials
+from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 CENTER, SADDLE = EquilibriumKind.CENTER.value, EquilibriumKind.SADDLE.value
 DEGENERATE, ABSENT = EquilibriumKind.DEGENERATE.value, EquilibriumKind.ABSENT.value
 
@@ -34,14 +38,23 @@ class Equilibria(NamedTuple):
     """sqrt(-V'') of saddles."""
     n_equilibria: npt.NDArray[np.int16]
     """Number of distinct equilibria; 0 where V is constant, -1 where a parameter is not finite."""
+    complete: Flags
+    """Whether it is proved that there are these and no others."""
+    gaps: npt.NDArray[np.float64]
+    """Ends (low, high) of what could not be excluded, nor stands for an equilibrium; else NaN."""
+
+
+class Zeros(NamedTuple):
+    """Zeros of V', rising, NaN beyond those that there are; the sign of V'' there, 0 if merged."""
+
+    phi: Array
+    sign: Array
+    complete: Flags
+    gaps: Array
 
 
 def equilibria(systems: Systems) -> Equilibria:
     """All equilibria of each system.
-
-    Between neighboring zeros of V'' the slope V' is monotone, so it has one zero if its sign
-    changes and none otherwise. Where V' at such a point is 0 within its rounding, equilibria have
-    merged: they are one, degenerate.
 
     Raises
     ------
@@ -51,12 +64,88 @@ def equilibria(systems: Systems) -> Equilibria:
 
     Notes
     -----
-    Complete for polynomials and Fourier sums. Any other potential is interpolated in Chebyshev
-    polynomials of degree 24 on pieces, halved until the series has converged; equilibria are
-    complete as far as the interpolant is V.
+    Polynomials and Fourier sums: `phasekit.phase.numerical.series`. Anything else on a stretch, and
+    what that leaves open on a circle: `phasekit.phase.numerical.isolation`. Neither needs a
+    tolerance. What is left, V' and V'' vanish at within rounding, is one equilibrium, degenerate,
+    and the system's equilibria are not complete: there may be several, or none. Nor are those of
+    functions of which no bounds are known; they are found as far as Chebyshev polynomials of
+    degree 24 on pieces represent V.
+    """
+    shape = systems.formula.shape
+    exact: dict[int, list[Fraction]] = {}
+    if shape is Shape.GENERAL:
+        proved = slope_bounds(systems.formula) is not None
+        zeros = _isolated(systems) if proved else _sampled(systems)
+    else:
+        polynomial = shape is Shape.POLYNOMIAL
+        roots = of_polynomials(systems) if polynomial else of_fourier_sums(systems)
+        exact = roots.exact
+        with np.errstate(all="ignore"):
+            zeros = _of_roots(systems, roots)
+        rest = np.flatnonzero(~roots.clear & systems.finite)
+        if rest.size:
+            few = systems.take(rest)
+            proved = not polynomial and slope_bounds(systems.formula) is not None
+            zeros = _replaced(zeros, rest, _isolated(few) if proved else _sampled(few))
+    return _collect(systems, zeros, exact)
+
+
+def _isolated(systems: Systems) -> Zeros:
+    found = isolate(systems)
+    gaps = np.full((systems.size, 2), np.nan)
+    for i, stretches in enumerate(found.unproved):
+        if stretches:
+            gaps[i] = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
+    return Zeros(_wrapped(systems, found.phi), found.sign, found.complete, gaps)
+
+
+def _of_roots(systems: Systems, roots: Roots) -> Zeros:
+    """Zeros in the interval, to the last digit where V' has opposite signs about them."""
+    phi, sign = roots.phi.copy(), roots.sign.copy()
+    reach = np.maximum(roots.radius, 4.0 * np.spacing(np.abs(phi)))
+    reach[list(roots.exact)] = np.nan
+    low, high = phi - reach, phi + reach
+    found = systems.slope(low) * systems.slope(high) < 0.0
+    cell, slot = np.nonzero(found)
+    few = systems.take(cell)
+    phi[cell, slot] = bracketed(few, low[cell, slot], high[cell, slot])
+    if systems.formula.interval is not None:
+        # The ends belong to it, and what lies within rounding of them.
+        first, last = systems.formula.ends
+        outside = (phi < first - np.spacing(abs(first))) | (phi > last + np.spacing(abs(last)))
+        phi, sign = (
+            np.where(outside, np.nan, values) for values in (np.clip(phi, first, last), sign)
+        )
+    gaps = np.full((systems.size, 2), np.nan)
+    return Zeros(_wrapped(systems, phi), sign, roots.clear, gaps)
+
+
+def _replaced(zeros: Zeros, rows: Index, others: Zeros) -> Zeros:
+    width = max(zeros.phi.shape[1], others.phi.shape[1])
+    fields = []
+    for one, other in ((zeros.phi, others.phi), (zeros.sign, others.sign)):
+        field = np.full((len(one), width), np.nan)
+        field[:, : one.shape[1]] = one
+        field[rows] = np.nan
+        field[rows, : other.shape[1]] = other
+        fields.append(field)
+    complete, gaps = zeros.complete.copy(), zeros.gaps.copy()
+    complete[rows], gaps[rows] = others.complete, others.gaps
+    return Zeros(fields[0], fields[1], complete, gaps)
+
+
+def _wrapped(systems: Systems, x: Array) -> Array:
+    period = systems.formula.period
+    return x if period is None else 0.5 * period - (0.5 * period - x) % period
+
+
+def _sampled(systems: Systems) -> Zeros:
+    """Zeros of V' between neighboring zeros of V'', where it is monotone.
+
+    Where V' at such a point is 0 within its rounding, equilibria have merged: they are one,
+    degenerate.
     """
     points, noise = partition(systems)
-    period = systems.formula.period
     with np.errstate(all="ignore"):
         points = _polish(systems, points)
         slope = systems.slope(points)
@@ -65,9 +154,12 @@ def equilibria(systems: Systems) -> Equilibria:
             # Far out only the leading power counts, which no rounding hides.
             sign = np.where(sign == 0.0, _outer_signs(points, slope), sign)
         found, degenerate = _roots(systems, points, sign, noise)
-    if period is not None:
-        found = 0.5 * period - (0.5 * period - found) % period
-    return _collect(systems, found, degenerate)
+        bend = np.sign(systems.bend(found))
+    unsure = np.zeros(systems.size, dtype=bool)
+    gaps = np.full((systems.size, 2), np.nan)
+    if systems.formula.shape is Shape.GENERAL:
+        gaps[:] = systems.formula.ends
+    return Zeros(_wrapped(systems, found), np.where(degenerate, 0.0, bend), unsure, gaps)
 
 
 def _polish(systems: Systems, points: Array) -> Array:
@@ -132,33 +224,14 @@ def _roots(
     few = systems.take(rows[cell])
     root = bracketed(few, left[cell, slot], right[cell, slot])
     found[cell, slot] = root
-    degenerate[cell, slot] = _merged(few, root, noise[cell, slot])
+    before_noise = noise[cell, np.maximum(slot - 1, 0)]
+    degenerate[cell, slot] = _merged(
+        few, root, noise_at(few, root, before_noise, noise[cell, slot])
+    )
     touched_at = np.stack(touch, axis=1)
     found[:, columns:] = touched_at
     degenerate[:, columns:] = np.isfinite(touched_at)
     return found, degenerate
-
-
-def bracketed(systems: Systems, low: Array, high: Array) -> Array:
-    """Zeros of V' between points where it has opposite signs: Newton's method, safeguarded."""
-    rising = systems.slope(high) > 0.0
-    x = 0.5 * (low + high)
-    for _ in range(200):
-        slope = systems.slope(x)
-        under = (slope < 0.0) == rising
-        low, high = np.where(under, x, low), np.where(under, high, x)
-        step = x - slope / systems.bend(x)
-        middle = 0.5 * (low + high)
-        inside = (step > low) & (step < high)
-        fresh = np.where(slope == 0.0, x, np.where(inside, step, middle))
-        # Newton's method may creep from one side; then the bracket is halved.
-        slow = np.abs(fresh - x) > 0.5 * (high - low)
-        fresh = np.where(slow, middle, fresh)
-        still = (fresh == x) | (high - low <= np.spacing(np.abs(x)))
-        if np.all(still | np.isnan(x)):
-            return fresh
-        x = fresh
-    return x
 
 
 def _merged(systems: Systems, root: Array, noise: Array) -> npt.NDArray[np.bool_]:
@@ -169,23 +242,29 @@ def _merged(systems: Systems, root: Array, noise: Array) -> npt.NDArray[np.bool_
     return np.asarray((bend == 0.0) | ~(np.maximum(*changed) < 0.5 * np.abs(bend)))
 
 
-def _collect(systems: Systems, found: Array, degenerate: npt.NDArray[np.bool_]) -> Equilibria:
-    order = np.argsort(found, axis=1)  # NaN last
-    found = np.take_along_axis(found, order, axis=1)
-    degenerate = np.take_along_axis(degenerate, order, axis=1)
-    there = np.isfinite(found)
-    count = there.sum(axis=1)
+def _collect(systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]) -> Equilibria:
+    order = np.argsort(zeros.phi, axis=1)  # NaN last
+    found = np.take_along_axis(zeros.phi, order, axis=1) + 0.0  # no -0.0
+    sign = np.take_along_axis(zeros.sign, order, axis=1)
+    count = np.isfinite(found).sum(axis=1)
     most = int(count.max(initial=0))
-    found, degenerate, there = found[:, :most], degenerate[:, :most], there[:, :most]
-    curvature = np.where(degenerate, 0.0, systems.bend(found))
+    found, sign = found[:, :most], sign[:, :most]
+    there = np.isfinite(found)
+    curvature, energy = systems.bend(found), systems.potential(found)
+    for row, coefficients in exact.items():
+        at = found[row, : count[row]]
+        rise, curvature[row, : count[row]] = exact_heights(coefficients, at)
+        energy[row, : count[row]] = systems.take(np.array([row])).potential(np.zeros(1)) + rise
     with np.errstate(invalid="ignore"):
-        kind = np.where(degenerate, DEGENERATE, np.where(curvature > 0.0, CENTER, SADDLE))
+        # The sign is proved; rounding may have turned that of a value next to 0.
+        curvature = np.where(there, np.where(sign == 0.0, 0.0, sign * np.abs(curvature)), np.nan)
+        kind = np.where(sign == 0.0, DEGENERATE, np.where(sign > 0.0, CENTER, SADDLE))
         kind = np.where(there, kind, ABSENT).astype(np.int8)
         center = np.where(kind == CENTER, np.sqrt(np.abs(curvature)), np.nan)
         saddle = np.where(kind == SADDLE, np.sqrt(np.abs(curvature)), np.nan)
-    valid = np.all([np.isfinite(p) for p in systems.parameters], axis=0)
+    valid = systems.finite
     number = np.where(valid, count, -1).astype(np.int16)
-    found = found + 0.0  # no -0.0
-    energy = systems.potential(found) + 0.0
-    curvature = np.where(there, curvature, np.nan)
-    return Equilibria(found, kind, energy, curvature, center, saddle, number)
+    complete = zeros.complete & valid
+    return Equilibria(
+        found, kind, energy + 0.0, curvature, center, saddle, number, complete, zeros.gaps
+    )

@@ -7,6 +7,7 @@ broadcast against it.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 
 import numpy as np
@@ -22,13 +23,17 @@ from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.ground import Ground, survey
-from phasekit.phase.numerical.systems import make_systems
-from phasekit.phase.orbits import Orbits
-from phasekit.phase.separatrices import Separatrices
+from phasekit.phase.numerical.motion import MotionWithErrors
+from phasekit.phase.numerical.orbits import Orbits
+from phasekit.phase.numerical.separatrices import Separatrices
+from phasekit.phase.numerical.systems import Systems, make_systems
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Shape = tuple[int, ...]
+
+#: Systems up to which a survey is kept for the next call.
+_KEPT = 256
 
 
 def potential(formula: Formula, *inputs: npt.ArrayLike) -> Array:
@@ -63,7 +68,11 @@ def phase_velocity(formula: Formula, *inputs: npt.ArrayLike) -> Array:
 def equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Equilibria:
     """All equilibria, from left to right on the last axis."""
     systems, shape = make_systems(formula, parameters)
-    return Equilibria._make(f.reshape(shape + f.shape[1:]) for f in find_equilibria(systems))
+    if systems.size <= _KEPT:
+        points = _survey(formula, parameters)[0].points
+    else:
+        points = find_equilibria(systems)
+    return Equilibria._make(np.array(f).reshape(shape + f.shape[1:]) for f in points)
 
 
 def separatrices(formula: Formula, *parameters: npt.ArrayLike) -> Separatrices:
@@ -81,11 +90,16 @@ def phase_space(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibri
     )
 
 
-def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int]:
-    """Greatest number of equilibria, and of saddles, that any of the systems has."""
+def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
+    """Greatest number of equilibria, and of saddles, that any of the systems has.
+
+    Besides the ends of what could not be excluded in the systems where there is such, shape (n, 2).
+    """
     ground, _ = _survey(formula, parameters)
     rows, _ = loops.saddles_of(ground)
-    return ground.points.phi.shape[1], int(np.bincount(rows, minlength=1).max())
+    gaps = ground.points.gaps
+    open_ = gaps[np.isfinite(gaps[:, 0])]
+    return ground.points.phi.shape[1], int(np.bincount(rows, minlength=1).max()), open_
 
 
 def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
@@ -146,35 +160,48 @@ def orbits_at_gap(
 
 def flow(formula: Formula, *inputs: npt.ArrayLike) -> Motion:
     """States after times, from states (phi0, dphi0); the three last of the inputs."""
+    return Motion(*flow_with_errors(formula, *inputs)[:2])
+
+
+def flow_with_errors(formula: Formula, *inputs: npt.ArrayLike) -> MotionWithErrors:
+    """States as of `flow`, with estimates of their errors."""
     *parameters, phi, dphi, t = inputs
     ground, states, (x, v) = _cells(formula, parameters, (phi, dphi))
     shape = np.broadcast_shapes(states, np.shape(t))
     number = np.arange(x.size).reshape(states)
     owner = np.array(np.broadcast_to(number, shape)).reshape(-1)
     time = np.array(np.broadcast_to(np.asarray(t, float), shape)).reshape(-1)
-    return Motion(*(a.reshape(shape) for a in motions.flow(ground, x, v, owner, time)))
+    found = motions.flow(ground, x, v, owner, time)
+    return MotionWithErrors(*(a.reshape(shape) for a in found))
 
 
 def separatrix_motion(
     formula: Formula, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> Motion:
     """Motion on the separatrix of a saddle at times, the last of the inputs."""
+    return Motion(*separatrix_motion_with_errors(formula, *inputs, saddle=saddle, side=side)[:2])
+
+
+def separatrix_motion_with_errors(
+    formula: Formula, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
+) -> MotionWithErrors:
+    """Motion as of `separatrix_motion`, with estimates of its errors."""
     *parameters, t = inputs
     ground, shape = _survey(formula, parameters)
     column, there = _pick_saddle(ground, saddle)
     rows = np.flatnonzero(there)
     whole = np.broadcast_shapes(shape, np.shape(t))
     if not rows.size:
-        return Motion(np.full(whole, np.nan), np.full(whole, np.nan))
+        return MotionWithErrors(*(np.full(whole, np.nan) for _ in range(4)))
     branch = loops.branch_of(ground.take(rows), column[rows], 1.0 if side else -1.0)
     number = np.full(there.size, -1)
     number[rows] = np.arange(rows.size)
     owner = np.array(np.broadcast_to(number.reshape(shape), whole)).reshape(-1)
     time = np.array(np.broadcast_to(np.asarray(t, float), whole)).reshape(-1)
-    out = np.full((2, owner.size), np.nan)
+    out = np.full((4, owner.size), np.nan)
     cells = np.flatnonzero(owner >= 0)
     out[:, cells] = motions.separatrix_motion(branch, owner[cells], time[cells])
-    return Motion(*(array.reshape(whole) for array in out))
+    return MotionWithErrors(*(array.reshape(whole) for array in out))
 
 
 # ------------------------------------------------------------------------- cells
@@ -182,7 +209,16 @@ def separatrix_motion(
 
 def _survey(formula: Formula, parameters: Sequence[npt.ArrayLike]) -> tuple[Ground, Shape]:
     systems, shape = make_systems(formula, tuple(parameters))
-    return survey(systems), shape
+    if systems.size > _KEPT:
+        return survey(systems), shape
+    return _surveyed(formula, systems.size, tuple(p.tobytes() for p in systems.parameters)), shape
+
+
+@functools.lru_cache(maxsize=32)
+def _surveyed(formula: Formula, size: int, parameters: tuple[bytes, ...]) -> Ground:
+    """The ground of a few systems, which calls in a row ask for again."""
+    arrays = tuple(np.frombuffer(values) for values in parameters)
+    return survey(Systems(formula, arrays, size))
 
 
 def _cells(

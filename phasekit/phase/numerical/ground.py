@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from phasekit.phase.numerical.equilibria import Equilibria, equilibria
 from phasekit.phase.numerical.formula import Shape
+from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
@@ -129,6 +130,13 @@ def _proved(systems: Systems, x: Array, near: Array) -> Array:
             size = np.max(np.abs(bend), axis=-1)
             worst = np.maximum(worst, np.abs(coarse - fine) / size)
         rough = worst > 2e-15
+        if formula.shape is Shape.GENERAL:
+            cell, slot = np.nonzero(np.isfinite(near))
+            at, reach = x[cell, slot], near[cell, slot]
+            few = systems.take(cell)
+            shown = [few.slope(at + reach), few.slope(at - reach), few.bend(at) * reach]
+            size = np.max(np.abs(shown), axis=0)
+            rough[cell, slot] |= ~smooth(few, np.arange(cell.size), at - reach, at + reach, size)
         if not rough.any():
             break
         near = np.where(rough, 0.5 * near, near)

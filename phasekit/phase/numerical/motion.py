@@ -8,22 +8,37 @@ w' is smooth, tends to a constant, and errors do not grow as the saddle is appro
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import OrbitKind
-from phasekit.phase.flow import Motion
 from phasekit.phase.numerical.collocation import integrate
 from phasekit.phase.numerical.ground import Ground
 from phasekit.phase.numerical.orbits import orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.pieces import speeds
+from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.separatrices import Branch, branch_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
+_EPS = float(np.finfo(float).eps)
 
 
-def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motion:
+class MotionWithErrors(NamedTuple):
+    """States along a motion, as of `phasekit.phase.flow`, with estimates of their errors.
+
+    Errors are infinite where a bounded motion took too many steps, NaN where there is no state.
+    """
+
+    motion_phi: Array
+    motion_dphi: Array
+    motion_phi_error: Array
+    motion_dphi_error: Array
+
+
+def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> MotionWithErrors:
     """States after times.
 
     Parameters
@@ -61,35 +76,73 @@ def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motio
         def rate(few: Index, y: Array) -> Array:
             return np.stack([y[..., 1], -systems.take(few).slope(y[..., 0])], axis=-1)
 
+        def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+            x = stages[..., 0]
+            size = np.max(np.abs(systems.take(few).slope(x)), axis=1)
+            return smooth(systems, few, np.min(x, axis=1), np.max(x, axis=1), size)
+
         bend = np.abs(systems.bend(out_x[rows]))
         pace = np.sqrt(bend) + 1.0 / np.where(turning[rows], period[rows], 1e3)
         start = np.stack([out_x[rows], out_v[rows]], axis=-1)
         with np.errstate(all="ignore"):
-            end = integrate(rate, start, rest[rows], 0.5 / pace)
+            end = integrate(rate, start, rest[rows], 0.5 / pace, trusted)
         out_x[rows], out_v[rows] = end.T
     turn = ground.systems.formula.period or 0.0
     rotating = kind == OrbitKind.ROTATION
     shift = states.turns[owner] + np.where(rotating, rounds * turn * np.sign(v[owner]), 0.0)
-    out_v = np.where(np.isfinite(time), out_v, np.nan)
-    return Motion(np.where(np.isfinite(time), out_x + shift, np.nan), out_v)
+    out_x, out_v = (np.where(np.isfinite(time), out, np.nan) for out in (out_x, out_v))
+    round_error = orbit.period_error[owner] + 2.0 * _EPS * np.where(turning, period, 0.0)
+    late = np.abs(rounds) * np.where(turning, round_error, 0.0)
+    energy = orbit.orbit_energy[owner]
+    errors = _errors(ground, owner, out_x, out_v, rest, late, energy)
+    lost = np.isnan(out_x) & np.isfinite(time) & (kind != OrbitKind.NOT_COMPUTED)
+    lost &= kind != OrbitKind.UNBOUNDED
+    phi_error, dphi_error = (np.where(lost, np.inf, error) for error in errors)
+    return MotionWithErrors(out_x + shift, out_v, phi_error + _EPS * np.abs(shift), dphi_error)
 
 
-def separatrix_motion(branch: Branch, owner: Index, time: Array) -> Motion:
+def _errors(
+    ground: Ground, owner: Index, x: Array, v: Array, time: Array, late: Array, energy: Array
+) -> tuple[Array, Array]:
+    """Estimated errors of states: by how much they come late, and how far their energy is off."""
+    systems = ground.systems.take(owner)
+    with np.errstate(all="ignore"):
+        height, slope = systems.potential(x), np.abs(systems.slope(x))
+        pace = np.sqrt(np.abs(systems.bend(x))) + 1.0 / (1.0 + np.abs(time))
+        off = np.abs(0.5 * v * v + height - energy) + _EPS * (v * v + np.abs(height))
+        size = v * v + (slope / pace) ** 2
+        late = late + np.abs(time) * (off / size + 4.0 * _EPS)
+        late = np.where(np.isfinite(late), late, 0.0)
+        speed = np.abs(v)
+        reach = speed + slope / pace
+        phi = speed * late + 0.5 * slope * late**2 + off / (reach * pace) + 4.0 * _EPS * np.abs(x)
+        dphi = slope * late + off / reach + 4.0 * _EPS * speed
+    rest = (v == 0.0) & (slope == 0.0)
+    return np.where(rest, 4.0 * _EPS * np.abs(x), phi), np.where(rest, 0.0, dphi)
+
+
+def separatrix_motion(branch: Branch, owner: Index, time: Array) -> MotionWithErrors:
     """Motion along branches of separatrices.
 
     Time 0 is at the turning point of a lobe, and half-way to the partner saddle, or to the same
     saddle a turn later. NaN for branches that end nowhere.
     """
-    return _along(branch, owner, np.zeros(time.shape), time)
+    x, v = _along(branch, owner, np.zeros(time.shape), time)
+    rows = np.arange(branch.saddle.size)
+    energy = branch.ground.systems.potential(branch.saddle)[rows[owner]]
+    nothing = np.zeros(time.shape)
+    errors = _errors(branch.ground, owner, x, v, nothing, nothing, energy)
+    lost = np.isnan(x) & np.isfinite(time) & np.isfinite(branch.length[owner])
+    return MotionWithErrors(x, v, *(np.where(lost, np.inf, error) for error in errors))
 
 
-def _along(branch: Branch, owner: Index, start: Array, time: Array) -> Motion:
+def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Array, Array]:
     """Motion along branches from the values `start` of w."""
     finite = np.isfinite(branch.length[owner]) & np.isfinite(time)
     x, v = np.full(time.shape, np.nan), np.full(time.shape, np.nan)
     rows = np.flatnonzero(finite)
     if not rows.size:
-        return Motion(x, v)
+        return x, v
     own = owner[rows]
 
     def rate(few: Index, y: Array) -> Array:
@@ -97,7 +150,15 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> Motion:
 
     exponent = branch.ground.systems.take(own).bend(branch.saddle[own])
     step = 0.25 / (np.sqrt(np.abs(exponent)) + 1e-3)
-    w = integrate(rate, start[rows, None], time[rows], step)[:, 0]
+
+    def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+        near, _, _ = _place(branch, own[few], stages[..., 0])
+        x = branch.saddle[own[few], None] + branch.side * near
+        systems = branch.ground.systems
+        size = np.max(np.abs(systems.take(own[few]).slope(x)), axis=1)
+        return smooth(systems, own[few], np.min(x, axis=1), np.max(x, axis=1), size)
+
+    w = integrate(rate, start[rows, None], time[rows], step, trusted)[:, 0]
     near, far, slope = _place(branch, own, w[:, None])
     pace = _pace(branch, own, w[:, None])
     u, d = near[:, 0], far[:, 0]
@@ -105,7 +166,7 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> Motion:
     end = branch.saddle[own] + branch.side * length
     x[rows] = np.where(u <= d, branch.saddle[own] + branch.side * u, end - branch.side * d)
     v[rows] = branch.side * (slope * pace)[:, 0]
-    return Motion(x, v)
+    return x, v
 
 
 def _place(branch: Branch, own: Index, w: Array) -> tuple[Array, Array, Array]:
@@ -175,10 +236,10 @@ def _asymptotic(
         own = place[inverse[cells]]
         # Between saddles w grows away from the one behind; the state may move back to it.
         forward = np.where(branch.joins, np.sign(side * v[starts[rows]]), 1.0)[own]
-        motion = _along(branch, own, w[own], forward * time[cells])
+        moved, speed = _along(branch, own, w[own], forward * time[cells])
         start = branch.saddle[own] + side * u[own]
-        out[0, cells] = motion.motion_phi + (x[owner[cells]] - start)
-        out[1, cells] = forward * motion.motion_dphi
+        out[0, cells] = moved + (x[owner[cells]] - start)
+        out[1, cells] = forward * speed
         known[cells] = True
     rest = ~known
     out[0, rest], out[1, rest] = x[owner[rest]], v[owner[rest]]

@@ -12,12 +12,27 @@ from phasekit.phase.numerical.arcs import End, find_end
 from phasekit.phase.numerical.ground import Anchor, Ground
 from phasekit.phase.numerical.periods import librations, rotations
 from phasekit.phase.numerical.systems import Systems
-from phasekit.phase.orbits import Orbits
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 
-_EPS = np.finfo(float).eps
+_EPS = float(np.finfo(float).eps)
+
+
+class Orbits(NamedTuple):
+    """Orbits of systems, as of `phasekit.phase.orbits`, with estimates of errors."""
+
+    orbit_kind: npt.NDArray[np.int8]
+    """`OrbitKind`."""
+    orbit_energy: Array
+    period: Array
+    frequency: Array
+    action: Array
+    phi_min: Array
+    phi_max: Array
+    period_error: Array
+    """Estimated error of the period, by its quadrature; 0 where the period is infinite."""
+    action_error: Array
 
 
 class States(NamedTuple):
@@ -98,19 +113,21 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
              OrbitKind.ROTATION, OrbitKind.UNBOUNDED],
             OrbitKind.LIBRATION,
         ).astype(np.int8)  # fmt: skip
-        period, action = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
+        found = np.full((4, *x.shape), np.nan)
+        period, action, period_error, action_error = found
         rows = np.flatnonzero(kind == OrbitKind.LIBRATION)
         if rows.size:
-            period[rows], action[rows] = librations(
+            found[:, rows] = librations(
                 ground.take(rows), x[rows], states.excess[rows], left.take(rows), right.take(rows)
             )
             # The double next to a center: no arc is left, and the period is that of the center.
             still = rows[~(left.offset[rows] + right.offset[rows] > 0.0)]
             bend = ground.systems.take(still).bend(x[still])
             period[still], action[still] = 2.0 * np.pi / np.sqrt(bend), 0.0
+            period_error[still], action_error[still] = 4.0 * _EPS * period[still], 0.0
         rows = np.flatnonzero(kind == OrbitKind.ROTATION)
         if rows.size:
-            period[rows], action[rows] = rotations(
+            found[:, rows] = rotations(
                 ground.take(rows), x[rows], states.kinetic[rows], states.excess[rows]
             )
         bend = ground.systems.bend(x)
@@ -122,6 +139,9 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         period = np.where(at_rest & valid, small, np.where(endless, np.inf, period))
         center = at_rest & np.isfinite(small) & valid
         action = np.where(center, 0.0, action)
+        period_error = np.where(center, 4.0 * _EPS * small, period_error)
+        period_error = np.where(np.isinf(period), 0.0, period_error)
+        action_error = np.where(center, 0.0, action_error)
         energy = np.where(valid, states.kinetic + ground.systems.potential(x), np.nan)
         low, high = (
             np.where(rest, distance, end.offset)
@@ -134,7 +154,7 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         round_ = (kind == OrbitKind.ROTATION) | ~valid
         low, high = np.where(round_, np.nan, low), np.where(round_, np.nan, high)
         frequency = 2.0 * np.pi / period
-    return Orbits(kind, energy, period, frequency, action, low, high)
+    return Orbits(kind, energy, period, frequency, action, low, high, period_error, action_error)
 
 
 def _turning_point(x: Array, way: Array, end: End, systems: Systems) -> Array:

@@ -4,20 +4,24 @@ A libration over [m - w, m + w] is parametrised by x = m + w sin(theta). There
 ``h - V = w^2 cos^2(theta) K``, and K is a mean of V'' over the arc with a positive weight, the
 Green's function of d^2/dx^2 that vanishes at both ends. So K has all its digits, however small
 the oscillation, and the period is the mean of 1/sqrt(2 K), a smooth periodic function of theta.
-Where that converges slowly, next to separatrices, the arc is cut at the maxima of V, and each
-piece is integrated by the double-exponential rule [TakahasiMori1974].
+Where that converges slowly, next to separatrices, and for formulas whose narrow features the rules
+might miss, the arc is cut at the maxima of V, and each piece is integrated on panels.
 """
 
 from __future__ import annotations
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.phase.numerical.arcs import End
+from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.ground import Ground
-from phasekit.phase.numerical.pieces import between, integrate, round_the_circle
+from phasekit.phase.numerical.panels import Integrals, integrate
+from phasekit.phase.numerical.pieces import between, round_the_circle
+from phasekit.phase.numerical.systems import Index
 
 Array = npt.NDArray[np.float64]
 
@@ -25,6 +29,18 @@ Array = npt.NDArray[np.float64]
 _RULES = ((16, 16), (32, 32), (64, 64), (128, 128), (128, 256))
 #: Two rules that agree so far: the finer one, whose error is the square, has all digits.
 _AGREE = 1e-10
+#: Integrals whose error may be larger than this part of them are not given.
+WORST = 1e-8
+_EPS = float(np.finfo(float).eps)
+
+
+class Round(NamedTuple):
+    """Period and action of orbits, with estimates of their errors; NaN where these are large."""
+
+    period: Array
+    action: Array
+    period_error: Array
+    action_error: Array
 
 
 @functools.cache
@@ -47,15 +63,13 @@ def _mean_of_bend(count: int, points: int) -> tuple[Array, Array, Array, Array]:
     return np.cos(angles), y, matrix @ to_series, to_series
 
 
-def librations(
-    ground: Ground, x: Array, excess: Array, left: End, right: End
-) -> tuple[Array, Array]:
+def librations(ground: Ground, x: Array, excess: Array, left: End, right: End) -> Round:
     """Period and action of orbits between two turning points."""
-    period, action = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
+    found = Round(*(np.full(x.shape, np.nan) for _ in range(4)))
     middle, half = _arc(x, left, right)
     coarse: tuple[Array, Array] | None = None
     rows = np.arange(x.size)
-    for count, points in _RULES:
+    for count, points in _RULES if ground.systems.formula.shape is not Shape.GENERAL else ():
         nodes, y, matrix, to_series = _mean_of_bend(count, points)
         few = ground.systems.take(rows)
         bend = few.bend(middle[rows, None] + half[rows, None] * nodes)
@@ -65,22 +79,55 @@ def librations(
             half[rows] ** 2 * np.mean((1.0 - y**2) * root, axis=1),
         )
         if coarse is not None:
-            good = np.all(
-                [np.abs(f - c) <= _AGREE * f for f, c in zip(fine, coarse, strict=True)], axis=0
-            )
             # Rules that differ in their points alone say nothing of how well V'' is known.
             tail = np.max(np.abs(bend @ to_series[-4:].T), axis=1)
-            good &= tail <= 1e-12 * np.max(np.abs(bend), axis=1)
-            period[rows[good]], action[rows[good]] = fine[0][good], fine[1][good]
-            rows, fine = rows[~good], (fine[0][~good], fine[1][~good])
+            least = np.min(root, axis=1) ** 2
+            rows, fine = _settle(found, rows, fine, coarse, tail / least)
         if not rows.size:
-            return period, action
+            return found
         coarse = fine
     rest, left, right = ground.take(rows), left.take(rows), right.take(rows)
     start, width = x[rows] - left.offset, left.offset + right.offset
-    time, area = integrate(rest, between(rest, start, width, excess[rows], left, right))
-    period[rows], action[rows] = 2.0 * time, area / np.pi
-    return period, action
+    _enter(
+        found, rows, integrate(rest, between(rest, start, width, excess[rows], left, right)), 2.0
+    )
+    return found
+
+
+def _settle(
+    found: Round,
+    rows: Index,
+    fine: tuple[Array, Array],
+    coarse: tuple[Array, Array],
+    tail: Array,
+) -> tuple[Index, tuple[Array, Array]]:
+    """Accept what two rules agree on; return the rows that are left, and the finer rule there."""
+    differences = [np.abs(f - c) / f for f, c in zip(fine, coarse, strict=True)]
+    good = np.all([d <= _AGREE for d in differences], axis=0) & (tail <= 1e-12)
+    done = rows[good]
+    for value, error, f, d in zip(
+        (found.period, found.action),
+        (found.period_error, found.action_error),
+        fine,
+        differences,
+        strict=True,
+    ):
+        value[done] = f[good]
+        # The error is the square of the difference: it falls by as many powers again.
+        error[done] = (f * (d * d + tail + 16.0 * _EPS))[good]
+    return rows[~good], (fine[0][~good], fine[1][~good])
+
+
+def _enter(found: Round, rows: Index, sums: Integrals, passes: float) -> None:
+    """Write down integrals over arcs that are passed so often in one round; NaN if not known."""
+    with np.errstate(all="ignore"):
+        for value, error, integral, rest, factor in (
+            (found.period, found.period_error, sums.time, sums.time_error, passes),
+            (found.action, found.action_error, sums.area, sums.area_error, 0.5 * passes / np.pi),
+        ):
+            known = rest <= WORST * integral
+            value[rows] = np.where(known, factor * integral, np.nan)
+            error[rows] = factor * rest
 
 
 def _arc(x: Array, left: End, right: End) -> tuple[Array, Array]:
@@ -93,29 +140,27 @@ def _arc(x: Array, left: End, right: End) -> tuple[Array, Array]:
     return middle, np.where(same, 0.5 * (right.u - left.u), half)
 
 
-def rotations(ground: Ground, x: Array, kinetic: Array, excess: Array) -> tuple[Array, Array]:
+def rotations(ground: Ground, x: Array, kinetic: Array, excess: Array) -> Round:
     """Period (of one turn) and action of orbits that run round the circle."""
     turn = ground.systems.formula.period
     assert turn is not None
-    period, action = np.full(x.shape, np.nan), np.full(x.shape, np.nan)
+    found = Round(*(np.full(x.shape, np.nan) for _ in range(4)))
     base = ground.systems.potential(x)
     coarse: tuple[Array, Array] | None = None
     rows = np.arange(x.size)
-    for count in (32, 64, 128, 256):
+    for count in (32, 64, 128, 256) if ground.systems.formula.shape is not Shape.GENERAL else ():
         few = ground.systems.take(rows)
         height = few.potential(x[rows, None] + turn * np.arange(count) / count)
         speed = np.sqrt(2.0 * (kinetic[rows, None] + (base[rows, None] - height)))
-        fine = (turn * np.mean(1.0 / speed, axis=1), turn * np.mean(speed, axis=1))
+        fine = (
+            turn * np.mean(1.0 / speed, axis=1),
+            turn * np.mean(speed, axis=1) / (2.0 * np.pi),
+        )
         if coarse is not None:
-            good = np.all(
-                [np.abs(f - c) <= _AGREE * f for f, c in zip(fine, coarse, strict=True)], axis=0
-            )
-            period[rows[good]], action[rows[good]] = fine[0][good], fine[1][good] / (2.0 * np.pi)
-            rows, fine = rows[~good], (fine[0][~good], fine[1][~good])
+            rows, fine = _settle(found, rows, fine, coarse, np.zeros(rows.size))
         if not rows.size:
-            return period, action
+            return found
         coarse = fine
     rest = ground.take(rows)
-    time, area = integrate(rest, round_the_circle(rest, excess[rows]))
-    period[rows], action[rows] = time, area / (2.0 * np.pi)
-    return period, action
+    _enter(found, rows, integrate(rest, round_the_circle(rest, excess[rows])), 1.0)
+    return found

@@ -1,9 +1,4 @@
-"""Integrals over arcs cut at the maxima of V, by the double-exponential rule.
-
-Its points crowd at both ends of a piece so fast that neither the root at a turning point nor the
-near-pole next to a saddle slows it down [TakahasiMori1974]. Each point is placed by its distance
-from the nearer end, and the energy there is a difference from that end, so digits are kept.
-"""
+"""Arcs of orbits cut at the maxima of V, and the speed at places on them."""
 
 from __future__ import annotations
 
@@ -20,27 +15,34 @@ Array = npt.NDArray[np.float64]
 #: An end of a piece: its anchor's place and reach, its own place from there, the energy above it.
 PieceEnd = tuple[float, float, float, float]
 
-_LEVELS = (3, 4, 5, 6, 7)
-#: How far the rule goes: where 1/v is like d^(-1/2) or log d at the ends, and for v alone.
-_RANGES = (4.2, 3.1)
-_AGREE = 1e-9
-
 
 @dataclass
 class Pieces:
-    """Stretches of orbits, each with its length and its two ends."""
+    """Stretches of orbits, each with its length, its two ends, and a place between to cut it.
+
+    `cut` counts from the left end. Where both ends are known from the center between them, `reach`
+    says more exactly how far from it they lie.
+    """
 
     orbit: list[int] = field(default_factory=list)
     length: list[float] = field(default_factory=list)
     left: list[PieceEnd] = field(default_factory=list)
     right: list[PieceEnd] = field(default_factory=list)
+    cut: list[float] = field(default_factory=list)
+    reach: list[tuple[float, float]] = field(default_factory=list)
 
-    def add(self, orbit: int, length: float, left: PieceEnd, right: PieceEnd) -> None:
-        """Add one stretch."""
+    def add(
+        self, orbit: int, length: float, left: PieceEnd, right: PieceEnd, bottoms: list[float]
+    ) -> None:
+        """Add one stretch; `bottoms` are distances of minima of V from its left end."""
+        inside = [d for d in bottoms if 0.0 < d < length]
         self.orbit.append(orbit)
         self.length.append(length)
         self.left.append(left)
         self.right.append(right)
+        self.cut.append(min(inside, key=lambda d: abs(d - 0.5 * length), default=0.5 * length))
+        shared = left[0] == right[0] and left[2] < 0.0 < right[2]
+        self.reach.append((-left[2], right[2]) if shared else (np.nan, np.nan))
 
 
 def tops(ground: Ground) -> npt.NDArray[np.bool_]:
@@ -59,6 +61,7 @@ def between(
     pieces = Pieces()
     way = distances(ground, start, 1.0)
     inside = tops(ground) & (way > 0.0) & (way < width[:, None])
+    low = (ground.points.kind == EquilibriumKind.CENTER) & (way > 0.0) & (way < width[:, None])
     points, near = ground.points, ground.near
     for i in range(start.size):
         first, last = (
@@ -75,7 +78,8 @@ def between(
         places.append(float(width[i]))
         ends.append(last)
         for k in range(len(ends) - 1):
-            pieces.add(i, places[k + 1] - places[k], ends[k], ends[k + 1])
+            bottoms = [float(d) - places[k] for d in way[i][low[i]]]
+            pieces.add(i, places[k + 1] - places[k], ends[k], ends[k + 1], bottoms)
     return pieces
 
 
@@ -84,7 +88,7 @@ def round_the_circle(ground: Ground, excess: Array) -> Pieces:
     pieces = Pieces()
     turn = ground.systems.formula.period
     assert turn is not None
-    high = tops(ground)
+    high, low = tops(ground), ground.points.kind == EquilibriumKind.CENTER
     for i in range(ground.systems.size):
         ends = [
             (float(ground.points.phi[i, j]), float(ground.near[i, j]), 0.0, float(excess[i, j]))
@@ -93,43 +97,9 @@ def round_the_circle(ground: Ground, excess: Array) -> Pieces:
         for k, end in enumerate(ends):
             after = ends[(k + 1) % len(ends)]
             length = after[0] - end[0]
-            pieces.add(i, length if k + 1 < len(ends) else length + turn, end, after)
+            bottoms = [float(d) % turn for d in ground.points.phi[i][low[i]] - end[0]]
+            pieces.add(i, length if k + 1 < len(ends) else length + turn, end, after, bottoms)
     return pieces
-
-
-def integrate(ground: Ground, pieces: Pieces, *, timed: bool = True) -> tuple[Array, Array]:
-    """Integrals of 1/v (if `timed`) and of v over the pieces of each orbit."""
-    orbit = np.array(pieces.orbit, dtype=np.intp)
-    length = np.array(pieces.length)
-    systems = ground.systems.take(orbit)
-    ends = [np.array(end).reshape(-1, 4).T for end in (pieces.left, pieces.right)]
-    sums = np.zeros((2, length.size))
-    rows = np.arange(length.size)
-    coarse = np.full((2, length.size), np.nan)
-    for level in _LEVELS:
-        steps = round(_RANGES[0 if timed else 1] * 2**level)
-        t = np.arange(-steps, steps + 1) / 2**level
-        share = 1.0 / (1.0 + np.exp(np.pi * np.abs(np.sinh(t))))  # distance from the nearer end
-        weight = np.pi * np.cosh(t) * share * (1.0 - share) / 2**level
-        speed = np.empty((rows.size, t.size))
-        for side, nodes in ((0, t <= 0.0), (1, t > 0.0)):
-            at, near, u, excess = (column[rows] for column in ends[side])
-            d = length[rows, None] * share[nodes] * (1.0 if side == 0 else -1.0)
-            speed[:, nodes] = speeds(Anchor(systems.take(rows), at, near), u, excess, d)
-        fine = np.zeros((2, rows.size))
-        fine[1] = length[rows] * (speed @ weight)
-        if timed:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                fine[0] = length[rows] * ((1.0 / speed) @ weight)
-        good = np.all(np.abs(fine - coarse) <= _AGREE * fine, axis=0) | (level == _LEVELS[-1])
-        sums[:, rows[good]] = fine[:, good]
-        rows, coarse = rows[~good], fine[:, ~good]
-        if not rows.size:
-            break
-    totals = np.zeros((2, ground.systems.size))
-    for total, values in zip(totals, sums, strict=True):
-        np.add.at(total, orbit, values)
-    return totals[0], totals[1]
 
 
 def speeds(anchor: Anchor, u: Array, excess: Array, d: Array) -> Array:

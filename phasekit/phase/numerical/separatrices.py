@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -10,14 +11,34 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.phase.numerical.arcs import End, distances, find_end
 from phasekit.phase.numerical.ground import Anchor, Ground
-from phasekit.phase.numerical.pieces import between, integrate
-from phasekit.phase.separatrices import Separatrices
+from phasekit.phase.numerical.panels import integrate
+from phasekit.phase.numerical.periods import WORST
+from phasekit.phase.numerical.pieces import between
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 _EPS = np.finfo(float).eps
 SIDES = (-1.0, 1.0)
+
+
+class Separatrices(NamedTuple):
+    """Separatrices of systems, as of `phasekit.phase.separatrices`, with estimates of errors."""
+
+    topology: npt.NDArray[np.int8]
+    """`Topology`."""
+    figure_eight: Flags
+    saddle_phi: Array
+    saddle_energy: Array
+    saddle_exponent: Array
+    loop: npt.NDArray[np.int8]
+    """`Loop`."""
+    winding_area: Array
+    turning_offset: Array
+    turning_phi: Array
+    lobe_area: Array
+    winding_area_error: Array
+    lobe_area_error: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,15 +105,17 @@ def branch_of(ground: Ground, column: npt.NDArray[np.intp], side: float) -> Bran
     return Branch(ground, saddle, side, length, joins, winds, near, end, excess)
 
 
-def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> Array:
-    """Integral of |v| over the finite branches of some rows."""
+def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
+    """Integral of v over the finite branches of some rows, NaN if not known; and its error."""
     ground, length = branch.ground.take(rows), branch.length[rows]
     near, far = branch.near.take(rows), branch.far.take(rows)
     start = branch.saddle[rows] - (length if branch.side < 0.0 else 0.0)
     ends = (near, far) if branch.side > 0.0 else (far, near)
     pieces = between(ground, start, length, branch.excess[rows], *ends)
     with np.errstate(all="ignore"):
-        return integrate(ground, pieces, timed=False)[1]
+        found = integrate(ground, pieces, timed=False)
+        known = found.area_error <= WORST * found.area
+    return np.where(known, found.area, np.nan), found.area_error
 
 
 def separatrices(ground: Ground) -> Separatrices:
@@ -110,15 +133,16 @@ def separatrices(ground: Ground) -> Separatrices:
     most = int(slot.max(initial=-1)) + 1
     shape = (systems.size, most)
     few = ground.take(rows)
-    found = np.full((len(rows), 3, 2), np.nan)  # offset, angle, area
+    found = np.full((len(rows), 4, 2), np.nan)  # offset, angle, area, its error
     closed, joined = (np.zeros((len(rows), 2), dtype=bool) for _ in range(2))
-    winding_area = np.full(len(rows), np.nan)
+    winding_area, winding_error = (np.full(len(rows), np.nan) for _ in range(2))
     winds = np.zeros(len(rows), dtype=bool)
     for k, side in enumerate(SIDES if rows.size else ()):
         branch = branch_of(few, columns, side)
         finite = np.flatnonzero(np.isfinite(branch.length))
         area = np.full(len(rows), np.inf)
-        area[finite] = areas(branch, finite)
+        error = np.zeros(len(rows))
+        area[finite], error[finite] = areas(branch, finite)
         place = branch.far.anchor.at + branch.far.u
         place = np.where(np.isfinite(branch.length), place, side * np.inf)
         if period is not None:
@@ -126,10 +150,12 @@ def separatrices(ground: Ground) -> Separatrices:
         found[:, 0, k] = side * branch.length
         found[:, 1, k] = place
         found[:, 2, k] = 2.0 * area
+        found[:, 3, k] = 2.0 * error
         closed[:, k] = np.isfinite(branch.length) & ~branch.joins
         joined[:, k] = branch.joins & ~branch.winds
         winds |= branch.winds
         winding_area = np.where(branch.winds, area, winding_area)
+        winding_error = np.where(branch.winds, error, winding_error)
     found[winds] = np.nan
     loop = np.select(
         [winds, joined.any(axis=1), closed.all(axis=1), closed.any(axis=1)],
@@ -168,4 +194,6 @@ def separatrices(ground: Ground) -> Separatrices:
         spread(found[:, 0], (2,)),
         spread(found[:, 1], (2,)),
         spread(found[:, 2], (2,)),
+        spread(winding_error),
+        spread(found[:, 3], (2,)),
     )

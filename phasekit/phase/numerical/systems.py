@@ -25,6 +25,14 @@ class Systems:
         """The systems of some rows, which may repeat."""
         return Systems(self.formula, tuple(p[rows] for p in self.parameters), len(rows))
 
+    @property
+    def finite(self) -> npt.NDArray[np.bool_]:
+        """Which systems have finite parameters alone."""
+        valid = np.ones(self.size, dtype=bool)
+        for p in self.parameters:
+            valid &= np.isfinite(p)
+        return valid
+
     def potential(self, x: Array) -> Array:
         """V at x of shape (systems, ...)."""
         return self.formula.values(x, *self._beside(x))

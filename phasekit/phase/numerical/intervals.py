@@ -1,0 +1,322 @@
+"""Interval arithmetic on formulas: bounds of their values over whole stretches of the coordinate.
+
+Every bound is rounded outward, so what it excludes is excluded, which no sampling can do
+[MooreKearfottCloud2009]. A formula becomes a list of operations, and each of them works on the
+arrays of all stretches at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+#: Lower and upper bounds, arrays of one shape.
+Interval: TypeAlias = tuple[Any, Any]
+
+#: Units in the last place by which elementary functions of NumPy may be off (it promises 4).
+_ULPS = 4.0
+_EPS = float(np.finfo(float).eps)
+_MOST = float(np.finfo(float).max)
+
+
+class NoRule(Exception):
+    """A formula holds a function of which no bounds are known; the argument names it."""
+
+
+def point(x: npt.ArrayLike) -> Interval:
+    """The interval of one number."""
+    return x, x
+
+
+def constant_bounds(expression: Any) -> Interval:
+    """Bounds of an expression without symbols."""
+    if expression.is_Float:
+        return point(float(expression))
+    value = float(expression)
+    if not np.isfinite(value):
+        raise NoRule(str(expression))
+    if expression.is_Rational:
+        from fractions import Fraction
+
+        exact = Fraction(int(expression.p), int(expression.q))
+        if Fraction(value) == exact:
+            return point(value)
+        return _outward(value, value)
+    return _outward(value, value)
+
+
+def _outward(low: Any, high: Any) -> Interval:
+    return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+
+
+def _wide(low: Array, high: Array) -> Interval:
+    """Round outward by what an elementary function may be off."""
+    low, high = np.minimum(low, _MOST), np.maximum(high, -_MOST)
+    return (
+        np.nextafter(low - _ULPS * _EPS * np.abs(low), -np.inf),
+        np.nextafter(high + _ULPS * _EPS * np.abs(high), np.inf),
+    )
+
+
+def add(_: Flags, a: Interval, b: Interval) -> Interval:
+    """Bounds of a sum."""
+    return _outward(a[0] + b[0], a[1] + b[1])
+
+
+def multiply(_: Flags, a: Interval, b: Interval) -> Interval:
+    """Bounds of a product."""
+    for one, other in ((a, b), (b, a)):
+        if isinstance(one[0], float) and one[0] == one[1]:
+            if abs(one[0]) == 1.0:  # exact
+                return other if one[0] > 0.0 else (-other[1], -other[0])
+            ends = (one[0] * other[0], one[0] * other[1])
+            return _outward(*(ends if one[0] > 0.0 else ends[::-1]))
+    products = np.stack(np.broadcast_arrays(a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]))
+    products = np.where(np.isnan(products), 0.0, products)  # 0 times infinity
+    return _outward(products.min(axis=0), products.max(axis=0))
+
+
+def _reciprocal(undefined: Flags, a: Interval) -> Interval:
+    low, high = a
+    through = (low <= 0.0) & (high >= 0.0)
+    undefined |= through
+    left, right = _outward(1.0 / np.asarray(high), 1.0 / np.asarray(low))
+    left = np.where(through, np.where((low == 0.0) & (high > 0.0), left, -np.inf), left)
+    right = np.where(through, np.where((high == 0.0) & (low < 0.0), right, np.inf), right)
+    return left, right
+
+
+def whole_power(n: int) -> Callable[..., Interval]:
+    """Rule for a power with a whole exponent, not 0."""
+
+    def power(undefined: Flags, a: Interval) -> Interval:
+        if n < 0:
+            return _reciprocal(undefined, positive(undefined, a))
+        return positive(undefined, a)
+
+    def positive(_: Flags, a: Interval) -> Interval:
+        m = abs(n)
+        if m == 1:
+            return a
+        low, high = (np.power(np.asarray(end, dtype=float), m) for end in a)
+        if m % 2:
+            return _wide(low, high)
+        through = (np.asarray(a[0]) <= 0.0) & (np.asarray(a[1]) >= 0.0)
+        least, most = _wide(np.minimum(low, high), np.maximum(low, high))
+        return np.where(through, 0.0, np.maximum(least, 0.0)), most
+
+    return power
+
+
+def real_power(exponent: Interval) -> Callable[..., Interval]:
+    """Rule for a power with a real exponent, of a base that is not negative."""
+
+    def power(undefined: Flags, a: Interval) -> Interval:
+        undefined |= np.asarray(a[0]) < 0.0
+        low, high = np.maximum(a[0], 0.0), np.maximum(a[1], 0.0)
+        if exponent[0] < 0.0:
+            undefined |= low == 0.0
+        ends = [np.power(end, p) for end in (low, high) for p in set(exponent)]
+        least, most = np.minimum.reduce(ends), np.maximum.reduce(ends)
+        least, most = _wide(least, most)
+        return np.maximum(least, 0.0), most
+
+    return power
+
+
+def _rising(
+    function: Callable[[Any], Any],
+    domain: tuple[float, float] = (-np.inf, np.inf),
+    image: tuple[float, float] = (-np.inf, np.inf),
+) -> Callable[..., Interval]:
+    def rule(undefined: Flags, a: Interval) -> Interval:
+        undefined |= (np.asarray(a[0]) < domain[0]) | (np.asarray(a[1]) > domain[1])
+        low, high = (function(np.clip(end, *domain)) for end in a)
+        undefined |= ~np.isfinite(low) & np.isfinite(a[0])
+        low, high = _wide(low, high)
+        return np.maximum(low, image[0]), np.minimum(high, image[1])
+
+    return rule
+
+
+def _falling(rule: Callable[..., Interval]) -> Callable[..., Interval]:
+    """Turn a rule for f into that for f(-x)."""
+    return lambda undefined, a: rule(undefined, (-a[1], -a[0]))
+
+
+def _cosh(_: Flags, a: Interval) -> Interval:
+    low, high = np.cosh(a[0]), np.cosh(a[1])
+    through = (np.asarray(a[0]) <= 0.0) & (np.asarray(a[1]) >= 0.0)
+    least, most = _wide(np.minimum(low, high), np.maximum(low, high))
+    return np.where(through, 1.0, np.maximum(least, 1.0)), most
+
+
+def _abs(_: Flags, a: Interval) -> Interval:
+    low, high = np.abs(a[0]), np.abs(a[1])
+    through = (np.asarray(a[0]) <= 0.0) & (np.asarray(a[1]) >= 0.0)
+    return np.where(through, 0.0, np.minimum(low, high)), np.maximum(low, high)
+
+
+def _wave(function: Callable[[Any], Any], top: float) -> Callable[..., Interval]:
+    """Rule for a sine whose maxima lie at ``top + 2 pi k``."""
+
+    def rule(_: Flags, a: Interval) -> Interval:
+        low, high = (np.asarray(end, dtype=float) for end in a)
+        ends = function(low), function(high)
+        least, most = _wide(np.minimum(*ends), np.maximum(*ends))
+        # The number of a turn is rounded so that a maximum is rather seen than missed.
+        slack = 8.0 * _EPS * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+        for place, bound in ((top, 1.0), (top + np.pi, -1.0)):
+            first = np.ceil((low - place - slack) / (2.0 * np.pi))
+            last = np.floor((high - place + slack) / (2.0 * np.pi))
+            held = ~(first > last)  # infinite ends hold it as well
+            if bound > 0.0:
+                most = np.where(held, 1.0, np.minimum(most, 1.0))
+            else:
+                least = np.where(held, -1.0, np.maximum(least, -1.0))
+        return least, most
+
+    return rule
+
+
+def _tan(undefined: Flags, a: Interval) -> Interval:
+    low, high = (np.asarray(end, dtype=float) for end in a)
+    slack = 8.0 * _EPS * (1.0 + np.maximum(np.abs(low), np.abs(high)))
+    first = np.ceil((low - 0.5 * np.pi - slack) / np.pi)
+    pole = ~(first > np.floor((high - 0.5 * np.pi + slack) / np.pi))
+    undefined |= pole
+    least, most = _wide(np.tan(low), np.tan(high))
+    return np.where(pole, -np.inf, least), np.where(pole, np.inf, most)
+
+
+def _erf(x: Any) -> Any:
+    from scipy.special import erf
+
+    return erf(x)
+
+
+def _erfc(x: Any) -> Any:
+    from scipy.special import erfc
+
+    return erfc(-np.asarray(x))
+
+
+RULES: dict[str, Callable[..., Interval]] = {
+    "exp": _rising(np.exp, image=(0.0, np.inf)),
+    "log": _rising(np.log, domain=(0.0, np.inf)),
+    "sin": _wave(np.sin, 0.5 * np.pi),
+    "cos": _wave(np.cos, 0.0),
+    "tan": _tan,
+    "sinh": _rising(np.sinh),
+    "cosh": _cosh,
+    "tanh": _rising(np.tanh, image=(-1.0, 1.0)),
+    "asin": _rising(np.arcsin, domain=(-1.0, 1.0)),
+    "acos": _falling(_rising(lambda x: np.arccos(-x), domain=(-1.0, 1.0))),
+    "atan": _rising(np.arctan),
+    "asinh": _rising(np.arcsinh),
+    "acosh": _rising(np.arccosh, domain=(1.0, np.inf)),
+    "atanh": _rising(np.arctanh, domain=(-1.0, 1.0)),
+    "erf": _rising(_erf, image=(-1.0, 1.0)),
+    "erfc": _falling(_rising(_erfc, image=(0.0, 2.0))),
+    "Abs": _abs,
+}
+_REWRITTEN: dict[str, Callable[[Any, Any], Any]] = {
+    "sec": lambda sp, x: 1 / sp.cos(x),
+    "csc": lambda sp, x: 1 / sp.sin(x),
+    "cot": lambda sp, x: sp.cos(x) / sp.sin(x),
+    "sech": lambda sp, x: 1 / sp.cosh(x),
+    "csch": lambda sp, x: 1 / sp.sinh(x),
+    "coth": lambda sp, x: sp.cosh(x) / sp.sinh(x),
+}
+
+
+class Bounds:
+    """Bounds of some expressions over boxes of their symbols.
+
+    Parameters
+    ----------
+    expressions : sequence of sympy expressions
+    symbols : sequence of sympy symbols
+
+    Raises
+    ------
+    NoRule
+        If an expression holds a function that has no rule here.
+    """
+
+    _constant: Callable[[Any], Any] = staticmethod(constant_bounds)
+    _sum: Callable[..., Any] = staticmethod(add)
+    _product: Callable[..., Any] = staticmethod(multiply)
+    _whole_power: Callable[[int], Callable[..., Any]] = staticmethod(whole_power)
+    _real_power: Callable[[Interval], Callable[..., Any]] = staticmethod(real_power)
+    _rules: Mapping[str, Callable[..., Any]] = RULES
+
+    def __init__(self, expressions: Sequence[Any], symbols: Sequence[Any]) -> None:
+        self._steps: list[tuple[Callable[..., Interval], tuple[int, ...]]] = []
+        self._place: dict[Any, int] = {symbol: i for i, symbol in enumerate(symbols)}
+        self._inputs = len(symbols)
+        self._outputs = [self._compile(expression) for expression in expressions]
+
+    def __call__(self, *inputs: Interval) -> tuple[list[Interval], Flags]:
+        """Return the bounds of each expression, and where one may be undefined or have a pole.
+
+        Bounds of infinite size stand for any value.
+        """
+        shape = np.broadcast_shapes(*(np.shape(low) for low, _ in inputs))
+        undefined = np.zeros(shape, dtype=bool)
+        values: list[Any] = list(inputs)
+        with np.errstate(all="ignore"):
+            for step, arguments in self._steps:
+                values.append(step(undefined, *(values[i] for i in arguments)))
+        found = []
+        for i in self._outputs:
+            low, high = (np.broadcast_to(end, shape) for end in values[i])
+            low, high = (
+                np.where(np.isnan(low), -np.inf, low),
+                np.where(np.isnan(high), np.inf, high),
+            )
+            found.append((low, high))
+        return found, undefined
+
+    def _add(self, step: Callable[..., Interval], *arguments: int) -> int:
+        self._steps.append((step, arguments))
+        return self._inputs + len(self._steps) - 1
+
+    def _compile(self, expression: Any) -> int:
+        if expression not in self._place:
+            self._place[expression] = self._lay_out(expression)
+        return self._place[expression]
+
+    def _lay_out(self, expression: Any) -> int:
+        import sympy as sp
+
+        if not expression.free_symbols:
+            constant = self._constant(expression)
+            return self._add(lambda _: constant)
+        if expression.is_Symbol:
+            raise NoRule(str(expression))
+        arguments = expression.args
+        name = type(expression).__name__
+        if expression.is_Add or expression.is_Mul:
+            join = self._sum if expression.is_Add else self._product
+            place = self._compile(arguments[0])
+            for argument in arguments[1:]:
+                place = self._add(join, place, self._compile(argument))
+            return place
+        if expression.is_Pow:
+            base, exponent = arguments
+            if exponent.is_Integer:
+                return self._add(self._whole_power(int(exponent)), self._compile(base))
+            if not exponent.free_symbols:
+                return self._add(self._real_power(constant_bounds(exponent)), self._compile(base))
+            return self._compile(sp.exp(exponent * sp.log(base), evaluate=False))
+        if name in self._rules and len(arguments) == 1:
+            return self._add(self._rules[name], self._compile(arguments[0]))
+        if name in _REWRITTEN and len(arguments) == 1:
+            return self._compile(_REWRITTEN[name](sp, arguments[0]))
+        raise NoRule(name)
