@@ -18,7 +18,6 @@ from phasekit.kernels.equilibria import LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.levels import (
     ANGLE,
     AROUND,
-    CURVATURE,
     DIRECTION,
     FREE,
     FREE_FROM,
@@ -26,7 +25,6 @@ from phasekit.kernels.levels import (
     HARMONIC,
     INVALID,
     MODE,
-    PHI,
     PLACE,
     RATE,
     REFERENCE,
@@ -34,11 +32,7 @@ from phasekit.kernels.levels import (
     SINGLE,
     SWING,
     TURN,
-    UNIT,
-    A,
     classify_level,
-    energy_between,
-    multiplier,
     well,
 )
 from phasekit.kernels.motion import phase_at
@@ -56,6 +50,14 @@ from phasekit.kernels.shape import (
     N,
     locate,
     shape,
+)
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
+    UNIT,
+    A,
+    energy_between,
+    multiplier,
 )
 
 NOT_COMPUTED = int(OrbitFamily.NOT_COMPUTED)

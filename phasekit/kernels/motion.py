@@ -32,14 +32,12 @@ from phasekit.kernels.gauss import phase
 from phasekit.kernels.levels import (
     ANGLE,
     ASYMPTOTE,
-    CURVATURE,
     DIRECTION,
     FREE,
     GAP,
     HARMONIC,
     INVALID,
     MODE,
-    PHI,
     RATE,
     REFERENCE,
     REST,
@@ -47,11 +45,6 @@ from phasekit.kernels.levels import (
     SWING,
     TURN,
     TURNS,
-    UNIT,
-    A,
-    B,
-    C,
-    potential_dd,
 )
 from phasekit.kernels.shape import (
     LEVELS,
@@ -75,6 +68,14 @@ from phasekit.kernels.shape import (
     U,
     locate,
     refer,
+)
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
+    UNIT,
+    A,
+    B,
+    C,
 )
 
 # Rows after those of an orbit: phase at the start and frequency (high and low parts), whole turns
@@ -136,6 +137,18 @@ def frequency_dd(w: Array) -> tuple[float, float]:
             break
     th, tl = dd_add(ah, al, gh, gl)
     return 0.5 * th, 0.5 * tl
+
+
+@inline
+def potential_dd(
+    a: float, b: float, c: float, ch: float, cl: float, sh: float, sl: float
+) -> tuple[float, float]:
+    """V = (a cos/2 - b) cos - c sin as a double-double."""
+    h, low = dd_multiply(ch, cl, 0.5 * a, 0.0)
+    h, low = dd_add(h, low, -b, 0.0)
+    h, low = dd_multiply(h, low, ch, cl)
+    th, tl = dd_multiply(sh, sl, c, 0.0)
+    return dd_add(h, low, -th, -tl)
 
 
 @inline

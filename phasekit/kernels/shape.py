@@ -37,17 +37,19 @@ from phasekit.kernels.gauss import STEPS, amplitude, halve
 from phasekit.kernels.levels import (
     AROUND,
     ASYMPTOTE,
-    CURVATURE,
     GAP,
     LEFT,
     MODE,
     ORBIT,
-    PHI,
     PLACE,
     REFERENCE,
     RIGHT,
     SWING,
     TURN,
+)
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
     A,
     B,
     C,
