@@ -52,6 +52,8 @@ FREE_FROM = 1e9
 HARMONIC_TO = 1e-30
 # For one orbit among many, and for a motion, where every digit counts.
 SOME, ALL = 1e-3, math.inf
+# Saddles with energies closer than this are level.
+LEVEL_TO = 1e-15
 # Smaller energies above an equilibrium, degenerate or not, are raised to these, lest they
 # underflow.
 LEAST, TINIEST = 1e-290, 1e-307
@@ -73,6 +75,21 @@ def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
     if gap == 0.0 or (slope > 0.0 and gap < HARMONIC_TO * min(slope, slope * slope * slope)):
         mode = HARMONIC if slope > 0.0 else REST
     w[MODE] = ASYMPTOTE if kind == ASYMPTOTIC else mode
+
+
+@routine
+def above_level_saddles(phi: float, v: float, w: Array) -> tuple[float, float]:
+    """Energy of a state above the lower and the upper saddle, whose energies almost agree.
+
+    The nearer one tells; the farther one is compared with it.
+    """
+    rise = energy_between(LOWER_SADDLE, UPPER_SADDLE, w)
+    lower = math.cos(phi - w[PHI + LOWER_SADDLE])
+    if lower > math.cos(phi - w[PHI + UPPER_SADDLE]):
+        within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
+        return within, within - rise
+    above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
+    return above + rise, above
 
 
 @inline
@@ -100,21 +117,28 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
         return EQUILIBRIUM
     # What the rounding of the state changes in its energy.
     slack = 8.0 * ROUNDING * (v * v + abs(slope * phi))
-    above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
+    single = w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]
+    level = not single and abs(w[B] if w[A] >= 0.0 else w[C]) < LEVEL_TO
+    within = math.nan
+    if level:
+        within, above = above_level_saddles(phi, v, w)
+    else:
+        above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
     if abs(above) <= slack:
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if above > 0.0:
         settle(UPPER_SADDLE, above, SINGLE, ROTATION, w)
         return ROTATION
-    if w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]:  # a single saddle
+    if single:
         own = energy_above(LOWER_CENTER, phi, v, w[DOUBLE_TO], w)
         if own < -above:
             settle(LOWER_CENTER, own, SINGLE, LIBRATION, w)
         else:
             settle(UPPER_SADDLE, above, SINGLE, LIBRATION, w)
         return LIBRATION
-    within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
+    if not level:
+        within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
     if abs(within) <= slack:
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC

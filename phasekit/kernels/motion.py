@@ -47,12 +47,15 @@ from phasekit.kernels.levels import (
     TURNS,
 )
 from phasekit.kernels.shape import (
+    FIRST,
     LEVELS,
     MEANS,
     PHI_S,
+    PHI_S_LOW,
     RATIO,
     REST_R,
     S2,
+    SECOND,
     SIGMA,
     SKEW,
     SLOPE,
@@ -60,6 +63,7 @@ from phasekit.kernels.shape import (
     TAU,
     X0,
     Y_PRODUCT,
+    Z_APART,
     Z_HIGH,
     Z_LOW,
     M,
@@ -83,8 +87,8 @@ from phasekit.kernels.system import (
 PHASE, PHASE_LOW, OMEGA_HIGH, OMEGA_LOW, BASE, RISE, FALL = range(SIZE, SIZE + 7)
 MOTION_SIZE = SIZE + 7
 
-# Gaps to a saddle and products y1 y2 below these are known better than what follows from the energy
-# in double-double arithmetic.
+# Gaps to a saddle, squares of the lesser mean and products y1 y2 below these are known better than
+# what follows from the energy in double-double arithmetic.
 GAP_FROM = 1e-15
 PRODUCT_FROM = 3e-8
 # Beyond this phase a double does not say where on the orbit the motion is.
@@ -171,7 +175,7 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         y = -y
     # Sines of half the angles to the turning points, but for a common factor: next to the
     # reference from the offset from it, which has more digits there.
-    half = 0.5 * (angle - w[PHI_S])
+    half = 0.5 * ((angle - w[PHI_S]) - w[PHI_S_LOW])
     c = np.float64(math.cos(half))
     s = np.float64(math.sin(half))
     if abs(s) > 0.05:
@@ -181,9 +185,17 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         size = w[U] * x + abs(y)
         square = 1.0 + w[U] * w[U]
     else:
-        high = abs(c - w[Z_HIGH] * s) / np.sqrt(1.0 + w[Z_HIGH] * w[Z_HIGH])
-        low = abs(c - w[Z_LOW] * s) / np.sqrt(1.0 + w[Z_LOW] * w[Z_LOW])
+        to_high = np.sqrt(1.0 + w[Z_HIGH] * w[Z_HIGH])
+        to_low = np.sqrt(1.0 + w[Z_LOW] * w[Z_LOW])
+        high = abs(c - w[Z_HIGH] * s) / to_high
+        low = abs(c - w[Z_LOW] * s) / to_low
         cosine = w[RATIO] * low - high
+        if w[GAP] > 0.0 and skew < 0.5:  # where the reference is amid the orbit that cancels
+            tilt = w[Z_APART] * w[TAU] / (to_low * to_high)
+            shift = w[Z_LOW] / to_low - w[Z_HIGH] / to_high
+            if w[Z_LOW] * w[Z_HIGH] > 0.0:
+                shift = -tilt / (w[Z_LOW] * to_high + w[Z_HIGH] * to_low)
+            cosine = c * tilt / (to_low + to_high) - s * shift - skew * low
         size = 1.0
         square = 1.0
     # Close to a turning point the rate knows the distance better, through the other factor.
@@ -232,7 +244,9 @@ def begin(w: Array) -> None:
             w[BASE] -= turns
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
         w[OMEGA_LOW] = 0.0
-        if w[Y_PRODUCT] > PRODUCT_FROM and (abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0):
+        apart = min(w[FIRST], w[SECOND])
+        known = apart * apart > GAP_FROM and (abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0)
+        if known and w[Y_PRODUCT] > PRODUCT_FROM:
             w[OMEGA_HIGH], w[OMEGA_LOW] = frequency_dd(w)
     elif mode == HARMONIC:
         j = int(w[REFERENCE])

@@ -186,6 +186,20 @@ def energy_above(j: int, phi: float, v: float, below: float, w: Array) -> float:
     return ph
 
 
+@inline
+def next_to_axis(x: float, y: float, a: float, b: float, c: float) -> tuple[float, float]:
+    """B/x + A = C/y of an equilibrium with a small y, and y, each with its digits.
+
+    What remains of B + A and y, where they cancel, is known from y; else it knows y better.
+    """
+    apart = math.copysign(1.0, x) * b + a
+    bend = -a * y * y / (1.0 + abs(x))
+    rest = (apart + bend) / abs(x)
+    if abs(apart + bend) < 1e-3 * (abs(apart) + abs(bend)):
+        return c / y, y
+    return rest, (c / rest if rest != 0.0 else y)
+
+
 @routine
 def multiplier(j: int, w: Array) -> int:
     """Row of cosine, sine, mu = B/cos and A - mu = -C/sin of equilibrium j, each with its digits.
@@ -201,19 +215,18 @@ def multiplier(j: int, w: Array) -> int:
     c = w[C]
     x = np.float64(math.cos(w[PHI + j]))
     y = np.float64(math.sin(w[PHI + j]))
-    # The quotient, or through the other one, whichever rounding harms less.
-    mu = b / x if abs(x) > abs(y) else a + c / y
-    rest = c / y if abs(y) >= abs(x) else b / x - a
-    if abs(mu) < abs(a * x):
+    if abs(y) < 1e-3:
+        sharpen(j, w)
+        rest, y = next_to_axis(x, y + w[PHI_LOW + j] * x, -a, b, c)
         mu = b / x
-    if abs(rest) < abs(a * y):
+    elif abs(x) < 1e-3:
+        sharpen(j, w)
+        mu, x = next_to_axis(y, x - w[PHI_LOW + j] * y, a, c, b)
         rest = c / y
-    # Next to an axis the small coefficient knows the angle better than a double does.
-    size = abs(a) + abs(mu)
-    if abs(y) < 1e-3 and abs(rest) > 1e-3 * size:
-        y = c / rest
-    if abs(x) < 1e-3 and abs(mu) > 1e-3 * size:
-        x = b / mu
+    else:
+        # The quotient, or through the other one, whichever rounding harms less.
+        mu = b / x if abs(x) > abs(y) or abs(a + c / y) < abs(a * x) else a + c / y
+        rest = c / y if abs(y) >= abs(x) or abs(b / x - a) < abs(a * y) else b / x - a
     w[row] = x
     w[row + 1] = y
     w[row + 2] = mu if a >= 0.0 else rest
