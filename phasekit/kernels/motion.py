@@ -203,7 +203,7 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     tilt = w[TAU] * s * c
     rest = c * c + tilt + r * s * s
     slack = c * c + abs(tilt) + abs(r) * s * s + abs(w[TAU] * c) + 2.0 * abs(r * s)
-    if min(high, low) * slack < abs(rest) * size:
+    if min(high, low) * slack < 0.25 * abs(rest) * size:
         common = square * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
         if high < low:
             high = common / low
