@@ -124,6 +124,27 @@ def levels(
 
 
 @kernel
+def rises(
+    a: Array, b: Array, c: Array, phi: Array, curvature: Array, start: int, stop: int, out: Outputs
+) -> None:
+    """Energies: depths of the lower and the upper well, from saddle to saddle, from end to end."""
+    w = np.zeros(ob.SIZE)
+    for i in range(start, stop):
+        out[0][i] = math.nan
+        if load_system(i, a, b, c, phi, curvature, w):
+            double = phi[i, eq.LOWER_SADDLE] == phi[i, eq.LOWER_SADDLE]
+            double = double and curvature[i, eq.LOWER_SADDLE] < 0.0  # a fold's pair is no saddle
+            rim = eq.LOWER_SADDLE if double else eq.UPPER_SADDLE
+            unit = w[sy.UNIT]
+            whole = sy.energy_between(eq.LOWER_CENTER, eq.UPPER_SADDLE, w) / unit / unit
+            out[0][i, 0] = sy.energy_between(eq.LOWER_CENTER, rim, w) / unit / unit
+            if double:
+                out[0][i, 1] = sy.energy_between(eq.UPPER_CENTER, rim, w) / unit / unit
+                out[0][i, 2] = sy.energy_between(rim, eq.UPPER_SADDLE, w) / unit / unit
+            out[0][i, 3] = whole
+
+
+@kernel
 def flow(
     a: Array,
     b: Array,

@@ -187,7 +187,9 @@ def energy_above(j: int, phi: float, v: float, below: float, w: Array) -> float:
 
 
 @inline
-def next_to_axis(x: float, y: float, a: float, b: float, c: float) -> tuple[float, float]:
+def next_to_axis(
+    x: np.float64, y: np.float64, a: float, b: float, c: float
+) -> tuple[np.float64, np.float64]:
     """B/x + A = C/y of an equilibrium with a small y, and y, each with its digits.
 
     What remains of B + A and y, where they cancel, is known from y; else it knows y better.
