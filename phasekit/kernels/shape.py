@@ -30,7 +30,7 @@ import math
 import numpy as np
 
 from phasekit.kernels.compile import Array, inline, routine
-from phasekit.kernels.double_double import TWO_PI
+from phasekit.kernels.double_double import TWO_PI, TWO_PI_LOW, dd_add, two_sum
 from phasekit.kernels.elementary import angle_half
 from phasekit.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.gauss import STEPS, amplitude, halve
@@ -64,14 +64,14 @@ from phasekit.kernels.system import (
 # 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the factors of a libration: sum
 # of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of its own, and its zeros at
 # both turning points. The number of Gauss steps. What `phasekit.kernels.orbits` makes of all
-# that. What the reference's angle misses, and Z_HIGH -
-# Z_LOW. Last, the means of the Gauss steps, and room for the nodes of `action`.
+# that. What the reference's angle misses, Z_HIGH - Z_LOW,
+# and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
 FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 10, ORBIT + 18)
 TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 18, ORBIT + 24)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 24, ORBIT + 28)
-PHI_S_LOW, Z_APART = ORBIT + 28, ORBIT + 29
-MEANS = ORBIT + 30
+PHI_S_LOW, Z_APART, SIGMA_LOW = range(ORBIT + 28, ORBIT + 31)
+MEANS = ORBIT + 31
 NODES = MEANS + 2 * STEPS
 
 
@@ -288,6 +288,9 @@ def swing(w: Array) -> None:
     else:
         o_high = o_second
         o_low = o_first
+        if z_big < 0.0:  # on the left of the reference
+            o_high = -2.0 * angle_half(1.0, -z_small)
+            o_low = -2.0 * angle_half(1.0, -z_big)
         w[U] = tan_half(disc, 1.0 + own)
         z_high = z_small
         z_low = z_big
@@ -295,6 +298,12 @@ def swing(w: Array) -> None:
     w[LOW] = w[PHI_S] + o_low
     w[HIGH] = w[PHI_S] + o_high
     w[SIGMA] = w[PHI_S] + 0.5 * (o_low + o_high)
+    w[SIGMA_LOW] = 0.0
+    if e < 0.0 and place == AROUND:  # opposite to the reference, all but exactly
+        shift = 0.5 * o_low - angle_half(1.0, -z_small)
+        w[SIGMA], rest = two_sum(w[PHI_S], 0.5 * TWO_PI)
+        w[SIGMA], rest = dd_add(w[SIGMA], rest, shift, 0.5 * TWO_PI_LOW + w[PHI_S_LOW])
+        w[SIGMA_LOW] = rest
     # V' at both turning points, but for a common factor.
     force_high = e + x / (1.0 + z_high * z_high)
     force_low = e + x / (1.0 + z_low * z_low)
