@@ -36,8 +36,8 @@ SUMS = 2 * MEASURES
 NODE, SHARE = np.polynomial.legendre.leggauss(8)
 # Parts of the double-exponential variable: the whole, the least, and the most at a time and in
 # all. Agreement of a part with its halves, and of all of them, in units of the whole.
-REACHED, LEAST, PARTS, MOST = 3.4, 1e-9, 64, 4000
-CLOSE, ENOUGH = 1e-11, 1e-8
+REACHED, LEAST, PARTS, MOST = 3.4, 1e-9, 64, 600
+CLOSE, ENOUGH = 1e-11, 1e-6
 
 
 @inline
@@ -140,16 +140,24 @@ def over_part(
 
 @routine
 def halved(
-    k: int, arc: Array, branches: int, rotators: bool, rough: Array, sums: Array, table: Array
+    k: int,
+    arc: Array,
+    branches: int,
+    measure: int,
+    rotators: bool,
+    sums: Array,
+    table: Array,
 ) -> None:
-    """Sums over an arc by halves, of which `rough` is an estimate; NaN where they do not agree."""
+    """Sums of one measure over an arc by halves, in place of estimates; NaN if they disagree."""
     parts = np.zeros((PARTS, 2 + SUMS))
     left, right, off = np.zeros(SUMS), np.zeros(SUMS), np.zeros(SUMS)
-    sums[:] = 0.0
+    first, last = 2 * measure, 2 * measure + 2
+    rough = sums.copy()
+    sums[first:last] = 0.0
     parts[0, 0], parts[0, 1] = -REACHED, REACHED
     over_part(k, arc, branches, rotators, -REACHED, REACHED, parts[0, 2:], table)
     count, tried = 1, 0
-    while count > 0 and tried < MOST:
+    while count > 0:
         tried += 1
         count -= 1
         low, high = parts[count, 0], parts[count, 1]
@@ -157,10 +165,10 @@ def halved(
         over_part(k, arc, branches, rotators, low, middle, left, table)
         over_part(k, arc, branches, rotators, middle, high, right, table)
         close = True
-        for n in range(SUMS):
+        for n in range(first, last):
             close = close and abs(left[n] + right[n] - parts[count, 2 + n]) <= CLOSE * rough[n]
-        if close or high - low < LEAST or count + 2 > PARTS:
-            for n in range(SUMS):
+        if close or high - low < LEAST or tried > MOST or count + 2 > PARTS:
+            for n in range(first, last):
                 sums[n] += left[n] + right[n]
                 off[n] += abs(left[n] + right[n] - parts[count, 2 + n])
         else:
@@ -169,6 +177,6 @@ def halved(
             parts[count, 0], parts[count, 1] = middle, high
             parts[count, 2:] = right
             count += 2
-    for n in range(SUMS):
-        if count > 0 or not off[n] <= ENOUGH * sums[n]:
+    for n in range(first, last):
+        if not off[n] <= ENOUGH * sums[n]:
             sums[n] = math.nan

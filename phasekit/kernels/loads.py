@@ -193,15 +193,14 @@ def raise_peak(
 
 
 @routine
-def dips(samples: Array, branches: int, sums: Array) -> bool:
+def dips(samples: Array, measure: int, branches: int, sums: Array) -> bool:
     """Whether a measure almost vanishes between the ends of an arc."""
+    low = DIP * sums[2 * measure] / branches
     for b in range(branches):
-        for measure in range(MEASURES):
-            y = samples[b, measure]
-            low = DIP * sums[2 * measure] / branches
-            for q in range(1, SAMPLES - 1):
-                if y[q] < low and y[q] < y[q - 1] and y[q] < y[q + 1]:
-                    return True
+        y = samples[b, measure]
+        for q in range(1, SAMPLES - 1):
+            if y[q] < low and y[q] < y[q - 1] and y[q] < y[q + 1]:
+                return True
     return False
 
 
@@ -229,7 +228,7 @@ def over_arc(
     last = arc[FIRST] + arc[DELTA]
     arc[SIN_FIRST], arc[COS_FIRST] = math.sin(arc[FIRST]), math.cos(arc[FIRST])
     arc[SIN_LAST], arc[COS_LAST] = math.sin(last), math.cos(last)
-    settled = False
+    settled, kinked = np.zeros(MEASURES, np.bool_), np.zeros(MEASURES, np.bool_)
     for level in range(LEVELS):
         count = 2 * REACH + 1 if level == 0 else REACH * 2**level
         scale *= 0.5
@@ -251,14 +250,19 @@ def over_arc(
                         samples[b, measure, at] = value
                         places[at] = place(distance[q])
         first += count
-        settled = level >= SAMPLED - 1
+        settled[:] = level >= SAMPLED - 1
         for n in range(SUMS):
-            settled = settled and abs(new[n] / scale - old[n]) <= TOLERANCE * new[n] / scale
+            close = abs(new[n] / scale - old[n]) <= TOLERANCE * new[n] / scale
+            settled[n // 2] = settled[n // 2] and close
             old[n] = new[n] / scale
-        if settled or (level == SAMPLED - 1 and dips(samples, branches, old)):
+        if level == SAMPLED - 1:
+            for measure in range(MEASURES):
+                kinked[measure] = dips(samples, measure, branches, old)
+        if level >= SAMPLED - 1 and (settled | kinked).all():
             break
-    if not settled or dips(samples, branches, old):
-        halved(k, arc, branches, rotators, old.copy(), old, table)
+    for measure in range(MEASURES):
+        if kinked[measure] or not settled[measure]:
+            halved(k, arc, branches, measure, rotators, old, table)
     for measure in range(MEASURES):
         for power in range(2):
             sums[measure, power] += abs(arc[DELTA]) / branches * old[2 * measure + power]

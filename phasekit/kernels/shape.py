@@ -269,7 +269,7 @@ def swing(w: Array) -> None:
     # |z1 - z2| |z3 - z4| = 2 |x1 - x2|/|E|.
     apart = 4.0 * product - others * others
     other_disc = 4.0 * rest_r - tau * tau
-    if disc < 0.3 * tau and apart > 0.0 and other_disc > 0.0:
+    if place == AROUND and disc < 0.3 * tau and apart > 0.1 * product and other_disc > 0.0:
         disc = 2.0 * np.sqrt(apart) / (abs(e) * np.sqrt(other_disc))
     # The zero without cancellation first.
     big = 0.5 * (sum_ + disc) if sum_ >= 0.0 else 0.5 * (sum_ - disc)
@@ -299,7 +299,7 @@ def swing(w: Array) -> None:
     w[HIGH] = w[PHI_S] + o_high
     w[SIGMA] = w[PHI_S] + 0.5 * (o_low + o_high)
     w[SIGMA_LOW] = 0.0
-    if e < 0.0 and place == AROUND:  # opposite to the reference, all but exactly
+    if e < 0.0 and place == AROUND and z_big > 0.0:  # opposite to the reference, all but exactly
         shift = 0.5 * o_low - angle_half(1.0, -z_small)
         w[SIGMA], rest = two_sum(w[PHI_S], 0.5 * TWO_PI)
         w[SIGMA], rest = dd_add(w[SIGMA], rest, shift, 0.5 * TWO_PI_LOW + w[PHI_S_LOW])
