@@ -15,7 +15,11 @@ import numpy as np
 from phasekit.kernels.compile import Array, inline, routine
 from phasekit.kernels.double_double import TWO_PI
 from phasekit.kernels.gauss import STEPS
-from phasekit.kernels.levels import GAP, MODE, PHI, SWING, A
+from phasekit.kernels.levels import (
+    GAP,
+    MODE,
+    SWING,
+)
 from phasekit.kernels.shape import (
     HIGH,
     LEVELS,
@@ -27,6 +31,10 @@ from phasekit.kernels.shape import (
     SKEW,
     SLOPE,
     U,
+)
+from phasekit.kernels.system import (
+    PHI,
+    A,
 )
 
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.

@@ -18,7 +18,6 @@ from phasekit.kernels.equilibria import LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.levels import (
     ANGLE,
     AROUND,
-    CURVATURE,
     DIRECTION,
     FREE,
     FREE_FROM,
@@ -26,7 +25,6 @@ from phasekit.kernels.levels import (
     HARMONIC,
     INVALID,
     MODE,
-    PHI,
     PLACE,
     RATE,
     REFERENCE,
@@ -34,11 +32,7 @@ from phasekit.kernels.levels import (
     SINGLE,
     SWING,
     TURN,
-    UNIT,
-    A,
     classify_level,
-    energy_between,
-    multiplier,
     well,
 )
 from phasekit.kernels.motion import phase_at
@@ -56,6 +50,14 @@ from phasekit.kernels.shape import (
     N,
     locate,
     shape,
+)
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
+    UNIT,
+    A,
+    energy_between,
+    multiplier,
 )
 
 NOT_COMPUTED = int(OrbitFamily.NOT_COMPUTED)
@@ -206,6 +208,8 @@ def find_action(code: int, action: float, w: Array) -> None:
         else:
             upper = gap
         new = gap - step
+        if action < 0.5 * found:  # far: the action grows like a power of the gap
+            new = gap * math.exp(found * w[OMEGA] / gap * math.log(max(action, 1e-300) / found))
         # Newton squares the error, but next to a separatrix only that against the distance to it.
         close = abs(step) <= max(1e-8 * min(gap, top - gap), 4e-16 * gap)
         if not (lower < new < upper):

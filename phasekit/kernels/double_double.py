@@ -96,6 +96,15 @@ def dd_multiply(ah: float, al: float, bh: float, bl: float) -> tuple[float, floa
 
 
 @inline
+def dd_divide(ah: float, al: float, bh: float, bl: float) -> tuple[float, float]:
+    """Quotient of two double-doubles, the second not 0; relative error 2^-100 or so."""
+    q = ah / bh
+    ph, pl = dd_multiply(bh, bl, q, 0.0)
+    rh, rl = dd_add(ah, al, -ph, -pl)
+    return two_sum(q, (rh + rl) / bh)
+
+
+@inline
 def dd_sqrt(h: float, low: float) -> tuple[float, float]:
     """Square root of a double-double > 0; relative error 2^-103 or so; 0 gives 0."""
     s = np.sqrt(h)
@@ -124,11 +133,14 @@ def reduce_angle(h: float, low: float) -> tuple[float, float, float]:
 
 
 @routine
-def dd_cos_sin(phi: float) -> tuple[float, float, float, float]:
-    """Cosine and sine of a double as double-doubles, absolute error 1e-31 below 1e8."""
+def dd_cos_sin(phi: float, low: float = 0.0) -> tuple[float, float, float, float]:
+    """Cosine and sine of a double-double as double-doubles, absolute error 1e-31 below 1e8.
+
+    The sine of a small angle has a relative error of that size.
+    """
     if not abs(phi) < LARGEST_ANGLE:
         return np.float64(math.cos(phi)), 0.0, np.float64(math.sin(phi)), 0.0
-    ah, al, _ = reduce_angle(phi, 0.0)
+    ah, al, _ = reduce_angle(phi, low)
     # The nearest multiple of pi/32, and what remains.
     steps = np.rint(ah * (64.0 / TWO_PI))
     p, e = two_product(steps, TWO_PI / 64.0)

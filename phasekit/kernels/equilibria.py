@@ -166,6 +166,13 @@ def place(j: int, i: int, w: Array) -> None:
     phi = (PI - phi) + PI_LOW if side < 0.0 else phi
     x = side * cosine
     energy = (0.5 * a0 * x - b0) * x - c0 * (half * sine)
+    # Twins are level to the last bit.
+    saddle = j == LOWER_SADDLE or j == UPPER_SADDLE
+    upright = saddle != swapped
+    twins = w[COUNT + i] == 4.0 and (b0 if upright else c0) == 0.0
+    share = (c0 if upright else b0) / a0
+    level = 0.5 * a0 + 0.5 * c0 * share if upright else -0.5 * b0 * share
+    energy = level if twins else energy
     present = w[KIND + p] != ABSENT
     w[PHI + p] = half * phi + 0.0 if present else math.nan
     w[ENERGY + p] = energy if present else math.nan

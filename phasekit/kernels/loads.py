@@ -13,19 +13,29 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Loop
-from phasekit.kernels.compile import Array, Outputs, inline, kernel, routine
-from phasekit.kernels.machine import (
-    ALONG,
-    OMEGA,
-    SPAN,
-    WEIGHT,
-    A,
-    B,
-    C,
-    Index,
-    acceleration,
-    pair,
+from phasekit.kernels.arcs import (
+    ARC,
+    AT_FIRST,
+    AT_LAST,
+    BEYOND,
+    COS_FIRST,
+    COS_LAST,
+    DELTA,
+    FIRST,
+    MEASURES,
+    SIGN,
+    SIN_FIRST,
+    SIN_LAST,
+    STEEP,
+    SUMS,
+    WINDS,
+    halved,
+    measures,
+    square_speed_from_saddle,
+    state,
 )
+from phasekit.kernels.compile import Array, Outputs, inline, kernel, routine
+from phasekit.kernels.machine import OMEGA, A, B, C, Index, acceleration
 
 Codes = npt.NDArray[np.int8]
 
@@ -44,14 +54,8 @@ CANDIDATES = 5  # highest samples that are refined to peaks
 WORTH = 0.8  # of the highest peak so far: lower samples are not refined
 REFINEMENTS = 24
 APART = 0.02  # of the arc: nearer local maxima are one
-BRANCHES, MEASURES = 2, 2
-
-# Rows of the description of an arc.
-FIRST, DELTA, SIGN, WINDS = 0, 1, 2, 3  # angle, signed length, sign of phi', whether it winds
-BEYOND, STEEP = 4, 5  # if not: what `square_speed_between` needs;
-AT_FIRST, AT_LAST = 6, 7  # if so: phi'^2 at the ends, which are saddles,
-SIN_FIRST, COS_FIRST, SIN_LAST, COS_LAST = 8, 9, 10, 11  # sines and cosines there
-ARC = 12
+BRANCHES = 2
+DIP = 0.3  # of the mean: what falls lower almost has a kink
 
 
 def _nodes() -> tuple[Array, Array]:
@@ -74,53 +78,6 @@ def _nodes() -> tuple[Array, Array]:
 DISTANCE, WEIGHTS = _nodes()
 
 
-@inline
-def square_speed_from_saddle(x: float, s: float, c: float, a: float, b: float, cc: float) -> float:
-    """phi'^2 at the offset x from a saddle with sine s and cosine c, on its separatrix.
-
-    V' = 0 at the saddle is used, so that it vanishes there with all its digits.
-    """
-    sin1, cos1 = math.sin(0.25 * x), math.cos(0.25 * x)
-    sin2, cos2 = 2.0 * sin1 * cos1, (cos1 - sin1) * (cos1 + sin1)
-    sin3, cos3 = sin2 * cos1 + cos2 * sin1, cos2 * cos1 - sin2 * sin1
-    double_s, double_c = 2.0 * s * c, (c - s) * (c + s)
-    slope = 2.0 * sin1 * (b * (c * cos1 - s * sin1) + cc * (s * cos1 + c * sin1))
-    slope -= 0.5 * a * sin3 * (double_c * cos3 - double_s * sin3)
-    slope -= 0.5 * a * sin1 * (double_c * cos1 - double_s * sin1)
-    return -4.0 * sin2 * slope
-
-
-@inline
-def square_speed_between(x: float, rest: float, beyond: float, k: float) -> float:
-    """phi'^2 at the offset x from a saddle, on the way to where it turns or to a partner saddle.
-
-    That end lies ``rest`` further on, the turning point on the other side of the saddle (the
-    partner again) ``beyond`` further on; k is -V'' of the saddle over the
-    product of the sines of half their offsets.
-    """
-    rise = math.sin(0.5 * x)
-    fall = math.sin(0.5 * rest) * math.sin(0.5 * beyond)
-    return 4.0 * k * rise * rise * fall
-
-
-@inline
-def measures(
-    k: int, s: float, c: float, dphi: float, ddphi: float, rotators: bool, table: Array
-) -> tuple[float, float]:
-    """Forces at A2 and B2, or intensities of R022 and R012."""
-    if rotators:
-        q = dphi * dphi
-        return math.sqrt(ddphi * ddphi + q * q), 2.0 * abs(table[OMEGA, k] * dphi)
-    u, v, du, dv, axial = pair(k, s, c, dphi, ddphi, 0.0, table)
-    hold = 0.5 * table[WEIGHT, k]
-    u, v = u + hold * s, v + hold * c
-    hold *= table[ALONG, k] / table[SPAN, k]
-    du, dv = du + hold * s, dv + hold * c
-    at_a = math.sqrt((u + du) * (u + du) + (v + dv) * (v + dv) + axial * axial)
-    at_b = math.sqrt((u - du) * (u - du) + (v - dv) * (v - dv))
-    return at_a, at_b
-
-
 @kernel
 def at_states(
     table: Array,
@@ -138,27 +95,6 @@ def at_states(
         s, c = math.sin(phi[i]), math.cos(phi[i])
         ddphi = acceleration(k, s, c, 0.0, table)
         out[0][i, 0], out[0][i, 1] = measures(k, s, c, dphi[i], ddphi, rotators, table)
-
-
-@inline
-def state(k: int, arc: Array, distance: float, table: Array) -> tuple[float, float]:
-    """Angle and angular velocity at a distance, as a part of the arc, from the nearer end.
-
-    It is negative where the last end is the nearer one.
-    """
-    from_first = distance > 0.0
-    x = arc[DELTA] * distance
-    if arc[WINDS] != 0.0:
-        s = arc[SIN_FIRST] if from_first else arc[SIN_LAST]
-        c = arc[COS_FIRST] if from_first else arc[COS_LAST]
-        square = square_speed_from_saddle(x, s, c, table[A, k], table[B, k], table[C, k])
-        square += arc[AT_FIRST] if from_first else arc[AT_LAST]
-    else:
-        rest = arc[DELTA] - x if from_first else -x
-        along = x if from_first else arc[DELTA] + x
-        square = square_speed_between(along, rest, arc[BEYOND] + rest, arc[STEEP])
-    end = arc[FIRST] if from_first else arc[FIRST] + arc[DELTA]
-    return end + x, arc[SIGN] * math.sqrt(max(square, 0.0))
 
 
 @inline
@@ -257,6 +193,18 @@ def raise_peak(
 
 
 @routine
+def dips(samples: Array, measure: int, branches: int, sums: Array) -> bool:
+    """Whether a measure almost vanishes between the ends of an arc."""
+    low = DIP * sums[2 * measure] / branches
+    for b in range(branches):
+        y = samples[b, measure]
+        for q in range(1, SAMPLES - 1):
+            if y[q] < low and y[q] < y[q - 1] and y[q] < y[q + 1]:
+                return True
+    return False
+
+
+@routine
 def over_arc(
     k: int,
     arc: Array,
@@ -272,14 +220,15 @@ def over_arc(
 ) -> None:
     """Add an arc to a loop: raise its peaks, add to the sums over the angle.
 
-    Levels of nodes are added until the sums no longer change.
+    Levels of nodes are added until the sums no longer change, or it shows that they will not.
     """
     samples[:] = -1.0
-    old, new = np.zeros((MEASURES, 2)), np.zeros((MEASURES, 2))
+    old, new = np.zeros(SUMS), np.zeros(SUMS)
     first, scale = 0, 0.0
     last = arc[FIRST] + arc[DELTA]
     arc[SIN_FIRST], arc[COS_FIRST] = math.sin(arc[FIRST]), math.cos(arc[FIRST])
     arc[SIN_LAST], arc[COS_LAST] = math.sin(last), math.cos(last)
+    settled, kinked = np.zeros(MEASURES, np.bool_), np.zeros(MEASURES, np.bool_)
     for level in range(LEVELS):
         count = 2 * REACH + 1 if level == 0 else REACH * 2**level
         scale *= 0.5
@@ -293,24 +242,30 @@ def over_arc(
                 values = measures(k, s, c, -dphi if b == 1 else dphi, ddphi, rotators, table)
                 for measure in range(MEASURES):
                     value = values[0] if measure == 0 else values[1]
-                    new[measure, 0] += weight[q] * value
-                    new[measure, 1] += weight[q] * value * value
+                    new[2 * measure] += weight[q] * value
+                    new[2 * measure + 1] += weight[q] * value * value
                     if level < SAMPLED:
                         stride = 2 ** (SAMPLED - 1 - level)
                         at = (q if level == 0 else 2 * (q - first) + 1) * stride
                         samples[b, measure, at] = value
                         places[at] = place(distance[q])
         first += count
-        settled = level >= SAMPLED - 1
-        for measure in range(MEASURES):
-            for power in range(2):
-                change = abs(new[measure, power] / scale - old[measure, power])
-                old[measure, power] = new[measure, power] / scale
-                settled = settled and change <= TOLERANCE * old[measure, power]
-        if settled:
+        settled[:] = level >= SAMPLED - 1
+        for n in range(SUMS):
+            close = abs(new[n] / scale - old[n]) <= TOLERANCE * new[n] / scale
+            settled[n // 2] = settled[n // 2] and close
+            old[n] = new[n] / scale
+        if level == SAMPLED - 1:
+            for measure in range(MEASURES):
+                kinked[measure] = dips(samples, measure, branches, old)
+        if level >= SAMPLED - 1 and (settled | kinked).all():
             break
     for measure in range(MEASURES):
-        sums[measure] += abs(arc[DELTA]) / branches * old[measure]
+        if kinked[measure] or not settled[measure]:
+            halved(k, arc, branches, measure, rotators, old, table)
+    for measure in range(MEASURES):
+        for power in range(2):
+            sums[measure, power] += abs(arc[DELTA]) / branches * old[2 * measure + power]
         raise_peak(k, arc, measure, rotators, places, samples, best[measure], table)
 
 

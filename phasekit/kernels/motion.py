@@ -32,14 +32,12 @@ from phasekit.kernels.gauss import phase
 from phasekit.kernels.levels import (
     ANGLE,
     ASYMPTOTE,
-    CURVATURE,
     DIRECTION,
     FREE,
     GAP,
     HARMONIC,
     INVALID,
     MODE,
-    PHI,
     RATE,
     REFERENCE,
     REST,
@@ -47,26 +45,26 @@ from phasekit.kernels.levels import (
     SWING,
     TURN,
     TURNS,
-    UNIT,
-    A,
-    B,
-    C,
-    potential_dd,
 )
 from phasekit.kernels.shape import (
+    FIRST,
     LEVELS,
     MEANS,
     PHI_S,
+    PHI_S_LOW,
     RATIO,
     REST_R,
     S2,
+    SECOND,
     SIGMA,
+    SIGMA_LOW,
     SKEW,
     SLOPE,
     SPAN,
     TAU,
     X0,
     Y_PRODUCT,
+    Z_APART,
     Z_HIGH,
     Z_LOW,
     M,
@@ -76,14 +74,22 @@ from phasekit.kernels.shape import (
     locate,
     refer,
 )
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
+    UNIT,
+    A,
+    B,
+    C,
+)
 
 # Rows after those of an orbit: phase at the start and frequency (high and low parts), whole turns
 # from the local angle to the state's; coefficients of exp(kt) and exp(-kt) in z.
 PHASE, PHASE_LOW, OMEGA_HIGH, OMEGA_LOW, BASE, RISE, FALL = range(SIZE, SIZE + 7)
 MOTION_SIZE = SIZE + 7
 
-# Gaps to a saddle and products y1 y2 below these are known better than what follows from the energy
-# in double-double arithmetic.
+# Gaps to a saddle, squares of the lesser mean and products y1 y2 below these are known better than
+# what follows from the energy in double-double arithmetic.
 GAP_FROM = 1e-15
 PRODUCT_FROM = 3e-8
 # Beyond this phase a double does not say where on the orbit the motion is.
@@ -139,13 +145,29 @@ def frequency_dd(w: Array) -> tuple[float, float]:
 
 
 @inline
+def potential_dd(
+    a: float, b: float, c: float, ch: float, cl: float, sh: float, sl: float
+) -> tuple[float, float]:
+    """V = (a cos/2 - b) cos - c sin as a double-double."""
+    h, low = dd_multiply(ch, cl, 0.5 * a, 0.0)
+    h, low = dd_add(h, low, -b, 0.0)
+    h, low = dd_multiply(h, low, ch, cl)
+    th, tl = dd_multiply(sh, sl, c, 0.0)
+    return dd_add(h, low, -th, -tl)
+
+
+@inline
 def phase_at(angle: float, rate: float, w: Array) -> float:
     """Phase in [-pi, pi] of a libration or rotation at an angle, passed with this rate."""
-    half = 0.5 * (angle - w[SIGMA])
+    apart, _, _ = reduce_angle(angle - w[SIGMA], -w[SIGMA_LOW])
+    half = 0.5 * apart
     x = np.float64(math.cos(half))
     y = np.float64(math.sin(half))
     skew = w[SKEW]
     if w[MODE] == TURN:
+        half = 0.5 * (angle - w[SIGMA])
+        x = np.float64(math.cos(half))
+        y = np.float64(math.sin(half))
         near = w[U] * x - y
         reach = skew * (w[U] * x + y)
         far = w[U] * x + y + reach
@@ -158,7 +180,7 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         y = -y
     # Sines of half the angles to the turning points, but for a common factor: next to the
     # reference from the offset from it, which has more digits there.
-    half = 0.5 * (angle - w[PHI_S])
+    half = 0.5 * ((angle - w[PHI_S]) - w[PHI_S_LOW])
     c = np.float64(math.cos(half))
     s = np.float64(math.sin(half))
     if abs(s) > 0.05:
@@ -168,9 +190,17 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         size = w[U] * x + abs(y)
         square = 1.0 + w[U] * w[U]
     else:
-        high = abs(c - w[Z_HIGH] * s) / np.sqrt(1.0 + w[Z_HIGH] * w[Z_HIGH])
-        low = abs(c - w[Z_LOW] * s) / np.sqrt(1.0 + w[Z_LOW] * w[Z_LOW])
+        to_high = np.sqrt(1.0 + w[Z_HIGH] * w[Z_HIGH])
+        to_low = np.sqrt(1.0 + w[Z_LOW] * w[Z_LOW])
+        high = abs(c - w[Z_HIGH] * s) / to_high
+        low = abs(c - w[Z_LOW] * s) / to_low
         cosine = w[RATIO] * low - high
+        if w[GAP] > 0.0 and skew < 0.5:  # where the reference is amid the orbit that cancels
+            tilt = w[Z_APART] * w[TAU] / (to_low * to_high)
+            shift = w[Z_LOW] / to_low - w[Z_HIGH] / to_high
+            if w[Z_LOW] * w[Z_HIGH] > 0.0:
+                shift = -tilt / (w[Z_LOW] * to_high + w[Z_HIGH] * to_low)
+            cosine = c * tilt / (to_low + to_high) - s * shift - skew * low
         size = 1.0
         square = 1.0
     # Close to a turning point the rate knows the distance better, through the other factor.
@@ -178,7 +208,7 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
     tilt = w[TAU] * s * c
     rest = c * c + tilt + r * s * s
     slack = c * c + abs(tilt) + abs(r) * s * s + abs(w[TAU] * c) + 2.0 * abs(r * s)
-    if min(high, low) * slack < abs(rest) * size:
+    if min(high, low) * slack < 0.25 * abs(rest) * size:
         common = square * rate * rate / (2.0 * abs(w[GAP] * w[SPAN] * rest))
         if high < low:
             high = common / low
@@ -219,7 +249,9 @@ def begin(w: Array) -> None:
             w[BASE] -= turns
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
         w[OMEGA_LOW] = 0.0
-        if w[Y_PRODUCT] > PRODUCT_FROM and (abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0):
+        apart = min(w[FIRST], w[SECOND])
+        known = apart * apart > GAP_FROM and (abs(w[GAP]) > GAP_FROM or w[SLOPE] > 0.0)
+        if known and w[Y_PRODUCT] > PRODUCT_FROM:
             w[OMEGA_HIGH], w[OMEGA_LOW] = frequency_dd(w)
     elif mode == HARMONIC:
         j = int(w[REFERENCE])

@@ -12,12 +12,10 @@ from phasekit.kernels.double_double import TWO_PI
 from phasekit.kernels.levels import (
     ANGLE,
     ASYMPTOTE,
-    CURVATURE,
     FREE,
     GAP,
     HARMONIC,
     MODE,
-    PHI,
     RATE,
     REFERENCE,
     REST,
@@ -25,10 +23,6 @@ from phasekit.kernels.levels import (
     SWING,
     TURN,
     TURNS,
-    UNIT,
-    A,
-    B,
-    C,
 )
 from phasekit.kernels.shape import (
     ACTION,
@@ -47,6 +41,14 @@ from phasekit.kernels.shape import (
     N,
     P,
     shape,
+)
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
+    UNIT,
+    A,
+    B,
+    C,
 )
 
 __all__ = ["ACTION", "OMEGA", "PHI_MAX", "PHI_MIN", "SIZE", "finish", "shape"]

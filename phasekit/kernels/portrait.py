@@ -15,6 +15,7 @@ from phasekit.kernels import equilibria as eq
 from phasekit.kernels import levels as lv
 from phasekit.kernels import motion as mo
 from phasekit.kernels import orbits as ob
+from phasekit.kernels import system as sy
 from phasekit.kernels.compile import Array, Outputs, inline, kernel
 from phasekit.kernels.double_double import TWO_PI
 
@@ -26,9 +27,9 @@ def load_system(
     i: int, a: Array, b: Array, c: Array, phi: Array, curvature: Array, w: Array
 ) -> bool:
     """System i with its equilibria; whether it has a force."""
-    valid = lv.load(a[i], b[i], c[i], w)
+    valid = sy.load(a[i], b[i], c[i], w)
     for j in range(4):
-        lv.load_point(j, phi[i, j], curvature[i, j], w)
+        sy.load_point(j, phi[i, j], curvature[i, j], w)
     return valid
 
 
@@ -72,7 +73,7 @@ def orbits(
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, w[lv.ENERGY] / w[lv.UNIT] / w[lv.UNIT], w, out)
+        write_orbit(k, code, w[lv.ENERGY] / w[sy.UNIT] / w[sy.UNIT], w, out)
 
 
 @kernel
@@ -111,7 +112,7 @@ def levels(
             j = eq.LOWER_CENTER if point[k] == 0.0 else eq.UPPER_CENTER
             center = j
             gap = level[k] - energy[i, j]
-            slack = 4.0 * lv.ROUNDING * (abs(level[k]) + abs(energy[i, j]))
+            slack = 4.0 * sy.ROUNDING * (abs(level[k]) + abs(energy[i, j]))
         present = valid and phi[i, j] == phi[i, j]
         if gaps and j == eq.LOWER_SADDLE and curvature[i, j] == 0.0:
             present = False  # a fold's pair is no saddle
@@ -120,6 +121,27 @@ def levels(
         ob.finish(w)
         value = gap + energy[i, j] if code != lv.NOT_COMPUTED else math.nan
         write_orbit(k, code, value, w, out)
+
+
+@kernel
+def rises(
+    a: Array, b: Array, c: Array, phi: Array, curvature: Array, start: int, stop: int, out: Outputs
+) -> None:
+    """Energies: depths of the lower and the upper well, from saddle to saddle, from end to end."""
+    w = np.zeros(ob.SIZE)
+    for i in range(start, stop):
+        out[0][i] = math.nan
+        if load_system(i, a, b, c, phi, curvature, w):
+            double = phi[i, eq.LOWER_SADDLE] == phi[i, eq.LOWER_SADDLE]
+            double = double and curvature[i, eq.LOWER_SADDLE] < 0.0  # a fold's pair is no saddle
+            rim = eq.LOWER_SADDLE if double else eq.UPPER_SADDLE
+            unit = w[sy.UNIT]
+            whole = sy.energy_between(eq.LOWER_CENTER, eq.UPPER_SADDLE, w) / unit / unit
+            out[0][i, 0] = sy.energy_between(eq.LOWER_CENTER, rim, w) / unit / unit
+            if double:
+                out[0][i, 1] = sy.energy_between(eq.UPPER_CENTER, rim, w) / unit / unit
+                out[0][i, 2] = sy.energy_between(rim, eq.UPPER_SADDLE, w) / unit / unit
+            out[0][i, 3] = whole
 
 
 @kernel
@@ -188,7 +210,7 @@ def action_angle(
         code = lv.classify(phi0[k], dphi0[k], valid, w)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, w[lv.ENERGY] / w[lv.UNIT] / w[lv.UNIT], w, out)
+        write_orbit(k, code, w[lv.ENERGY] / w[sy.UNIT] / w[sy.UNIT], w, out)
         family[k] = aa.family(w)
         angle[k] = aa.angle(w)
         twist[k] = aa.twist(w)
@@ -221,7 +243,7 @@ def state_of(
             valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
         w[lv.MODE] = lv.INVALID
-        if (valid or w[lv.A] == 0.0) and family[k] == family[k]:
+        if (valid or w[sy.A] == 0.0) and family[k] == family[k]:
             aa.find_action(int(family[k]), action[k], w)
         state_phi[k], state_dphi[k] = aa.state_at(angle[k], w)
 

@@ -30,24 +30,27 @@ import math
 import numpy as np
 
 from phasekit.kernels.compile import Array, inline, routine
-from phasekit.kernels.double_double import TWO_PI
+from phasekit.kernels.double_double import TWO_PI, TWO_PI_LOW, dd_add, two_sum
 from phasekit.kernels.elementary import angle_half
 from phasekit.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.gauss import STEPS, amplitude, halve
 from phasekit.kernels.levels import (
     AROUND,
     ASYMPTOTE,
-    CURVATURE,
     GAP,
     LEFT,
     MODE,
     ORBIT,
-    PHI,
     PLACE,
     REFERENCE,
     RIGHT,
     SWING,
     TURN,
+)
+from phasekit.kernels.system import (
+    CURVATURE,
+    PHI,
+    PHI_LOW,
     A,
     B,
     C,
@@ -61,12 +64,14 @@ from phasekit.kernels.levels import (
 # 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the factors of a libration: sum
 # of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of its own, and its zeros at
 # both turning points. The number of Gauss steps. What `phasekit.kernels.orbits` makes of all
-# that. Last, the means of the Gauss steps, and room for the nodes of `action`.
+# that. What the reference's angle misses, Z_HIGH - Z_LOW,
+# and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
 FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 10, ORBIT + 18)
 TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 18, ORBIT + 24)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 24, ORBIT + 28)
-MEANS = ORBIT + 28
+PHI_S_LOW, Z_APART, SIGMA_LOW = range(ORBIT + 28, ORBIT + 31)
+MEANS = ORBIT + 31
 NODES = MEANS + 2 * STEPS
 
 
@@ -80,6 +85,7 @@ def refer(w: Array) -> None:
     w[M] = w[row + 2]
     w[N] = w[row + 3]
     w[PHI_S] = w[PHI + j]
+    w[PHI_S_LOW] = w[PHI_LOW + j] if w[PHI_LOW + j] == w[PHI_LOW + j] else 0.0
     w[COS] = x
     w[SIN] = y
     w[SLOPE] = w[CURVATURE + j]
@@ -259,6 +265,12 @@ def swing(w: Array) -> None:
     own = r2 if second else r1
     rest_r = r1 if second else r2
     disc = np.sqrt(max(tau * tau - 4.0 * own, 0.0))
+    # Next to a level saddle that cancels; there it is known from the other two zeros and roots,
+    # |z1 - z2| |z3 - z4| = 2 |x1 - x2|/|E|.
+    apart = 4.0 * product - others * others
+    other_disc = 4.0 * rest_r - tau * tau
+    if place == AROUND and disc < 0.3 * tau and apart > 0.1 * product and other_disc > 0.0:
+        disc = 2.0 * np.sqrt(apart) / (abs(e) * np.sqrt(other_disc))
     # The zero without cancellation first.
     big = 0.5 * (sum_ + disc) if sum_ >= 0.0 else 0.5 * (sum_ - disc)
     small = own / big if big != 0.0 else 0.0
@@ -272,25 +284,37 @@ def swing(w: Array) -> None:
         w[U] = tan_half(disc, -(1.0 + own))
         z_high = z_big
         z_low = z_small
+        way = disc
     else:
         o_high = o_second
         o_low = o_first
+        if z_big < 0.0:  # on the left of the reference
+            o_high = -2.0 * angle_half(1.0, -z_small)
+            o_low = -2.0 * angle_half(1.0, -z_big)
         w[U] = tan_half(disc, 1.0 + own)
         z_high = z_small
         z_low = z_big
+        way = -disc
     w[LOW] = w[PHI_S] + o_low
     w[HIGH] = w[PHI_S] + o_high
     w[SIGMA] = w[PHI_S] + 0.5 * (o_low + o_high)
+    w[SIGMA_LOW] = 0.0
+    if e < 0.0 and place == AROUND and z_big > 0.0:  # opposite to the reference, all but exactly
+        shift = 0.5 * o_low - angle_half(1.0, -z_small)
+        w[SIGMA], rest = two_sum(w[PHI_S], 0.5 * TWO_PI)
+        w[SIGMA], rest = dd_add(w[SIGMA], rest, shift, 0.5 * TWO_PI_LOW + w[PHI_S_LOW])
+        w[SIGMA_LOW] = rest
     # V' at both turning points, but for a common factor.
     force_high = e + x / (1.0 + z_high * z_high)
     force_low = e + x / (1.0 + z_low * z_low)
     w[RATIO] = np.sqrt(force_high / force_low)
     w[SPAN] = np.sqrt(disc * disc + (1.0 + own) * (1.0 + own))
-    difference = x * (z_high - z_low) * sum_ / (w[SPAN] * w[SPAN])
+    difference = x * way * sum_ / (w[SPAN] * w[SPAN])
     w[SKEW] = difference / (force_low * (1.0 + w[RATIO]))
     w[TAU] = sum_
     w[Z_HIGH] = z_high
     w[Z_LOW] = z_low
+    w[Z_APART] = way
     w[REST_R] = rest_r
 
 

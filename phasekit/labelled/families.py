@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import EquilibriumKind, ParameterError
+from phasekit.errors import EquilibriumKind, ParameterError, Topology
 from phasekit.labelled.arguments import FloatArray, number, whole
 from phasekit.labelled.as_system import as_system
 from phasekit.labelled.quantities import ROWS, Pass
 from phasekit.labelled.states import at_states
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.phase.equilibria import equilibria
-from phasekit.phase.orbits import orbits_at_gap
+from phasekit.phase.orbits import energy_rises, orbits_at_gap
+from phasekit.phase.separatrices import phase_space
 
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
 CLUSTER = 4
@@ -95,23 +95,17 @@ def families(
     energy_max: float | None, A: FloatArray, B: FloatArray, C: FloatArray, level: FloatArray
 ) -> Families:
     """Orbits at levels between 0 and 1 of the families lower_well, upper_well, outer, rotation."""
-    points = equilibria(A, B, C)
-    lower, low, upper, high = np.moveaxis(points.energy, -1, 0)  # center, saddle, center, saddle
-    low = np.where(points.kind[..., 1] == EquilibriumKind.SADDLE, low, np.nan)  # but for a fold
-    inner = np.where(np.isnan(low), high, low)  # where the wells end
-    rise = (inner - lower, inner - upper)
-    top = 2.0 * high - lower if energy_max is None else energy_max
+    points, loops = phase_space(A, B, C)
+    _, low, _, high = np.moveaxis(points.energy, -1, 0)  # center, saddle, center, saddle
+    *rise, step, whole = np.moveaxis(energy_rises(A, B, C), -1, 0)
+    above = whole if energy_max is None else energy_max - high
     up, down = level**CLUSTER, (1.0 - level) ** CLUSTER
     near, far = 2.0 ** (CLUSTER - 1) * up, 2.0 ** (CLUSTER - 1) * down
     under = level < 0.5  # of an outer orbit: nearer to the lower saddle
-    gaps = (
-        -rise[0] * down,
-        -rise[1] * down,
-        (high - low) * np.where(under, near, -far),
-        (top - high) * up,
-    )
-    present = (rise[0] > 0.0, rise[1] > 0.0, high > low, top > high)
-    first = np.where(np.isnan(low), 1, 0)  # the saddle where the wells end
+    gaps = (-rise[0] * down, -rise[1] * down, step * np.where(under, near, -far), above * up)
+    eight = loops.topology == Topology.FIGURE_EIGHT
+    present = (rise[0] > 0.0, rise[1] > 0.0, eight & (step > 0.0), above > 0.0)
+    first = np.where(points.kind[..., 1] == EquilibriumKind.SADDLE, 0, 1)  # where the wells end
     saddles = (first, first, np.where(under, 0, 1), 1)
     # To the right of the lower saddle: the center that comes before the upper saddle.
     way = (points.phi - points.phi[..., 1:2]) % (2.0 * np.pi)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from phasekit.kernels.launch import launch
 from phasekit.mechanics.bearings import BearingForces, bearing_forces
 from phasekit.mechanics.machine import machine_table
 from phasekit.mechanics.rotators import ROTATORS, rotators
-from phasekit.phase.flow import flow
+from phasekit.phase import orbit_means
 from phasekit.phase.orbits import Orbits, orbits
 
 Array = npt.NDArray[np.float64]
@@ -85,7 +86,8 @@ def separatrix_forces(
 
     Mean and rms are over the angle: over time both are the saddle's, where the motion rests for
     ever. A lobe counts there and back, as does an arc between two saddles; of a winding
-    separatrix the side is the direction.
+    separatrix the side is the direction. Mean and rms are NaN where their quadrature does not
+    converge.
 
     Parameters
     ----------
@@ -182,7 +184,8 @@ def orbit_forces(
 ) -> Loads:
     """Bearing forces over one round of the orbits through states, axes (..., 2 bearings).
 
-    Mean and rms are over time. On a separatrix, where a round takes for ever, all are NaN.
+    Mean and rms are over time; NaN where their quadrature does not converge. On a separatrix,
+    where a round takes for ever, all are NaN.
 
     Parameters
     ----------
@@ -252,6 +255,11 @@ def _over_orbits(
         for array, values in zip(out, loads, strict=True):
             array[cells] = values
         power[here] += 2
+        for cell in cells[~settled & (power[here] > ENOUGH)]:
+            means = orbit_means.halved(
+                columns[:, cell], start[:, cell], period[cell], of_rotators, threads
+            )
+            out.mean[cell], out.rms[cell] = means
         done = here[settled | (power[here] > ENOUGH)]
         waiting, power = np.delete(waiting, done), np.delete(power, done)
     if of_rotators:
@@ -267,18 +275,7 @@ def _sampled(
     The mean of a smooth periodic function converges exponentially; that of a force that almost
     vanishes somewhere is less smooth.
     """
-    table = np.ascontiguousarray(table)
-    a, b, c = table[[machine.A, machine.B, machine.C]][..., None]
-    phi0, dphi0 = start[..., None]
-
-    def measured(t: Array) -> tuple[Array, Array, Array]:
-        phi, dphi = flow(a, b, c, phi0, dphi0, t, threads=threads)
-        index = np.repeat(np.arange(table.shape[1]), t.shape[1])
-        out = np.empty((index.size, 2))
-        flat = (table, index, np.ravel(phi), np.ravel(dphi), of_rotators)
-        launch(kernels.at_states, flat, index.size, ((out,),), threads)
-        return out.reshape(*t.shape, 2), phi, dphi
-
+    measured = functools.partial(orbit_means.measured, table, start, of_rotators, threads)
     step = period[:, None] / count
     values = measured(step * np.arange(count))[0]
     mean = values.mean(axis=1)

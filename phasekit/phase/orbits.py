@@ -173,6 +173,32 @@ def orbits_at_gap(
     return _at_levels(A, B, C, gap, saddle, side, True, threads)
 
 
+def energy_rises(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
+    """Heights of the wells, each with its own digits, where their energies have lost them.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2; they broadcast.
+
+    Returns
+    -------
+    ndarray
+        Energies in 1/s^2 on a last axis of length 4: from the lower center, and from the upper
+        one, to the saddle where its well ends; from the lower saddle to the upper one, 0 between
+        equal saddles; from the lower center to the upper saddle. NaN where one is absent.
+
+    Examples
+    --------
+    >>> energy_rises(2.0, 1.0, 0.0).tolist()
+    [0.25, 0.25, 2.0, 2.25]
+    """
+    cells = systems(A, B, C, None)
+    out = (np.empty((cells.A.size, 4)),)
+    launch(kernels.rises, cells.arrays, cells.A.size, (out,), None)
+    return out[0].reshape(*cells.shape, 4)
+
+
 def _at_levels(
     A: npt.ArrayLike,
     B: npt.ArrayLike,

@@ -84,7 +84,7 @@ def period_energy(
     handles += _draw_centers(axes, bottom, periods)
 
     energies = families.energy_level
-    low = min(float(energies.min()), *bottom[np.isfinite(natural)])
+    low = min([float(energies.min()), *bottom[np.isfinite(natural)]])
     high = float(energies.max())
     axes.set_xlim(low - 0.04 * (high - low), high)
     # A family too narrow to be seen must not take the height.

@@ -6,6 +6,7 @@ doubles, means from Gauss-Legendre panels that shrink towards the ends.
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass
 from functools import cache
 
@@ -309,6 +310,77 @@ def test_loops(name, rotators):
                 assert (own[0][1], own[1][1], own[2][1]) == (0.0, 0.0, 0.0)
                 continue
         check(curve(DISKS[name], found, (i,), j, side), own, rotators, (name, j, side))
+    assert some > 0
+
+
+def mean_by_kinks(f, least: float, most: float) -> float:
+    """Mean of f over panels that crowd at its minima, where it all but has kinks."""
+    x = np.linspace(least, most, 801)
+    y = f(x)
+    low = np.flatnonzero((y[1:-1] < y[:-2]) & (y[1:-1] < y[2:])) + 1
+    ends = [least]
+    for first, last in ((x[i - 1], x[i + 1]) for i in low):
+        for _ in range(10):
+            grid = np.linspace(first, last, 33)
+            at = np.clip(f(grid).argmin(), 1, 31)
+            first, last = grid[at - 1], grid[at + 1]
+        ends.append(0.5 * (first + last))
+    node, weight = np.polynomial.legendre.leggauss(16)
+    halves = 0.5 ** np.arange(1, 40)
+    edges = np.unique(np.concatenate([[0.0], halves, 1 - halves, [1.0], np.linspace(0, 1, 17)]))
+    wide = np.diff(edges)[:, None] / 2
+    part, share = (edges[:-1, None] + wide * (1 + node)).ravel(), (wide * weight).ravel()
+    total = 0.0
+    for first, last in itertools.pairwise([*ends, most]):
+        total += (last - first) * (share @ f(first + (last - first) * part))
+    return total / (most - least)
+
+
+# Of disks of `random_disks(24)`: loops where a force falls to a fiftieth of its mean, and less.
+KINKS = [(12, 0, 1), (4, 1, 1)]
+
+
+@pytest.mark.parametrize(("number", "j", "side"), KINKS)
+def test_means_where_a_force_almost_vanishes(number, j, side):
+    x = random_disks(24)[number]
+    found = separatrices(*abc(x))
+    got = loads.separatrix_forces(*x.values(), *places(found))
+    loop = curve(x, found, (), j, side)
+    some = 0
+    for k in range(2):
+        want, ways = 0.0, 0
+        for p, q in loop.pieces:
+            for way in range(2 if loop.back else 1):
+
+                def f(t, p=p, q=q, way=way, k=k):
+                    value = loop.values(p + (q - p) * np.sin(t) ** 2, False)[way, :, k]
+                    return value * np.sin(2 * t)
+
+                want += mean_by_kinks(f, 0.0, np.pi / 2) * np.pi / 2 * abs((q - p) / loop.delta)
+                ways += 1
+        want /= ways / len(loop.pieces)
+        least = loop.values(loop.crowded(2000), False)[:, :, k].min()
+        some += least < 0.05 * want
+        assert abs(got.mean[j, side, k] - want) <= 1e-11 * want
+    assert some > 0
+
+
+def test_means_over_an_orbit_where_a_force_almost_vanishes():
+    """Over time, between the kinks."""
+    some = 0
+    for number, phi0, dphi0 in ((12, 0.3, 0.0), (4, 1.0, 0.4), (12, 2.0, 0.7)):
+        x = random_disks(24)[number]
+        disk = Disk(**x)
+        period = float(orbits(*abc(x), phi0, dphi0).period)
+        got = loads.orbit_forces(*x.values(), phi0, dphi0)
+        for k in range(2):
+
+            def f(t, k=k, x=x, disk=disk, phi0=phi0, dphi0=dphi0):
+                return disk.sizes(*flow(*abc(x), phi0, dphi0, t))[:, k]
+
+            want = mean_by_kinks(f, 0.0, period)
+            some += f(np.linspace(0, period, 4000)).min() < 0.05 * want
+            assert abs(got.mean[k] - want) <= 1e-8 * want, (number, k)
     assert some > 0
 
 
