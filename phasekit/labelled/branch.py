@@ -14,7 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.locate import Special
+from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.path import Path, Sample, join
 from phasekit.bifurcation.continuation.specials import Placed, find
 from phasekit.bifurcation.continuation.start import go_on
@@ -93,8 +93,8 @@ class Branch:
         -------
         xarray.Dataset
             `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
-            parameter and state, ``special_residual``, ``special_status``, ``special_index`` (the
-            point of the curve), ``special_interval`` on (``special_point``, ``end``).
+            parameter and state, ``special_residual``, ``special_status``, ``special_corank``,
+            ``special_index`` (the point of the curve), ``special_interval`` on (``special_point``, ``end``).
         """
         ds = self.points
         dim = "special_point"
@@ -111,6 +111,7 @@ class Branch:
         for name in (*self.free, *self.problem_state):
             ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
         ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
+        ds["special_corank"] = (dim, np.array([s.corank for s in specials], dtype=np.int64))
         ds["special_index"] = (dim, np.array([s.index for s in specials], dtype=np.int64))
         ds["special_interval"] = (
             (dim, "end"),

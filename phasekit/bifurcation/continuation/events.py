@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.path import Path, Sample, between
 from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, test_functions
 
 DEPTH = 10
+ON_END = 1e-7  # part of its neighbour's value at which a test function of an end is zero
 TESTS = ("fold", "branch", "pair")
 
 
@@ -20,13 +21,13 @@ TESTS = ("fold", "branch", "pair")
 class Bracket:
     """Two points of the path between which test functions change sign.
 
-    ``crossing`` counts eigenvalues that cross between them beyond what the changes explain.
+    ``jump`` is by how much the number of unstable eigenvalues changes between them.
     """
 
     a: Sample
     b: Sample
     changes: frozenset[str]
-    crossing: int
+    jump: int
     index: int = 0  # of the path's point before it
 
 
@@ -37,9 +38,7 @@ def brackets(
     pairs = "hopf" in detect and curve.n > 1
     tests = test_functions(curve, path.tangent, path.slopes, pairs=pairs)
     if conservative or is_conservative(tests.eigenvalues):
-        tests = Tests(
-            tests.fold, tests.branch, np.ones(path.count), tests.unstable, tests.eigenvalues
-        )
+        tests = replace(tests, pair=np.ones(path.count))
         pairs = False
     eigenvalues = tests.eigenvalues
     keep = _regular(tests)
@@ -51,14 +50,36 @@ def brackets(
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
         for bracket in seek.explore(a, b, DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
+    if not path.closed and len(keep) > 1:
+        found += _on_ends(path, keep, tests, found)
     return found, eigenvalues
+
+
+def _on_ends(
+    path: Path, keep: npt.NDArray[np.int64], tests: Tests, found: list[Bracket]
+) -> list[Bracket]:
+    """Brackets where the path ends on a special point, whatever signs rounding gives there."""
+    more = []
+    for i, (end, beside) in ((0, (0, 1)), (len(keep) - 2, (-1, -2))):
+        changes = set()
+        if tests.volume[end] < tests.volume[beside] + np.log(ON_END):
+            changes.add("branch")
+        for name in ("fold", "pair"):
+            values = np.abs(getattr(tests, name))
+            if values[end] < ON_END * values[beside]:
+                changes.add(name)
+        known = {n for one in found if one.index == keep[i] for n in one.changes}
+        if changes - known:
+            a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
+            more.append(Bracket(a, b, frozenset(changes - known), 0, int(keep[i])))
+    return more
 
 
 def _regular(tests: Tests) -> npt.NDArray[np.int64]:
     """Points that are no branch points themselves, where signs are those of rounding errors."""
-    size = np.abs(tests.branch)
-    around = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
-    regular = size > 1e-7 * around
+    size = tests.volume
+    around = np.maximum(np.append(size[1:], -np.inf), np.insert(size[:-1], 0, -np.inf))
+    regular = size > around + np.log(1e-7)
     regular[[0, -1]] = True
     return np.flatnonzero(regular | (len(size) < 3))
 
@@ -75,10 +96,9 @@ class _Seek:
         for name in TESTS:
             sign = signs[name]
             marked.update(np.flatnonzero(sign[1:] != sign[:-1]).tolist())
-            value = np.abs(getattr(tests, name))
             if count < 3:
                 continue
-            left, middle, right = value[:-2], value[1:-1], value[2:]
+            left, middle, right = self.sizes(tests, name)
             dip = (middle <= left) & (middle <= right) & (sign[:-2] == sign[2:])
             # The parabola through three points: what is left of the value at its lowest point.
             bend = left - 2.0 * middle + right
@@ -91,6 +111,15 @@ class _Seek:
             marked.update(np.flatnonzero(np.diff(tests.unstable) != 0).tolist())
         return sorted(marked)
 
+    @staticmethod
+    def sizes(tests: Tests, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sizes of a test function at three points in a row, in units that may differ by triple."""
+        value = tests.volume if name == "branch" else np.abs(getattr(tests, name))
+        three = np.stack([value[:-2], value[1:-1], value[2:]])
+        if name == "branch":
+            three = np.exp(three - np.max(three, axis=0))
+        return three[0], three[1], three[2]
+
     def tests(self, sample: Sample) -> Tests:
         key = id(sample)
         if key not in self.seen:
@@ -98,8 +127,15 @@ class _Seek:
             self.seen[key] = (sample, tests)
         return self.seen[key][1]
 
-    def value(self, name: str) -> Callable[[Sample], float]:
-        return lambda sample: float(getattr(self.tests(sample), name))
+    def value(self, name: str, unit: float) -> Callable[[Sample], float]:
+        """A test function of samples; that of branch points in units of exp(unit)."""
+
+        def of(sample: Sample) -> float:
+            tests = self.tests(sample)
+            size = float(np.exp(min(tests.volume - unit, 50.0))) if name == "branch" else 1.0
+            return size * float(getattr(tests, name))
+
+        return of
 
     def explore(self, a: Sample, b: Sample, depth: int, *, force: bool) -> Iterator[Bracket]:
         """Brackets between two points; the interval is halved where it holds more than one."""
@@ -117,7 +153,7 @@ class _Seek:
                 yield from self.explore(middle, b, depth - 1, force=False)
                 return
         if changes or jump:
-            yield Bracket(a, b, frozenset(changes), max(0, jump - explained))
+            yield Bracket(a, b, frozenset(changes), jump)
         elif force:
             split = self._dip(a, b)
             if split is not None:
@@ -129,7 +165,7 @@ class _Seek:
         for name in TESTS:
             if name == "pair" and not self.pairs:
                 continue
-            test = self.value(name)
+            test = self.value(name, float(self.tests(a).volume))
             sign = np.sign(test(a))
             low, high = 0.0, 1.0
             ratio = 0.5 * (np.sqrt(5.0) - 1.0)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
+from phasekit.bifurcation.continuation.units import force_sizes, row_sizes
 
 Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
@@ -102,21 +103,18 @@ def _trilinear(form: Any, a: Vector, b: Vector, c: Vector) -> Vector:
     return np.asarray(total)
 
 
-def row_sizes(matrix: Array) -> Array:
-    """Largest entries of the rows; 1 for rows that vanish."""
-    sizes = np.max(np.abs(matrix), axis=1)
-    return np.asarray(np.where(sizes > 1e-12 * np.max(sizes, initial=0.0), sizes, 1.0))
-
-
-def null_vectors(jacobian: Array, scale: Array) -> tuple[Array, Array]:
+def null_vectors(
+    jacobian: Array, scale: Array, rows: Array | None = None
+) -> tuple[Array, Array]:
     """Right and left null vector of f_x: |q| = 1, its largest entry positive, and p.q = 1.
 
-    Found with states in units of their scales, so that units do not matter. Where zero is a double
+    Found with states in units of their scales and f in those of ``rows``, so that units do not
+    matter; by default rows are of one size, but one may vanish with its eigenvalue. Where zero is a double
     eigenvalue, as always in conservative systems, p.q = 0: then p.q1 = 1 with f_x q1 = q, and
     normal forms are those of the second derivative by time.
     """
     scaled = jacobian * scale
-    rows = row_sizes(scaled)
+    rows = row_sizes(scaled) if rows is None else rows
     left, _, right = np.linalg.svd(scaled / rows[:, None])
     q, p = right[-1] * scale, left[:, -1] / rows
     q = q / np.linalg.norm(q)
@@ -143,7 +141,7 @@ def solve_off(jacobian: Array, right: Array, q: Array, p: Array) -> Array:
 def fold(d: Derivatives) -> dict[str, float]:
     """Xi' = b (p - p0) + a xi^2 on the center manifold."""
     n = d.curve.n
-    q, p = null_vectors(d.slopes[:, :n], d.curve.scale[:n])
+    q, p = null_vectors(d.slopes[:, :n], d.curve.scale[:n], force_sizes(d.curve, d.u))
     return {"a": float(0.5 * p @ d.second(q, q)), "b": float(p @ d.slopes[:, n])}
 
 
@@ -154,7 +152,7 @@ def branch_point(d: Derivatives, tangent: Array, *, pitchfork: bool) -> dict[str
     """
     n = d.curve.n
     jacobian = d.slopes[:, :n]
-    q, p = null_vectors(jacobian, d.curve.scale[:n])
+    q, p = null_vectors(jacobian, d.curve.scale[:n], force_sizes(d.curve, d.u))
     along = tangent[: n + 1] / tangent[n]
     forms = {"d": float(p @ d.second(q, along))}
     if not pitchfork:

@@ -10,8 +10,9 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.compare import turned
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
-from phasekit.bifurcation.continuation.locate import CONVERGED, Special, locate
+from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.kernels.defining import EQUILIBRIUM
 
@@ -62,7 +63,7 @@ def _find(
 
 def wanted(special: Special, detect: tuple[str, ...]) -> bool:
     """Whether a kind was asked for."""
-    group = {"fold": "fold", "hopf": "hopf", "neutral_saddle": "hopf"}
+    group = {"fold": "fold"} | dict.fromkeys(("hopf", "neutral_saddle", "bogdanov_takens"), "hopf")
     return group.get(special.kind, "branch_point") in detect
 
 

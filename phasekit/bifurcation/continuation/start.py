@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve, Track, nullspace
-from phasekit.bifurcation.continuation.locate import directions_at
+from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.errors import ConvergenceError
 
@@ -101,7 +101,7 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     if len(directions) == 1:
         t = directions[0]
     else:
-        found, _ = directions_at(curve, u)
+        found = directions_at(curve, u)
         t = max(found, key=lambda t: abs(t[n])) if found else directions[0]
     t = t / curve.length(t)
     lead = t[n] if abs(t[n]) > 1e-9 * curve.scale[n] else t[np.argmax(np.abs(t[:n]))]
