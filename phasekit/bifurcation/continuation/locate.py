@@ -172,7 +172,7 @@ def directions_at(curve: Curve, u: Array) -> tuple[list[Array], Array]:
     left, _, right = np.linalg.svd(scaled / rows[:, None])
     w = left[:, -1] / rows
     basis = right[n - 1 :] * curve.scale[:m]
-    c = np.array([[w @ d.second(a, b) for b in basis] for a in basis])
+    c = np.array([[w @ d.second(a, b).value for b in basis] for a in basis])
     size = np.max(np.abs(c))
     root = c[0, 1] ** 2 - c[0, 0] * c[1, 1]
     if not size > 0.0 or root <= 1e-10 * size**2:
