@@ -162,11 +162,11 @@ def test_derivatives_of_every_form(form):
     plain = f.jacobian([x, y])
     second = (plain * sympy.Matrix(a)).jacobian([x, y])
     wanted = np.array((second * sympy.Matrix(b)).subs(at).tolist(), float).ravel()
-    np.testing.assert_allclose(d.second(a, b), wanted, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(d.second(a, b).value, wanted, rtol=1e-10, atol=1e-10)
     third = (second * sympy.Matrix(b)).jacobian([x, y]) * sympy.Matrix(c)
     wanted = np.array(third.subs(at).tolist(), float).ravel()
     error = 1e-13 if form == "symbolic" else 1e-7
-    np.testing.assert_allclose(d.third(a, b, c), wanted, rtol=error, atol=error)
+    np.testing.assert_allclose(d.third(a, b, c).value, wanted, rtol=error, atol=error)
 
 
 @pytest.mark.parametrize("kind", [FOLD, HOPF, BRANCH])

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.kernels import defining, newton, trace
+from phasekit.kernels import defining, differences, newton, trace
 from phasekit.kernels import state as state_places
 from phasekit.kernels.defining import EQUILIBRIUM
 from phasekit.kernels.state import NUMBERS, VECTORS
@@ -126,7 +126,10 @@ class Curve:
         self.field.prepare(self.scale[: self.m])
         first = self.field.first(self.active, sharp=sharp)
         second = first if self.kind == EQUILIBRIUM else self.field.second(self.active)
-        return first, second, self.field.mode
+        mode = (
+            differences.SHARP if sharp and self.field.mode == differences.PLAIN else self.field.mode
+        )
+        return first, second, mode
 
     def refine(
         self,
@@ -173,7 +176,7 @@ class Curve:
     def at(self, u: Array) -> tuple[Array, Array]:
         """F and its derivatives by states and free parameters."""
         n, m = self.n, self.m
-        w = np.zeros(m + n + n * m + 8 * m + 8)
+        w = np.zeros(2 * m + n + n * m + differences.spare_size(n, m))
         w[:m] = u[:m]
         w[m : 2 * m] = self.scale[:m]
         out = 2 * m
@@ -185,6 +188,12 @@ class Curve:
         with np.errstate(all="ignore"):
             kernel(first, mode, n, w, 0, self.par.copy(), active, m, out, spare)
         return w[out : out + n].copy(), w[out + n : spare].reshape(n, m).copy()
+
+    def values(self, u: Array) -> Array:
+        """F at many points, the rows of u."""
+        u = np.ascontiguousarray(u[:, : self.m], dtype=float)
+        with np.errstate(all="ignore"):
+            return np.asarray(self.field.values(u, self.par.copy(), self.active))
 
     def bend(self, u: Array, z: Array) -> Array:
         """The derivatives of f_u z by states and free parameters, shape (n, m)."""
@@ -218,7 +227,7 @@ class Curve:
         n, m = self.n, self.m
         place = 2 * m
         out = place + z.size
-        w = np.zeros(out + count + 2 * m + 2 * n)
+        w = np.zeros(out + count + differences.spare_size(n, m))
         w[:m], w[m:place], w[place:out] = u[:m], self.scale[:m], z
         self.field.prepare(self.scale[:m])
         kernel = self._kernel(defining.second_derivatives)

@@ -8,13 +8,13 @@ write f with its derivatives by u, row by row; the second goes on with the deriv
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.kernels.defining import DERIVED
+from phasekit.kernels.differences import DERIVED
 
 Array = npt.NDArray[np.float64]
 
@@ -43,6 +43,16 @@ class Field:
     def third(self, active: tuple[int, ...]) -> Any:
         """Third derivative along the three directions that z holds, of a symbolic field."""
         raise NotImplementedError
+
+    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+        """F at many points, the rows of u; NaN where it has no value."""
+        raise NotImplementedError
+
+    def slopes_along(
+        self, par: Array, active: tuple[int, ...], u: Array, z: Array
+    ) -> Callable[[Array], Array] | None:
+        """f_u z at a point, as a function of the point, if it is known without differences of f."""
+        return None
 
     def prepare(self, scale: Array) -> None:
         """Take the scales of the states, for differences."""

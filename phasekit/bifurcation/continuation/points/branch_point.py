@@ -108,7 +108,7 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
                 form = forms.branch_point(
                     forms.Derivatives(curve, u), moving, pitchfork=kind == "pitchfork"
                 )
-    note = message or found.message
+    note = message or found.message or forms.unknown(form)
     if len(others) > 1 and corank == 1:
         note = f"{len(others) + 1} branches meet"
     return Special(

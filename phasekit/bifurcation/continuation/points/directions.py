@@ -55,7 +55,7 @@ def directions(curve: Curve, point: Singular) -> Directions:
     vectors = (basis * scale[:, None]).T
     q = np.zeros((k, k + 1, k + 1))
     for i, j in tuples(range(k + 1), 2):
-        q[:, i, j] = q[:, j, i] = 0.5 * (w @ d.second(vectors[i], vectors[j]))
+        q[:, i, j] = q[:, j, i] = 0.5 * (w @ d.second(vectors[i], vectors[j]).value)
     size = float(np.max(np.abs(q)))
     cubic = _cubic(curve, d, point, w, vectors[:k])
     most = max(size, float(np.max(np.abs(cubic))))
@@ -194,14 +194,14 @@ def _cubic(curve: Curve, d: forms.Derivatives, point: Singular, w: Array, v: Arr
     inverse = np.linalg.pinv(slopes, rcond=1e-9)
     slaved = {}
     for a, b in tuples(range(k), 2):
-        force = d.second(v[a], v[b]) / point.rows
+        force = d.second(v[a], v[b]).value / point.rows
         force = force - point.left @ (point.left.T @ force)
         slaved[a, b] = -(inverse @ force) * scale
     result = np.zeros((k, k, k, k))
     for a, b, c in tuples(range(k), 3):
-        total = d.third(v[a], v[b], v[c])
+        total = d.third(v[a], v[b], v[c]).value
         for one, pair in ((a, (b, c)), (b, (a, c)), (c, (a, b))):
-            total = total + d.second(v[one], slaved[pair])
+            total = total + d.second(v[one], slaved[pair]).value
         value = w @ total / 6.0
         for i, j, l in {(a, b, c), (a, c, b), (b, a, c), (b, c, a), (c, a, b), (c, b, a)}:  # noqa: E741
             result[:, i, j, l] = value

@@ -49,8 +49,9 @@ def fold(curve: Curve, bracket: Bracket) -> Special:
     if message:
         best, _, _ = bracket_root(curve, left, right, test, steps=60, width=1e-14)
         u = best.u
+    form = forms.fold(forms.Derivatives(curve, u))
     return Special(
-        "fold", u, interval_of(curve, bracket), residual, GUESS if message else CONVERGED, message,
-        forms.fold(forms.Derivatives(curve, u)), tangent=tangent_at(curve, u, best.tangent),
+        "fold", u, interval_of(curve, bracket), residual, GUESS if message else CONVERGED,
+        message or forms.unknown(form), form, tangent=tangent_at(curve, u, best.tangent),
         extra=v, corank=1,
     )  # fmt: skip

@@ -72,6 +72,7 @@ def pair(curve: Curve, bracket: Bracket) -> Special:
         form = {"l1": np.nan, "omega": omega, "d": np.nan}
         if not message:
             form = forms.hopf(forms.Derivatives(curve, u), omega)
+            note = forms.unknown(form)
     return Special(
         kind, u, interval_of(curve, bracket), residual, status, note, form,
         tangent=tangent_at(curve, u, best.tangent),
