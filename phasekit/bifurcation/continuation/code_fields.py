@@ -112,20 +112,24 @@ class PythonField(Field):
         self.scale = np.asarray(scale, dtype=float)
 
     def value(self, x: Array, p: Mapping[str, float]) -> Array:
-        """F as an array; NaN where it has no value. Warnings are the caller's."""
+        """F as an array of its own; NaN where it has no value. Warnings are the caller's."""
         try:
-            return np.asarray(self.function(x, **p), dtype=float).reshape(-1)
-        except (ArithmeticError, ValueError):
+            result = self.function(x, **p)
+        except (ArithmeticError, ValueError) as error:
+            self.failure = error
             return np.full(len(self.states), np.nan)
+        return _numbers("f", result, (len(self.states),))
 
     def slopes(self, x: Array, p: Mapping[str, float]) -> Array:
         """The given derivatives by the states; NaN where they have no value."""
         n = len(self.states)
         assert self.jacobian is not None
         try:
-            return np.asarray(self.jacobian(x, **p), dtype=float).reshape(n, n)
-        except (ArithmeticError, ValueError):
+            result = self.jacobian(x, **p)
+        except (ArithmeticError, ValueError) as error:
+            self.failure = error
             return np.full((n, n), np.nan)
+        return _numbers("jac", result, (n, n))
 
     def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
         """F at many points, the rows of u."""
@@ -259,3 +263,20 @@ def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
             break
         h *= SHORTER
     return slope
+
+
+def _numbers(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
+    """What a function returned as an array of its own, of real numbers."""
+    try:
+        numbers = np.array(result)
+        if numbers.dtype.kind == "c":
+            raise ParameterError(
+                f"{argument}: returned complex numbers, {str(numbers)[:80]}, wants real ones"
+            )
+        return np.asarray(numbers, dtype=float).reshape(shape)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(
+            f"{argument}: returned {str(result)[:80]}, wants numbers of shape {shape}"
+        ) from error

@@ -90,9 +90,7 @@ def _merged(curve: Curve, found: list[Special]) -> list[Special]:
     return kept
 
 
-def _together(
-    curve: Curve, bracket: Bracket, found: list[Special], left: int
-) -> list[Special]:
+def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -> list[Special]:
     """Eigenvalues that cross together, without a change of sign that would tell."""
     ends = [
         eigenvalues_of(s.slopes[None], accuracy=curve.field.accuracy)[0]

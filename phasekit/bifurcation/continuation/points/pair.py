@@ -130,9 +130,7 @@ def _refined(
     extra = np.append(v * scale, kappa)
     if not (np.isfinite(extra).all() and np.isfinite(aux).all()):
         return best.u, extra, aux, np.inf, "the two eigenvalues have one eigenvector"
-    u, extra, residual, message = polish(
-        curve, HOPF, best.u, extra, reach_of(curve, bracket), aux
-    )
+    u, extra, residual, message = polish(curve, HOPF, best.u, extra, reach_of(curve, bracket), aux)
     return u, extra, aux, residual, message
 
 
