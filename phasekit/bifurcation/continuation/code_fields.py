@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.kernels import differences
-from phasekit.kernels.differences import ALIKE, COARSE, FINE, PLAIN, SHORTER, STEP, TRIES
+from phasekit.kernels.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
 
 Array = npt.NDArray[np.float64]
 
@@ -254,12 +254,18 @@ def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
         near = (ahead - behind) / (2.0 * h)
         gap = np.abs(near - far)
         best = near + (near - far) / 3.0
-        large = np.abs(near) + np.abs(ahead + behind - 2.0 * middle) / h
+        steep, curved = np.abs(near), np.abs(ahead + behind - 2.0 * middle) / h
+        width = np.fmin((gap / curved) ** 2, gap / steep)
+        left = np.where(gap > 0.0, gap * width, 0.0)
+        rounding = np.minimum(
+            FINE * size / h * np.abs(fine - wide), KNOWN * (steep + 100.0 * curved)
+        )
+        rounding += EPSILON * size / h * steep
         off = np.maximum(0.0, np.abs(best - fine) - 4.0 * np.abs(fine - wide))
-        off[off <= 1e-9 * large] = 0.0
-        better = gap + off < least
-        slope[better], least[better] = best[better], (gap + off)[better]
-        if np.all((gap <= ALIKE * large) & (off == 0.0)):
+        off[off <= 1e-9 * (steep + curved)] = 0.0
+        better = left + off + rounding < least
+        slope[better], least[better] = best[better], (left + off + rounding)[better]
+        if np.all((left <= rounding) & (off == 0.0)):
             break
         h *= SHORTER
     return slope
