@@ -165,3 +165,16 @@ def _copy(w: Array, source: int, target: int, n: int) -> None:
 def copy(w: Array, source: int, target: int, n: int) -> None:
     """Copy n entries."""
     w[target : target + n] = w[source : source + n]
+
+
+def _dot(w: Array, x: int, y: int, n: int) -> float:
+    total = 0.0
+    for i in range(n):
+        total += w[x + i] * w[y + i]
+    return total
+
+
+@twin(_dot)
+def dot(w: Array, x: int, y: int, n: int) -> float:
+    """Sum of x * y over n entries."""
+    return float(np.dot(w[x : x + n], w[y : y + n]))

@@ -12,7 +12,7 @@ import numpy as np
 
 from phasekit.kernels.compile import Array, kernel, routine
 from phasekit.kernels.defining import evaluate, places
-from phasekit.kernels.native import solve, twin
+from phasekit.kernels.native import dot, solve, twin
 from phasekit.kernels.state import QUADRATIC, SCALE, SIGN, VECTORS
 
 # Newton steps that shrink like this converge quadratically.
@@ -177,9 +177,7 @@ def correct(
         evaluate(first, second, mode, kind, n, par, active, w, u)
         rest = 0.0
         if rows < size:
-            rest = -target
-            for j in range(size):
-                rest += w[row + j] * w[u + j]
+            rest = dot(w, row, u, size) - target
         assemble(w, g, jac, rows, size, scale, row, rest, a, b)
         sign = solve(w, a, b, size)
         if sign == 0.0:

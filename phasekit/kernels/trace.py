@@ -14,7 +14,7 @@ import numpy as np
 
 from phasekit.kernels.compile import Array, kernel, routine
 from phasekit.kernels.defining import HOPF, evaluate, places
-from phasekit.kernels.native import copy, inner, orientation
+from phasekit.kernels.native import copy, dot, inner, orientation, twin
 from phasekit.kernels.newton import DIVERGED, NO_NUMBER, correct
 from phasekit.kernels.state import DONE, LAST, LENGTH, NEXT, SCALE, SIDE, SIGN
 
@@ -27,16 +27,18 @@ CAREFUL = 1e-6
 FULL, BOUND, CLOSED, STUCK, NOT_FINITE = range(5)
 # Why steps are refused, beside what Newton's method says: the curve turns, or branches cross.
 TURNS, CROSSES = 1, 2
-# What is recorded of a step, after unknowns, tangent and the derivatives of f.
+# What is recorded of a step, after unknowns and tangent.
 STEP_LENGTH, NEWTON_STEPS, ANGLE, ARCLENGTH, RECORDED = range(5)
 
 
 @kernel
 def trace(
     first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, fixed: Array,
-    w: Array, record: Array,
+    w: Array, record: Array, slopes: Array,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Follow a curve until the record is full, or something ends it.
+
+    The derivatives of f at each point are left in ``slopes``.
 
     The state at the head of ``w`` says where it stands, and is left so after the last point.
     Returns the number of points, the reason to stop, and which unknown met its bound, or why the
@@ -71,9 +73,7 @@ def trace(
             if h < fixed[SHORTEST]:
                 return k, (NOT_FINITE if why == NO_NUMBER else STUCK), why
             predict(w, u, t, old, weight, h, w[number + LAST], v, row, guess, size)
-            target = 0.0
-            for j in range(size):
-                target += w[row + j] * w[v + j]
+            target = dot(w, row, v, size)
             steps = correct(
                 first, second, mode, kind, n, par, active, w, v, row, target, tolerance, limit
             )
@@ -81,10 +81,7 @@ def trace(
                 why = steps
                 w[number + NEXT] = 0.25 * h
                 continue
-            for j in range(size):
-                w[new + j] = w[scale + j] * w[b + 2 * j + 1]
-                w[chord + j] = w[v + j] - w[u + j]
-                w[guess + j] -= w[v + j]
+            gather(w, scale, b, new, u, v, chord, guess, size)
             length = np.sqrt(inner(w, weight, new, new, size))
             for j in range(size):
                 w[new + j] /= length
@@ -177,8 +174,7 @@ def trace(
                     w[new + j] /= length
             break
 
-        for j in range(size):
-            w[chord + j] = w[v + j] - w[u + j]
+        gather(w, scale, b, -1, u, v, chord, -1, size)
         length = np.sqrt(inner(w, weight, chord, chord, size))
         w[number + LENGTH] += length
         w[number + LAST] = 0.0 if not smooth else (h if reason < 0 else length)
@@ -193,12 +189,10 @@ def trace(
             factor = min(factor, max(fixed[TURN] / angle, 0.5))
         w[number + NEXT] = min(h * factor, fixed[LONGEST])
         grow(w, n, size, fixed, period)
-        for j in range(size):
-            record[k, j] = w[u + j]
-            record[k, size + j] = w[t + j]
-        for j in range(n * m):
-            record[k, 2 * size + j] = w[base + n + j]
-        j = 2 * size + n * m
+        record[k, :size] = w[u : u + size]
+        record[k, size : 2 * size] = w[t : t + size]
+        slopes[k] = w[base + n : base + n + n * m]
+        j = 2 * size
         record[k, j + STEP_LENGTH] = length
         record[k, j + NEWTON_STEPS] = steps
         record[k, j + ANGLE] = angle
@@ -210,18 +204,50 @@ def trace(
     return record.shape[0], FULL, 0
 
 
-@routine
-def predict(
+def _predict(
     w: Array, u: int, t: int, old: int, weight: int, h: float, last: float, v: int, row: int,
     guess: int, size: int,
 ) -> None:  # fmt: skip
-    """The next point, on the parabola through the last two tangents, and the row of its plane."""
     bend = 0.5 * h * h / last if last > 0.0 else 0.0
     for j in range(size):
         value = w[u + j] + h * w[t + j] + bend * (w[t + j] - w[old + j])
         w[v + j] = value
         w[guess + j] = value
         w[row + j] = w[weight + j] * w[t + j]
+
+
+@twin(_predict)
+def predict(
+    w: Array, u: int, t: int, old: int, weight: int, h: float, last: float, v: int, row: int,
+    guess: int, size: int,
+) -> None:  # fmt: skip
+    """The next point, on the parabola through the last two tangents, and the row of its plane."""
+    bend = 0.5 * h * h / last if last > 0.0 else 0.0
+    tangent = w[t : t + size]
+    value = w[u : u + size] + h * tangent + bend * (tangent - w[old : old + size])
+    w[v : v + size] = w[guess : guess + size] = value
+    w[row : row + size] = w[weight : weight + size] * tangent
+
+
+def _gather(
+    w: Array, scale: int, b: int, new: int, u: int, v: int, chord: int, guess: int, size: int
+) -> None:
+    for j in range(size):
+        w[chord + j] = w[v + j] - w[u + j]
+        if new >= 0:
+            w[new + j] = w[scale + j] * w[b + 2 * j + 1]
+            w[guess + j] -= w[v + j]
+
+
+@twin(_gather)
+def gather(
+    w: Array, scale: int, b: int, new: int, u: int, v: int, chord: int, guess: int, size: int
+) -> None:
+    """The chord from u to v and, unless their places are -1, the new tangent and the drift."""
+    w[chord : chord + size] = w[v : v + size] - w[u : u + size]
+    if new >= 0:
+        w[new : new + size] = w[scale : scale + size] * w[b + 1 : b + 2 * size : 2]
+        w[guess : guess + size] -= w[v : v + size]
 
 
 @routine

@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.errors import ParameterError, StoreError
+from phasekit.kernels.trace import RECORDED
 from phasekit.labelled.arguments import bad, flag
 from phasekit.labelled.branch import NUMBERS, Branch, make_branch
 from phasekit.labelled.problem import Problem, as_problem
@@ -41,6 +42,10 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
     for name, track in zip(("backward", "forward"), branch.tracks, strict=True):
         if track is not None:
             ds[f"raw_{name}"] = ((f"raw_{name}_point", f"raw_{name}_column"), track.record)
+            if track.slopes.size:
+                ds[f"raw_{name}_slopes"] = (
+                    (f"raw_{name}_point", f"raw_{name}_slope"), track.slopes,
+                )  # fmt: skip
             ds[f"raw_{name}_state"] = ((f"raw_{name}_entry",), track.state)
     spec = {
         "problem": problem.specification(),
@@ -100,7 +105,15 @@ def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
             tracks.append(None)
             continue
         record_ = ds[f"raw_{name}"].values
-        tracks.append(Track(record_, ds[f"raw_{name}_state"].values, Stop(*stop)))
+        slopes = record_[:, :0]
+        here = slice(2 * curve.size, 2 * curve.size + curve.n * curve.m)
+        if f"raw_{name}_slopes" in ds:
+            slopes = ds[f"raw_{name}_slopes"].values
+        elif curve.keeps:  # earlier versions kept them between tangents and step data
+            slopes = record_[:, here]
+        if record_.shape[1] > 2 * curve.size + RECORDED:
+            record_ = np.delete(record_, here, axis=1)
+        tracks.append(Track(record_, slopes, ds[f"raw_{name}_state"].values, Stop(*stop)))
     return make_branch(problem, curve, start, tracks[0], tracks[1], functions)
 
 

@@ -18,6 +18,8 @@ from phasekit.kernels.state import NUMBERS, VECTORS
 Array = npt.NDArray[np.float64]
 
 CHUNK = 256
+MOST = 1 << 20  # derivatives at a time, where they are not kept
+KEPT = 16  # states up to which derivatives are kept at each point
 TIGHT = 1e-13
 
 
@@ -47,9 +49,13 @@ class Stop:
 
 @dataclass(frozen=True)
 class Track:
-    """Points of a curve in one direction from a start, and the state to go on from."""
+    """Points of a curve in one direction from a start, and the state to go on from.
+
+    Of many states the derivatives of f are not kept (no columns): they would be most of it all.
+    """
 
     record: Array
+    slopes: Array
     state: Array
     stop: Stop
 
@@ -107,6 +113,11 @@ class Curve:
     def rows(self) -> int:
         """Number of equations."""
         return defining.equations(self.kind, self.n)
+
+    @property
+    def keeps(self) -> bool:
+        """Whether the derivatives of f are kept at each point."""
+        return self.kind != EQUILIBRIUM or self.n <= KEPT
 
     @property
     def weight(self) -> Array:
@@ -266,21 +277,26 @@ class Curve:
         kernel = self._kernel(trace.trace)
         functions = self._functions()
         active = np.array(self.active, dtype=np.int64)
-        columns = 2 * size + n * self.m + trace.RECORDED
+        columns = 2 * size + trace.RECORDED
+        chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
         records = []
+        kept = []
         reason = trace.FULL
         which = 0
         left = points
         with np.errstate(all="ignore"):
             while reason == trace.FULL and left > 0:
-                record = np.empty((min(left, CHUNK), columns))
+                record = np.empty((min(left, chunk), columns))
+                slopes = np.empty((len(record), n * self.m))
                 count, reason, which = kernel(
-                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record
+                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record, slopes
                 )
                 records.append(record[:count])
+                kept.append(slopes[:count] if self.keeps else slopes[:count, :0])
                 left -= count
         record = np.concatenate(records) if records else np.empty((0, columns))
-        return Track(record, w[: state.size].copy(), self._stop(reason, which, record, w))
+        slopes = np.concatenate([np.empty((0, n * self.m if self.keeps else 0)), *kept])
+        return Track(record, slopes, w[: state.size].copy(), self._stop(reason, which, record, w))
 
     def _stop(self, reason: int, which: int, record: Array, w: Array) -> Stop:
         names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]

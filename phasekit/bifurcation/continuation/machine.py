@@ -51,14 +51,18 @@ _COMPARISONS = {
 
 
 def compile_expressions(
-    expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Symbol, tuple[int, int]]
+    expressions: Mapping[int, sympy.Expr],
+    count: int,
+    inputs: Mapping[sympy.Symbol, tuple[int, int]],
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
     Parameters
     ----------
-    expressions : sequence of sympy.Expr
-        One for each entry of ``out``.
+    expressions : mapping of int to sympy.Expr
+        By their places in ``out``; other places become 0.
+    count : int
+        Length of ``out``.
     inputs : mapping
         Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
 
@@ -72,13 +76,16 @@ def compile_expressions(
     module.triple = llvm.get_process_triple()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer] * 4), name="fill")
     builder = ir.IRBuilder(function.append_basic_block())
-    shared, results = sympy.cse(list(expressions), symbols=sympy.numbered_symbols("_c"))
     writer = _Writer(module, builder, function.args, inputs)
+    if len(expressions) < count:
+        writer.clear(function.args[3], count)
+    shared, results = sympy.cse(
+        list(expressions.values()), symbols=sympy.numbered_symbols("_c"), list=True
+    )
     for symbol, expression in shared:
         writer.values[symbol] = writer.write(expression)
-    values = [writer.write(result) for result in results]
-    for i, value in enumerate(values):
-        builder.store(value, writer.place(function.args[3], i))
+    for i, result in zip(expressions, results, strict=True):
+        builder.store(writer.write(result), writer.place(function.args[3], i))
     builder.ret_void()
     return _machine_code(str(module))
 
@@ -119,6 +126,14 @@ class _Writer:
 
     def place(self, array: Any, index: int) -> Any:
         return self.builder.gep(array, [ir.Constant(ir.IntType(64), index)])
+
+    def clear(self, array: Any, count: int) -> None:
+        """Set so many entries to zero."""
+        byte, long = ir.IntType(8), ir.IntType(64)
+        memset = self.module.declare_intrinsic("llvm.memset", [byte.as_pointer(), long])
+        start = self.builder.bitcast(array, byte.as_pointer())
+        zero, no = ir.Constant(byte, 0), ir.Constant(ir.IntType(1), 0)
+        self.builder.call(memset, [start, zero, ir.Constant(long, 8 * count), no])
 
     def library(self, name: str, *args: Any) -> Any:
         known = self.module.globals.get(name)

@@ -163,4 +163,5 @@ def go_on(curve: Curve, track: Track | None, points: int) -> Track | None:
     if track is None or track.stop.reason != "max_points":
         return track
     more = curve.follow(track.state, points)
-    return Track(np.concatenate([track.record, more.record]), more.state, more.stop)
+    joined = (np.concatenate([getattr(one, name) for one in (track, more)]) for name in ("record", "slopes"))
+    return Track(*joined, more.state, more.stop)
