@@ -92,7 +92,7 @@ def find_on(curve: Curve, path: Path) -> list[Placed]:
                     gap = np.dot(ahead, special.u - path.u[i, :m])
                     square = np.dot(ahead, chord[:m])
                     found.append(Placed(i, float(gap / square), special))
-    return _without_echoes(curve, unique(curve, found))
+    return _without_echoes(curve, unique(curve, path, found))
 
 
 def _interesting(values: Array) -> list[int]:

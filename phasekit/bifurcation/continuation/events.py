@@ -145,7 +145,11 @@ class _Seek:
         simple = len(changes & {"fold", "branch"})
         explained = simple + 2 * ("pair" in changes)
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)
-        several = jump > explained or len(changes) > 1 or (odd and self.curve.n > 1)
+        # Where the path turns at a pitchfork, both change at once: halving finds nothing between.
+        turns = changes == {"fold", "branch"} and jump in (0, 2)
+        several = (
+            jump > explained or (len(changes) > 1 and not turns) or (odd and self.curve.n > 1)
+        )
         if several and depth > 0:
             middle = between(self.curve, a, b, 0.5)
             if middle is not None:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -54,7 +52,7 @@ def pair(curve: Curve, bracket: Bracket) -> Special:
     kappa = float((values[i] * values[j]).real)
     size = float(np.max(np.abs(values)))
     accuracy = curve.field.accuracy
-    if abs(kappa) <= 1e2 * accuracy * _block_size(curve, slopes, values[i], values[j]) ** 2:
+    if _doubtful(curve, u, kappa, best.tangent):
         return Special(
             "bogdanov_takens", u, interval_of(curve, bracket), residual, GUESS,
             "two eigenvalues vanish together", tangent=tangent_at(curve, u, best.tangent), corank=1,
@@ -136,24 +134,15 @@ def _refined(
     return u, extra, aux, residual, message
 
 
-def _block_size(curve: Curve, slopes: Array, one: complex, other: complex) -> float:
-    """Size of the block of f_x of two eigenvalues, on scaled axes: its rounding is that of it."""
-    from scipy.linalg import schur
-
-    n = curve.n
-    scale = curve.scale[:n]
-    scaled = slopes[:, :n] * scale / scale[:, None]
-    if n == 2:
-        return float(np.max(np.abs(scaled)))
-    gap = max(abs(one - other), abs(one), abs(other))
-
-    def near(real: Any, imag: Any = 0.0) -> bool:
-        value = complex(real, abs(imag))
-        return any(abs(value - complex(x.real, abs(x.imag))) <= 1e-6 * gap for x in (one, other))
-
-    block, _, count = schur(scaled, sort=near)
-    count = max(int(count), 2)
-    return float(np.max(np.abs(np.triu(block[:count, :count], -1))))
+def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
+    """Whether the product of the two eigenvalues is but what rounding of the unknowns makes it."""
+    step = 1e2 * curve.field.accuracy * curve.length(tangent)
+    changes = []
+    for side in (step, -step):
+        values = _values(curve, curve.at(u + side * tangent[: curve.m])[1])
+        i, j = _nearest_pair(values)
+        changes.append(abs(float((values[i] * values[j]).real) - kappa))
+    return abs(kappa) <= max(changes)
 
 
 def _nearest_pair(values: npt.NDArray[np.complex128]) -> tuple[int, int]:
