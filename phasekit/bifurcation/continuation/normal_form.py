@@ -29,9 +29,7 @@ def unknown(form: dict[str, float]) -> str:
     return f"{' and '.join(names)} not known: the derivatives of f are not known to enough digits"
 
 
-def null_vectors(
-    jacobian: Array, scale: Array, rows: Array | None = None
-) -> tuple[Array, Array]:
+def null_vectors(jacobian: Array, scale: Array, rows: Array | None = None) -> tuple[Array, Array]:
     """Right and left null vector of f_x: |q| = 1, its largest entry positive, and p.q = 1.
 
     Found with states in units of their scales and f in those of ``rows``, so that units do not
@@ -120,9 +118,7 @@ def hopf(d: Derivatives, omega: float) -> dict[str, float]:
     still, double = d.second(q, bar), d.second(q, q)
     matrix = 2j * omega * np.eye(n) - A
     second = _fed(d, q, np.linalg.solve(A, still.value.real), np.linalg.inv(A), still.error)
-    third = _fed(
-        d, bar, np.linalg.solve(matrix, double.value), np.linalg.inv(matrix), double.error
-    )
+    third = _fed(d, bar, np.linalg.solve(matrix, double.value), np.linalg.inv(matrix), double.error)
     total = (d.third(q, q, bar) - 2.0 * second + third).dot(p) * (0.5 / omega)
     rows = force_sizes(d.curve, d.u)
     motion = _motion(d)

@@ -119,6 +119,10 @@ def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
         for other in all_:
             if other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
                 return True
+    if one.special.kind == "neutral_saddle" and one.special.status != CONVERGED:
+        # Next to a multiple branch point sums of eigenvalues are those of rounding errors.
+        if any(o.special.corank > 1 and _distance(curve, one, o) < STAYS for o in all_):
+            return True
     if one.special.kind != "fold":
         return False
     for other in all_:

@@ -163,15 +163,14 @@ def _rays(
     regular = np.linalg.svd(matrix, compute_uv=False)[:, -1] > 1e-5
     found: list[Array] = []
     loose = 0
-    for one, sure in zip(z, regular, strict=True):
-        if any(abs(abs(np.dot(one[:k], other[:k])) - 1.0) < 1e-8 for other in found):
-            continue
-        if not sure:
-            loose += 1
-            if loose > 1:
-                continue
-        lead = one[np.argmax(np.abs(one[:k]) > 1e-6)]
-        found.append(one if lead > 0.0 or free == 0 else np.append(-one[:k], one[k:]))
+    left = np.ones(len(z), dtype=bool)
+    while left.any() and len(found) <= MOST:
+        i = int(np.argmax(left))
+        one = z[i]
+        left &= np.abs(np.abs(z[:, :k] @ one[:k]) - 1.0) >= 1e-8
+        loose += not regular[i]
+        if regular[i] or loose == 1:
+            found.append(one)
     message = ""
     if loose:
         message = "the reduced equations have solutions that are not isolated"
@@ -204,7 +203,7 @@ def _newton(value: Array, matrix: Array) -> Array:
 
 def _cubic(curve: Curve, d: forms.Derivatives, point: Singular, w: Array, v: Array) -> Array:
     """c(a, b, c) on the first k null vectors: third derivatives, and what is slaved to them."""
-    n, m, k = curve.n, curve.m, point.corank
+    m, k = curve.m, point.corank
     scale = curve.scale[:m]
     slopes = d.slopes * scale / point.rows[:, None]
     inverse = np.linalg.pinv(slopes, rcond=1e-9)

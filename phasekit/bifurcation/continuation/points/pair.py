@@ -27,11 +27,11 @@ Array = npt.NDArray[np.float64]
 ON = 1e-6  # distance on scaled axes within which a point of larger corank is looked for
 
 
-def pair(curve: Curve, bracket: Bracket) -> Special:
+def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None:
     """The point of a bracket in which the pair function changes its sign.
 
     A Hopf point where the two eigenvalues are conjugate, a neutral saddle where they are real; a
-    branch point or a Bogdanov-Takens point where both vanish.
+    branch point, unless it is known, or a Bogdanov-Takens point where both vanish.
     """
 
     def test(s: Sample) -> float:
@@ -45,6 +45,8 @@ def pair(curve: Curve, bracket: Bracket) -> Special:
     near = max(ON, curve.length(right.u - left.u)) if message else ON
     point = singular_point(curve, u, near, max(10.0 * near, 1e-4), least=2)
     if point is not None and meets(curve, point):
+        if any(curve.length(one.u - point.u) < ON and one.corank >= 2 for one in known):
+            return None
         return described(curve, bracket, best, point)
     slopes = curve.at(u)[1]
     values = _values(curve, slopes)
@@ -102,7 +104,7 @@ def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
 
 
 def _values(curve: Curve, slopes: Array) -> npt.NDArray[np.complex128]:
-    return eigenvalues_of(slopes[None], accuracy=curve.field.accuracy)[0]
+    return np.asarray(eigenvalues_of(slopes[None], accuracy=curve.field.accuracy)[0])
 
 
 def _refined(
@@ -128,9 +130,7 @@ def _refined(
     extra = np.append(v * scale, kappa)
     if not (np.isfinite(extra).all() and np.isfinite(aux).all()):
         return best.u, extra, aux, np.inf, "the two eigenvalues have one eigenvector"
-    u, extra, residual, message = polish(
-        curve, HOPF, best.u, extra, reach_of(curve, bracket), aux
-    )
+    u, extra, residual, message = polish(curve, HOPF, best.u, extra, reach_of(curve, bracket), aux)
     return u, extra, aux, residual, message
 
 
