@@ -1,7 +1,7 @@
 """Derivatives of a right-hand side that is given alone, by differences, and its values.
 
-A step that suits the size of an unknown may be far too wide for f: each derivative is taken at two
-steps, and again at shorter ones as long as that brings the two closer.
+A step that suits the size of an unknown may be far too wide for f: each derivative is taken over
+one and over two steps, and again over shorter ones until what they leave out is rounding.
 """
 
 from __future__ import annotations
@@ -21,9 +21,8 @@ STEP = 2.0**-10  # of fourth-order differences: their error is STEP^4 and roundi
 FINE = 2.0**-22  # of those that show whether STEP is too wide to see what f does
 SHORTER = 0.125
 TRIES = 8
-# Part by which the differences over one and over two steps differ where STEP is short enough: the
-# error of both together is about its square.
-ALIKE = 1e-5
+EPSILON = 2.0**-52
+KNOWN = 1e-10  # relative error that rounding alone does not exceed
 MIXED = 2.0**-12  # of mixed second differences
 
 
@@ -99,13 +98,21 @@ def _jet(
             for i in range(n):
                 gap = abs(w[near + i] - w[far + i])
                 best = w[near + i] + (w[near + i] - w[far + i]) / 3.0
-                large = abs(w[near + i]) + abs(w[bend_ + i]) / step
+                slope, curved = abs(w[near + i]), abs(w[bend_ + i]) / step
+                # The square of the step over the width of f, by its first or second derivative.
+                width = (gap / curved) ** 2 if curved > 0.0 else np.inf
+                width = min(width, gap / slope) if slope > 0.0 else width
+                left = gap * width if gap > 0.0 else 0.0
+                # What rounding does to the shortest differences, here in proportion.
+                rounding = FINE * size / step * abs(w[fine + i] - w[wide + i])
+                rounding = min(rounding, KNOWN * (slope + 100.0 * curved))
+                rounding += EPSILON * size / step * slope
                 off = max(0.0, abs(best - w[fine + i]) - 4.0 * abs(w[fine + i] - w[wide + i]))
-                off = 0.0 if off <= 1e-9 * large else off
-                if gap + off < w[least + i]:
+                off = 0.0 if off <= 1e-9 * (slope + curved) else off
+                if left + off + rounding < w[least + i]:
                     w[place + i * m] = best
-                    w[least + i] = gap + off
-                done = done and gap <= ALIKE * large and off == 0.0
+                    w[least + i] = left + off + rounding
+                done = done and left <= rounding and off == 0.0
             if done:
                 break
             step *= SHORTER

@@ -19,6 +19,9 @@ from numba.extending import intrinsic, overload
 from phasekit.kernels.compile import Array, Function
 
 
+OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
+
+
 def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
     """Give a function that is interpreted as it stands another body for the compiler."""
 
@@ -62,6 +65,16 @@ def call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
 
 
 def _solve(w: Array, a: int, b: int, n: int) -> float:
+    if n > OWN:
+        matrix, right = w[a : a + n * n].reshape(n, n), w[b : b + 2 * n].reshape(n, 2)
+        for i in range(n * n):
+            if not np.isfinite(w[a + i]):
+                return 0.0
+        try:
+            right[:] = np.linalg.solve(matrix, right)
+        except Exception:  # noqa: BLE001 (all that numba knows)
+            return 0.0
+        return 1.0
     sign = 1.0
     for j in range(n):
         pivot = j
@@ -119,6 +132,8 @@ def solve(w: Array, a: int, b: int, n: int) -> float:
 
 
 def _orientation(w: Array, a: int, n: int, sign: float) -> float:
+    if n > OWN:
+        return float(np.linalg.slogdet(w[a : a + n * n].reshape(n, n))[0])
     return sign
 
 

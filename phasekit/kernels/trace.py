@@ -15,7 +15,7 @@ import numpy as np
 from phasekit.kernels.compile import Array, kernel, routine
 from phasekit.kernels.defining import HOPF, evaluate, places
 from phasekit.kernels.native import copy, inner, orientation
-from phasekit.kernels.newton import correct
+from phasekit.kernels.newton import DIVERGED, NO_NUMBER, correct
 from phasekit.kernels.state import DONE, LAST, LENGTH, NEXT, SCALE, SIDE, SIGN
 
 # Settings, by place; then come period, lower and upper bound of each unknown.
@@ -25,6 +25,8 @@ LONGEST, SHORTEST, TOLERANCE, ITERATIONS, TURN, LARGEST_TURN, SETTINGS = range(7
 CAREFUL = 1e-6
 # Reasons to stop.
 FULL, BOUND, CLOSED, STUCK, NOT_FINITE = range(5)
+# Why steps are refused, beside what Newton's method says: the curve turns, or branches cross.
+TURNS, CROSSES = 1, 2
 # What is recorded of a step, after unknowns, tangent and the derivatives of f.
 STEP_LENGTH, NEWTON_STEPS, ANGLE, ARCLENGTH, RECORDED = range(5)
 
@@ -37,7 +39,8 @@ def trace(
     """Follow a curve until the record is full, or something ends it.
 
     The state at the head of ``w`` says where it stands, and is left so after the last point.
-    Returns the number of points, the reason to stop, and which unknown met its bound.
+    Returns the number of points, the reason to stop, and which unknown met its bound, or why the
+    last step was refused.
     """
     size, _, aux, v, a, b, base, _, _, _, _, _, spare = places(kind, n, active.size)
     m = n + active.size
@@ -59,15 +62,14 @@ def trace(
         angle = 0.0
         steps = 0
         side = 0.0
+        smooth = True
         which = -1
         reason = -1
+        why = DIVERGED
         while True:  # until a step stands
             h = w[number + NEXT]
             if h < fixed[SHORTEST]:
-                finite = True
-                for i in range(n):
-                    finite = finite and np.isfinite(w[base + i])
-                return k, (STUCK if finite else NOT_FINITE), 0
+                return k, (NOT_FINITE if why == NO_NUMBER else STUCK), why
             predict(w, u, t, old, weight, h, w[number + LAST], v, row, guess, size)
             target = 0.0
             for j in range(size):
@@ -76,6 +78,7 @@ def trace(
                 first, second, mode, kind, n, par, active, w, v, row, target, tolerance, limit
             )
             if steps < 0:
+                why = steps
                 w[number + NEXT] = 0.25 * h
                 continue
             for j in range(size):
@@ -87,11 +90,17 @@ def trace(
                 w[new + j] /= length
             angle = np.arccos(min(1.0, max(-1.0, inner(w, weight, new, t, size))))
             drift = np.sqrt(inner(w, weight, guess, guess, size)) / h
-            if not (angle <= fixed[LARGEST_TURN] and drift <= 0.25):
+            smooth = angle <= fixed[LARGEST_TURN] and drift <= 0.25
+            # A bend that is shorter than any step is passed: the point is next to the last one.
+            sharp = not smooth and 0.5 * h < fixed[SHORTEST] and drift <= 2.0
+            if smooth or sharp:
+                side = orientation(w, a, size, w[number + SIGN])
+            if not smooth and not (sharp and side * w[number + SIDE] >= 0.0):
+                why = TURNS
                 w[number + NEXT] = 0.5 * h
                 continue
-            side = orientation(w, a, size, w[number + SIGN])
             if side * w[number + SIDE] < 0.0 and h > max(CAREFUL, 4.0 * fixed[SHORTEST]):
+                why = CROSSES
                 w[number + NEXT] = 0.25 * h
                 continue
 
@@ -151,6 +160,7 @@ def trace(
             elif final > 0 and which < 0 and far <= 1e-6:
                 reason = CLOSED
             elif which >= 0:
+                why = final if final < 0 else TURNS
                 w[number + NEXT] = 0.5 * h
                 continue
             if reason < 0:  # a near miss: the step stands, and its derivatives are restored
@@ -171,7 +181,7 @@ def trace(
             w[chord + j] = w[v + j] - w[u + j]
         length = np.sqrt(inner(w, weight, chord, chord, size))
         w[number + LENGTH] += length
-        w[number + LAST] = h if reason < 0 else length
+        w[number + LAST] = 0.0 if not smooth else (h if reason < 0 else length)
         w[number + DONE] += 1.0
         w[number + SIDE] = side
         copy(w, t, old, size)
@@ -179,7 +189,7 @@ def trace(
         copy(w, new, t, size)
         # The next step: after Newton's work and after how far the tangent turned.
         factor = 2.0 if steps <= 3 else (1.2 if steps == 4 else (0.8 if steps == 5 else 0.5))
-        if angle > 0.0:
+        if angle > 0.0 and smooth:
             factor = min(factor, max(fixed[TURN] / angle, 0.5))
         w[number + NEXT] = min(h * factor, fixed[LONGEST])
         grow(w, n, size, fixed, period)
@@ -248,13 +258,17 @@ def comes_back(
 
 @routine
 def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
-    """Let the scales of states that are no angles follow the states; lengths are measured anew."""
-    scale, weight = 3 * size, 4 * size
+    """Let the scales of states that are no angles follow how far the states have come.
+
+    Lengths are measured anew.
+    """
+    scale, weight, start = 3 * size, 4 * size, 5 * size
     grown = False
     for j in range(n):
-        if fixed[period + j] == 0.0 and abs(w[j]) > 2.0 * w[scale + j]:
-            w[scale + j] = abs(w[j])
-            w[weight + j] = 1.0 / (w[j] * w[j])
+        far = abs(w[j] - w[start + j])
+        if fixed[period + j] == 0.0 and far > 2.0 * w[scale + j]:
+            w[weight + j] *= (w[scale + j] / far) ** 2
+            w[scale + j] = far
             grown = True
     if grown:
         length = np.sqrt(inner(w, weight, size, size, size))

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.kernels import differences
-from phasekit.kernels.differences import ALIKE, COARSE, FINE, PLAIN, SHORTER, STEP, TRIES
+from phasekit.kernels.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
 
 Array = npt.NDArray[np.float64]
 
@@ -112,20 +112,24 @@ class PythonField(Field):
         self.scale = np.asarray(scale, dtype=float)
 
     def value(self, x: Array, p: Mapping[str, float]) -> Array:
-        """F as an array; NaN where it has no value. Warnings are the caller's."""
+        """F as an array of its own; NaN where it has no value. Warnings are the caller's."""
         try:
-            return np.asarray(self.function(x, **p), dtype=float).reshape(-1)
-        except (ArithmeticError, ValueError):
+            result = self.function(x, **p)
+        except (ArithmeticError, ValueError) as error:
+            self.failure = error
             return np.full(len(self.states), np.nan)
+        return _numbers("f", result, (len(self.states),))
 
     def slopes(self, x: Array, p: Mapping[str, float]) -> Array:
         """The given derivatives by the states; NaN where they have no value."""
         n = len(self.states)
         assert self.jacobian is not None
         try:
-            return np.asarray(self.jacobian(x, **p), dtype=float).reshape(n, n)
-        except (ArithmeticError, ValueError):
+            result = self.jacobian(x, **p)
+        except (ArithmeticError, ValueError) as error:
+            self.failure = error
             return np.full((n, n), np.nan)
+        return _numbers("jac", result, (n, n))
 
     def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
         """F at many points, the rows of u."""
@@ -250,12 +254,35 @@ def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
         near = (ahead - behind) / (2.0 * h)
         gap = np.abs(near - far)
         best = near + (near - far) / 3.0
-        large = np.abs(near) + np.abs(ahead + behind - 2.0 * middle) / h
+        steep, curved = np.abs(near), np.abs(ahead + behind - 2.0 * middle) / h
+        width = np.fmin((gap / curved) ** 2, gap / steep)
+        left = np.where(gap > 0.0, gap * width, 0.0)
+        rounding = np.minimum(
+            FINE * size / h * np.abs(fine - wide), KNOWN * (steep + 100.0 * curved)
+        )
+        rounding += EPSILON * size / h * steep
         off = np.maximum(0.0, np.abs(best - fine) - 4.0 * np.abs(fine - wide))
-        off[off <= 1e-9 * large] = 0.0
-        better = gap + off < least
-        slope[better], least[better] = best[better], (gap + off)[better]
-        if np.all((gap <= ALIKE * large) & (off == 0.0)):
+        off[off <= 1e-9 * (steep + curved)] = 0.0
+        better = left + off + rounding < least
+        slope[better], least[better] = best[better], (left + off + rounding)[better]
+        if np.all((left <= rounding) & (off == 0.0)):
             break
         h *= SHORTER
     return slope
+
+
+def _numbers(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
+    """What a function returned as an array of its own, of real numbers."""
+    try:
+        numbers = np.array(result)
+        if numbers.dtype.kind == "c":
+            raise ParameterError(
+                f"{argument}: returned complex numbers, {str(numbers)[:80]}, wants real ones"
+            )
+        return np.asarray(numbers, dtype=float).reshape(shape)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(
+            f"{argument}: returned {str(result)[:80]}, wants numbers of shape {shape}"
+        ) from error

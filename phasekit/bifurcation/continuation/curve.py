@@ -110,9 +110,10 @@ class Curve:
 
     @property
     def weight(self) -> Array:
-        """Weights of lengths: of states and free parameters only."""
+        """Weights of lengths: of the mean square of states, and of free parameters."""
         weight = np.zeros(self.size)
         weight[: self.m] = 1.0 / self.scale[: self.m] ** 2
+        weight[: self.n] /= self.n
         return weight
 
     def length(self, difference: Array) -> float:
@@ -296,12 +297,20 @@ class Curve:
         if reason == trace.CLOSED:
             return Stop("closed", f"the curve closed on its start at {where}")
         if reason == trace.STUCK:
-            return Stop(
-                "stuck", f"no step longer than min_step = {self.options.min_step:g} converged "
-                f"at {where}",
-            )  # fmt: skip
+            step = f"min_step = {self.options.min_step:g}"
+            words = {
+                newton.DIVERGED: f"Newton's method converged for no step longer than {step}",
+                newton.SINGULAR: f"the derivatives of f are singular beyond, for every step "
+                f"longer than {step}",
+                trace.TURNS: f"the curve turns by more than max_turn = {self.options.max_turn:g} "
+                f"within {step}",
+                trace.CROSSES: f"branches cross or pass each other within {step}",
+            }
+            return Stop("stuck", f"{words[which]} at {where}")
         if reason == trace.NOT_FINITE:
-            return Stop("not_finite", f"f is not finite beyond {where}")
+            failure = self.field.failure
+            said = "" if failure is None else f": it raised {type(failure).__name__}: {failure}"
+            return Stop("not_finite", f"f is not finite beyond {where}{said}")
         return Stop(
             "max_points", f"max_points were computed, the last at {where}; extend() goes on"
         )

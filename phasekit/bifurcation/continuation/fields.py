@@ -28,6 +28,7 @@ class Field:
 
     def __init__(self, states: Sequence[str], parameters: Sequence[str]) -> None:
         self.states, self.parameters = tuple(states), tuple(parameters)
+        self.failure: Exception | None = None  # what f raised last, instead of a value
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Any:
         """F and its derivatives, or f alone where the mode is PLAIN.

@@ -140,8 +140,9 @@ def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
     changes = []
     for side in (step, -step):
         values = _values(curve, curve.at(u + side * tangent[: curve.m])[1])
-        i, j = _nearest_pair(values)
-        changes.append(abs(float((values[i] * values[j]).real) - kappa))
+        # Of several pairs that cancel at once, the one that is meant.
+        products = (values[:, None] * values)[np.triu_indices(len(values), 1)]
+        changes.append(float(np.min(np.abs(products - kappa))))
     return abs(kappa) <= max(changes)
 
 
