@@ -14,8 +14,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.path import Path, Sample, join
+from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.specials import Placed, find
 from phasekit.bifurcation.continuation.start import go_on
 from phasekit.errors import ParameterError
@@ -94,7 +94,8 @@ class Branch:
         xarray.Dataset
             `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
             parameter and state, ``special_residual``, ``special_status``, ``special_corank``,
-            ``special_index`` (the point of the curve), ``special_interval`` on (``special_point``, ``end``).
+            ``special_index`` (the point of the curve), ``special_interval`` on
+            (``special_point``, ``end``).
         """
         ds = self.points
         dim = "special_point"

@@ -10,13 +10,13 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
     Special,
     extended,
 )
-from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.specials import Placed, unique
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
 from phasekit.bifurcation.continuation.units import force_sizes
@@ -92,7 +92,7 @@ def find_on(curve: Curve, path: Path) -> list[Placed]:
                     gap = np.dot(ahead, special.u - path.u[i, :m])
                     square = np.dot(ahead, chord[:m])
                     found.append(Placed(i, float(gap / square), special))
-    return _without_echoes(curve, unique(curve, found))
+    return _without_echoes(curve, unique(curve, path, found))
 
 
 def _interesting(values: Array) -> list[int]:

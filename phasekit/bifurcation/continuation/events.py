@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.path import Path, Sample, between
 from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, test_functions
 
 DEPTH = 10
+TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
 ON_END = 1e-7  # part of its neighbour's value at which a test function of an end is zero
 TESTS = ("fold", "branch", "pair")
 
@@ -50,6 +51,9 @@ def brackets(
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
         for bracket in seek.explore(a, b, DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
+    for i in np.flatnonzero(np.diff(keep) > 1):  # on a point that was left out there may be one
+        a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
+        found.append(Bracket(a, b, frozenset({"touch"}), 0, int(keep[i])))
     if not path.closed and len(keep) > 1:
         found += _on_ends(path, keep, tests, found)
     return found, eigenvalues
@@ -132,7 +136,7 @@ class _Seek:
 
         def of(sample: Sample) -> float:
             tests = self.tests(sample)
-            size = float(np.exp(min(tests.volume - unit, 50.0))) if name == "branch" else 1.0
+            size = float(np.exp(np.minimum(tests.volume - unit, 50.0))) if name == "branch" else 1.0
             return size * float(getattr(tests, name))
 
         return of
@@ -145,7 +149,9 @@ class _Seek:
         simple = len(changes & {"fold", "branch"})
         explained = simple + 2 * ("pair" in changes)
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)
-        several = jump > explained or len(changes) > 1 or (odd and self.curve.n > 1)
+        # Where the path turns at a pitchfork, both change at once: halving finds nothing between.
+        turns = changes == {"fold", "branch"} and jump in (0, 2)
+        several = jump > explained or (len(changes) > 1 and not turns) or (odd and self.curve.n > 1)
         if several and depth > 0:
             middle = between(self.curve, a, b, 0.5)
             if middle is not None:
@@ -155,13 +161,19 @@ class _Seek:
         if changes or jump:
             yield Bracket(a, b, frozenset(changes), jump)
         elif force:
-            split = self._dip(a, b)
-            if split is not None:
+            split, low = self._dip(a, b)
+            if split is None and low is not None:
+                yield Bracket(a, low, frozenset({"touch"}), 0)
+            elif split is not None:
                 yield from self.explore(a, split, depth - 1, force=False)
                 yield from self.explore(split, b, depth - 1, force=False)
 
-    def _dip(self, a: Sample, b: Sample) -> Sample | None:
-        """A point between with the other sign of a test function that almost vanishes, if any."""
+    def _dip(self, a: Sample, b: Sample) -> tuple[Sample | None, Sample | None]:
+        """A point between with the other sign of a test function that almost vanishes, if any.
+
+        And, if there is none, one next to which the determinant touches zero.
+        """
+        touch = None
         for name in TESTS:
             if name == "pair" and not self.pairs:
                 continue
@@ -175,7 +187,7 @@ class _Seek:
                 if sample is None:
                     break
                 if sign * test(sample) <= 0.0:
-                    return sample
+                    return sample, None
                 marks.append((s, sign * test(sample)))
             if len(marks) < 2:
                 continue
@@ -192,6 +204,8 @@ class _Seek:
                     break
                 value = sign * test(sample)
                 if value <= 0.0:
-                    return sample
+                    return sample, None
+                if name == "branch" and value < TOUCH * min(sign * test(a), sign * test(b)):
+                    touch = sample
                 marks = sorted([(new, value), marks[0] if v1 < v2 else marks[1]])
-        return None
+        return None, touch

@@ -25,7 +25,7 @@ from phasekit.bifurcation.continuation.points.special import (
     interval_of,
     reach_of,
 )
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, orientation
 
 Array = npt.NDArray[np.float64]
 
@@ -50,12 +50,25 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     if "fold" in bracket.changes and not any(_is_turn(curve, point) for point in found):
         found.append(fold(curve, bracket))
     if "pair" in bracket.changes:
-        found.append(pair(curve, bracket))
+        point = pair(curve, bracket, found)
+        found += [] if point is None else [point]
+    if "touch" in bracket.changes:
+        found += _touch(curve, bracket)
     found = _merged(curve, found)
     left = abs(bracket.jump) - sum(_explained(one) for one in found)
     if left > 0:
         found += _together(curve, bracket, found, left)
     return found
+
+
+def _touch(curve: Curve, bracket: Bracket) -> list[Special]:
+    """A branch point at which two eigenvalues pass zero, one in each direction; or nothing."""
+    best = min((bracket.a, bracket.b), key=lambda s: orientation(curve, s.tangent, s.slopes)[1])
+    width = curve.length(bracket.b.u - bracket.a.u)
+    point = singular_point(curve, best.u, width, 2.0 * width, least=2)
+    if point is None or not meets(curve, point):
+        return []
+    return [described(curve, bracket, best, point)]
 
 
 def _is_turn(curve: Curve, point: Special) -> bool:

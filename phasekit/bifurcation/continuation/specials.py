@@ -18,6 +18,7 @@ from phasekit.kernels.defining import EQUILIBRIUM
 
 Array = npt.NDArray[np.float64]
 SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
+STAYS = 1e-3  # distance within which a path that passes a special point has not left it
 TURNS = 1e-4  # part of a unit tangent along the parameter, on scaled axes
 
 
@@ -52,7 +53,7 @@ def _find(
             if not wanted(special, detect):
                 continue
             placed.append(place(curve, path, bracket, special))
-    placed = unique(curve, placed)
+    placed = unique(curve, path, placed)
     # The start of a closed curve is its end as well.
     if path.closed and len(placed) > 1:
         first, last = placed[0], placed[-1]
@@ -78,22 +79,31 @@ def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Place
     return Placed(i, float(np.dot(curve.weight * chord, gap)) / square if square else 0.0, special)
 
 
-def unique(curve: Curve, placed: list[Placed]) -> list[Placed]:
-    """In order along the path, each once: one that lies on a point of the path is seen twice."""
+def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
+    """In order along the path, each once: next to some, all test functions change their signs."""
     placed = sorted(placed, key=lambda one: (one.index, one.along))
     kept: list[Placed] = []
     for one in placed:
         twin = None
         for i in range(len(kept) - 1, max(-1, len(kept) - 4), -1):
             other = kept[i]
-            near = one.index - other.index <= 2 and other.special.kind == one.special.kind
-            if near and _distance(curve, one, other) < SAME:
+            alike = other.special.kind == one.special.kind and _distance(curve, one, other) < SAME
+            if alike and _stays(curve, path, other, one):
                 twin = i
         if twin is None:
             kept.append(one)
         elif kept[twin].special.status != "converged" and one.special.status == "converged":
             kept[twin] = one
     return [one for one in kept if not _echo(curve, one, kept)]
+
+
+def _stays(curve: Curve, path: Path, one: Placed, other: Placed) -> bool:
+    """Whether the path stays next to a special point up to where it is seen again."""
+    if other.index - one.index <= 2:
+        return True
+    m = curve.m
+    gap = turned(curve, path.u[one.index + 1 : other.index, :m] - one.special.u[:m])
+    return bool(np.max(np.abs(gap / curve.scale[:m])) < STAYS)
 
 
 def _distance(curve: Curve, one: Placed, other: Placed) -> float:
@@ -109,6 +119,10 @@ def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
         for other in all_:
             if other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
                 return True
+    if one.special.kind == "neutral_saddle" and one.special.status != CONVERGED:
+        # Next to a multiple branch point sums of eigenvalues are those of rounding errors.
+        if any(o.special.corank > 1 and _distance(curve, one, o) < STAYS for o in all_):
+            return True
     if one.special.kind != "fold":
         return False
     for other in all_:

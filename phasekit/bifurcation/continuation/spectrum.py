@@ -149,14 +149,11 @@ def test_functions(
     slopes: Array,
     *,
     pairs: bool,
-    eigenvalues: npt.NDArray[np.complex128] | None = None,
 ) -> Tests:
     """The test functions of points with their tangents and derivatives of f."""
     n = curve.n
     sign, log = orientation(curve, tangent, slopes)
-    values = eigenvalues
-    if values is None:
-        values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
+    values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
     return Tests(
         tangent[..., n] / curve.scale[n],
         sign,

@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve, Track, nullspace
-from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.errors import ConvergenceError
 
 Array = npt.NDArray[np.float64]

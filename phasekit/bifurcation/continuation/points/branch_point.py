@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
-from collections.abc import Callable
-
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
 from phasekit.bifurcation.continuation.points.around import rays_around
@@ -54,7 +54,7 @@ def determinant_test(curve: Curve, bracket: Bracket) -> Callable[[Sample], float
 
     def test(s: Sample) -> float:
         sign, log = orientation(curve, s.tangent, s.slopes)
-        return float(sign * np.exp(min(log - unit, 50.0)))
+        return float(sign * np.exp(np.minimum(log - unit, 50.0)))
 
     return test
 

@@ -135,49 +135,42 @@ def _rays(
     The last ``free`` unknowns have no part in the length, which is one.
     """
     k = size - free
-    generator = np.random.default_rng(0)
-    count = min(4000, 60 * most)
-    starts = [generator.normal(size=(count, k))]
-    grid = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * min(k, 6), indexing="ij"))
-    grid = grid.reshape(min(k, 6), -1).T
-    starts.append(np.pad(grid, ((0, 0), (0, k - grid.shape[1]))))
-    z = np.concatenate(starts)
-    z = z[np.any(z != 0.0, axis=1)]
-    z = z / np.linalg.norm(z, axis=1, keepdims=True)
-    z = np.pad(z, ((0, 0), (0, free)))
+    z = np.pad(_starts(k, most), ((0, 0), (0, free)))
     length = np.ones(size)
     length[k:] = 0.0
     if free:  # the best multiplier of each start
         value, jacobian = equations(z)
         linear = jacobian[:, :, k]
         z[:, k] = -np.sum(value * linear, axis=1) / np.maximum(np.sum(linear**2, axis=1), 1e-30)
-    for _ in range(60):
+
+    def system(z: Array) -> tuple[Array, Array]:
         value, jacobian = equations(z)
-        right = np.append(value, 0.5 * (np.sum(length * z * z, axis=1, keepdims=True) - 1.0), 1)
+        norm = 0.5 * (np.sum(length * z * z, axis=1, keepdims=True) - 1.0)
         matrix = np.concatenate([jacobian, (length * z)[:, None, :]], axis=1)
-        with np.errstate(all="ignore"):
-            step = (np.linalg.pinv(matrix, rcond=1e-12) @ right[:, :, None])[:, :, 0]
-        large = np.linalg.norm(step, axis=1, keepdims=True)
-        z = z - step * np.minimum(1.0, 0.5 / np.maximum(large, 1e-300))
-        if np.all(large <= 1e-14):
+        return np.append(value, norm, 1), matrix
+
+    large = np.full(len(z), np.inf)
+    for _ in range(50):
+        active = np.flatnonzero(large > 1e-14)
+        if not len(active):
             break
-    value, jacobian = equations(z)
-    matrix = np.concatenate([jacobian, (length * z)[:, None, :]], axis=1)
-    with np.errstate(all="ignore"):
-        regular = np.linalg.svd(matrix, compute_uv=False)[:, -1] > 1e-5
-    solved = (np.max(np.abs(value), axis=1) < 1e-11) & (large[:, 0] < 1e-7)
-    solved &= np.abs(np.sum(length * z * z, axis=1) - 1.0) < 1e-9
+        step = _newton(*system(z[active]))
+        large[active] = np.linalg.norm(step, axis=1)
+        z[active] -= step * np.minimum(1.0, 0.5 / np.maximum(large[active, None], 1e-300))
+    value, matrix = system(z)
+    solved = (np.max(np.abs(value), axis=1) < 1e-11) & (large < 1e-7)
+    z, matrix = z[solved], matrix[solved]
+    regular = np.linalg.svd(matrix, compute_uv=False)[:, -1] > 1e-5
     found: list[Array] = []
     loose = 0
-    for one, sure in zip(z[solved], regular[solved], strict=True):
-        if any(abs(abs(np.dot(one[:k], other[:k])) - 1.0) < 1e-8 for other in found):
-            continue
-        if not sure:
-            loose += 1
-            if loose > 1:
-                continue
-        lead = one[np.argmax(np.abs(one[:k]) > 1e-6)]
-        found.append(one if lead > 0.0 or free == 0 else np.append(-one[:k], one[k:]))
+    left = np.ones(len(z), dtype=bool)
+    while left.any() and len(found) <= MOST:
+        i = int(np.argmax(left))
+        one = z[i]
+        left &= np.abs(np.abs(z[:, :k] @ one[:k]) - 1.0) >= 1e-8
+        loose += not regular[i]
+        if regular[i] or loose == 1:
+            found.append(one)
     message = ""
     if loose:
         message = "the reduced equations have solutions that are not isolated"
@@ -186,9 +179,31 @@ def _rays(
     return found[:MOST], message
 
 
+def _starts(k: int, most: int) -> Array:
+    """Directions to start from: along the axes and between them, and many at random."""
+    generator = np.random.default_rng(0)
+    axes = min(k, 5)
+    grid = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * axes, indexing="ij")).reshape(axes, -1).T
+    grid = np.pad(grid[np.any(grid != 0.0, axis=1)], ((0, 0), (0, k - axes)))
+    z = np.concatenate([grid, generator.normal(size=(min(1500, 40 * most), k))])
+    return np.asarray(z / np.linalg.norm(z, axis=1, keepdims=True))
+
+
+def _newton(value: Array, matrix: Array) -> Array:
+    """Newton steps of many systems; of singular ones the shortest."""
+    try:
+        step = np.linalg.solve(matrix, value[:, :, None])[:, :, 0]
+    except np.linalg.LinAlgError:
+        step = np.full(value.shape, np.nan)
+    bad = ~np.isfinite(step).all(axis=1)
+    if bad.any():
+        step[bad] = (np.linalg.pinv(matrix[bad]) @ value[bad][:, :, None])[:, :, 0]
+    return np.asarray(step)
+
+
 def _cubic(curve: Curve, d: forms.Derivatives, point: Singular, w: Array, v: Array) -> Array:
     """c(a, b, c) on the first k null vectors: third derivatives, and what is slaved to them."""
-    n, m, k = curve.n, curve.m, point.corank
+    m, k = curve.m, point.corank
     scale = curve.scale[:m]
     slopes = d.slopes * scale / point.rows[:, None]
     inverse = np.linalg.pinv(slopes, rcond=1e-9)

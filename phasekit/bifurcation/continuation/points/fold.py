@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
@@ -22,7 +23,10 @@ from phasekit.bifurcation.continuation.points.special import (
     reach_of,
     tangent_at,
 )
+from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.kernels.defining import FOLD
+
+Array = npt.NDArray[np.float64]
 
 ON = 1e-7  # distance on scaled axes from a point of larger corank that is none
 
@@ -42,7 +46,9 @@ def fold(curve: Curve, bracket: Bracket) -> Special:
     # Where the parameter stands still, the tangent is the null vector.
     v = best.tangent[:n] / np.linalg.norm(best.tangent[:n] / curve.scale[:n])
     u, v, residual, message = polish(curve, FOLD, best.u, v, reach)
-    width = curve.length(right.u - left.u) if message else ON
+    if not message and not _turns(curve, u, v):
+        message = "Newton's method on the defining system came to no end"
+    width = max(curve.length(right.u - left.u), 1e-4) if message else ON
     point = singular_point(curve, 0.5 * (left.u + right.u) if message else u, width, reach)
     if point is not None and meets(curve, point):
         return described(curve, bracket, best, point)
@@ -55,3 +61,14 @@ def fold(curve: Curve, bracket: Bracket) -> Special:
         message or forms.unknown(form), form, tangent=tangent_at(curve, u, best.tangent),
         extra=v, corank=1,
     )  # fmt: skip
+
+
+def _turns(curve: Curve, u: Array, v: Array) -> bool:
+    """Whether the eigenvalue vanishes at the point itself, by how fast it changes along v."""
+    n = curve.n
+    rows, scale = force_sizes(curve, u), curve.scale[:n]
+    left, _, _ = np.linalg.svd(curve.at(u)[1][:, :n] * scale / rows[:, None])
+    w = left[:, -1] / rows
+    rest = abs(w @ curve.at(u)[1][:, :n] @ v)
+    rate = abs(w @ curve.bend(u, v)[:, :n] @ v)
+    return bool(rest <= 1e-8 * rate + 1e2 * curve.field.accuracy)

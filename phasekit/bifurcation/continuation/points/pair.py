@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -29,11 +27,11 @@ Array = npt.NDArray[np.float64]
 ON = 1e-6  # distance on scaled axes within which a point of larger corank is looked for
 
 
-def pair(curve: Curve, bracket: Bracket) -> Special:
+def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None:
     """The point of a bracket in which the pair function changes its sign.
 
     A Hopf point where the two eigenvalues are conjugate, a neutral saddle where they are real; a
-    branch point or a Bogdanov-Takens point where both vanish.
+    branch point, unless it is known, or a Bogdanov-Takens point where both vanish.
     """
 
     def test(s: Sample) -> float:
@@ -47,6 +45,8 @@ def pair(curve: Curve, bracket: Bracket) -> Special:
     near = max(ON, curve.length(right.u - left.u)) if message else ON
     point = singular_point(curve, u, near, max(10.0 * near, 1e-4), least=2)
     if point is not None and meets(curve, point):
+        if any(curve.length(one.u - point.u) < ON and one.corank >= 2 for one in known):
+            return None
         return described(curve, bracket, best, point)
     slopes = curve.at(u)[1]
     values = _values(curve, slopes)
@@ -54,7 +54,7 @@ def pair(curve: Curve, bracket: Bracket) -> Special:
     kappa = float((values[i] * values[j]).real)
     size = float(np.max(np.abs(values)))
     accuracy = curve.field.accuracy
-    if abs(kappa) <= 1e2 * accuracy * _block_size(curve, slopes, values[i], values[j]) ** 2:
+    if _doubtful(curve, u, kappa, best.tangent):
         return Special(
             "bogdanov_takens", u, interval_of(curve, bracket), residual, GUESS,
             "two eigenvalues vanish together", tangent=tangent_at(curve, u, best.tangent), corank=1,
@@ -104,7 +104,7 @@ def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
 
 
 def _values(curve: Curve, slopes: Array) -> npt.NDArray[np.complex128]:
-    return eigenvalues_of(slopes[None], accuracy=curve.field.accuracy)[0]
+    return np.asarray(eigenvalues_of(slopes[None], accuracy=curve.field.accuracy)[0])
 
 
 def _refined(
@@ -134,24 +134,16 @@ def _refined(
     return u, extra, aux, residual, message
 
 
-def _block_size(curve: Curve, slopes: Array, one: complex, other: complex) -> float:
-    """Size of the block of f_x of two eigenvalues, on scaled axes: its rounding is that of it."""
-    from scipy.linalg import schur
-
-    n = curve.n
-    scale = curve.scale[:n]
-    scaled = slopes[:, :n] * scale / scale[:, None]
-    if n == 2:
-        return float(np.max(np.abs(scaled)))
-    gap = max(abs(one - other), abs(one), abs(other))
-
-    def near(real: Any, imag: Any = 0.0) -> bool:
-        value = complex(real, abs(imag))
-        return any(abs(value - complex(x.real, abs(x.imag))) <= 1e-6 * gap for x in (one, other))
-
-    block, _, count = schur(scaled, sort=near)
-    count = max(int(count), 2)
-    return float(np.max(np.abs(np.triu(block[:count, :count], -1))))
+def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
+    """Whether the product of the two eigenvalues is but what rounding of the unknowns makes it."""
+    step = 1e2 * curve.field.accuracy * curve.length(tangent)
+    changes = []
+    for side in (step, -step):
+        values = _values(curve, curve.at(u + side * tangent[: curve.m])[1])
+        # Of several pairs that cancel at once, the one that is meant.
+        products = (values[:, None] * values)[np.triu_indices(len(values), 1)]
+        changes.append(float(np.min(np.abs(products - kappa))))
+    return abs(kappa) <= max(changes)
 
 
 def _nearest_pair(values: npt.NDArray[np.complex128]) -> tuple[int, int]:

@@ -57,7 +57,7 @@ class Singular:
     @property
     def corank(self) -> int:
         """By how much the rank of f_u is less than the number of equations."""
-        return self.left.shape[1]
+        return int(self.left.shape[1])
 
 
 def candidates(curve: Curve, u: Array, reach: float) -> int:
