@@ -21,6 +21,7 @@ FAST = 1e-3
 ROUNDING = 64.0 * 2.0**-52
 NOTHING = 1e-30  # of an unknown's scale
 NEIGHBOURS = 8
+APART = 4.2e-14  # of unknowns; no power of two, which would show the same rounding everywhere
 RAISED = 1e-10  # tolerances from here on are for noisy functions
 # Why it fails: steps that do not shrink, a singular matrix, f that is not finite.
 DIVERGED, SINGULAR, NO_NUMBER = -1, -2, -3
@@ -133,7 +134,7 @@ def at_noise(
     here = w[u : u + size].copy()
     for k in range(NEIGHBOURS):
         for j in range(size):
-            w[u + j] = here[j] + k * 2.0**-44 * max(abs(here[j]), w[SCALE * size + j])
+            w[u + j] = here[j] + k * APART * max(abs(here[j]), w[SCALE * size + j])
         evaluate(first, second, mode, kind, n, par, active, w, u)
         for i in range(rows):
             values[k, i] = w[g + i]

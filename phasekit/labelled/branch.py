@@ -45,7 +45,8 @@ class Branch:
         ``arclength`` (0 at the start, on scaled axes), ``n_unstable`` (number of eigenvalues with
         a positive real part) or, of a conservative problem, ``kind`` (`EquilibriumKind`),
         ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
-        empty string), ``step``, ``newton_steps``, and what was recorded.
+        empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
+        beside that of the terms that cancel in it), and what was recorded.
     special_points : tuple of SpecialPoint
         In order along the curve.
     stops : tuple of Stop

@@ -82,7 +82,7 @@ def find_on(curve: Curve, path: Path) -> list[Placed]:
     found: list[Placed] = []
     m = curve.m
     for test in _tests(curve):
-        values = test.values(path.u, path.slopes)
+        values = test.values(path.u, path.slopes[:])
         for i in _interesting(values):
             for a, b in _changes(curve, path, values, i, test):
                 special = _locate(curve, a, b, test)

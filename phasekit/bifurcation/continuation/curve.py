@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.kernels import defining, differences, newton, trace
 from phasekit.kernels import state as state_places
@@ -206,6 +206,31 @@ class Curve:
         u = np.ascontiguousarray(u[:, : self.m], dtype=float)
         with np.errstate(all="ignore"):
             return np.asarray(self.field.values(u, self.par.copy(), self.active))
+
+    def residuals(self, u: Array, slopes: Any) -> Array:
+        """Largest size of an entry of f beside its terms, at many points, the rows of u.
+
+        The terms of a formula are those of its sums; of a function, what its derivatives (indexed
+        by points) make of the unknowns.
+        """
+        n, m = self.n, self.m
+        points = np.ascontiguousarray(u[:, :m], dtype=float)
+        with np.errstate(all="ignore"):
+            if isinstance(self.field, SymbolicField):
+                out = np.empty((len(points), 2 * n))
+                differences.values(
+                    self.field.terms(self.active), 2 * n, self.par.copy(),
+                    np.array(self.active, dtype=np.int64), points, out,
+                )  # fmt: skip
+                value, terms = np.abs(out[:, :n]), np.abs(out[:, n:])
+            else:
+                value = np.abs(self.values(points))
+                terms = np.empty_like(value)
+                for k, point in enumerate(points):
+                    terms[k] = np.abs(slopes[k]) @ np.abs(point)
+            return np.asarray(
+                np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
+            )
 
     def bend(self, u: Array, z: Array) -> Array:
         """The derivatives of f_u z by states and free parameters, shape (n, m)."""

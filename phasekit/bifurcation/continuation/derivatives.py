@@ -26,6 +26,7 @@ Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
 EPSILON = 2.0**-52
+APART = 7.7e-13  # neighbours that show rounding; no power of two, which would hide it
 LEVELS = 24  # steps of a line: from half the size of the unknowns, each half the one before
 MORE = 10  # further ones, where the best lie at an end
 FARTHEST = 44
@@ -201,7 +202,7 @@ class Derivatives:
         """
         if given is None and self._noise is not None:
             return self._noise
-        tiny = 2.0**-40 * (self.reach if given is None else z)
+        tiny = APART * (self.reach if given is None else z)
         found = self._values(self.u + np.arange(-4.0, 5.0)[:, None] * tiny, given)
         noise = EPSILON * np.max(np.abs(found), axis=0, initial=0.0)
         for order in (4, 5):

@@ -37,7 +37,7 @@ def brackets(
 ) -> tuple[list[Bracket], npt.NDArray[np.complex128]]:
     """All brackets of a path, in order, and the eigenvalues of f_x at its points."""
     pairs = "hopf" in detect and curve.n > 1
-    tests = test_functions(curve, path.tangent, path.slopes, pairs=pairs)
+    tests = _all_tests(curve, path, pairs=pairs)
     if conservative or is_conservative(tests.eigenvalues):
         tests = replace(tests, pair=np.ones(path.count))
         pairs = False
@@ -51,12 +51,25 @@ def brackets(
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
         for bracket in seek.explore(a, b, DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
-    for i in np.flatnonzero(np.diff(keep) > 1):  # on a point that was left out there may be one
+    for i in np.flatnonzero(
+        np.diff(keep) > 1
+    ).tolist():  # on a point that was left out there may be one
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
         found.append(Bracket(a, b, frozenset({"touch"}), 0, int(keep[i])))
     if not path.closed and len(keep) > 1:
         found += _on_ends(path, keep, tests, found)
     return found, eigenvalues
+
+
+def _all_tests(curve: Curve, path: Path, *, pairs: bool) -> Tests:
+    """The test functions of all points; of many states, of some at a time."""
+    if isinstance(path.slopes, np.ndarray):
+        return test_functions(curve, path.tangent, path.slopes, pairs=pairs)
+    parts = [
+        test_functions(curve, path.tangent[some], path.slopes[some], pairs=pairs)
+        for some in path.slopes.chunks()
+    ]
+    return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
 
 
 def _on_ends(

@@ -94,7 +94,10 @@ def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
     signs = np.where(np.arange(n) % 2, -1.0, 1.0)
     sides = np.stack([-slopes[:, n] * scale[n], rounding, signs * rounding], axis=1)
     with np.errstate(all="ignore"):
-        motion, *noise = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
+        try:  # elimination leaves zero what is zero
+            motion, *noise = np.linalg.solve(slopes[:, :n], sides).T
+        except np.linalg.LinAlgError:
+            motion, *noise = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
     unknown = 100.0 * np.max(np.abs(noise), axis=0)
     motion = np.where(np.isfinite(motion), np.abs(motion), 0.0)
     for i in range(n):
@@ -163,5 +166,5 @@ def go_on(curve: Curve, track: Track | None, points: int) -> Track | None:
     if track is None or track.stop.reason != "max_points":
         return track
     more = curve.follow(track.state, points)
-    joined = (np.concatenate([getattr(one, name) for one in (track, more)]) for name in ("record", "slopes"))
-    return Track(*joined, more.state, more.stop)
+    record = np.concatenate([track.record, more.record])
+    return Track(record, np.concatenate([track.slopes, more.slopes]), more.state, more.stop)
