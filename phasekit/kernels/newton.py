@@ -19,6 +19,7 @@ from phasekit.kernels.state import QUADRATIC, SCALE, SIGN, VECTORS
 FAST = 1e-3
 # Of terms that cancel: what is left of them where they do so but for rounding.
 ROUNDING = 64.0 * 2.0**-52
+LITTLE = 0.1  # of an unknown
 NOTHING = 1e-30  # of an unknown's scale
 NEIGHBOURS = 8
 APART = 4.2e-14  # of unknowns; no power of two, which would show the same rounding everywhere
@@ -94,6 +95,10 @@ def at_rounding(w: Array, u: int, scale: int, b: int, n: int) -> bool:
 def _settled(
     w: Array, jac: int, rows: int, n: int, u: int, scale: int, b: int, factor: float
 ) -> bool:
+    for j in range(n):
+        step = abs(w[scale + j] * w[b + 2 * j])
+        if not (step <= LITTLE * abs(w[u + j]) or step <= NOTHING * w[scale + j]):
+            return False
     for i in range(rows):
         left = 0.0
         terms = 0.0
@@ -112,11 +117,17 @@ def _settled(
 def settled(
     w: Array, jac: int, rows: int, n: int, u: int, scale: int, b: int, factor: float
 ) -> bool:
-    """Whether a part `factor` of the last step changes G by no more than rounding of its terms."""
-    slopes = np.abs(w[jac : jac + rows * n].reshape(rows, n))
+    """Whether a part `factor` of the last step changes G by no more than rounding of its terms.
+
+    And whether the derivatives at the point before it, of which the tangent is made, are those
+    here: what is small against its scale may still have changed by much.
+    """
     scales = w[scale : scale + n]
-    left = slopes @ np.abs(scales * w[b : b + 2 * n : 2])
-    terms = slopes @ np.abs(w[u : u + n])
+    steps, sizes = np.abs(scales * w[b : b + 2 * n : 2]), np.abs(w[u : u + n])
+    if not np.all((steps <= LITTLE * sizes) | (steps <= NOTHING * scales)):
+        return False
+    slopes = np.abs(w[jac : jac + rows * n].reshape(rows, n))
+    left, terms = slopes @ steps, slopes @ sizes
     return bool(np.all((factor * left <= ROUNDING * terms) | (left <= NOTHING * (slopes @ scales))))
 
 

@@ -83,8 +83,7 @@ def trace(
                 continue
             gather(w, scale, b, new, u, v, chord, guess, size)
             length = np.sqrt(inner(w, weight, new, new, size))
-            for j in range(size):
-                w[new + j] /= length
+            w[new : new + size] /= length
             angle = np.arccos(min(1.0, max(-1.0, inner(w, weight, new, t, size))))
             drift = np.sqrt(inner(w, weight, guess, guess, size)) / h
             smooth = angle <= fixed[LARGEST_TURN] and drift <= 0.25
@@ -102,16 +101,7 @@ def trace(
                 continue
 
             # A bound that is passed ends the curve on it, at the smallest fraction of the chord.
-            fraction = 1.0
-            which = -1
-            for j in range(size):
-                value = w[v + j]
-                over = max(value - fixed[high + j], fixed[low + j] - value)
-                if over > 0.0:
-                    part = max(0.0, 1.0 - over / abs(w[chord + j])) if w[chord + j] != 0.0 else 0.0
-                    if part < fraction or which < 0:
-                        fraction = part
-                        which = j
+            fraction, which = passed(w, fixed, v, chord, low, high, size)
             if which >= 0 and fraction <= 1e-12:
                 return k, BOUND, which
             if which < 0 and not (
@@ -170,8 +160,7 @@ def trace(
                 length = np.sqrt(inner(w, weight, new, new, size))
                 if inner(w, weight, new, t, size) < 0.0:
                     length = -length
-                for j in range(size):
-                    w[new + j] /= length
+                w[new : new + size] /= length
             break
 
         gather(w, scale, b, -1, u, v, chord, -1, size)
@@ -282,12 +271,32 @@ def comes_back(
     return ahead > 0.8 * np.sqrt(inner(w, weight, start_tangent, start_tangent, size))
 
 
-@routine
-def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
-    """Let the scales of states that are no angles follow how far the states have come.
+def _passed(
+    w: Array, fixed: Array, v: int, chord: int, low: int, high: int, size: int
+) -> tuple[float, int]:
+    fraction = 1.0
+    which = -1
+    for j in range(size):
+        over = max(w[v + j] - fixed[high + j], fixed[low + j] - w[v + j])
+        if over > 0.0:
+            part = max(0.0, 1.0 - over / abs(w[chord + j])) if w[chord + j] != 0.0 else 0.0
+            if part < fraction or which < 0:
+                fraction = part
+                which = j
+    return fraction, which
 
-    Lengths are measured anew.
-    """
+
+@twin(_passed)
+def passed(
+    w: Array, fixed: Array, v: int, chord: int, low: int, high: int, size: int
+) -> tuple[float, int]:
+    """The smallest fraction of the chord at which a bound is met, and which one; -1: none."""
+    value = w[v : v + size]
+    inside = (value <= fixed[high : high + size]) & (value >= fixed[low : low + size])
+    return (1.0, -1) if inside.all() else _passed(w, fixed, v, chord, low, high, size)
+
+
+def _grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
     scale, weight, start = 3 * size, 4 * size, 5 * size
     grown = False
     for j in range(n):
@@ -301,6 +310,17 @@ def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
         for j in range(size):
             w[size + j] /= length
         w[7 * size + LAST] = 0.0
+
+
+@twin(_grow)
+def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
+    """Let the scales of states that are no angles follow how far the states have come.
+
+    Lengths are measured anew.
+    """
+    far = np.abs(w[:n] - w[5 * size : 5 * size + n])
+    if (far > 2.0 * w[3 * size : 3 * size + n]).any():
+        _grow(w, n, size, fixed, period)
 
 
 @routine
