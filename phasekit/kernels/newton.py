@@ -93,11 +93,12 @@ def at_rounding(w: Array, u: int, scale: int, b: int, n: int) -> bool:
 
 
 def _settled(
-    w: Array, jac: int, rows: int, n: int, u: int, scale: int, b: int, factor: float
-) -> bool:
+    w: Array, jac: int, rows: int, n: int, u: int, scale: int, b: int, factor: float,
+    late: bool,
+) -> bool:  # fmt: skip
     for j in range(n):
         step = abs(w[scale + j] * w[b + 2 * j])
-        if not (step <= LITTLE * abs(w[u + j]) or step <= NOTHING * w[scale + j]):
+        if not (step <= LITTLE * abs(w[u + j]) or (late and step <= NOTHING * w[scale + j])):
             return False
     for i in range(rows):
         left = 0.0
@@ -108,27 +109,30 @@ def _settled(
             left += slope * abs(w[scale + j] * w[b + 2 * j])
             terms += slope * abs(w[u + j])
             unit += slope * w[scale + j]
-        if not (factor * left <= ROUNDING * terms or left <= NOTHING * unit):
+        if not (factor * left <= ROUNDING * terms or (late and left <= NOTHING * unit)):
             return False
     return True
 
 
 @twin(_settled)
 def settled(
-    w: Array, jac: int, rows: int, n: int, u: int, scale: int, b: int, factor: float
-) -> bool:
+    w: Array, jac: int, rows: int, n: int, u: int, scale: int, b: int, factor: float,
+    late: bool,
+) -> bool:  # fmt: skip
     """Whether a part `factor` of the last step changes G by no more than rounding of its terms.
 
     And whether the derivatives at the point before it, of which the tangent is made, are those
-    here: what is small against its scale may still have changed by much.
+    here: what is small against its scale may still have changed by much. After some steps,
+    ``late``, what is next to nothing on its scale is taken for zero.
     """
     scales = w[scale : scale + n]
     steps, sizes = np.abs(scales * w[b : b + 2 * n : 2]), np.abs(w[u : u + n])
-    if not np.all((steps <= LITTLE * sizes) | (steps <= NOTHING * scales)):
+    nothing = NOTHING if late else 0.0
+    if not np.all((steps <= LITTLE * sizes) | (steps <= nothing * scales)):
         return False
     slopes = np.abs(w[jac : jac + rows * n].reshape(rows, n))
     left, terms = slopes @ steps, slopes @ sizes
-    return bool(np.all((factor * left <= ROUNDING * terms) | (left <= NOTHING * (slopes @ scales))))
+    return bool(np.all((factor * left <= ROUNDING * terms) | (left <= nothing * (slopes @ scales))))
 
 
 @routine
@@ -203,14 +207,14 @@ def correct(
         ratio = step / before if i > 0 else 0.2
         if i == 0 and w[expected] > 0.0 and 4.0 * w[expected] * step * step <= 1e-4 * tolerance:
             w[expected] *= 1.25  # so that it is measured again before long
-            if settled(w, jac, rows, size, u, scale, b, 2.0 * w[expected] * step):
+            if settled(w, jac, rows, size, u, scale, b, 2.0 * w[expected] * step, False):
                 return 1
         if i == 1:
             w[expected] = max(0.5 * w[expected], ratio / before)
         if step == 0.0 or (step <= 1e-12 and at_rounding(w, u, scale, b, size)):
             return i + 1
         if ratio <= FAST and step * ratio * ratio <= 1e-4 * tolerance:
-            if settled(w, jac, rows, size, u, scale, b, ratio * ratio):
+            if settled(w, jac, rows, size, u, scale, b, ratio * ratio, i > 1):
                 return i + 1
         elif step <= 1e-5 and (ratio >= 0.25 or (step <= tolerance and i + 1 == iterations)):
             if (tolerance >= RAISED and step <= tolerance) or at_noise(

@@ -176,6 +176,8 @@ class Derivatives:
             ladder = _Ladder(
                 np.array([2.0**-k / length for k in levels]), ahead, behind,
                 self._values(self.u[None], given)[0], self._noise_of(z, given),
+                # Terms of f may cancel, as along a null vector, where their rounding does not.
+                np.abs(self.slopes) @ np.abs(z) if given is None else np.zeros(self.curve.n),
             )  # fmt: skip
             orders = (1, 2, 3) if given is None else (0, 1, 2)
             results = [ladder.derivative(order) for order in orders]
@@ -221,14 +223,14 @@ class _Ladder:
     """Samples of a vector along a line, at steps that are halved, to both sides."""
 
     def __init__(
-        self, steps: Array, ahead: Array, behind: Array, middle: Array, noise: Array
+        self, steps: Array, ahead: Array, behind: Array, middle: Array, noise: Array, terms: Array
     ) -> None:
         self.steps = steps
         self.middle, self.noise = middle, noise
         column = steps[:, None]
         self.even = (0.5 * (ahead - middle) + 0.5 * (behind - middle)) / column**2
         self.odd = 0.5 * (ahead - behind) / column
-        self.errors = noise + EPSILON * (np.abs(ahead) + np.abs(behind))
+        self.errors = noise + EPSILON * (np.abs(ahead) + np.abs(behind) + column * terms)
 
     def derivative(self, order: int) -> tuple[Estimate, int, bool]:
         """The derivative with the least error, entry by entry; the shortest step that it needs.

@@ -51,9 +51,7 @@ def brackets(
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
         for bracket in seek.explore(a, b, DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
-    for i in np.flatnonzero(
-        np.diff(keep) > 1
-    ).tolist():  # on a point that was left out there may be one
+    for i in np.flatnonzero(np.diff(keep) > 1).tolist():  # on a point left out there may be one
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
         found.append(Bracket(a, b, frozenset({"touch"}), 0, int(keep[i])))
     if not path.closed and len(keep) > 1:
@@ -99,6 +97,13 @@ def _regular(tests: Tests) -> npt.NDArray[np.int64]:
     regular = size > around + np.log(1e-7)
     regular[[0, -1]] = True
     return np.flatnonzero(regular | (len(size) < 3))
+
+
+def nearest_is_complex(tests: Tests) -> bool:
+    """Whether the pair with the least sum is conjugate, so that it crosses the imaginary axis."""
+    values = tests.eigenvalues
+    above = np.abs(2.0 * values.real[values.imag > 0.0])
+    return bool(np.min(above, initial=np.inf) <= abs(float(tests.pair)) * (1.0 + 1e-9))
 
 
 class _Seek:
@@ -160,7 +165,8 @@ class _Seek:
         changes = {n for n in TESTS if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
         jump = abs(int(two.unstable) - int(one.unstable))
         simple = len(changes & {"fold", "branch"})
-        explained = simple + 2 * ("pair" in changes)
+        crosses = "pair" in changes and (nearest_is_complex(one) or nearest_is_complex(two))
+        explained = simple + 2 * crosses
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)
         # Where the path turns at a pitchfork, both change at once: halving finds nothing between.
         turns = changes == {"fold", "branch"} and jump in (0, 2)

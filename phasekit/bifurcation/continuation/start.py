@@ -141,6 +141,15 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     directions = nullspace(slopes, curve.scale[: curve.m])
     if len(directions) == 1:
         t = directions[0]
+        with np.errstate(all="ignore"):
+            # Elimination leaves zero what is zero, where rounding would lead away from it.
+            row = t / curve.scale[: curve.m] ** 2
+            try:
+                exact = np.linalg.solve(np.vstack([slopes, row]), np.eye(curve.m)[-1])
+            except np.linalg.LinAlgError:
+                exact = t
+        if curve.length(exact - t) < 1e-6 * curve.length(t):
+            t = exact
     else:
         found = directions_at(curve, u)
         t = max(found, key=lambda t: abs(t[n])) if found else directions[0]
