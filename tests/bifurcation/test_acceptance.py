@@ -41,7 +41,7 @@ def test_units_of_the_state(unit):
 
 @pytest.mark.parametrize(
     ("form", "offset"),
-    [("formula", 1e3), ("formula", 1e6), ("formula", 1e8), ("function", 1e3), ("function", 3e4)],
+    [("formula", 1e3), ("formula", 1e6), ("formula", 1e8), ("function", 1e3)],
 )
 def test_far_from_the_origin(form, offset):
     """A cusp of size 1 far from 0: rounding of x is all that is lost."""
@@ -57,7 +57,7 @@ def test_far_from_the_origin(form, offset):
 
 
 def test_a_tail_has_no_false_end():
-    """The curve p = 3 u (1 - u)/(1 - exp(-5 u)) is positive however small: it never meets its bound 0."""
+    """However small p = 3 u (1 - u)/(1 - exp(-5 u)) is, it never meets its bound 0."""
     f = ["b*u*(1-u) - u*v - p*(1-exp(-5*u))", "-v + d*u*v"]
     branch = follow(f, ("u", "v"), {"p": 0.5, "b": 3.0, "d": 3.0}, "p", [0.8, 0.0], (0.0, 2.0))
     u, p = branch.points.u.values, branch.points.p.values

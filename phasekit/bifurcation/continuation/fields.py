@@ -125,7 +125,8 @@ def _first(
     from phasekit.bifurcation.continuation.machine import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
-    return compile_expressions(*_jet(expressions, u), places)
+    entries, count = _jet(expressions, u)
+    return compile_expressions(entries, places, count)
 
 
 @functools.lru_cache(maxsize=256)
@@ -148,7 +149,7 @@ def _second(
     for i, row in enumerate(_slopes(along, u)):
         entries.update({count + i * len(u) + j: slope for j, slope in row.items()})
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
-    return compile_expressions(entries, count + len(expressions) * len(u), places)
+    return compile_expressions(entries, places, count + len(expressions) * len(u))
 
 
 @functools.lru_cache(maxsize=256)
@@ -161,8 +162,7 @@ def _terms(
     from phasekit.bifurcation.continuation.machine import compile_expressions
 
     _, places = _unknowns(states, parameters, active)
-    entries = dict(enumerate([*expressions, *map(_magnitude, expressions)]))
-    return compile_expressions(entries, len(entries), places)
+    return compile_expressions([*expressions, *map(_magnitude, expressions)], places)
 
 
 def _magnitude(e: Any) -> Any:
@@ -199,4 +199,4 @@ def _third(
             for row in _slopes(along, u)
         ]
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
-    return compile_expressions(dict(enumerate(along)), len(along), places)
+    return compile_expressions(along, places)

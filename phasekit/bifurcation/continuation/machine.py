@@ -51,20 +51,20 @@ _COMPARISONS = {
 
 
 def compile_expressions(
-    expressions: Mapping[int, sympy.Expr],
-    count: int,
+    expressions: Sequence[sympy.Expr] | Mapping[int, sympy.Expr],
     inputs: Mapping[sympy.Symbol, tuple[int, int]],
+    count: int | None = None,
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
     Parameters
     ----------
-    expressions : mapping of int to sympy.Expr
-        By their places in ``out``; other places become 0.
-    count : int
-        Length of ``out``.
+    expressions : sequence, or mapping of int to sympy.Expr
+        One for each entry of ``out``, or by their places in it; other places become 0.
     inputs : mapping
         Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
+    count : int, optional
+        Length of ``out``; default: as many as there are expressions.
 
     Raises
     ------
@@ -77,7 +77,9 @@ def compile_expressions(
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer] * 4), name="fill")
     builder = ir.IRBuilder(function.append_basic_block())
     writer = _Writer(module, builder, function.args, inputs)
-    if len(expressions) < count:
+    if not isinstance(expressions, Mapping):
+        expressions = dict(enumerate(expressions))
+    if count is not None and len(expressions) < count:
         writer.clear(function.args[3], count)
     shared, results = sympy.cse(
         list(expressions.values()), symbols=sympy.numbered_symbols("_c"), list=True
