@@ -18,7 +18,6 @@ from numba.extending import intrinsic, overload
 
 from phasekit.kernels.compile import Array, Function
 
-
 OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
 
 
