@@ -24,6 +24,8 @@ from phasekit.kernels.defining import BRANCH, FOLD, HOPF
 
 Array = npt.NDArray[np.float64]
 
+GOLDEN = 18  # halvings, nearly, of a step in which a test function may touch zero
+
 
 def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curve, Sample] | None:
     """The curve through a special point with one more free parameter, and the point on it.
@@ -113,10 +115,29 @@ def _changes(
     a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
     if np.sign(values[i]) != np.sign(values[i + 1]):
         return [(a, b)]
-    for s in (0.5, 0.25, 0.75):
-        middle = between(curve, a, b, s)
-        if middle is not None and np.sign(test.value(middle)) != np.sign(values[i]):
-            return [(a, middle), (middle, b)]
+    sign = np.sign(values[i])
+
+    def height(s: float) -> float:
+        sample = between(curve, a, b, s)
+        return np.inf if sample is None else sign * test.value(sample)
+
+    # Golden section, to where the sign is another or the function is lowest.
+    low, high = 0.0, 1.0
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    one, two = 1.0 - ratio, ratio
+    at_one, at_two = height(one), height(two)
+    for _ in range(GOLDEN):
+        if min(at_one, at_two) < 0.0:
+            middle = between(curve, a, b, one if at_one < at_two else two)
+            return [] if middle is None else [(a, middle), (middle, b)]
+        if at_one < at_two:
+            high, two, at_two = two, one, at_one
+            one = high - ratio * (high - low)
+            at_one = height(one)
+        else:
+            low, one, at_one = one, two, at_two
+            two = low + ratio * (high - low)
+            at_two = height(two)
     return []
 
 

@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, t
 
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
-ON_END = 1e-7  # part of its neighbour's value at which a test function of an end is zero
+ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
 TESTS = ("fold", "branch", "pair")
 
 
@@ -55,7 +55,7 @@ def brackets(
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
         found.append(Bracket(a, b, frozenset({"touch"}), 0, int(keep[i])))
     if not path.closed and len(keep) > 1:
-        found += _on_ends(path, keep, tests, found)
+        found += _on_ends(curve, path, keep, tests, found)
     return found, eigenvalues
 
 
@@ -71,11 +71,17 @@ def _all_tests(curve: Curve, path: Path, *, pairs: bool) -> Tests:
 
 
 def _on_ends(
-    path: Path, keep: npt.NDArray[np.int64], tests: Tests, found: list[Bracket]
+    curve: Curve, path: Path, keep: npt.NDArray[np.int64], tests: Tests, found: list[Bracket]
 ) -> list[Bracket]:
     """Brackets where the path ends on a special point, whatever signs rounding gives there."""
     more = []
-    for i, (end, beside) in ((0, (0, 1)), (len(keep) - 2, (-1, -2))):
+    for end in (0, len(keep) - 1):
+        # The path may come to its end in ever smaller steps.
+        gap = (path.u[keep] - path.u[keep[end]])[:, : curve.m] / curve.scale[: curve.m]
+        away = np.flatnonzero(np.max(np.abs(gap), axis=1) > 1e-3)
+        if not len(away):
+            continue
+        beside = int(away[0] if end == 0 else away[-1])
         changes = set()
         if tests.volume[end] < tests.volume[beside] + np.log(ON_END):
             changes.add("branch")
@@ -83,10 +89,15 @@ def _on_ends(
             values = np.abs(getattr(tests, name))
             if values[end] < ON_END * values[beside]:
                 changes.add(name)
-        known = {n for one in found if one.index == keep[i] for n in one.changes}
+        within = range(*sorted((end, beside)))
+        known = {n for one in found if one.index in keep[within] for n in one.changes}
         if changes - known:
-            a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
-            more.append(Bracket(a, b, frozenset(changes - known), 0, int(keep[i])))
+            a, b = (
+                Sample(path.u[k], path.tangent[k], path.slopes[k])
+                for k in sorted((int(keep[end]), int(keep[beside])))
+            )
+            index = int(keep[min(end, len(keep) - 2)])
+            more.append(Bracket(a, b, frozenset(changes - known), 0, index))
     return more
 
 

@@ -86,7 +86,7 @@ def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
     def test(s: Sample) -> float:
         values = _values(curve, s.slopes)
         above = values[values.imag > 0.0]
-        return float(np.sum(np.sort_complex(above)[np.argsort(np.abs(above.real))][:count].real))
+        return float(np.sum(above.real[np.argsort(np.abs(above.real))][:count]))
 
     best, _, _ = bracket_root(curve, bracket.a, bracket.b, test, steps=60, width=1e-14)
     values = _values(curve, best.slopes)
