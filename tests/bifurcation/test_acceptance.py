@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -162,3 +165,17 @@ def test_many_states_keep_no_matrices():
         options=pk.ContinuationOptions(max_points=17, detect=()),
     )  # fmt: skip
     np.testing.assert_array_equal(longer.points.u7, whole.points.u7)
+
+
+def _logistic(x, r):
+    return [r * x[0] * (1.0 - x[0]) - 0.1]
+
+
+@pytest.mark.parametrize("f", [["r*x - x**3"], _logistic])
+def test_problems_travel(f):
+    """Copies and pickles of a problem give the same branch, to the last bit."""
+    problem = pk.Problem(f, "x", {"r": 1.0})
+    branch = pk.continuation(problem, "r", x0=[0.9], span=(0.7, 2.0))
+    for other in (copy.copy(problem), copy.deepcopy(problem), pickle.loads(pickle.dumps(problem))):
+        again = pk.continuation(other, "r", x0=[0.9], span=(0.7, 2.0))
+        np.testing.assert_array_equal(again.points.x, branch.points.x)
