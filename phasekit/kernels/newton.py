@@ -217,6 +217,8 @@ def correct(
             if settled(w, jac, rows, size, u, scale, b, ratio * ratio, i > 1):
                 return i + 1
         elif step <= 1e-5 and (ratio >= 0.25 or (step <= tolerance and i + 1 == iterations)):
+            if settled(w, jac, rows, size, u, scale, b, 0.1, i > 1):
+                return i + 1  # G itself was but rounding of its terms
             if (tolerance >= RAISED and step <= tolerance) or at_noise(
                 first, second, mode, kind, n, par, active, w, u
             ):

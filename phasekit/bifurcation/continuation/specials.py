@@ -46,8 +46,10 @@ def _find(
         from phasekit.bifurcation.continuation.codimension_two import find_on
 
         return find_on(curve, path), eigenvalues_of(path.slopes[:])
-    if not detect and not curve.keeps:  # nothing is asked for that takes long
-        return [], np.full((path.count, curve.n), np.nan, dtype=complex)
+    if not detect:
+        if not curve.keeps:  # nothing is asked for that takes long
+            return [], np.full((path.count, curve.n), np.nan, dtype=complex)
+        return [], eigenvalues_of(path.slopes[:])
     found, eigenvalues = brackets(curve, path, detect, conservative)
     placed: list[Placed] = []
     for bracket in found:
