@@ -94,7 +94,14 @@ def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
             kept.append(one)
         elif kept[twin].special.status != "converged" and one.special.status == "converged":
             kept[twin] = one
+        elif not _inside(kept[twin]) and _inside(one):
+            kept[twin] = one
     return [one for one in kept if not _echo(curve, one, kept)]
+
+
+def _inside(one: Placed) -> bool:
+    """Whether a point stands between the two points of the path that it is placed at."""
+    return -1e-6 <= one.along <= 1.0 + 1e-6
 
 
 def _stays(curve: Curve, path: Path, one: Placed, other: Placed) -> bool:

@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
 
 Array = npt.NDArray[np.float64]
 
@@ -74,7 +74,7 @@ def candidates(curve: Curve, u: Array, reach: float) -> int:
         w = left[:, j]
         slope = curve.bend(u, right[j] * scale) * scale / rows[:, None]
         rate = np.linalg.norm(w @ slope) + np.linalg.norm(w @ ahead)
-        if values[j] > 2.0 * reach * rate + 1e2 * curve.field.accuracy:
+        if values[j] > 2.0 * reach * rate + 1e2 * accuracy_of(curve):
             break
         count += 1
     return count
@@ -86,7 +86,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     scale = curve.scale[:m]
     u = np.array(start[:m])
     rows = force_sizes(curve, u)
-    accuracy = curve.field.accuracy
+    accuracy = accuracy_of(curve)
     left, _, right = np.linalg.svd(curve.at(u)[1] * scale / rows[:, None])
     W, V = left[:, n - k :], right[n - k :]
     b = np.zeros(k)
