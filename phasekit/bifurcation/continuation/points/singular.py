@@ -24,6 +24,7 @@ from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
 Array = npt.NDArray[np.float64]
 
 STEPS = 25
+FLOOR = (1e-12, 1e-9)  # steps that are no more than rounding, likewise
 LAST = (1e-9, 1e-7)  # longest last step, with exact derivatives and with differences
 
 
@@ -118,7 +119,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
         miss = float(np.max(np.abs(right_side)))
         if not np.isfinite(size) or curve.length(u - start[:m]) > 2.0 * reach:
             return None
-        if size > 1e-12:
+        if size > FLOOR[accuracy > 1e-12]:
             fast = size <= 0.1 * last  # where the point is degenerate, steps shrink slowly
         small = fast and size <= LAST[accuracy > 1e-12]
         small &= miss <= max(1e-10 * slope, 1e2 * accuracy)
