@@ -24,7 +24,7 @@ from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
 Array = npt.NDArray[np.float64]
 
 STEPS = 25
-FLOOR = (1e-12, 1e-9)  # steps that are no more than rounding, likewise
+FLOOR = (1e-12, 2e-8)  # steps that are no more than rounding, likewise
 LAST = (1e-9, 1e-7)  # longest last step, with exact derivatives and with differences
 
 
