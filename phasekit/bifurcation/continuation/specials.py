@@ -74,13 +74,20 @@ def wanted(special: Special, detect: tuple[str, ...]) -> bool:
 
 def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:
     """Where on the path a special point stands."""
-    i = bracket.index
-    m = curve.m
-    chord = path.u[i + 1] - path.u[i]
-    gap = np.zeros(curve.size)
-    gap[:m] = special.u[:m] - path.u[i, :m]
-    square = float(np.dot(curve.weight * chord, chord))
-    return Placed(i, float(np.dot(curve.weight * chord, gap)) / square if square else 0.0, special)
+    first = None
+    # A bracket may hold points that lie too near to a branch point to say anything.
+    for i in range(bracket.index, min(bracket.index + 8, path.count - 1)):
+        chord = path.u[i + 1] - path.u[i]
+        gap = np.zeros(curve.size)
+        gap[: curve.m] = special.u[: curve.m] - path.u[i, : curve.m]
+        square = float(np.dot(curve.weight * chord, chord))
+        along = float(np.dot(curve.weight * chord, gap)) / square if square else 0.0
+        one = Placed(i, along, special)
+        first = one if first is None else first
+        if _inside(one):
+            return one
+    assert first is not None
+    return first
 
 
 def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
@@ -98,7 +105,14 @@ def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
             kept.append(one)
         elif kept[twin].special.status != "converged" and one.special.status == "converged":
             kept[twin] = one
+        elif not _inside(kept[twin]) and _inside(one):
+            kept[twin] = one
     return [one for one in kept if not _echo(curve, one, kept)]
+
+
+def _inside(one: Placed) -> bool:
+    """Whether a point stands between the two points of the path that it is placed at."""
+    return -1e-6 <= one.along <= 1.0 + 1e-6
 
 
 def _stays(curve: Curve, path: Path, one: Placed, other: Placed) -> bool:

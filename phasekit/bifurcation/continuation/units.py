@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.kernels.differences import PLAIN
 
 Array = npt.NDArray[np.float64]
 
@@ -26,3 +27,8 @@ def force_sizes(curve: Curve, u: Array) -> Array:
     sizes = np.max(np.abs(curve.at(u)[1] * scale), axis=1)
     sizes = sizes + np.max(np.abs(curve.bend(u, scale) * scale), axis=1)
     return np.asarray(np.where((sizes > 0.0) & np.isfinite(sizes), sizes, 1.0))
+
+
+def accuracy_of(curve: Curve) -> float:
+    """Relative accuracy of the derivatives of f, by differences where f comes alone."""
+    return max(curve.field.accuracy, 1e-11 if curve.field.mode == PLAIN else 0.0)

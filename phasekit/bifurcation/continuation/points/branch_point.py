@@ -22,7 +22,7 @@ from phasekit.bifurcation.continuation.points.special import (
     reach_of,
 )
 from phasekit.bifurcation.continuation.spectrum import orientation
-from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
 
 Array = npt.NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def singular_point(
 
 def meets(curve: Curve, point: Singular) -> bool:
     """Whether f itself vanishes where f_u loses rank."""
-    return float(np.max(np.abs(point.offset))) <= 1e3 * curve.field.accuracy
+    return float(np.max(np.abs(point.offset))) <= 1e3 * accuracy_of(curve)
 
 
 def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> Special:

@@ -19,11 +19,12 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
 
 Array = npt.NDArray[np.float64]
 
 STEPS = 25
+FLOOR = (1e-12, 2e-8)  # steps that are no more than rounding, likewise
 LAST = (1e-9, 1e-7)  # longest last step, with exact derivatives and with differences
 
 
@@ -74,7 +75,7 @@ def candidates(curve: Curve, u: Array, reach: float) -> int:
         w = left[:, j]
         slope = curve.bend(u, right[j] * scale) * scale / rows[:, None]
         rate = np.linalg.norm(w @ slope) + np.linalg.norm(w @ ahead)
-        if values[j] > 2.0 * reach * rate + 1e2 * curve.field.accuracy:
+        if values[j] > 2.0 * reach * rate + 1e2 * accuracy_of(curve):
             break
         count += 1
     return count
@@ -86,7 +87,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     scale = curve.scale[:m]
     u = np.array(start[:m])
     rows = force_sizes(curve, u)
-    accuracy = curve.field.accuracy
+    accuracy = accuracy_of(curve)
     left, _, right = np.linalg.svd(curve.at(u)[1] * scale / rows[:, None])
     W, V = left[:, n - k :], right[n - k :]
     b = np.zeros(k)
@@ -118,7 +119,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
         miss = float(np.max(np.abs(right_side)))
         if not np.isfinite(size) or curve.length(u - start[:m]) > 2.0 * reach:
             return None
-        if size > 1e-12:
+        if size > FLOOR[accuracy > 1e-12]:
             fast = size <= 0.1 * last  # where the point is degenerate, steps shrink slowly
         small = fast and size <= LAST[accuracy > 1e-12]
         small &= miss <= max(1e-10 * slope, 1e2 * accuracy)
