@@ -6,6 +6,7 @@ import os
 import tempfile
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # numba's cache of a kernel knows the file of that kernel only, not the files that it calls into:
@@ -21,3 +22,24 @@ os.environ.setdefault(
 # in the working directory.
 settings.register_profile("phasekit", deadline=None, derandomize=True, database=None)
 settings.load_profile("phasekit")
+
+
+@pytest.fixture(autouse=True, scope="session")
+def every_branch_is_checked():
+    """Hold each branch of equilibria that a test computes against what holds of all of them."""
+    import branch_invariants
+
+    from phasekit.kernels.defining import EQUILIBRIUM
+    from phasekit.labelled import branch
+
+    find = branch.find
+
+    def checked(curve, path, detect, conservative):
+        placed, eigenvalues = find(curve, path, detect, conservative)
+        if curve.kind == EQUILIBRIUM and set(detect) == {"fold", "branch_point", "hopf"}:
+            branch_invariants.check(curve, path, placed, eigenvalues, conservative)
+        return placed, eigenvalues
+
+    branch.find = checked
+    yield
+    branch.find = find

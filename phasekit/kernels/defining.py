@@ -23,16 +23,10 @@ from typing import Any
 import numpy as np
 
 from phasekit.kernels.compile import Array, kernel, routine
-from phasekit.kernels.native import call, twin
+from phasekit.kernels.differences import DERIVED, bend, jet, spare_size
 from phasekit.kernels.state import NUMBERS, SCALE, VECTORS
 
 EQUILIBRIUM, FOLD, HOPF, BRANCH = range(4)
-
-# How the right-hand side comes: with its derivatives, or alone, to be differenced.
-DERIVED, PLAIN = range(2)
-
-STEP = 2.0**-10  # of fourth-order differences: their error is STEP^4 and rounding/STEP
-MIXED = 2.0**-12  # of mixed second differences
 
 
 def unknowns(kind: int, n: int, free: int) -> int:
@@ -59,7 +53,7 @@ def work_size(kind: int, n: int, free: int) -> int:
         + n * m
         + rows
         + rows * size
-        + (n * m + n * n + 4 * m + 2 * n)
+        + (n * m + n * n + m + spare_size(n, m))
     )
 
 
@@ -94,98 +88,6 @@ def places(kind: int, n: int, free: int) -> tuple[int, ...]:
     z = square + n * n
     spare = z + m
     return size, rows, aux, vectors, matrix, right, jet_, g, jacobian, bent, square, z, spare
-
-
-@routine
-def plain(function: Any, n: int, w: Array, x: int, par: Array, active: Any, out: int) -> None:
-    """Call a right-hand side that takes the state and all parameters."""
-    for i in range(n):
-        w[out + i] = np.nan
-    for j in range(active.size):
-        par[active[j]] = w[x + n + j]
-    call(function, w, x, par, x, out)
-
-
-def _jet(
-    first: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any, scale: int, out: int,
-    spare: int,
-) -> None:  # fmt: skip
-    if mode == DERIVED:
-        call(first, w, u, par, u, out)
-        return
-    m = n + active.size
-    x = spare
-    value = spare + m
-    for i in range(m):
-        w[x + i] = w[u + i]
-    for j in range(m):
-        step = STEP * max(abs(w[u + j]), w[scale + j])
-        for i in range(n):
-            w[out + n + i * m + j] = 0.0
-        for side in range(4):
-            k = (-2.0, -1.0, 1.0, 2.0)[side]
-            weight = (1.0, -8.0, 8.0, -1.0)[side] / (12.0 * step)
-            w[x + j] = w[u + j] + k * step
-            plain(first, n, w, x, par, active, value)
-            for i in range(n):
-                w[out + n + i * m + j] += weight * w[value + i]
-        w[x + j] = w[u + j]
-    plain(first, n, w, x, par, active, out)
-
-
-@twin(_jet)
-def jet(
-    first: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any, scale: int, out: int,
-    spare: int,
-) -> None:  # fmt: skip
-    """F and its derivatives by state and free parameters, row by row."""
-    call(first, w, u, par, u, out)
-
-
-def _bend(
-    first: Any, second: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any,
-    scale: int, z: int, out: int, spare: int,
-) -> None:  # fmt: skip
-    if mode == DERIVED:
-        call(second, w, u, par, z, out)
-        return
-    m = n + active.size
-    out += n + n * m
-    x = spare
-    value = spare + m
-    length = 0.0
-    for i in range(m):
-        length = max(length, abs(w[z + i]) / max(abs(w[u + i]), w[scale + i]))
-    for i in range(n * m):
-        w[out + i] = 0.0
-    if length == 0.0:
-        return
-    along = MIXED / length
-    for j in range(m):
-        step = MIXED * max(abs(w[u + j]), w[scale + j])
-        for side in range(4):
-            k = (1.0, 1.0, -1.0, -1.0)[side]
-            l = (1.0, -1.0, 1.0, -1.0)[side]  # noqa: E741
-            for i in range(m):
-                w[x + i] = w[u + i] + l * along * w[z + i]
-            w[x + j] += k * step
-            plain(first, n, w, x, par, active, value)
-            weight = k * l / (4.0 * step * along)
-            for i in range(n):
-                w[out + i * m + j] += weight * w[value + i]
-
-
-@twin(_bend)
-def bend(
-    first: Any, second: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any,
-    scale: int, z: int, out: int, spare: int,
-) -> None:  # fmt: skip
-    """The derivatives of f_u z by state and free parameters, row by row.
-
-    They come after f and its derivatives, which begin at out and are filled as well where the mode
-    is DERIVED: what they share is computed once.
-    """
-    call(second, w, u, par, z, out)
 
 
 @routine
@@ -302,7 +204,7 @@ def bend_all(
     m = n + active.size
     base = 3 * m
     bent = base + n + n * m
-    w = np.zeros(bent + n * m + 2 * (m + n))
+    w = np.zeros(bent + n * m + m + 7 * n)
     for j in range(m):
         w[m + j] = scale[j]
     for k in range(points.shape[0]):

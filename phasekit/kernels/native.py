@@ -18,6 +18,8 @@ from numba.extending import intrinsic, overload
 
 from phasekit.kernels.compile import Array, Function
 
+OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
+
 
 def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
     """Give a function that is interpreted as it stands another body for the compiler."""
@@ -62,6 +64,16 @@ def call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
 
 
 def _solve(w: Array, a: int, b: int, n: int) -> float:
+    if n > OWN:
+        matrix, right = w[a : a + n * n].reshape(n, n), w[b : b + 2 * n].reshape(n, 2)
+        for i in range(n * n):
+            if not np.isfinite(w[a + i]):
+                return 0.0
+        try:
+            right[:] = np.linalg.solve(matrix, right)
+        except Exception:  # noqa: BLE001 (all that numba knows)
+            return 0.0
+        return 1.0
     sign = 1.0
     for j in range(n):
         pivot = j
@@ -119,6 +131,8 @@ def solve(w: Array, a: int, b: int, n: int) -> float:
 
 
 def _orientation(w: Array, a: int, n: int, sign: float) -> float:
+    if n > OWN:
+        return float(np.linalg.slogdet(w[a : a + n * n].reshape(n, n))[0])
     return sign
 
 
@@ -150,3 +164,16 @@ def _copy(w: Array, source: int, target: int, n: int) -> None:
 def copy(w: Array, source: int, target: int, n: int) -> None:
     """Copy n entries."""
     w[target : target + n] = w[source : source + n]
+
+
+def _dot(w: Array, x: int, y: int, n: int) -> float:
+    total = 0.0
+    for i in range(n):
+        total += w[x + i] * w[y + i]
+    return total
+
+
+@twin(_dot)
+def dot(w: Array, x: int, y: int, n: int) -> float:
+    """Sum of x * y over n entries."""
+    return float(np.dot(w[x : x + n], w[y : y + n]))

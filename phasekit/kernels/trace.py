@@ -14,8 +14,8 @@ import numpy as np
 
 from phasekit.kernels.compile import Array, kernel, routine
 from phasekit.kernels.defining import HOPF, evaluate, places
-from phasekit.kernels.native import copy, inner, orientation
-from phasekit.kernels.newton import correct
+from phasekit.kernels.native import copy, dot, inner, orientation, twin
+from phasekit.kernels.newton import DIVERGED, NO_NUMBER, correct
 from phasekit.kernels.state import DONE, LAST, LENGTH, NEXT, SCALE, SIDE, SIGN
 
 # Settings, by place; then come period, lower and upper bound of each unknown.
@@ -25,19 +25,24 @@ LONGEST, SHORTEST, TOLERANCE, ITERATIONS, TURN, LARGEST_TURN, SETTINGS = range(7
 CAREFUL = 1e-6
 # Reasons to stop.
 FULL, BOUND, CLOSED, STUCK, NOT_FINITE = range(5)
-# What is recorded of a step, after unknowns, tangent and the derivatives of f.
+# Why steps are refused, beside what Newton's method says: the curve turns, or branches cross.
+TURNS, CROSSES = 1, 2
+# What is recorded of a step, after unknowns and tangent.
 STEP_LENGTH, NEWTON_STEPS, ANGLE, ARCLENGTH, RECORDED = range(5)
 
 
 @kernel
 def trace(
     first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, fixed: Array,
-    w: Array, record: Array,
+    w: Array, record: Array, slopes: Array,
 ) -> tuple[int, int, int]:  # fmt: skip
     """Follow a curve until the record is full, or something ends it.
 
+    The derivatives of f at each point are left in ``slopes``.
+
     The state at the head of ``w`` says where it stands, and is left so after the last point.
-    Returns the number of points, the reason to stop, and which unknown met its bound.
+    Returns the number of points, the reason to stop, and which unknown met its bound, or why the
+    last step was refused.
     """
     size, _, aux, v, a, b, base, _, _, _, _, _, spare = places(kind, n, active.size)
     m = n + active.size
@@ -59,53 +64,44 @@ def trace(
         angle = 0.0
         steps = 0
         side = 0.0
+        smooth = True
         which = -1
         reason = -1
+        why = DIVERGED
         while True:  # until a step stands
             h = w[number + NEXT]
             if h < fixed[SHORTEST]:
-                finite = True
-                for i in range(n):
-                    finite = finite and np.isfinite(w[base + i])
-                return k, (STUCK if finite else NOT_FINITE), 0
+                return k, (NOT_FINITE if why == NO_NUMBER else STUCK), why
             predict(w, u, t, old, weight, h, w[number + LAST], v, row, guess, size)
-            target = 0.0
-            for j in range(size):
-                target += w[row + j] * w[v + j]
+            target = dot(w, row, v, size)
             steps = correct(
                 first, second, mode, kind, n, par, active, w, v, row, target, tolerance, limit
             )
             if steps < 0:
+                why = steps
                 w[number + NEXT] = 0.25 * h
                 continue
-            for j in range(size):
-                w[new + j] = w[scale + j] * w[b + 2 * j + 1]
-                w[chord + j] = w[v + j] - w[u + j]
-                w[guess + j] -= w[v + j]
+            gather(w, scale, b, new, u, v, chord, guess, size)
             length = np.sqrt(inner(w, weight, new, new, size))
-            for j in range(size):
-                w[new + j] /= length
+            w[new : new + size] /= length
             angle = np.arccos(min(1.0, max(-1.0, inner(w, weight, new, t, size))))
             drift = np.sqrt(inner(w, weight, guess, guess, size)) / h
-            if not (angle <= fixed[LARGEST_TURN] and drift <= 0.25):
+            smooth = angle <= fixed[LARGEST_TURN] and drift <= 0.25
+            # A bend that is shorter than any step is passed: the point is next to the last one.
+            sharp = not smooth and 0.5 * h < fixed[SHORTEST] and drift <= 2.0
+            if smooth or sharp:
+                side = orientation(w, a, size, w[number + SIGN])
+            if not smooth and not (sharp and side * w[number + SIDE] >= 0.0):
+                why = TURNS
                 w[number + NEXT] = 0.5 * h
                 continue
-            side = orientation(w, a, size, w[number + SIGN])
             if side * w[number + SIDE] < 0.0 and h > max(CAREFUL, 4.0 * fixed[SHORTEST]):
+                why = CROSSES
                 w[number + NEXT] = 0.25 * h
                 continue
 
             # A bound that is passed ends the curve on it, at the smallest fraction of the chord.
-            fraction = 1.0
-            which = -1
-            for j in range(size):
-                value = w[v + j]
-                over = max(value - fixed[high + j], fixed[low + j] - value)
-                if over > 0.0:
-                    part = max(0.0, 1.0 - over / abs(w[chord + j])) if w[chord + j] != 0.0 else 0.0
-                    if part < fraction or which < 0:
-                        fraction = part
-                        which = j
+            fraction, which = passed(w, fixed, v, chord, low, high, size)
             if which >= 0 and fraction <= 1e-12:
                 return k, BOUND, which
             if which < 0 and not (
@@ -151,6 +147,7 @@ def trace(
             elif final > 0 and which < 0 and far <= 1e-6:
                 reason = CLOSED
             elif which >= 0:
+                why = final if final < 0 else TURNS
                 w[number + NEXT] = 0.5 * h
                 continue
             if reason < 0:  # a near miss: the step stands, and its derivatives are restored
@@ -163,15 +160,13 @@ def trace(
                 length = np.sqrt(inner(w, weight, new, new, size))
                 if inner(w, weight, new, t, size) < 0.0:
                     length = -length
-                for j in range(size):
-                    w[new + j] /= length
+                w[new : new + size] /= length
             break
 
-        for j in range(size):
-            w[chord + j] = w[v + j] - w[u + j]
+        gather(w, scale, b, -1, u, v, chord, -1, size)
         length = np.sqrt(inner(w, weight, chord, chord, size))
         w[number + LENGTH] += length
-        w[number + LAST] = h if reason < 0 else length
+        w[number + LAST] = 0.0 if not smooth else (h if reason < 0 else length)
         w[number + DONE] += 1.0
         w[number + SIDE] = side
         copy(w, t, old, size)
@@ -179,16 +174,14 @@ def trace(
         copy(w, new, t, size)
         # The next step: after Newton's work and after how far the tangent turned.
         factor = 2.0 if steps <= 3 else (1.2 if steps == 4 else (0.8 if steps == 5 else 0.5))
-        if angle > 0.0:
+        if angle > 0.0 and smooth:
             factor = min(factor, max(fixed[TURN] / angle, 0.5))
         w[number + NEXT] = min(h * factor, fixed[LONGEST])
         grow(w, n, size, fixed, period)
-        for j in range(size):
-            record[k, j] = w[u + j]
-            record[k, size + j] = w[t + j]
-        for j in range(n * m):
-            record[k, 2 * size + j] = w[base + n + j]
-        j = 2 * size + n * m
+        record[k, :size] = w[u : u + size]
+        record[k, size : 2 * size] = w[t : t + size]
+        slopes[k] = w[base + n : base + n + n * m]
+        j = 2 * size
         record[k, j + STEP_LENGTH] = length
         record[k, j + NEWTON_STEPS] = steps
         record[k, j + ANGLE] = angle
@@ -200,18 +193,50 @@ def trace(
     return record.shape[0], FULL, 0
 
 
-@routine
-def predict(
+def _predict(
     w: Array, u: int, t: int, old: int, weight: int, h: float, last: float, v: int, row: int,
     guess: int, size: int,
 ) -> None:  # fmt: skip
-    """The next point, on the parabola through the last two tangents, and the row of its plane."""
     bend = 0.5 * h * h / last if last > 0.0 else 0.0
     for j in range(size):
         value = w[u + j] + h * w[t + j] + bend * (w[t + j] - w[old + j])
         w[v + j] = value
         w[guess + j] = value
         w[row + j] = w[weight + j] * w[t + j]
+
+
+@twin(_predict)
+def predict(
+    w: Array, u: int, t: int, old: int, weight: int, h: float, last: float, v: int, row: int,
+    guess: int, size: int,
+) -> None:  # fmt: skip
+    """The next point, on the parabola through the last two tangents, and the row of its plane."""
+    bend = 0.5 * h * h / last if last > 0.0 else 0.0
+    tangent = w[t : t + size]
+    value = w[u : u + size] + h * tangent + bend * (tangent - w[old : old + size])
+    w[v : v + size] = w[guess : guess + size] = value
+    w[row : row + size] = w[weight : weight + size] * tangent
+
+
+def _gather(
+    w: Array, scale: int, b: int, new: int, u: int, v: int, chord: int, guess: int, size: int
+) -> None:
+    for j in range(size):
+        w[chord + j] = w[v + j] - w[u + j]
+        if new >= 0:
+            w[new + j] = w[scale + j] * w[b + 2 * j + 1]
+            w[guess + j] -= w[v + j]
+
+
+@twin(_gather)
+def gather(
+    w: Array, scale: int, b: int, new: int, u: int, v: int, chord: int, guess: int, size: int
+) -> None:
+    """The chord from u to v and, unless their places are -1, the new tangent and the drift."""
+    w[chord : chord + size] = w[v : v + size] - w[u : u + size]
+    if new >= 0:
+        w[new : new + size] = w[scale : scale + size] * w[b + 1 : b + 2 * size : 2]
+        w[guess : guess + size] -= w[v : v + size]
 
 
 @routine
@@ -246,21 +271,56 @@ def comes_back(
     return ahead > 0.8 * np.sqrt(inner(w, weight, start_tangent, start_tangent, size))
 
 
-@routine
-def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
-    """Let the scales of states that are no angles follow the states; lengths are measured anew."""
-    scale, weight = 3 * size, 4 * size
+def _passed(
+    w: Array, fixed: Array, v: int, chord: int, low: int, high: int, size: int
+) -> tuple[float, int]:
+    fraction = 1.0
+    which = -1
+    for j in range(size):
+        over = max(w[v + j] - fixed[high + j], fixed[low + j] - w[v + j])
+        if over > 0.0:
+            part = max(0.0, 1.0 - over / abs(w[chord + j])) if w[chord + j] != 0.0 else 0.0
+            if part < fraction or which < 0:
+                fraction = part
+                which = j
+    return fraction, which
+
+
+@twin(_passed)
+def passed(
+    w: Array, fixed: Array, v: int, chord: int, low: int, high: int, size: int
+) -> tuple[float, int]:
+    """The smallest fraction of the chord at which a bound is met, and which one; -1: none."""
+    value = w[v : v + size]
+    inside = (value <= fixed[high : high + size]) & (value >= fixed[low : low + size])
+    return (1.0, -1) if inside.all() else _passed(w, fixed, v, chord, low, high, size)
+
+
+def _grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
+    scale, weight, start = 3 * size, 4 * size, 5 * size
     grown = False
     for j in range(n):
-        if fixed[period + j] == 0.0 and abs(w[j]) > 2.0 * w[scale + j]:
-            w[scale + j] = abs(w[j])
-            w[weight + j] = 1.0 / (w[j] * w[j])
+        far = abs(w[j] - w[start + j])
+        if fixed[period + j] == 0.0 and far > 2.0 * w[scale + j]:
+            w[weight + j] *= (w[scale + j] / far) ** 2
+            w[scale + j] = far
             grown = True
     if grown:
         length = np.sqrt(inner(w, weight, size, size, size))
         for j in range(size):
             w[size + j] /= length
         w[7 * size + LAST] = 0.0
+
+
+@twin(_grow)
+def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
+    """Let the scales of states that are no angles follow how far the states have come.
+
+    Lengths are measured anew.
+    """
+    far = np.abs(w[:n] - w[5 * size : 5 * size + n])
+    if (far > 2.0 * w[3 * size : 3 * size + n]).any():
+        _grow(w, n, size, fixed, period)
 
 
 @routine

@@ -14,8 +14,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.locate import Special
 from phasekit.bifurcation.continuation.path import Path, Sample, join
+from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.specials import Placed, find
 from phasekit.bifurcation.continuation.start import go_on
 from phasekit.errors import ParameterError
@@ -46,7 +46,8 @@ class Branch:
         ``arclength`` (0 at the start, on scaled axes), ``n_unstable`` (number of eigenvalues with
         a positive real part) or, of a conservative problem, ``kind`` (`EquilibriumKind`),
         ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
-        empty string), ``step``, ``newton_steps``, and what was recorded.
+        empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
+        beside that of the terms that cancel in it), and what was recorded.
     special_points : tuple of SpecialPoint
         In order along the curve.
     stops : tuple of Stop
@@ -94,8 +95,9 @@ class Branch:
         -------
         xarray.Dataset
             `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
-            parameter and state, ``special_residual``, ``special_status``, ``special_index`` (the
-            point of the curve), ``special_interval`` on (``special_point``, ``end``).
+            parameter and state, ``special_residual``, ``special_status``, ``special_corank``,
+            ``special_index`` (the point of the curve), ``special_interval`` on
+            (``special_point``, ``end``).
         """
         ds = self.points
         dim = "special_point"
@@ -112,6 +114,7 @@ class Branch:
         for name in (*self.free, *self.problem_state):
             ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
         ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
+        ds["special_corank"] = (dim, np.array([s.corank for s in specials], dtype=np.int64))
         ds["special_index"] = (dim, np.array([s.index for s in specials], dtype=np.int64))
         ds["special_interval"] = (
             (dim, "end"),

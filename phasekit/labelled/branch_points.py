@@ -97,7 +97,10 @@ def points_of(
     kappa = np.full(total, np.nan)
     if curve.kind == HOPF:
         kappa[own] = path.u[:, -1]
-    return _dataset(problem, curve, u, t, info, values, label, record, kappa), places
+    residual = np.empty(total)
+    residual[own] = curve.residuals(path.u, path.slopes)
+    residual[mine] = curve.residuals(u[mine], [curve.at(point)[1] for point in u[mine]])
+    return _dataset(problem, curve, u, t, info, values, label, record, kappa, residual), places
 
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
@@ -127,6 +130,7 @@ def _dataset(
     label: Any,
     record: Record,
     kappa: FloatArray,
+    residual: FloatArray,
 ) -> xr.Dataset:
     n = curve.n
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
@@ -149,8 +153,10 @@ def _dataset(
         size = np.max(np.abs(values), axis=1, keepdims=True)
         floor = np.where(critical[:, None], 1e-6, 0.0) * size
         unstable = np.sum(values.real > floor, axis=1).astype(np.int64)
+        unstable[np.isnan(values).any(axis=1)] = -1
         data["n_unstable"] = (
-            dim, unstable, {"long_name": "number of eigenvalues with a positive real part"},
+            dim, unstable,
+            {"long_name": "number of eigenvalues with a positive real part; -1: not known"},
         )  # fmt: skip
     if curve.kind == HOPF:
         pair = np.where(
@@ -165,6 +171,9 @@ def _dataset(
         (dim, "unknown"), t.copy(), {"long_name": "unit tangent on scaled axes, unscaled"},
     )  # fmt: skip
     data["step"] = (dim, info[:, trace.STEP_LENGTH].copy(), {"long_name": "length of the step"})
+    data["residual"] = (
+        dim, residual, {"long_name": "largest size of f beside that of its terms"},
+    )  # fmt: skip
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
     coords: dict[str, Any] = {"unknown": np.array(names, dtype=np.dtypes.StringDType())}
     for name, value in problem.parameters.items():

@@ -41,6 +41,10 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
     for name, track in zip(("backward", "forward"), branch.tracks, strict=True):
         if track is not None:
             ds[f"raw_{name}"] = ((f"raw_{name}_point", f"raw_{name}_column"), track.record)
+            if track.slopes.shape[1]:
+                ds[f"raw_{name}_slopes"] = (
+                    (f"raw_{name}_point", f"raw_{name}_slope"), track.slopes,
+                )  # fmt: skip
             ds[f"raw_{name}_state"] = ((f"raw_{name}_entry",), track.state)
     spec = {
         "problem": problem.specification(),

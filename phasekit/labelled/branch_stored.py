@@ -143,17 +143,31 @@ class Stored:
         if stop is None:
             return None
         size = curve.size
-        columns = 2 * size + curve.n * curve.m + trace.RECORDED
+        columns = 2 * size + trace.RECORDED
         state = VECTORS * size + curve.n
         reason, message = stop
         if reason not in _REASONS or not isinstance(message, str):
             raise ValueError(f"stops: got {reason!r:.80}, wants one of {', '.join(_REASONS)}")
         # Where f ends, derivatives and the state that is left need not be finite.
-        record = self.array(name, (None, columns), finite=False)
+        record, slopes = self._points(name, curve, columns)
         left = self.array(f"{name}_state", (state + STATE_NUMBERS,), finite=False)
         if not np.isfinite(record[:, : 2 * size]).all():
             raise ValueError(f"raw_{name}: got points that are not finite")
-        return Track(record, left, Stop(reason, message))
+        return Track(record, slopes, left, Stop(reason, message))
+
+    def _points(self, name: str, curve: Curve, columns: int) -> tuple[Array, Array]:
+        """Points and, of few states, the derivatives of f at each."""
+        matrix = curve.n * curve.m
+        if self.ds.variables[f"raw_{name}"].shape[-1:] != (columns,):
+            # Earlier versions kept the derivatives between tangents and step data.
+            record = self.array(name, (None, columns + matrix), finite=False)
+            here = slice(2 * curve.size, 2 * curve.size + matrix)
+            slopes = record[:, here] if curve.keeps else record[:, :0]
+            return np.delete(record, here, axis=1), slopes
+        record = self.array(name, (None, columns), finite=False)
+        if not curve.keeps:
+            return record, record[:, :0]
+        return record, self.array(f"{name}_slopes", (len(record), matrix), finite=False)
 
     def array(self, name: str, shape: tuple[int | None, ...], *, finite: bool = True) -> Array:
         """Read an array of doubles of a shape, in which None is any length."""

@@ -216,6 +216,9 @@ def _check_values(problem: Problem, guess: FloatArray) -> None:
             value = function(guess.copy(), **problem.parameters)
         except (ArithmeticError, ValueError):
             continue  # not defined there: the start will say so
+        found = np.asarray(value)
+        if found.dtype.kind not in "biuf" and found.dtype != object:
+            raise bad(argument, value, f"real numbers of shape {shape} to be returned")
         try:
             found = np.asarray(value, dtype=float)
         except (TypeError, ValueError):

@@ -116,14 +116,15 @@ def _grow(branches: list[Branch], first: int, depth: int) -> None:
         if level >= depth:
             continue
         for point in branch.special("BP"):
-            if point.special.other is None or any(_same(point, other) for other in done):
+            if any(_same(point, other) for other in done):
                 continue
             done.append(point)
-            if _led(branches, point):
-                continue
-            other = switch(point)
-            branches.append(other)
-            queue.append((other, level + 1))
+            for i, tangent in enumerate(point.special.others):
+                if _led(branches, point, tangent):
+                    continue
+                other = switch(point, direction=i)
+                branches.append(other)
+                queue.append((other, level + 1))
 
 
 def path_of(branch: Branch) -> tuple[Curve, Path]:
@@ -138,11 +139,9 @@ def _same(a: SpecialPoint, b: SpecialPoint) -> bool:
     return bool(np.max(np.abs(gap / curve.scale[: curve.m])) < 1e-6)
 
 
-def _led(branches: list[Branch], point: SpecialPoint) -> bool:
-    """Whether both ways along the other branch are known already."""
+def _led(branches: list[Branch], point: SpecialPoint, t: FloatArray) -> bool:
+    """Whether both ways along another branch are known already."""
     curve, _ = point.branch.known()
-    t = point.special.other
-    assert t is not None
     for sign in (1.0, -1.0):
         step = sign * curve.options.initial_step * t
         probe = curve.refine(point.special.u + step, curve.weight * t)

@@ -68,6 +68,8 @@ def point_curve(
     if point.branch.kind != "equilibrium":
         raise bad("point", point.branch.kind, "a point of a branch of equilibria")
     curve, problem = point.branch.known()
+    if point.corank > 1:
+        raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
     if point.special.extra is None or point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     check_parameter(problem, parameter)
@@ -104,13 +106,17 @@ def point_curve(
     return make_branch(problem, made, start, backward, forward, {})
 
 
-def switch(point: SpecialPoint, *, options: ContinuationOptions | None = None) -> Branch:
-    """The other branch through a branch point, followed to both sides.
+def switch(
+    point: SpecialPoint, *, direction: int = 0, options: ContinuationOptions | None = None
+) -> Branch:
+    """Another branch through a branch point, followed to both sides.
 
     Parameters
     ----------
     point : SpecialPoint
         A branch point, pitchfork or transcritical point.
+    direction : int, default 0
+        Which of ``point.directions``.
     options : ContinuationOptions, optional
         Default: those of the branch.
 
@@ -122,11 +128,14 @@ def switch(point: SpecialPoint, *, options: ContinuationOptions | None = None) -
     if LABELS.get(point.kind) != "BP":
         raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
     curve, problem = point.branch.known()
-    other = point.special.other
-    if other is None:
+    others = point.special.others
+    if not others:
         raise bad("point", point.status, "a branch point whose directions are known", point.message)
+    whole = isinstance(direction, (int, np.integer)) and not isinstance(direction, bool)
+    if not whole or not 0 <= direction < len(others):
+        raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
     options = curve.options if options is None else check_options(options)
     curve = curve.replace(options=options)
-    start = Sample(point.special.u, other, curve.at(point.special.u)[1])
+    start = Sample(point.special.u, others[direction], curve.at(point.special.u)[1])
     backward, forward = run(curve, start, options.directions)
     return make_branch(problem, curve, start, backward, forward, point.branch.record)

@@ -130,6 +130,11 @@ class Problem:
         """Refuse: a problem is frozen."""
         raise AttributeError(f"a Problem is frozen; use .replace({name}=...) for a parameter")
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
+        arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
+        return _made, (type(self), *arguments, self.conservative, self.system)
+
     @property
     def field(self) -> Field:
         """What the stepping code takes."""
@@ -295,6 +300,16 @@ class Problem:
         notes += [f"{name} modulo {value:.6g}" for name, value in self.periods.items()]
         notes += ["conservative"] * self.conservative
         return f"Problem({equations}{'; ' if notes else ''}{', '.join(notes)})"
+
+
+def _made(
+    kind: type[Problem], f: Any, state: Any, parameters: Any, jac: Any, periods: Any,
+    conservative: bool, system: Any,
+) -> Problem:  # fmt: skip
+    """The problem of its arguments, for copies and pickles."""
+    problem = kind(f, state, parameters, jac, periods=periods, conservative=conservative)
+    problem._set("system", system)
+    return problem
 
 
 def _model(name: str) -> Callable[..., Model]:

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.locate import Special
+from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.labelled.branch_points import LABELS, eigenvalues_at, wrap
 from phasekit.labelled.problem import Problem
 
@@ -51,15 +51,28 @@ class SpecialPoint:
         fold ``xi' = b (p - p0) + a xi^2``; transcritical ``xi' = d (p - p0) xi + a xi^2``;
         pitchfork ``xi' = d (p - p0) xi + c xi^3`` (supercritical: c < 0); Hopf: ``l1``, the first
         Lyapunov coefficient (divided by 2 omega once, see Notes), ``omega`` and ``d``, the speed
-        at which the real part grows with the parameter.
+        at which the real part grows with the parameter. A coefficient that is not known is NaN,
+        and `message` says why.
     eigenvalues : ndarray
         Eigenvalues of f_x.
+    corank : int
+        Dimension of the null space of f_x: 1 at folds and simple branch points, more at multiple
+        branch points, 0 at Hopf points and ends.
+    directions : ndarray, shape (branch, unknown)
+        At a branch point the unit tangents (on scaled axes, unscaled; states, then the parameter)
+        of the other branches through it, which `switch` follows: all real solutions of the reduced
+        equations (see Notes).
 
     Notes
     -----
     ``l1 = Re[<p, C(q, q, q*)> - 2 <p, B(q, A^-1 B(q, q*))> + <p, B(q*, (2 i omega - A)^-1
     B(q, q))>]/(2 omega)`` with ``<q, q> = <p, q> = 1`` ([Kuznetsov2004] (5.62)); negative:
     supercritical.
+
+    At a branch point of corank k the equations are reduced to k equations on the k + 1 null vectors
+    of f_u (Liapunov-Schmidt). Their quadratic terms decide the directions; where a symmetry leaves
+    none of these on the null space of f_x, their cubic terms. At a multiple branch point `message`
+    says where directions may be missing.
     """
 
     kind: str
@@ -76,6 +89,17 @@ class SpecialPoint:
     branch: Branch
 
     @property
+    def corank(self) -> int:
+        """Dimension of the null space of f_x."""
+        return self.special.corank
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit tangents of the other branches through a branch point, one a row."""
+        n = len(self.x) + 1
+        return np.array([t[:n] for t in self.special.others]).reshape(-1, n)
+
+    @property
     def label(self) -> str:
         """LP, BP, H, NS, CP, BT, GH, ZH or EP."""
         return LABELS[self.kind]
@@ -86,14 +110,41 @@ class SpecialPoint:
             return float(self.x[self.branch.problem_state.index(name)])
         return self.parameters[name]
 
-    def switch(self, *, options: Any = None) -> Branch:
-        """The other branch through a branch point.
+    def switch(self, *, direction: int = 0, options: Any = None) -> Branch:
+        """Another branch through a branch point.
+
+        Parameters
+        ----------
+        direction : int, default 0
+            Which one where there are several: a row of `directions`.
+        options : ContinuationOptions, optional
+            Default: those of the branch.
+
+        Raises
+        ------
+        ParameterError
+            If it is no branch point, or the direction is not known.
 
         See Also
         --------
         continuation, diagram
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> triangle = pk.Problem(
+        ...     ["l*x + x**2 - y**2 - x*(x**2 + y**2)", "l*y - 2*x*y - y*(x**2 + y**2)"],
+        ...     state=("x", "y"), parameters={"l": -1.0},
+        ... )
+        >>> branch = pk.continuation(triangle, "l", x0=[0.0, 0.0], span=(-1.0, 1.0))
+        >>> (point,) = branch.special("BP")
+        >>> point.corank, len(point.directions)
+        (2, 3)
+        >>> sides = [point.switch(direction=i) for i in range(3)]
         """
-        return _module("switch")(self, options=options)  # type: ignore[no-any-return]
+        return _module("switch")(  # type: ignore[no-any-return]
+            self, direction=direction, options=options
+        )
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Branch:
         """The curve of such points in this branch's parameter and a second one."""
@@ -106,6 +157,7 @@ class SpecialPoint:
             f"{n}={v:.6g}" for n, v in zip(self.branch.problem_state[:4], self.x, strict=False)
         ]
         notes = [f"{name}={value:.6g}" for name, value in self.normal_form.items()]
+        notes += [f"corank={self.corank}"] if self.corank > 1 else []
         notes += [self.status] if self.status != "converged" else []
         notes += [self.message] if self.message else []
         text = f"{self.label} {self.kind} at {', '.join(where)}"

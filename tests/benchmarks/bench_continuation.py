@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 from benchmarks import rivals_continuation as rivals
 from benchmarks.bench_map import by_roots, random_systems
-from published import compare
+from published import bratu, compare
 from published.systems import SYSTEMS
 
 import phasekit as pk
@@ -203,3 +203,37 @@ def test_fold_curves(capsys: pytest.CaptureFixture[str]) -> None:
 
             rows[f"phasekit, {name}, {form}"] = per_point(run)
     report(capsys, "fold curves", rows, "folds")
+
+
+def test_many_states(capsys: pytest.CaptureFixture[str]) -> None:
+    """Time a point of Bratu's equation on n nodes, beside the barest loop with the same steps."""
+    with capsys.disabled():
+        print(f"\n\n{'Bratu, n':>10} {'us/point':>10} {'loop, us':>10} {'ratio':>6}")
+        for n, points in ((10, 300), (100, 60), (400, 20)):
+            problem = pk.Problem(
+                bratu.bratu, [f"u{i}" for i in range(n)], {"c": 0.0}, jac=bratu.bratu_jacobian
+            )
+
+            def run(count: int, problem: Any = problem, n: int = n) -> Any:
+                steps = pk.ContinuationOptions(
+                    max_step=2e-3, initial_step=2e-3, max_points=count, directions="forward",
+                    detect=(),
+                )  # fmt: skip
+                return pk.continuation(problem, "c", x0=np.zeros(n), span=(0, 4), options=steps)
+
+            def both(u: np.ndarray) -> np.ndarray:
+                return bratu.bratu(u[:-1], c=u[-1])
+
+            def slopes(u: np.ndarray) -> np.ndarray:
+                step = 6e-6
+                ahead, behind = (bratu.bratu(u[:-1], c=u[-1] + k * step) for k in (1, -1))
+                by_c = (ahead - behind) / (2.0 * step)
+                return np.column_stack([bratu.bratu_jacobian(u[:-1], c=u[-1]), by_c])
+
+            short = cpu(functools.partial(run, 5))[0]
+            ours = (cpu(functools.partial(run, points))[0] - short) / (points - 5)
+            loop = functools.partial(
+                rivals.barest_loop, both, np.zeros(n + 1), 8e-3, points, slopes
+            )
+            bare = cpu(loop)[0] / points
+            print(f"{n:10d} {ours * 1e6:10.4g} {bare * 1e6:10.4g} {ours / bare:6.2f}")

@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import sys
+from pathlib import Path
 
 import h5py
 import matplotlib.pyplot as plt
@@ -382,3 +383,18 @@ def test_numbers_of_formulas_are_saved_to_the_last_digit(tmp_path):
     loaded = Branch.load(tmp_path / "line.zarr")
     assert loaded.problem([1.0]) == problem([1.0])
     assert loaded.points.identical(line.points)
+
+
+def test_a_branch_of_the_first_layout_opens_and_goes_on():
+    """Version 0.1.0 of 2026-11 kept the derivatives of f between tangents and step data."""
+    old = pk.Branch.load(Path(__file__).parents[1] / "data" / "branch_layout1.nc")
+    problem = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    options = pk.ContinuationOptions(max_points=15)
+    new = pk.continuation(problem, "mu", x0=[-1.3], span=(-1, 1), options=options)
+    assert old.points.sizes["point"] == 16 <= new.points.sizes["point"]
+    x, mu = old.points.x.values, old.points.mu.values
+    assert np.abs(mu + x - x**3).max() < 1e-14
+    longer = old.extend(400)
+    assert longer.points.mu.values[-1] == 1.0
+    folds = [point.parameters["mu"] for point in longer.special("fold")]
+    np.testing.assert_allclose(sorted(folds), [-2 / 27**0.5, 2 / 27**0.5], rtol=1e-13)

@@ -106,3 +106,21 @@ def test_branch_point_curve():
     c, a = curve.points.c.values, curve.points.a.values
     assert np.abs(a - (1 + 2 * c) * np.exp(-(1 + 2 * c))).max() < 1e-9
     assert (c.min(), c.max()) == (0.5, 2.0)
+
+
+@pytest.mark.parametrize("gap", [0.02, 0.001])
+@pytest.mark.parametrize("centre", [0.0, 0.0317])
+def test_two_bogdanov_takens_points_a_hair_apart(gap, centre):
+    """The trace at the fold x = b = 0 is (m - centre)^2 - gap^2/4."""
+    import phasekit as pk
+
+    problem = pk.Problem(
+        ["y", f"b + x**2 + ((m - {centre})**2 - {0.25 * gap**2!r})*y"],
+        state=("x", "y"),
+        parameters={"b": -1.0, "m": 1.5},
+    )
+    branch = pk.continuation(problem, "b", x0=[1.0, 0.0], span=(-1.0, 1.0))
+    curve = special(branch, "fold").curve("m", (-2.0, 2.0))
+    found = sorted(one.parameters["m"] for one in curve.special("BT"))
+    assert np.allclose(found, [centre - 0.5 * gap, centre + 0.5 * gap], atol=1e-8)
+    assert len(found) == 2

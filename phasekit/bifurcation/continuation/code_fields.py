@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
-from phasekit.kernels.defining import PLAIN
+from phasekit.kernels import differences
+from phasekit.kernels.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
 
 Array = npt.NDArray[np.float64]
 
@@ -42,6 +43,13 @@ class CompiledField(Field):
     def second(self, active: tuple[int, ...]) -> int:
         """Address of f alone."""
         return self.first(active)
+
+    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+        """F at many points, the rows of u."""
+        out = np.empty((len(u), len(self.states)))
+        places = np.array(active, dtype=np.int64)
+        differences.values(self.first(active), len(self.states), par, places, u, out)
+        return out
 
 
 def _wrap(function: Any, n: int, order: tuple[int, ...]) -> Any:
@@ -104,29 +112,55 @@ class PythonField(Field):
         self.scale = np.asarray(scale, dtype=float)
 
     def value(self, x: Array, p: Mapping[str, float]) -> Array:
-        """F as an array; NaN where it has no value. Warnings are the caller's."""
+        """F as an array of its own; NaN where it has no value. Warnings are the caller's."""
         try:
-            return np.asarray(self.function(x, **p), dtype=float).reshape(-1)
-        except (ArithmeticError, ValueError):
+            result = self.function(x, **p)
+        except (ArithmeticError, ValueError) as error:
+            self.failure = error
             return np.full(len(self.states), np.nan)
+        return _numbers("f", result, (len(self.states),))
 
     def slopes(self, x: Array, p: Mapping[str, float]) -> Array:
         """The given derivatives by the states; NaN where they have no value."""
         n = len(self.states)
         assert self.jacobian is not None
         try:
-            return np.asarray(self.jacobian(x, **p), dtype=float).reshape(n, n)
-        except (ArithmeticError, ValueError):
+            result = self.jacobian(x, **p)
+        except (ArithmeticError, ValueError) as error:
+            self.failure = error
             return np.full((n, n), np.nan)
+        return _numbers("jac", result, (n, n))
+
+    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+        """F at many points, the rows of u."""
+        n = len(self.states)
+        p = dict(zip(self.parameters, par.tolist(), strict=True))
+        free = [self.parameters[i] for i in active]
+        out = np.empty((len(u), n))
+        for k, point in enumerate(u):
+            p.update(zip(free, point[n:].tolist(), strict=True))
+            out[k] = self.value(point[:n].copy(), p) if np.isfinite(point).all() else np.nan
+        return out
+
+    def slopes_along(
+        self, par: Array, active: tuple[int, ...], u: Array, z: Array
+    ) -> Callable[[Array], Array] | None:
+        """f_x z by the given derivatives, where z has no part along parameters."""
+        n = len(self.states)
+        if self.jacobian is None or np.any(z[n:]):
+            return None
+        p = dict(zip(self.parameters, par.tolist(), strict=True))
+        p.update(zip((self.parameters[i] for i in active), u[n:].tolist(), strict=True))
+        return lambda point: np.asarray(self.slopes(point[:n].copy(), p) @ z[:n])
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Callable[..., None]:
-        """A function that fills f and its derivatives."""
+        """A function that fills f and its derivatives.
+
+        They are central differences: of second order while stepping, of fourth for refined points.
+        """
         names, n = self.parameters, len(self.states)
         free = [names[i] for i in active]
         m = n + len(free)
-        # Central differences: of second order while stepping, of fourth for refined points.
-        step = 2.0**-10 if sharp else 2.0**-17
-        sides = ((1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0)) if sharp else ((1.0, 0.5),)
         exact = self.jacobian
 
         def first(u: Array, par: Array, z: Array, out: Array) -> None:
@@ -138,28 +172,27 @@ class PythonField(Field):
             for name, number in zip(free, values[n:], strict=True):
                 p[name] = number
             x = np.array(values[:n])
-            out[:n] = self.value(x.copy(), p)
+            out[:n] = middle = self.value(x.copy(), p)
             slopes = out[n : n + n * m].reshape(n, m)
             begin = 0
             if exact is not None:
                 slopes[:, :n] = self.slopes(x.copy(), p)
                 begin = n
             for j in range(begin, m):
-                h = step * max(abs(values[j]), self.scale[j])
-                # A power of two, so that what is added to a number of its size is exact.
-                h = 2.0 ** math.floor(math.log2(h))
-                slope: Any = 0.0
-                for k, weight in sides:
-                    if j < n:
-                        ahead, behind = x.copy(), x.copy()
-                        ahead[j] += k * h
-                        behind[j] -= k * h
-                        slope = slope + weight * (self.value(ahead, p) - self.value(behind, p))
-                    else:
-                        up = self.value(x.copy(), p | {free[j - n]: values[j] + k * h})
-                        down = self.value(x.copy(), p | {free[j - n]: values[j] - k * h})
-                        slope = slope + weight * (up - down)
-                slopes[:, j] = slope / h
+
+                def at(h: float, j: int = j) -> Array:
+                    if j >= n:
+                        return self.value(x.copy(), p | {free[j - n]: values[j] + h})
+                    shifted = x.copy()
+                    shifted[j] += h
+                    return self.value(shifted, p)
+
+                size = _power(max(abs(values[j]), self.scale[j]))
+                if sharp:
+                    slopes[:, j] = _slope(at, middle, size)
+                else:
+                    h = COARSE * size
+                    slopes[:, j] = (at(h) - at(-h)) / (2.0 * h)
 
         return first
 
@@ -202,3 +235,54 @@ class PythonField(Field):
                         bent[:, j] += k * difference / (4.0 * h * along)
 
         return second
+
+
+def _power(h: float) -> float:
+    """The power of two below: what is added to a number of its size is then exact."""
+    return 2.0 ** math.floor(math.log2(h))
+
+
+def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
+    """The slope of a function at 0, as `phasekit.kernels.differences` takes it."""
+    h = FINE * size
+    fine, wide = ((at(k * h) - at(-k * h)) / (2.0 * k * h) for k in (1.0, 2.0))
+    slope, least = fine.copy(), np.full_like(middle, np.inf)
+    h = STEP * size
+    for _ in range(TRIES):
+        far = (at(2.0 * h) - at(-2.0 * h)) / (4.0 * h)
+        ahead, behind = at(h), at(-h)
+        near = (ahead - behind) / (2.0 * h)
+        gap = np.abs(near - far)
+        best = near + (near - far) / 3.0
+        steep, curved = np.abs(near), np.abs(ahead + behind - 2.0 * middle) / h
+        width = np.fmin((gap / curved) ** 2, gap / steep)
+        left = np.where(gap > 0.0, gap * width, 0.0)
+        rounding = np.minimum(
+            FINE * size / h * np.abs(fine - wide), KNOWN * (steep + 100.0 * curved)
+        )
+        rounding += EPSILON * size / h * steep
+        off = np.maximum(0.0, np.abs(best - fine) - 4.0 * np.abs(fine - wide))
+        off[off <= 1e-9 * (steep + curved)] = 0.0
+        better = left + off + rounding < least
+        slope[better], least[better] = best[better], (left + off + rounding)[better]
+        if np.all((left <= rounding) & (off == 0.0)):
+            break
+        h *= SHORTER
+    return slope
+
+
+def _numbers(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
+    """What a function returned as an array of its own, of real numbers."""
+    try:
+        numbers = np.array(result)
+        if numbers.dtype.kind == "c":
+            raise ParameterError(
+                f"{argument}: returned complex numbers, {str(numbers)[:80]}, wants real ones"
+            )
+        return np.asarray(numbers, dtype=float).reshape(shape)
+    except (TypeError, ValueError) as error:
+        if isinstance(error, ParameterError):
+            raise
+        raise ParameterError(
+            f"{argument}: returned {str(result)[:80]}, wants numbers of shape {shape}"
+        ) from error

@@ -10,19 +10,21 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.locate import (
+from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
+from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
     Special,
     extended,
-    force_sizes,
 )
-from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.specials import Placed, unique
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
+from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.kernels.defining import BRANCH, FOLD, HOPF
 
 Array = npt.NDArray[np.float64]
+
+GOLDEN = 18  # halvings, nearly, of a step in which a test function may touch zero
 
 
 def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curve, Sample] | None:
@@ -82,7 +84,7 @@ def find_on(curve: Curve, path: Path) -> list[Placed]:
     found: list[Placed] = []
     m = curve.m
     for test in _tests(curve):
-        values = test.values(path.u, path.slopes)
+        values = test.values(path.u, path.slopes[:])
         for i in _interesting(values):
             for a, b in _changes(curve, path, values, i, test):
                 special = _locate(curve, a, b, test)
@@ -92,7 +94,7 @@ def find_on(curve: Curve, path: Path) -> list[Placed]:
                     gap = np.dot(ahead, special.u - path.u[i, :m])
                     square = np.dot(ahead, chord[:m])
                     found.append(Placed(i, float(gap / square), special))
-    return _without_echoes(curve, unique(curve, found))
+    return _without_echoes(curve, unique(curve, path, found))
 
 
 def _interesting(values: Array) -> list[int]:
@@ -113,10 +115,29 @@ def _changes(
     a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
     if np.sign(values[i]) != np.sign(values[i + 1]):
         return [(a, b)]
-    for s in (0.5, 0.25, 0.75):
-        middle = between(curve, a, b, s)
-        if middle is not None and np.sign(test.value(middle)) != np.sign(values[i]):
-            return [(a, middle), (middle, b)]
+    sign = np.sign(values[i])
+
+    def height(s: float) -> float:
+        sample = between(curve, a, b, s)
+        return np.inf if sample is None else sign * test.value(sample)
+
+    # Golden section, to where the sign is another or the function is lowest.
+    low, high = 0.0, 1.0
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    one, two = 1.0 - ratio, ratio
+    at_one, at_two = height(one), height(two)
+    for _ in range(GOLDEN):
+        if min(at_one, at_two) < 0.0:
+            middle = between(curve, a, b, one if at_one < at_two else two)
+            return [] if middle is None else [(a, middle), (middle, b)]
+        if at_one < at_two:
+            high, two, at_two = two, one, at_one
+            one = high - ratio * (high - low)
+            at_one = height(one)
+        else:
+            low, one, at_one = one, two, at_two
+            two = low + ratio * (high - low)
+            at_two = height(two)
     return []
 
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.kernels import defining, newton, trace
+from phasekit.kernels import defining, differences, newton, trace
 from phasekit.kernels import state as state_places
 from phasekit.kernels.defining import EQUILIBRIUM
 from phasekit.kernels.state import NUMBERS, VECTORS
@@ -18,6 +18,8 @@ from phasekit.kernels.state import NUMBERS, VECTORS
 Array = npt.NDArray[np.float64]
 
 CHUNK = 256
+MOST = 1 << 20  # derivatives at a time, where they are not kept
+KEPT = 16  # states up to which derivatives are kept at each point
 TIGHT = 1e-13
 
 
@@ -47,9 +49,13 @@ class Stop:
 
 @dataclass(frozen=True)
 class Track:
-    """Points of a curve in one direction from a start, and the state to go on from."""
+    """Points of a curve in one direction from a start, and the state to go on from.
+
+    Of many states the derivatives of f are not kept (no columns): they would be most of it all.
+    """
 
     record: Array
+    slopes: Array
     state: Array
     stop: Stop
 
@@ -109,10 +115,16 @@ class Curve:
         return defining.equations(self.kind, self.n)
 
     @property
+    def keeps(self) -> bool:
+        """Whether the derivatives of f are kept at each point."""
+        return self.kind != EQUILIBRIUM or self.n <= KEPT
+
+    @property
     def weight(self) -> Array:
-        """Weights of lengths: of states and free parameters only."""
+        """Weights of lengths: of the mean square of states, and of free parameters."""
         weight = np.zeros(self.size)
         weight[: self.m] = 1.0 / self.scale[: self.m] ** 2
+        weight[: self.n] /= self.n
         return weight
 
     def length(self, difference: Array) -> float:
@@ -126,7 +138,10 @@ class Curve:
         self.field.prepare(self.scale[: self.m])
         first = self.field.first(self.active, sharp=sharp)
         second = first if self.kind == EQUILIBRIUM else self.field.second(self.active)
-        return first, second, self.field.mode
+        mode = (
+            differences.SHARP if sharp and self.field.mode == differences.PLAIN else self.field.mode
+        )
+        return first, second, mode
 
     def refine(
         self,
@@ -173,7 +188,7 @@ class Curve:
     def at(self, u: Array) -> tuple[Array, Array]:
         """F and its derivatives by states and free parameters."""
         n, m = self.n, self.m
-        w = np.zeros(m + n + n * m + 8 * m + 8)
+        w = np.zeros(2 * m + n + n * m + differences.spare_size(n, m))
         w[:m] = u[:m]
         w[m : 2 * m] = self.scale[:m]
         out = 2 * m
@@ -185,6 +200,37 @@ class Curve:
         with np.errstate(all="ignore"):
             kernel(first, mode, n, w, 0, self.par.copy(), active, m, out, spare)
         return w[out : out + n].copy(), w[out + n : spare].reshape(n, m).copy()
+
+    def values(self, u: Array) -> Array:
+        """F at many points, the rows of u."""
+        u = np.ascontiguousarray(u[:, : self.m], dtype=float)
+        with np.errstate(all="ignore"):
+            return np.asarray(self.field.values(u, self.par.copy(), self.active))
+
+    def residuals(self, u: Array, slopes: Any) -> Array:
+        """Largest size of an entry of f beside its terms, at many points, the rows of u.
+
+        The terms of a formula are those of its sums; of a function, what its derivatives (indexed
+        by points) make of the unknowns.
+        """
+        n, m = self.n, self.m
+        points = np.ascontiguousarray(u[:, :m], dtype=float)
+        with np.errstate(all="ignore"):
+            if isinstance(self.field, SymbolicField):
+                out = np.empty((len(points), 2 * n))
+                differences.values(
+                    self.field.terms(self.active), 2 * n, self.par.copy(),
+                    np.array(self.active, dtype=np.int64), points, out,
+                )  # fmt: skip
+                value, terms = np.abs(out[:, :n]), np.abs(out[:, n:])
+            else:
+                value = np.abs(self.values(points))
+                terms = np.empty_like(value)
+                for k, point in enumerate(points):
+                    terms[k] = np.abs(slopes[k]) @ np.abs(point)
+            return np.asarray(
+                np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
+            )
 
     def bend(self, u: Array, z: Array) -> Array:
         """The derivatives of f_u z by states and free parameters, shape (n, m)."""
@@ -218,7 +264,7 @@ class Curve:
         n, m = self.n, self.m
         place = 2 * m
         out = place + z.size
-        w = np.zeros(out + count + 2 * m + 2 * n)
+        w = np.zeros(out + count + differences.spare_size(n, m))
         w[:m], w[m:place], w[place:out] = u[:m], self.scale[:m], z
         self.field.prepare(self.scale[:m])
         kernel = self._kernel(defining.second_derivatives)
@@ -256,21 +302,26 @@ class Curve:
         kernel = self._kernel(trace.trace)
         functions = self._functions()
         active = np.array(self.active, dtype=np.int64)
-        columns = 2 * size + n * self.m + trace.RECORDED
+        columns = 2 * size + trace.RECORDED
+        chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
         records = []
+        kept = []
         reason = trace.FULL
         which = 0
         left = points
         with np.errstate(all="ignore"):
             while reason == trace.FULL and left > 0:
-                record = np.empty((min(left, CHUNK), columns))
+                record = np.empty((min(left, chunk), columns))
+                slopes = np.empty((len(record), n * self.m))
                 count, reason, which = kernel(
-                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record
+                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record, slopes
                 )
                 records.append(record[:count])
+                kept.append(slopes[:count] if self.keeps else slopes[:count, :0])
                 left -= count
         record = np.concatenate(records) if records else np.empty((0, columns))
-        return Track(record, w[: state.size].copy(), self._stop(reason, which, record, w))
+        slopes = np.concatenate([np.empty((0, n * self.m if self.keeps else 0)), *kept])
+        return Track(record, slopes, w[: state.size].copy(), self._stop(reason, which, record, w))
 
     def _stop(self, reason: int, which: int, record: Array, w: Array) -> Stop:
         names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]
@@ -287,12 +338,20 @@ class Curve:
         if reason == trace.CLOSED:
             return Stop("closed", f"the curve closed on its start at {where}")
         if reason == trace.STUCK:
-            return Stop(
-                "stuck", f"no step longer than min_step = {self.options.min_step:g} converged "
-                f"at {where}",
-            )  # fmt: skip
+            step = f"min_step = {self.options.min_step:g}"
+            words = {
+                newton.DIVERGED: f"Newton's method converged for no step longer than {step}",
+                newton.SINGULAR: f"the derivatives of f are singular beyond, for every step "
+                f"longer than {step}",
+                trace.TURNS: f"the curve turns by more than max_turn = {self.options.max_turn:g} "
+                f"within {step}",
+                trace.CROSSES: f"branches cross or pass each other within {step}",
+            }
+            return Stop("stuck", f"{words[which]} at {where}")
         if reason == trace.NOT_FINITE:
-            return Stop("not_finite", f"f is not finite beyond {where}")
+            failure = self.field.failure
+            said = "" if failure is None else f": it raised {type(failure).__name__}: {failure}"
+            return Stop("not_finite", f"f is not finite beyond {where}{said}")
         return Stop(
             "max_points", f"max_points were computed, the last at {where}; extend() goes on"
         )

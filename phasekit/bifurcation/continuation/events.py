@@ -13,6 +13,8 @@ from phasekit.bifurcation.continuation.path import Path, Sample, between
 from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, test_functions
 
 DEPTH = 10
+TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
+ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
 TESTS = ("fold", "branch", "pair")
 
 
@@ -20,13 +22,13 @@ TESTS = ("fold", "branch", "pair")
 class Bracket:
     """Two points of the path between which test functions change sign.
 
-    ``crossing`` counts eigenvalues that cross between them beyond what the changes explain.
+    ``jump`` is by how much the number of unstable eigenvalues changes between them.
     """
 
     a: Sample
     b: Sample
     changes: frozenset[str]
-    crossing: int
+    jump: int
     index: int = 0  # of the path's point before it
 
 
@@ -35,11 +37,9 @@ def brackets(
 ) -> tuple[list[Bracket], npt.NDArray[np.complex128]]:
     """All brackets of a path, in order, and the eigenvalues of f_x at its points."""
     pairs = "hopf" in detect and curve.n > 1
-    tests = test_functions(curve, path.tangent, path.slopes, pairs=pairs)
+    tests = _all_tests(curve, path, pairs=pairs)
     if conservative or is_conservative(tests.eigenvalues):
-        tests = Tests(
-            tests.fold, tests.branch, np.ones(path.count), tests.unstable, tests.eigenvalues
-        )
+        tests = replace(tests, pair=np.ones(path.count))
         pairs = False
     eigenvalues = tests.eigenvalues
     keep = _regular(tests)
@@ -51,16 +51,70 @@ def brackets(
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
         for bracket in seek.explore(a, b, DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
+    for i in np.flatnonzero(np.diff(keep) > 1).tolist():  # on a point left out there may be one
+        a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
+        found.append(Bracket(a, b, frozenset({"touch"}), 0, int(keep[i])))
+    if not path.closed and len(keep) > 1:
+        found += _on_ends(curve, path, keep, tests, found)
     return found, eigenvalues
+
+
+def _all_tests(curve: Curve, path: Path, *, pairs: bool) -> Tests:
+    """The test functions of all points; of many states, of some at a time."""
+    if isinstance(path.slopes, np.ndarray):
+        return test_functions(curve, path.tangent, path.slopes, pairs=pairs)
+    parts = [
+        test_functions(curve, path.tangent[some], path.slopes[some], pairs=pairs)
+        for some in path.slopes.chunks()
+    ]
+    return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
+
+
+def _on_ends(
+    curve: Curve, path: Path, keep: npt.NDArray[np.int64], tests: Tests, found: list[Bracket]
+) -> list[Bracket]:
+    """Brackets where the path ends on a special point, whatever signs rounding gives there."""
+    more = []
+    for end in (0, len(keep) - 1):
+        # The path may come to its end in ever smaller steps.
+        gap = (path.u[keep] - path.u[keep[end]])[:, : curve.m] / curve.scale[: curve.m]
+        away = np.flatnonzero(np.max(np.abs(gap), axis=1) > 1e-3)
+        if not len(away):
+            continue
+        beside = int(away[0] if end == 0 else away[-1])
+        changes = set()
+        if tests.volume[end] < tests.volume[beside] + np.log(ON_END):
+            changes.add("branch")
+        for name in ("fold", "pair"):
+            values = np.abs(getattr(tests, name))
+            if values[end] < ON_END * values[beside]:
+                changes.add(name)
+        within = range(*sorted((end, beside)))
+        known = {n for one in found if one.index in keep[within] for n in one.changes}
+        if changes - known:
+            a, b = (
+                Sample(path.u[k], path.tangent[k], path.slopes[k])
+                for k in sorted((int(keep[end]), int(keep[beside])))
+            )
+            index = int(keep[min(end, len(keep) - 2)])
+            more.append(Bracket(a, b, frozenset(changes - known), 0, index))
+    return more
 
 
 def _regular(tests: Tests) -> npt.NDArray[np.int64]:
     """Points that are no branch points themselves, where signs are those of rounding errors."""
-    size = np.abs(tests.branch)
-    around = np.maximum(np.append(size[1:], 0.0), np.insert(size[:-1], 0, 0.0))
-    regular = size > 1e-7 * around
+    size = tests.volume
+    around = np.maximum(np.append(size[1:], -np.inf), np.insert(size[:-1], 0, -np.inf))
+    regular = size > around + np.log(1e-7)
     regular[[0, -1]] = True
     return np.flatnonzero(regular | (len(size) < 3))
+
+
+def nearest_is_complex(tests: Tests) -> bool:
+    """Whether the pair with the least sum is conjugate, so that it crosses the imaginary axis."""
+    values = tests.eigenvalues
+    above = np.abs(2.0 * values.real[values.imag > 0.0])
+    return bool(np.min(above, initial=np.inf) <= abs(float(tests.pair)) * (1.0 + 1e-9))
 
 
 class _Seek:
@@ -75,10 +129,9 @@ class _Seek:
         for name in TESTS:
             sign = signs[name]
             marked.update(np.flatnonzero(sign[1:] != sign[:-1]).tolist())
-            value = np.abs(getattr(tests, name))
             if count < 3:
                 continue
-            left, middle, right = value[:-2], value[1:-1], value[2:]
+            left, middle, right = self.sizes(tests, name)
             dip = (middle <= left) & (middle <= right) & (sign[:-2] == sign[2:])
             # The parabola through three points: what is left of the value at its lowest point.
             bend = left - 2.0 * middle + right
@@ -91,6 +144,15 @@ class _Seek:
             marked.update(np.flatnonzero(np.diff(tests.unstable) != 0).tolist())
         return sorted(marked)
 
+    @staticmethod
+    def sizes(tests: Tests, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Sizes of a test function at three points in a row, in units that may differ by triple."""
+        value = tests.volume if name == "branch" else np.abs(getattr(tests, name))
+        three = np.stack([value[:-2], value[1:-1], value[2:]])
+        if name == "branch":
+            three = np.exp(three - np.max(three, axis=0))
+        return three[0], three[1], three[2]
+
     def tests(self, sample: Sample) -> Tests:
         key = id(sample)
         if key not in self.seen:
@@ -98,8 +160,15 @@ class _Seek:
             self.seen[key] = (sample, tests)
         return self.seen[key][1]
 
-    def value(self, name: str) -> Callable[[Sample], float]:
-        return lambda sample: float(getattr(self.tests(sample), name))
+    def value(self, name: str, unit: float) -> Callable[[Sample], float]:
+        """A test function of samples; that of branch points in units of exp(unit)."""
+
+        def of(sample: Sample) -> float:
+            tests = self.tests(sample)
+            size = float(np.exp(np.minimum(tests.volume - unit, 50.0))) if name == "branch" else 1.0
+            return size * float(getattr(tests, name))
+
+        return of
 
     def explore(self, a: Sample, b: Sample, depth: int, *, force: bool) -> Iterator[Bracket]:
         """Brackets between two points; the interval is halved where it holds more than one."""
@@ -107,9 +176,12 @@ class _Seek:
         changes = {n for n in TESTS if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
         jump = abs(int(two.unstable) - int(one.unstable))
         simple = len(changes & {"fold", "branch"})
-        explained = simple + 2 * ("pair" in changes)
+        crosses = "pair" in changes and (nearest_is_complex(one) or nearest_is_complex(two))
+        explained = simple + 2 * crosses
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)
-        several = jump > explained or len(changes) > 1 or (odd and self.curve.n > 1)
+        # Where the path turns at a pitchfork, both change at once: halving finds nothing between.
+        turns = changes == {"fold", "branch"} and jump in (0, 2)
+        several = jump > explained or (len(changes) > 1 and not turns) or (odd and self.curve.n > 1)
         if several and depth > 0:
             middle = between(self.curve, a, b, 0.5)
             if middle is not None:
@@ -117,19 +189,25 @@ class _Seek:
                 yield from self.explore(middle, b, depth - 1, force=False)
                 return
         if changes or jump:
-            yield Bracket(a, b, frozenset(changes), max(0, jump - explained))
+            yield Bracket(a, b, frozenset(changes), jump)
         elif force:
-            split = self._dip(a, b)
-            if split is not None:
+            split, low = self._dip(a, b)
+            if split is None and low is not None:
+                yield Bracket(a, low, frozenset({"touch"}), 0)
+            elif split is not None:
                 yield from self.explore(a, split, depth - 1, force=False)
                 yield from self.explore(split, b, depth - 1, force=False)
 
-    def _dip(self, a: Sample, b: Sample) -> Sample | None:
-        """A point between with the other sign of a test function that almost vanishes, if any."""
+    def _dip(self, a: Sample, b: Sample) -> tuple[Sample | None, Sample | None]:
+        """A point between with the other sign of a test function that almost vanishes, if any.
+
+        And, if there is none, one next to which the determinant touches zero.
+        """
+        touch = None
         for name in TESTS:
             if name == "pair" and not self.pairs:
                 continue
-            test = self.value(name)
+            test = self.value(name, float(self.tests(a).volume))
             sign = np.sign(test(a))
             low, high = 0.0, 1.0
             ratio = 0.5 * (np.sqrt(5.0) - 1.0)
@@ -139,7 +217,7 @@ class _Seek:
                 if sample is None:
                     break
                 if sign * test(sample) <= 0.0:
-                    return sample
+                    return sample, None
                 marks.append((s, sign * test(sample)))
             if len(marks) < 2:
                 continue
@@ -156,6 +234,8 @@ class _Seek:
                     break
                 value = sign * test(sample)
                 if value <= 0.0:
-                    return sample
+                    return sample, None
+                if name == "branch" and value < TOUCH * min(sign * test(a), sign * test(b)):
+                    touch = sample
                 marks = sorted([(new, value), marks[0] if v1 < v2 else marks[1]])
-        return None
+        return None, touch

@@ -8,14 +8,14 @@ write f with its derivatives by u, row by row; the second goes on with the deriv
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.kernels.defining import DERIVED
+from phasekit.kernels.differences import DERIVED
 
 Array = npt.NDArray[np.float64]
 
@@ -29,6 +29,7 @@ class Field:
 
     def __init__(self, states: Sequence[str], parameters: Sequence[str]) -> None:
         self.states, self.parameters = tuple(states), tuple(parameters)
+        self.failure: Exception | None = None  # what f raised last, instead of a value
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Any:
         """F and its derivatives, or f alone where the mode is PLAIN.
@@ -44,6 +45,16 @@ class Field:
     def third(self, active: tuple[int, ...]) -> Any:
         """Third derivative along the three directions that z holds, of a symbolic field."""
         raise NotImplementedError
+
+    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+        """F at many points, the rows of u; NaN where it has no value."""
+        raise NotImplementedError
+
+    def slopes_along(
+        self, par: Array, active: tuple[int, ...], u: Array, z: Array
+    ) -> Callable[[Array], Array] | None:
+        """f_u z at a point, as a function of the point, if it is known without differences of f."""
+        return None
 
     def prepare(self, scale: Array) -> None:
         """Take the scales of the states, for differences."""
@@ -65,6 +76,10 @@ class SymbolicField(Field):
     def second(self, active: tuple[int, ...]) -> int:
         """Machine code for f, its derivatives and those of f_u z."""
         return _second(self.expressions, self.states, self.parameters, active)
+
+    def terms(self, active: tuple[int, ...]) -> int:
+        """Machine code for f and, after it, the sums of the sizes of its terms."""
+        return _terms(self.expressions, self.states, self.parameters, active)
 
     def third(self, active: tuple[int, ...]) -> int:
         """Machine code for the third derivative along three directions."""
@@ -106,8 +121,22 @@ def _unknowns(
     return u, places
 
 
-def _derivative(expression: Any, symbol: Any) -> Any:
-    return expression.diff(symbol) if symbol in expression.free_symbols else expression * 0
+def _slopes(expressions: Sequence[Any], u: Sequence[Any]) -> list[dict[int, Any]]:
+    """Derivatives that do not vanish, by the places of their symbols, of each expression."""
+    place = {symbol: j for j, symbol in enumerate(u)}
+    return [
+        {place[s]: e.diff(s) for s in sorted(e.free_symbols & place.keys(), key=place.__getitem__)}
+        for e in expressions
+    ]
+
+
+def _jet(expressions: Sequence[Any], u: Sequence[Any]) -> tuple[dict[int, Any], int]:
+    """F and its derivatives, row by row, those that do not vanish by their places; how many."""
+    n, m = len(expressions), len(u)
+    entries = dict(enumerate(expressions))
+    for i, row in enumerate(_slopes(expressions, u)):
+        entries.update({n + i * m + j: slope for j, slope in row.items()})
+    return entries, n + n * m
 
 
 @functools.lru_cache(maxsize=256)
@@ -120,9 +149,8 @@ def _first(
     from phasekit.bifurcation.continuation.machine import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
-    return compile_expressions(
-        [*expressions, *(_derivative(e, s) for e in expressions for s in u)], places
-    )
+    entries, count = _jet(expressions, u)
+    return compile_expressions(entries, places, count)
 
 
 @functools.lru_cache(maxsize=256)
@@ -138,12 +166,40 @@ def _second(
 
     u, places = _unknowns(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
-    along = [*expressions, *(_derivative(e, s) for e in expressions for s in u)]
-    for e in expressions:
-        slope = sympy.Add(*(_derivative(e, s) * t for s, t in zip(u, z, strict=True)))
-        along.extend(_derivative(slope, s) for s in u)
+    entries, count = _jet(expressions, u)
+    along = [
+        sympy.Add(*(slope * z[j] for j, slope in row.items())) for row in _slopes(expressions, u)
+    ]
+    for i, row in enumerate(_slopes(along, u)):
+        entries.update({count + i * len(u) + j: slope for j, slope in row.items()})
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
-    return compile_expressions(along, places)
+    return compile_expressions(entries, places, count + len(expressions) * len(u))
+
+
+@functools.lru_cache(maxsize=256)
+def _terms(
+    expressions: tuple[Any, ...],
+    states: tuple[str, ...],
+    parameters: tuple[str, ...],
+    active: tuple[int, ...],
+) -> int:
+    from phasekit.bifurcation.continuation.machine import compile_expressions
+
+    _, places = _unknowns(states, parameters, active)
+    return compile_expressions([*expressions, *map(_magnitude, expressions)], places)
+
+
+def _magnitude(e: Any) -> Any:
+    """An expression with the sizes of all terms of its sums added up."""
+    import sympy
+
+    if e.is_Add:
+        return sympy.Add(*map(_magnitude, e.args))
+    if e.is_Mul:
+        return sympy.Mul(*map(_magnitude, e.args))
+    if e.is_Pow and e.exp.is_Integer and e.exp.is_positive:
+        return _magnitude(e.base) ** e.exp
+    return abs(e)
 
 
 @functools.lru_cache(maxsize=256)
@@ -163,8 +219,8 @@ def _third(
     for k in range(3):
         directions = z[k * len(u) : (k + 1) * len(u)]
         along = [
-            sympy.Add(*(_derivative(e, s) * t for s, t in zip(u, directions, strict=True)))
-            for e in along
+            sympy.Add(*(slope * directions[j] for j, slope in row.items()))
+            for row in _slopes(along, u)
         ]
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
     return compile_expressions(along, places)

@@ -54,16 +54,20 @@ _COMPARISONS = {
 
 
 def compile_expressions(
-    expressions: Sequence[sympy.Expr], inputs: Mapping[sympy.Symbol, tuple[int, int]]
+    expressions: Sequence[sympy.Expr] | Mapping[int, sympy.Expr],
+    inputs: Mapping[sympy.Symbol, tuple[int, int]],
+    count: int | None = None,
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
     Parameters
     ----------
-    expressions : sequence of sympy.Expr
-        One for each entry of ``out``.
+    expressions : sequence, or mapping of int to sympy.Expr
+        One for each entry of ``out``, or by their places in it; other places become 0.
     inputs : mapping
         Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
+    count : int, optional
+        Length of ``out``; default: as many as there are expressions.
 
     Raises
     ------
@@ -75,13 +79,18 @@ def compile_expressions(
     module.triple = llvm.get_process_triple()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer] * 4), name="fill")
     builder = ir.IRBuilder(function.append_basic_block())
-    shared, results = sympy.cse(list(expressions), symbols=sympy.numbered_symbols("_c"))
     writer = _Writer(module, builder, function.args, inputs)
+    if not isinstance(expressions, Mapping):
+        expressions = dict(enumerate(expressions))
+    if count is not None and len(expressions) < count:
+        writer.clear(function.args[3], count)
+    shared, results = sympy.cse(
+        list(expressions.values()), symbols=sympy.numbered_symbols("_c"), list=True
+    )
     for symbol, expression in shared:
         writer.values[symbol] = writer.write(expression)
-    values = [writer.write(result) for result in results]
-    for i, value in enumerate(values):
-        builder.store(value, writer.place(function.args[3], i))
+    for i, result in zip(expressions, results, strict=True):
+        builder.store(writer.write(result), writer.place(function.args[3], i))
     builder.ret_void()
     return _machine_code(str(module))
 
@@ -122,6 +131,14 @@ class _Writer:
 
     def place(self, array: Any, index: int) -> Any:
         return self.builder.gep(array, [ir.Constant(ir.IntType(64), index)])
+
+    def clear(self, array: Any, count: int) -> None:
+        """Set so many entries to zero."""
+        byte, long = ir.IntType(8), ir.IntType(64)
+        memset = self.module.declare_intrinsic("llvm.memset", [byte.as_pointer(), long])
+        start = self.builder.bitcast(array, byte.as_pointer())
+        zero, no = ir.Constant(byte, 0), ir.Constant(ir.IntType(1), 0)
+        self.builder.call(memset, [start, zero, ir.Constant(long, 8 * count), no])
 
     def library(self, name: str, *args: Any) -> Any:
         known = self.module.globals.get(name)

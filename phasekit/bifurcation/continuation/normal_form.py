@@ -1,122 +1,44 @@
-"""Normal forms at special points ([Kuznetsov2004] chapters 3, 5 and 8)."""
+"""Normal forms at special points ([Kuznetsov2004] chapters 3, 5 and 8).
+
+A coefficient whose error hides its digits is NaN.
+"""
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.fields import SymbolicField
+from phasekit.bifurcation.continuation.derivatives import Derivatives as Derivatives
+from phasekit.bifurcation.continuation.derivatives import Estimate
+from phasekit.bifurcation.continuation.units import force_sizes, row_sizes
 
 Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
-# Central differences along a line: of order 8 for the second, of order 6 for the third derivative.
-_SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
-_THIRD = np.array(
-    [-7 / 240, 3 / 10, -169 / 120, 61 / 30, 0.0, -61 / 30, 169 / 120, -3 / 10, 7 / 240]
-)
-# Steps that are tried, in units of the states; the two results that agree best decide.
-_REACHES = (2.0**-3, 2.0**-4, 2.0**-5, 2.0**-6, 2.0**-7)
+DIGITS = 1e-2  # largest relative error of a coefficient that is said
+SMALL = 1e-9  # largest error in units of f and of the states, where a coefficient is next to zero
 
 
-class Derivatives:
-    """The multilinear forms of f at one point: B(a, b) and C(a, b, c), of unknowns u = (x, p)."""
-
-    def __init__(self, curve: Curve, u: Array) -> None:
-        self.curve, self.u = curve, np.array(u[: curve.m])
-        self.exact = isinstance(curve.field, SymbolicField)
-        self.reach = np.maximum(np.abs(self.u), curve.scale[: curve.m])
-        self.value, self.slopes = curve.at(self.u)
-
-    def _full(self, z: Array) -> Array:
-        full = np.zeros(self.curve.m)
-        full[: len(z)] = z
-        return full
-
-    def _along(self, z: Array, weights: Array, order: int) -> Array:
-        """A derivative of f along a line."""
-        length = float(np.max(np.abs(z) / self.reach))
-        if length == 0.0:
-            return np.zeros(self.curve.n)
-        found = []
-        for reach in _REACHES:
-            h = reach / length
-            total = np.zeros(self.curve.n)
-            for k, weight in zip(range(-4, 5), weights, strict=True):
-                if weight:
-                    total += weight * self.curve.at(self.u + k * h * z)[0]
-            found.append(total / h**order)
-        gaps = [float(np.max(np.abs(b - a))) for a, b in pairwise(found)]
-        best = int(np.nanargmin(gaps)) if np.isfinite(gaps).any() else 0
-        return np.asarray(found[best + 1])
-
-    def second(self, a: Vector, b: Vector) -> Vector:
-        """B(a, b): the second derivative of f along a and b."""
-        if np.iscomplexobj(a) or np.iscomplexobj(b):
-            return _bilinear(self.second, a, b)
-        a, b = self._full(a), self._full(b)
-        if self.exact:
-            return np.asarray(self.curve.bend(self.u, a) @ b)
-        a, b, size = _balance(a, b, self.reach)
-        plus, minus = self._along(a + b, _SECOND, 2), self._along(a - b, _SECOND, 2)
-        return np.asarray(size * 0.25 * (plus - minus))
-
-    def third(self, a: Vector, b: Vector, c: Vector) -> Vector:
-        """C(a, b, c): the third derivative of f along a, b and c."""
-        if any(np.iscomplexobj(z) for z in (a, b, c)):
-            return _trilinear(self.third, a, b, c)
-        a, b, c = self._full(a), self._full(b), self._full(c)
-        if self.exact:
-            return self.curve.twist(self.u, a, b, c)
-        total = np.zeros(self.curve.n)
-        for j, k in ((1.0, 1.0), (1.0, -1.0), (-1.0, 1.0), (-1.0, -1.0)):
-            total += j * k * self._along(a + j * b + k * c, _THIRD, 3)
-        return np.asarray(total / 24.0)
+def unknown(form: dict[str, float]) -> str:
+    """Which coefficients are not known, in words; nothing if all are."""
+    names = [name for name, value in form.items() if np.isnan(value)]
+    if not names:
+        return ""
+    return f"{' and '.join(names)} not known: the derivatives of f are not known to enough digits"
 
 
-def _balance(a: Array, b: Array, size: Array) -> tuple[Array, Array, float]:
-    """Two vectors brought to the same length, and the product of their lengths."""
-    one, two = np.max(np.abs(a) / size), np.max(np.abs(b) / size)
-    if one == 0.0 or two == 0.0:
-        return a, b, 0.0
-    return a / one, b / two, float(one * two)
-
-
-def _bilinear(form: Any, a: Vector, b: Vector) -> Vector:
-    """A real bilinear form of complex vectors."""
-    (a, x), (b, y) = ((np.real(z), np.imag(z)) for z in (a, b))
-    return np.asarray(form(a, b) - form(x, y) + 1j * (form(a, y) + form(x, b)))
-
-
-def _trilinear(form: Any, a: Vector, b: Vector, c: Vector) -> Vector:
-    """A real trilinear form of complex vectors."""
-    total: Any = 0j * np.real(a)
-    for i in range(8):
-        chosen = [(np.imag(z) if i >> j & 1 else np.real(z)) for j, z in enumerate((a, b, c))]
-        if all(np.any(z) for z in chosen):
-            total = total + 1j ** i.bit_count() * form(*chosen)
-    return np.asarray(total)
-
-
-def row_sizes(matrix: Array) -> Array:
-    """Largest entries of the rows; 1 for rows that vanish."""
-    sizes = np.max(np.abs(matrix), axis=1)
-    return np.asarray(np.where(sizes > 1e-12 * np.max(sizes, initial=0.0), sizes, 1.0))
-
-
-def null_vectors(jacobian: Array, scale: Array) -> tuple[Array, Array]:
+def null_vectors(jacobian: Array, scale: Array, rows: Array | None = None) -> tuple[Array, Array]:
     """Right and left null vector of f_x: |q| = 1, its largest entry positive, and p.q = 1.
 
-    Found with states in units of their scales, so that units do not matter. Where zero is a double
-    eigenvalue, as always in conservative systems, p.q = 0: then p.q1 = 1 with f_x q1 = q, and
-    normal forms are those of the second derivative by time.
+    Found with states in units of their scales and f in those of ``rows``, so that units do not
+    matter; by default all rows are of one size, but one may vanish with its eigenvalue. Where zero
+    is a double eigenvalue, as always in conservative systems, p.q = 0: then p.q1 = 1 with
+    f_x q1 = q, and normal forms are those of the second derivative by time.
     """
     scaled = jacobian * scale
-    rows = row_sizes(scaled)
+    rows = row_sizes(scaled) if rows is None else rows
     left, _, right = np.linalg.svd(scaled / rows[:, None])
     q, p = right[-1] * scale, left[:, -1] / rows
     q = q / np.linalg.norm(q)
@@ -143,8 +65,13 @@ def solve_off(jacobian: Array, right: Array, q: Array, p: Array) -> Array:
 def fold(d: Derivatives) -> dict[str, float]:
     """Xi' = b (p - p0) + a xi^2 on the center manifold."""
     n = d.curve.n
-    q, p = null_vectors(d.slopes[:, :n], d.curve.scale[:n])
-    return {"a": float(0.5 * p @ d.second(q, q)), "b": float(p @ d.slopes[:, n])}
+    rows = force_sizes(d.curve, d.u)
+    q, p = null_vectors(d.slopes[:, :n], d.curve.scale[:n], rows)
+    unit = _unit(d, rows, p, q, 2)
+    return {
+        "a": _known(d.second(q, q).dot(p) * 0.5, unit),
+        "b": float(p @ d.slopes[:, n]),
+    }
 
 
 def branch_point(d: Derivatives, tangent: Array, *, pitchfork: bool) -> dict[str, float]:
@@ -154,14 +81,21 @@ def branch_point(d: Derivatives, tangent: Array, *, pitchfork: bool) -> dict[str
     """
     n = d.curve.n
     jacobian = d.slopes[:, :n]
-    q, p = null_vectors(jacobian, d.curve.scale[:n])
+    rows = force_sizes(d.curve, d.u)
+    q, p = null_vectors(jacobian, d.curve.scale[:n], rows)
     along = tangent[: n + 1] / tangent[n]
-    forms = {"d": float(p @ d.second(q, along))}
+    length = float(np.max(np.abs(along) / d.curve.scale[: n + 1]))
+    bent = d.second(q, q)
+    forms = {"d": _known(d.second(q, along).dot(p), _unit(d, rows, p, q, 1) * length)}
     if not pitchfork:
-        forms["a"] = float(0.5 * p @ d.second(q, q))
+        forms["a"] = _known(bent.dot(p) * 0.5, _unit(d, rows, p, q, 2))
         return forms
-    h = solve_off(jacobian, d.second(q, q), q, p)
-    forms["c"] = float(p @ (d.third(q, q, q) - 3.0 * d.second(q, h)) / 6.0)
+    h = solve_off(jacobian, bent.value, q, p)
+    loose = solve_off(jacobian, bent.error, q, p)
+    fed = d.second(q, h)
+    fed = Estimate(fed.value, fed.error + np.abs(d.second(q, loose).value))
+    total = d.third(q, q, q) - 3.0 * fed
+    forms["c"] = _known(total.dot(p) * (1.0 / 6.0), _unit(d, rows, p, q, 3))
     return forms
 
 
@@ -181,15 +115,40 @@ def hopf(d: Derivatives, omega: float) -> dict[str, float]:
     p = vectors[:, np.argmin(np.abs(values + 1j * omega))]
     p = p / np.conj(np.vdot(p, q))
     bar = np.conj(q)
-    first = np.vdot(p, d.third(q, q, bar))
-    second = np.vdot(p, d.second(q, np.linalg.solve(A, d.second(q, bar).real).astype(complex)))
-    third = np.vdot(p, d.second(bar, np.linalg.solve(2j * omega * np.eye(n) - A, d.second(q, q))))
-    slope = np.vdot(p, d.second(q, _motion(d)))
+    still, double = d.second(q, bar), d.second(q, q)
+    matrix = 2j * omega * np.eye(n) - A
+    second = _fed(d, q, np.linalg.solve(A, still.value.real), np.linalg.inv(A), still.error)
+    third = _fed(d, bar, np.linalg.solve(matrix, double.value), np.linalg.inv(matrix), double.error)
+    total = (d.third(q, q, bar) - 2.0 * second + third).dot(p) * (0.5 / omega)
+    rows = force_sizes(d.curve, d.u)
+    motion = _motion(d)
+    length = float(np.max(np.abs(motion) / d.curve.scale[: n + 1]))
     return {
-        "l1": float((first - 2.0 * second + third).real / (2.0 * omega)),
+        "l1": _known(total, _unit(d, rows, p, q, 3) / omega),
         "omega": float(omega),
-        "d": float(slope.real),
+        "d": _known(d.second(q, motion).dot(p), _unit(d, rows, p, q, 1) * length),
     }
+
+
+def _fed(d: Derivatives, q: Vector, h: Vector, inverse: Vector, error: Array) -> Estimate:
+    """B(q, h), with what the error of the right side of h leaves of it."""
+    found = d.second(q, h)
+    loose = np.abs(inverse) @ error
+    size = np.max(loose / np.maximum(np.max(np.abs(h)), 1e-300))
+    return Estimate(found.value, found.error + size * np.abs(found.value))
+
+
+def _unit(d: Derivatives, rows: Array, p: Vector, q: Vector, order: int) -> float:
+    """Size of a coefficient, f being of its own size where states change by theirs."""
+    scale = d.curve.scale[: d.curve.n]
+    return float(np.abs(p) @ rows) * float(np.max(np.abs(q) / scale)) ** order
+
+
+def _known(coefficient: Estimate, unit: float) -> float:
+    """The real part of a coefficient, NaN where its error hides it."""
+    value, error = float(np.real(coefficient.value)), float(np.max(coefficient.error))
+    sure = error <= DIGITS * abs(value) or error <= SMALL * unit
+    return value if sure else np.nan
 
 
 def _motion(d: Derivatives) -> Array:

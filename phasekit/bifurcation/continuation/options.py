@@ -49,8 +49,9 @@ class ContinuationOptions:
     directions : {"both", "forward", "backward"}
         From the start to both sides, or only towards larger or smaller parameters.
     detect : sequence of {"fold", "branch_point", "hopf"}
-        What is looked for; neutral saddles come with Hopf points. Leave out what is not wanted to
-        save time with many states.
+        What is looked for; neutral saddles come with Hopf points. With nothing asked for and more
+        than 16 states no eigenvalues are computed, which take most of the time then: n_unstable is
+        -1.
     bounds : mapping of str to (float, float), optional
         Limits of states by name (and of other free parameters): the branch ends on them.
     scales : mapping of str to float, optional

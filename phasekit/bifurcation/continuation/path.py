@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.kernels import trace
 from phasekit.kernels.defining import EQUILIBRIUM
@@ -20,11 +21,14 @@ DOUBTFUL = 1e-6  # real parts that are smaller, relative to the largest eigenval
 
 @dataclass(frozen=True)
 class Path:
-    """Points in order: unknowns, unit tangents along the path, derivatives of f, step data."""
+    """Points in order: unknowns, unit tangents along the path, derivatives of f, step data.
+
+    ``slopes`` is an array or, of many states, takes the derivatives again wherever it is indexed.
+    """
 
     u: Array
     tangent: Array
-    slopes: Array
+    slopes: Array | Slopes
     info: Array
     start: int
     stops: tuple[Stop, Stop]
@@ -52,11 +56,9 @@ class Sample:
 def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | None) -> Path:
     """One path of two tracks from the same start; the start stands once between them."""
     size, n, m = curve.size, curve.n, curve.m
-    columns = 2 * size + n * m + trace.RECORDED
-    middle = np.zeros((1, columns))
+    middle = np.zeros((1, 2 * size + trace.RECORDED))
     middle[0, :size], middle[0, size : 2 * size] = start.u, start.tangent
-    middle[0, 2 * size : 2 * size + n * m] = start.slopes.ravel()
-    nothing = np.empty((0, columns))
+    nothing = np.empty((0, middle.shape[1]))
     # A copy: the record belongs to the track.
     behind = np.array(backward.record[::-1]) if backward is not None else nothing
     behind[:, size : 2 * size] *= -1.0
@@ -70,15 +72,38 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     )
     if forward is not None and forward.stop.reason == "closed":
         stops = (forward.stop, forward.stop)
-    slopes = table[:, 2 * size : 2 * size + n * m].reshape(-1, n, m)
+    u = table[:, :size]
+    slopes: Array | Slopes = Slopes(curve, u)
+    if curve.keeps:
+        kept = [start.slopes.reshape(1, -1)]
+        if backward is not None:
+            kept.insert(0, backward.slopes[::-1])
+        if forward is not None:
+            kept.append(forward.slopes)
+        slopes = _sharpened(curve, u, np.concatenate(kept).reshape(-1, n, m))
     return Path(
-        table[:, :size],
-        table[:, size : 2 * size],
-        _sharpened(curve, table[:, :size], slopes),
-        table[:, -trace.RECORDED :],
-        len(behind),
-        stops,
+        u, table[:, size : 2 * size], slopes, table[:, -trace.RECORDED :], len(behind), stops
     )
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives of f at points, taken where they are asked for."""
+
+    curve: Curve
+    u: Array
+
+    def __getitem__(self, places: Any) -> Array:
+        """Those at one point, or at several."""
+        if np.ndim(self.u[places]) == 1:
+            return self.curve.at(self.u[places])[1]
+        return np.array([self.curve.at(u)[1] for u in self.u[places]])
+
+    def chunks(self) -> Iterator[slice]:
+        """The points, so many at a time that their derivatives take little memory."""
+        step = max(1, MOST // (self.curve.n * self.curve.m))
+        for first in range(0, len(self.u), step):
+            yield slice(first, min(first + step, len(self.u)))
 
 
 def _sharpened(curve: Curve, u: Array, slopes: Array) -> Array:

@@ -10,13 +10,15 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.compare import turned
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
-from phasekit.bifurcation.continuation.locate import CONVERGED, Special, locate
+from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.kernels.defining import EQUILIBRIUM
 
 Array = npt.NDArray[np.float64]
 SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
+STAYS = 1e-3  # distance within which a path that passes a special point has not left it
 TURNS = 1e-4  # part of a unit tangent along the parameter, on scaled axes
 
 
@@ -43,7 +45,11 @@ def _find(
     if curve.kind != EQUILIBRIUM:
         from phasekit.bifurcation.continuation.codimension_two import find_on
 
-        return find_on(curve, path), eigenvalues_of(path.slopes)
+        return find_on(curve, path), eigenvalues_of(path.slopes[:])
+    if not detect:
+        if not curve.keeps:  # nothing is asked for that takes long
+            return [], np.full((path.count, curve.n), np.nan, dtype=complex)
+        return [], eigenvalues_of(path.slopes[:])
     found, eigenvalues = brackets(curve, path, detect, conservative)
     placed: list[Placed] = []
     for bracket in found:
@@ -51,7 +57,7 @@ def _find(
             if not wanted(special, detect):
                 continue
             placed.append(place(curve, path, bracket, special))
-    placed = unique(curve, placed)
+    placed = unique(curve, path, placed)
     # The start of a closed curve is its end as well.
     if path.closed and len(placed) > 1:
         first, last = placed[0], placed[-1]
@@ -62,37 +68,60 @@ def _find(
 
 def wanted(special: Special, detect: tuple[str, ...]) -> bool:
     """Whether a kind was asked for."""
-    group = {"fold": "fold", "hopf": "hopf", "neutral_saddle": "hopf"}
+    group = {"fold": "fold"} | dict.fromkeys(("hopf", "neutral_saddle", "bogdanov_takens"), "hopf")
     return group.get(special.kind, "branch_point") in detect
 
 
 def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:
     """Where on the path a special point stands."""
-    i = bracket.index
-    m = curve.m
-    chord = path.u[i + 1] - path.u[i]
-    gap = np.zeros(curve.size)
-    gap[:m] = special.u[:m] - path.u[i, :m]
-    square = float(np.dot(curve.weight * chord, chord))
-    return Placed(i, float(np.dot(curve.weight * chord, gap)) / square if square else 0.0, special)
+    first = None
+    # A bracket may hold points that lie too near to a branch point to say anything.
+    for i in range(bracket.index, min(bracket.index + 8, path.count - 1)):
+        chord = path.u[i + 1] - path.u[i]
+        gap = np.zeros(curve.size)
+        gap[: curve.m] = special.u[: curve.m] - path.u[i, : curve.m]
+        square = float(np.dot(curve.weight * chord, chord))
+        along = float(np.dot(curve.weight * chord, gap)) / square if square else 0.0
+        one = Placed(i, along, special)
+        first = one if first is None else first
+        if _inside(one):
+            return one
+    assert first is not None
+    return first
 
 
-def unique(curve: Curve, placed: list[Placed]) -> list[Placed]:
-    """In order along the path, each once: one that lies on a point of the path is seen twice."""
+def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
+    """In order along the path, each once: next to some, all test functions change their signs."""
     placed = sorted(placed, key=lambda one: (one.index, one.along))
     kept: list[Placed] = []
     for one in placed:
         twin = None
         for i in range(len(kept) - 1, max(-1, len(kept) - 4), -1):
             other = kept[i]
-            near = one.index - other.index <= 2 and other.special.kind == one.special.kind
-            if near and _distance(curve, one, other) < SAME:
+            alike = other.special.kind == one.special.kind and _distance(curve, one, other) < SAME
+            if alike and _stays(curve, path, other, one):
                 twin = i
         if twin is None:
             kept.append(one)
         elif kept[twin].special.status != "converged" and one.special.status == "converged":
             kept[twin] = one
+        elif not _inside(kept[twin]) and _inside(one):
+            kept[twin] = one
     return [one for one in kept if not _echo(curve, one, kept)]
+
+
+def _inside(one: Placed) -> bool:
+    """Whether a point stands between the two points of the path that it is placed at."""
+    return -1e-6 <= one.along <= 1.0 + 1e-6
+
+
+def _stays(curve: Curve, path: Path, one: Placed, other: Placed) -> bool:
+    """Whether the path stays next to a special point up to where it is seen again."""
+    if other.index - one.index <= 2:
+        return True
+    m = curve.m
+    gap = turned(curve, path.u[one.index + 1 : other.index, :m] - one.special.u[:m])
+    return bool(np.max(np.abs(gap / curve.scale[:m])) < STAYS)
 
 
 def _distance(curve: Curve, one: Placed, other: Placed) -> float:
@@ -108,6 +137,10 @@ def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
         for other in all_:
             if other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
                 return True
+    if one.special.kind == "neutral_saddle" and one.special.status != CONVERGED:
+        # Next to a multiple branch point sums of eigenvalues are those of rounding errors.
+        if any(o.special.corank > 1 and _distance(curve, one, o) < STAYS for o in all_):
+            return True
     if one.special.kind != "fold":
         return False
     for other in all_:

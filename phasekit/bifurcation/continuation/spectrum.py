@@ -22,7 +22,10 @@ class Tests:
     fold : ndarray
         Component of the unit tangent along the parameter.
     branch : ndarray
-        Determinant of f_u with the tangent as last row, on scaled axes, rows of length one.
+        Sign of the determinant of f_u with the tangent as last row.
+    volume : ndarray
+        Logarithm of the size of that determinant on scaled axes. Only differences of it count:
+        the number itself has no scale, and of many states it is beyond the range of numbers.
     pair : ndarray
         Sum of two real or two conjugate eigenvalues, the smallest in size, with the sign of the
         product of all: zero at Hopf points and neutral saddles.
@@ -34,22 +37,77 @@ class Tests:
 
     fold: Array
     branch: Array
+    volume: Array
     pair: Array
     unstable: npt.NDArray[np.int64]
     eigenvalues: npt.NDArray[np.complex128]
 
 
-def eigenvalues_of(slopes: Array) -> npt.NDArray[np.complex128]:
-    """Eigenvalues of f_x of many points."""
+def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.complex128]:
+    """Eigenvalues of f_x of many points.
+
+    Those of matrices that a change of units makes symmetric, within the accuracy of their entries,
+    are real, as those of gradient systems: rounding does not make pairs of them.
+    """
     n = slopes.shape[-2]
     if n == 1:
         return slopes[..., :, 0].astype(complex)
+    matrices = slopes[..., :n]
     if n == 2:
-        return _eigenvalues_of_two(slopes)
+        values = _eigenvalues_of_two(matrices)
+        real = _symmetric(_in_even_units(matrices), accuracy)
+        values.imag[real] = 0.0
+        return values
     finite = np.isfinite(slopes).all(axis=(-2, -1))
     result = np.full(slopes.shape[:-2] + (n,), np.nan, dtype=complex)
-    result[finite] = np.linalg.eigvals(slopes[finite][..., :n])
+    given = matrices[finite]
+    even = _in_even_units(given)
+    real = _symmetric(even, accuracy)
+    values = np.empty(given.shape[:-1], dtype=complex)
+    values[~real] = np.linalg.eigvals(given[~real])
+    if real.any():
+        # The lower triangle alone counts for LAPACK; the mean of both is the better one.
+        values[real] = np.linalg.eigvalsh(0.5 * (even + np.swapaxes(even, -1, -2))[real])
+    result[finite] = values
     return result
+
+
+def _symmetric(matrices: Array, accuracy: float) -> npt.NDArray[np.bool_]:
+    size = np.max(np.abs(matrices), axis=(-2, -1), initial=0.0)
+    gap = np.max(np.abs(matrices - np.swapaxes(matrices, -1, -2)), axis=(-2, -1), initial=0.0)
+    return np.asarray(gap <= 4.0 * accuracy * size)
+
+
+def _in_even_units(matrices: Array) -> Array:
+    """D^-1 A D of matrices A, the same diagonal D for all: symmetric if any such are.
+
+    Along the edges of a spanning forest of the entries, (d_j/d_i)^2 = |A_ji/A_ij|.
+    """
+    if not matrices.size or _symmetric(matrices, 0.0).all():
+        return matrices
+    sizes = np.abs(matrices).reshape(-1, *matrices.shape[-2:]).sum(axis=0)
+    both = np.sqrt(sizes * sizes.T)
+    if not np.any(both):
+        return matrices
+    from scipy.sparse.csgraph import breadth_first_order
+
+    n = len(sizes)
+    log = np.zeros(n)
+    seen = np.zeros(n, dtype=bool)
+    # Zeros by differences are zeros but for rounding.
+    joined = both > 1e-12 * np.max(both)
+    for root in range(n):
+        if seen[root]:
+            continue
+        order, before = breadth_first_order(joined, root, directed=False)
+        seen[order] = True
+        for j in order[1:]:
+            i = before[j]
+            log[j] = log[i] + 0.5 * (np.log(sizes[j, i]) - np.log(sizes[i, j]))
+    with np.errstate(all="ignore"):
+        unit = np.exp(log - np.mean(log))
+        even = matrices * unit / unit[:, None]
+    return even if np.isfinite(even).all() else matrices
 
 
 def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
@@ -69,34 +127,37 @@ def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
     return result
 
 
-def determinant(matrix: Array) -> Array:
-    """Determinants of many matrices; of small ones in closed form."""
-    if matrix.shape[-1] == 2:
-        a, b, c, d = (matrix[..., i, j] for i in (0, 1) for j in (0, 1))
-        return np.asarray(a * d - b * c)
-    if matrix.shape[-1] == 3:
-        return np.asarray(np.sum(matrix[..., 0, :] * _cross(matrix), axis=-1))
-    return np.asarray(np.linalg.det(matrix))
+def orientation(curve: Curve, tangent: Array, slopes: Array) -> tuple[Array, Array]:
+    """Sign, and logarithm of the size, of the determinant of f_u with the tangent as last row.
 
-
-def _cross(matrix: Array) -> Array:
-    """Cross product of the last two of three rows."""
-    (a, b, c), (x, y, z) = (np.moveaxis(matrix[..., i, :], -1, 0) for i in (1, 2))
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
-
-
-def test_functions(curve: Curve, tangent: Array, slopes: Array, *, pairs: bool) -> Tests:
-    """The test functions of points with their tangents and derivatives of f."""
-    n, m = curve.n, curve.m
+    On scaled axes; rows are brought to a length of one for it, so that units do not matter.
+    """
+    m = curve.m
     scale = curve.scale[:m]
     top = slopes * scale
-    top = top / np.maximum(np.linalg.norm(top, axis=-1, keepdims=True), 1e-300)
+    rows = np.max(np.abs(top), axis=-1, keepdims=True)
+    rows = np.where(rows > 0.0, rows, 1.0)
     bottom = tangent[..., :m] / scale
-    matrix = np.concatenate([top, bottom[..., None, :]], axis=-2)
-    values = eigenvalues_of(slopes)
+    matrix = np.concatenate([top / rows, bottom[..., None, :]], axis=-2)
+    sign, log = np.linalg.slogdet(matrix)
+    return np.asarray(sign), np.asarray(log + np.sum(np.log(rows[..., 0]), axis=-1))
+
+
+def test_functions(
+    curve: Curve,
+    tangent: Array,
+    slopes: Array,
+    *,
+    pairs: bool,
+) -> Tests:
+    """The test functions of points with their tangents and derivatives of f."""
+    n = curve.n
+    sign, log = orientation(curve, tangent, slopes)
+    values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
     return Tests(
-        tangent[..., n] / scale[n],
-        determinant(matrix),
+        tangent[..., n] / curve.scale[n],
+        sign,
+        log,
         pair_function(values) if pairs and n > 1 else np.ones(slopes.shape[:-2]),
         np.sum(values.real > 0.0, axis=-1),
         values,
@@ -106,6 +167,9 @@ def test_functions(curve: Curve, tangent: Array, slopes: Array, *, pairs: bool) 
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
     """Smallest real sum of two eigenvalues with the sign of the product of all such sums."""
     n = values.shape[-1]
+    if n > 8:  # all pairs of many eigenvalues would cost more than the eigenvalues
+        rows = [_least_sum(row) for row in values.reshape(-1, n)]
+        return np.array(rows).reshape(values.shape[:-1])
     i, j = np.triu_indices(n, 1)
     sums = values[..., i] + values[..., j]
     both_real = (values[..., i].imag == 0.0) & (values[..., j].imag == 0.0)
@@ -116,6 +180,28 @@ def pair_function(values: npt.NDArray[np.complex128]) -> Array:
     least = np.min(sizes, axis=-1, initial=np.inf)
     least = np.where(np.isfinite(least), least, 1.0)
     return np.asarray(np.where(negative % 2 == 1, -least, least))
+
+
+def _least_sum(values: npt.NDArray[np.complex128]) -> float:
+    """`pair_function` of one point, by sorting: of real eigenvalues neighbours of -r count."""
+    real = np.sort(values.real[values.imag == 0.0])
+    above = values.real[values.imag > 0.0]  # one of each conjugate pair
+    sums = [2.0 * above]
+    negative = int(np.sum(above < 0.0))
+    count = len(real)
+    if count > 1:
+        # How many of the others are less than -r.
+        place = np.searchsorted(real, -real, side="left")
+        both = int(np.sum(place)) - int(np.sum(real < -real))
+        negative += both // 2
+        own = np.arange(count)
+        for shift in (-2, -1, 0, 1):
+            other = place + shift
+            there = (other >= 0) & (other < count) & (other != own)
+            sums.append(real[there] + real[other[there]])
+    sizes = np.abs(np.concatenate(sums))
+    least = float(np.min(sizes)) if len(sizes) and np.isfinite(sizes).all() else 1.0
+    return -least if negative % 2 else least
 
 
 def is_conservative(values: npt.NDArray[np.complex128]) -> bool:

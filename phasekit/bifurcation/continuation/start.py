@@ -6,12 +6,16 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve, Track, nullspace
-from phasekit.bifurcation.continuation.locate import directions_at
+from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.errors import ConvergenceError
 
 Array = npt.NDArray[np.float64]
 
+EPSILON = 2.0**-52
+FAR = 1e3  # a state that moves by less than this part of its size counts by its motion
+MANY = 20  # states up to which each is looked at by itself
 LARGE = 1e8  # a state that grows so many times beyond its scale leaves the picture
 
 
@@ -26,16 +30,27 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     n = curve.n
     value, _ = curve.at(u)
     if not np.isfinite(value).all():
+        failure = curve.field.failure
+        said = "" if failure is None else f" (it raised {type(failure).__name__}: {failure})"
         raise ConvergenceError(
-            f"x0: f is not finite there: f = {value.tolist()} at {names}; give another x0"
-        )
+            f"x0: f is not finite there{said}: f = {value.tolist()} at {names}; give another x0"
+        ) from failure
     row = np.zeros(curve.size)
     row[n] = 1.0
     point = curve.refine(u, row, iterations=30)
     if point.converged and np.isfinite(point.residual).all():
         return _at(point.u, u, n)
-    if np.max(np.abs(value)) <= 1e-13 * max(1.0, float(np.max(np.abs(u[:n])))):
+
+    def vanishes(u: Array) -> bool:
+        """Whether f does: beside its terms, and what it was where the search began."""
+        found, slopes = curve.at(u)
+        size = np.abs(slopes) @ np.abs(u[: curve.m]) + np.abs(value)
+        return bool(np.all(np.abs(found) <= 1e-12 * size))
+
+    if not np.any(value):
         return u  # an equilibrium, but one where f_x is singular
+    if np.isfinite(point.u).all() and vanishes(point.u):
+        return _at(point.u, u, n)
 
     from scipy.optimize import root
 
@@ -56,8 +71,7 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
         close = np.max(np.abs(point.u - guess) / np.maximum(curve.scale, np.abs(guess))) < 1e-3
         if point.converged and close:
             return _at(point.u, u, n)
-        residual = np.max(np.abs(found.fun))
-        if residual <= 1e-12:
+        if vanishes(guess):
             return guess
     raise ConvergenceError(
         f"x0: no equilibrium was found from {names} (|f| = {np.max(np.abs(value)):.3g} there) by "
@@ -75,22 +89,49 @@ def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
     n = curve.n
     scale = curve.scale.copy()
     _, slopes = curve.at(u)
+    # By how much the states move along the span, and by how much they are known.
+    rounding = EPSILON * np.abs(slopes) @ np.abs(u[: curve.m])
+    signs = np.where(np.arange(n) % 2, -1.0, 1.0)
+    sides = np.stack([-slopes[:, n] * scale[n], rounding, signs * rounding], axis=1)
     with np.errstate(all="ignore"):
-        motion = np.linalg.lstsq(slopes[:, :n], -slopes[:, n], rcond=1e-10)[0] * scale[n]
+        try:  # elimination leaves zero what is zero
+            motion, *noise = np.linalg.solve(slopes[:, :n], sides).T
+        except np.linalg.LinAlgError:
+            motion, *noise = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
+    unknown = 100.0 * np.max(np.abs(noise), axis=0)
+    motion = np.where(np.isfinite(motion), np.abs(motion), 0.0)
     for i in range(n):
         if curve.period[i] > 0.0:
             scale[i] = curve.period[i] / (2.0 * np.pi)
         elif i in given:
             scale[i] = given[i]
         else:
-            size = max(abs(u[i]), min(abs(motion[i]), 1.0) if np.isfinite(motion[i]) else 0.0)
-            scale[i] = size if size > 1e-10 else 1.0
+            size = max(abs(u[i]), min(motion[i], 1.0))
+            if unknown[i] < motion[i] < abs(u[i]) / FAR:  # what it does is small beside where it is
+                size = max(FAR * motion[i], 1e-6 * abs(u[i]))
+            scale[i] = size if size > unknown[i] else _natural(curve, u, i)
     low, high = curve.low.copy(), curve.high.copy()
     for i in range(n):
         if curve.period[i] == 0.0 and not np.isfinite(low[i]) and not np.isfinite(high[i]):
-            reach = LARGE * max(scale[i], 1.0)
+            reach = LARGE * max(scale[i], abs(u[i]), 1.0)
             low[i], high[i] = u[i] - reach, u[i] + reach
     return curve.replace(scale=scale, low=low, high=high)
+
+
+def _natural(curve: Curve, u: Array, i: int) -> float:
+    """Where a state is zero and stays so: the size at which f ceases to be linear in it, or 1."""
+    if curve.n > MANY:
+        return 1.0
+    d = Derivatives(curve, u)
+    e = np.zeros(curve.n)
+    e[i] = 1.0
+    slope = np.abs(d.slopes[:, i])
+    sizes: list[float] = []
+    for order, form in ((1, d.second(e, e)), (2, d.third(e, e, e))):
+        known = (np.abs(form.value) > 10.0 * form.error) & (slope > 0.0)
+        ratio = slope[known] / np.abs(form.value[known])
+        sizes.extend((ratio ** (1.0 / order)).tolist())
+    return min(sizes, default=1.0)
 
 
 def tangent_of(curve: Curve, u: Array) -> Array:
@@ -100,8 +141,17 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     directions = nullspace(slopes, curve.scale[: curve.m])
     if len(directions) == 1:
         t = directions[0]
+        with np.errstate(all="ignore"):
+            # Elimination leaves zero what is zero, where rounding would lead away from it.
+            row = t / curve.scale[: curve.m] ** 2
+            try:
+                exact = np.linalg.solve(np.vstack([slopes, row]), np.eye(curve.m)[-1])
+            except np.linalg.LinAlgError:
+                exact = t
+        if curve.length(exact - t) < 1e-6 * curve.length(t):
+            t = exact
     else:
-        found, _ = directions_at(curve, u)
+        found = directions_at(curve, u)
         t = max(found, key=lambda t: abs(t[n])) if found else directions[0]
     t = t / curve.length(t)
     lead = t[n] if abs(t[n]) > 1e-9 * curve.scale[n] else t[np.argmax(np.abs(t[:n]))]
@@ -125,4 +175,5 @@ def go_on(curve: Curve, track: Track | None, points: int) -> Track | None:
     if track is None or track.stop.reason != "max_points":
         return track
     more = curve.follow(track.state, points)
-    return Track(np.concatenate([track.record, more.record]), more.state, more.stop)
+    record = np.concatenate([track.record, more.record])
+    return Track(record, np.concatenate([track.slopes, more.slopes]), more.state, more.stop)

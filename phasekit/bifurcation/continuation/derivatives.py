@@ -1,0 +1,325 @@
+"""Directional derivatives of f at one point, each with an estimate of its error.
+
+Those of formulas are exact. Of a function they are taken along lines: f is sampled at steps
+t, t/2, t/4, ... to both sides; each window of neighbouring steps gives one extrapolated value
+(Richardson), with the rounding error that f brings into it. A wide step may miss what f does
+nearby, and give values that agree with each other all the same: so each value is held against
+those of all shorter steps as well. The one with the least error is taken, entry by entry. Forms of
+several directions are combinations of lines (polarisation), and a line is sampled once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from itertools import product
+from math import factorial
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.fields import SymbolicField
+
+Array = npt.NDArray[np.float64]
+Vector = npt.NDArray[Any]  # real or complex
+
+EPSILON = 2.0**-52
+APART = 7.7e-13  # neighbours that show rounding; no power of two, which would hide it
+LEVELS = 24  # steps of a line: from half the size of the unknowns, each half the one before
+MORE = 10  # further ones, where the best lie at an end
+FARTHEST = 44
+POOR = 1e-7  # relative error that wider steps might bring down
+CAUTION = 3.0  # errors that are said, over errors that were seen
+WINDOW = 5  # most steps of one extrapolation
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """An array or a number, and the estimated size of its error, entry by entry."""
+
+    value: Any
+    error: Any
+
+    def __add__(self, other: Estimate) -> Estimate:
+        """The sum; errors add."""
+        return Estimate(self.value + other.value, self.error + other.error)
+
+    def __sub__(self, other: Estimate) -> Estimate:
+        """The difference; errors add."""
+        return Estimate(self.value - other.value, self.error + other.error)
+
+    def __mul__(self, factor: complex) -> Estimate:
+        """The multiple by a number."""
+        return Estimate(self.value * factor, self.error * abs(factor))
+
+    __rmul__ = __mul__
+
+    def dot(self, p: Vector) -> Estimate:
+        """The product with a vector, which is conjugated."""
+        return Estimate(np.vdot(p, self.value), float(np.abs(p) @ np.abs(self.error)))
+
+    def known(self, digits: float = 1.0) -> bool:
+        """Whether so many digits are known, in the largest entry; of zero, whether it is exact."""
+        size, error = np.max(np.abs(self.value)), np.max(np.abs(self.error))
+        return bool(error <= 10.0**-digits * size)
+
+
+class Derivatives:
+    """The multilinear forms of f at one point, of the unknowns u = (x, free parameters).
+
+    Attributes
+    ----------
+    value, slopes : ndarray
+        F and its matrix of derivatives by u.
+    exact : bool
+        Whether derivatives are those of formulas.
+    """
+
+    def __init__(self, curve: Curve, u: Array) -> None:
+        self.curve, self.u = curve, np.array(u[: curve.m])
+        self.exact = isinstance(curve.field, SymbolicField)
+        self.reach = np.maximum(np.abs(self.u), curve.scale[: curve.m])
+        self.value, self.slopes = curve.at(self.u)
+        self._lines: dict[bytes, tuple[Estimate, Estimate, Estimate]] = {}
+        self._noise: Array | None = None
+
+    def first(self, a: Vector) -> Estimate:
+        """The derivative of f along a."""
+        if np.iscomplexobj(a):
+            one, two = self.first(np.real(a)), self.first(np.imag(a))
+            return Estimate(one.value + 1j * two.value, one.error + two.error)
+        a = self._full(a)
+        if self.exact:
+            return _rounded(self.slopes @ a)
+        return self._along(a)[0]
+
+    def second(self, a: Vector, b: Vector) -> Estimate:
+        """B(a, b): the second derivative of f along a and b."""
+        if np.iscomplexobj(a) or np.iscomplexobj(b):
+            return _multilinear(self.second, a, b)
+        a, b = self._full(a), self._full(b)
+        if self.exact:
+            return _rounded(self.curve.bend(self.u, a) @ b)
+        (a, b), size = self._balanced(a, b)
+        if size == 0.0:
+            return self._nothing()
+        if np.array_equal(a, b):
+            return size * self._along(a)[1]
+        return (self._along(a + b)[1] - self._along(a - b)[1]) * (0.25 * size)
+
+    def third(self, a: Vector, b: Vector, c: Vector) -> Estimate:
+        """C(a, b, c): the third derivative of f along a, b and c."""
+        if any(np.iscomplexobj(z) for z in (a, b, c)):
+            return _multilinear(self.third, a, b, c)
+        a, b, c = self._full(a), self._full(b), self._full(c)
+        if self.exact:
+            return _rounded(self.curve.twist(self.u, a, b, c))
+        (a, b, c), size = self._balanced(a, b, c)
+        if size == 0.0:
+            return self._nothing()
+        if np.array_equal(a, c):
+            b, c = c, b
+        elif np.array_equal(b, c):
+            a, c = c, a
+        if np.array_equal(a, b):  # C(a, a, c)
+            if np.array_equal(b, c):
+                return size * self._along(a)[2]
+            total = self._along(a + c)[2] - self._along(a - c)[2]
+            return (size / 6.0) * (total - 2.0 * self._along(c)[2])
+        total = self._along(a + b + c)[2] - self._along(a + b - c)[2]
+        total = total - self._along(a - b + c)[2] + self._along(a - b - c)[2]
+        return (size / 24.0) * total
+
+    def _full(self, z: Array) -> Array:
+        full = np.zeros(self.curve.m)
+        full[: len(z)] = z
+        return full
+
+    def _nothing(self) -> Estimate:
+        return Estimate(np.zeros(self.curve.n), np.zeros(self.curve.n))
+
+    def _balanced(self, *directions: Array) -> tuple[list[Array], float]:
+        """Directions brought to the same length, and the product of their lengths."""
+        lengths = [float(np.max(np.abs(z) / self.reach)) for z in directions]
+        if min(lengths) == 0.0:
+            return list(directions), 0.0
+        return [z / s for z, s in zip(directions, lengths, strict=True)], float(np.prod(lengths))
+
+    def _along(self, z: Array) -> tuple[Estimate, Estimate, Estimate]:
+        """The first three derivatives of f along a line; the sign of z does not matter."""
+        lead = z[np.flatnonzero(z)[:1]]
+        if not len(lead):
+            return (self._nothing(),) * 3
+        sign = float(np.sign(lead[0]))
+        z = z * sign
+        key = z.tobytes()
+        if key not in self._lines:
+            with np.errstate(all="ignore"):
+                self._lines[key] = self._sampled(z)
+        one, two, three = self._lines[key]
+        return sign * one, two, sign * three
+
+    def _sampled(self, z: Array) -> tuple[Estimate, Estimate, Estimate]:
+        given = self.curve.field.slopes_along(self.curve.par, self.curve.active, self.u, z)
+        length = float(np.max(np.abs(z) / self.reach))
+        first, last = 1, LEVELS
+        samples: dict[int, tuple[Array, Array]] = {}
+        while True:
+            missing = [k for k in range(first, last + 1) if k not in samples]
+            steps = [s * 2.0**-k / length for k in missing for s in (1.0, -1.0)]
+            found = self._values(self.u + np.array(steps)[:, None] * z, given)
+            samples.update({k: (found[2 * i], found[2 * i + 1]) for i, k in enumerate(missing)})
+            levels = range(first, last + 1)
+            ahead, behind = (np.array([samples[k][s] for k in levels]) for s in (0, 1))
+            ladder = _Ladder(
+                np.array([2.0**-k / length for k in levels]), ahead, behind,
+                self._values(self.u[None], given)[0], self._noise_of(z, given),
+                # Terms of f may cancel, as along a null vector, where their rounding does not.
+                np.abs(self.slopes) @ np.abs(z) if given is None else np.zeros(self.curve.n),
+            )  # fmt: skip
+            orders = (1, 2, 3) if given is None else (0, 1, 2)
+            results = [ladder.derivative(order) for order in orders]
+            finest = max(place for _, place, _ in results[-2:])
+            if finest >= len(ladder.steps) - 3 and last < FARTHEST:
+                last += MORE
+            elif any(wide for _, _, wide in results[-2:]) and first > 1 - 2 * MORE:
+                first -= MORE
+            else:
+                break
+        one, two, three = (estimate for estimate, _, _ in results)
+        return one, two, three
+
+    def _values(self, points: Array, given: Any) -> Array:
+        if given is None:
+            return self.curve.values(points)
+        return np.array([given(point) for point in points])
+
+    def _noise_of(self, z: Array, given: Any) -> Array:
+        """Size of the rounding errors of f, or of what stands for it, near the point.
+
+        At least that of the unknowns, by which f changes; and what differences over tiny steps
+        show, of a smooth function nothing else (J. More, S. Wild, SIAM J. Sci. Comput. 33 (2011)).
+        """
+        if given is None and self._noise is not None:
+            return self._noise
+        tiny = APART * (self.reach if given is None else z)
+        found = self._values(self.u + np.arange(-4.0, 5.0)[:, None] * tiny, given)
+        noise = EPSILON * np.max(np.abs(found), axis=0, initial=0.0)
+        for order in (4, 5):
+            differences = np.diff(found, n=order, axis=0)
+            size = factorial(2 * order) / factorial(order) ** 2
+            level = np.sqrt(np.mean(differences**2, axis=0) / size)
+            noise = np.maximum(noise, np.where(np.isfinite(level), level, 0.0))
+        if given is None:
+            terms = np.abs(self.slopes) @ np.abs(self.u)
+            noise = np.maximum(noise, EPSILON * np.where(np.isfinite(terms), terms, 0.0))
+            self._noise = noise
+        return np.asarray(noise)
+
+
+class _Ladder:
+    """Samples of a vector along a line, at steps that are halved, to both sides."""
+
+    def __init__(
+        self, steps: Array, ahead: Array, behind: Array, middle: Array, noise: Array, terms: Array
+    ) -> None:
+        self.steps = steps
+        self.middle, self.noise = middle, noise
+        column = steps[:, None]
+        self.even = (0.5 * (ahead - middle) + 0.5 * (behind - middle)) / column**2
+        self.odd = 0.5 * (ahead - behind) / column
+        self.errors = noise + EPSILON * (np.abs(ahead) + np.abs(behind) + column * terms)
+
+    def derivative(self, order: int) -> tuple[Estimate, int, bool]:
+        """The derivative with the least error, entry by entry; the shortest step that it needs.
+
+        And whether rounding hides it that wider steps may leave behind.
+        """
+        if order == 0:
+            return Estimate(self.middle, self.noise), 0, False
+        count, n = self.even.shape
+        data = self.even if order == 2 else self.odd
+        errors = self.errors / self.steps[:, None] ** (2 if order == 2 else 1)
+        least = 2 if order == 3 else 1
+        values = np.full((WINDOW + 1, count, n), np.nan)
+        noises = np.full((WINDOW + 1, count, n), np.inf)
+        for width in range(least, WINDOW + 1):
+            weights = _weights(order, width)
+            unit = self.steps[: count - width + 1, None] ** (2 if order == 3 else 0)
+            place = slice(0, count - width + 1)
+            for kept, given, by in (
+                (values, data, weights),
+                (noises, errors, np.abs(weights)),
+            ):
+                windows = np.lib.stride_tricks.sliding_window_view(given, width, axis=0)
+                kept[width, place] = windows @ by / unit
+        return self._best(values, noises, least)
+
+    def _best(self, values: Array, noises: Array, least: int) -> tuple[Estimate, int, bool]:
+        _, count, n = values.shape
+        # What the same window says one step on; and how far all shorter steps are from it.
+        cut = np.full_like(values, np.inf)
+        cut[:, :-1] = np.abs(np.diff(values, axis=1))
+        plain = values[least]
+        slack = 2.0 * cut[least] + 3.0 * noises[least]
+        # All shorter steps at once: the range that they all allow.
+        low, high = plain - slack, plain + slack
+        low[~np.isfinite(low)], high[~np.isfinite(high)] = -np.inf, np.inf
+        low = np.maximum.accumulate(low[::-1], axis=0)[::-1]
+        high = np.minimum.accumulate(high[::-1], axis=0)[::-1]
+        errors = cut + noises
+        errors[:, :-1] += np.maximum(np.maximum(low[1:] - values[:, :-1], 0.0),
+                                     values[:, :-1] - high[1:])  # fmt: skip
+        errors = np.where(np.isfinite(errors), errors, np.inf).reshape(-1, n)
+        best = np.argmin(errors, axis=0)
+        columns = np.arange(n)
+        error = errors[best, columns]
+        value = np.where(np.isfinite(error), values.reshape(-1, n)[best, columns], np.nan)
+        # Entries that are exact show nothing of the steps that they need.
+        places = np.where(error > 0.0, best % count + best // count - 1, 0)
+        unit = np.maximum(np.max(np.abs(self.odd), axis=0), 1e-300)
+        wide = (best % count <= 1) & np.isfinite(value)
+        poor = np.max(error[wide] / unit[wide], initial=0.0) > POOR * np.max(
+            np.abs(value)[wide] / unit[wide], initial=0.0
+        )
+        finest = int(np.max(places, initial=0))
+        return Estimate(value, CAUTION * error), finest, bool(poor)
+
+
+@cache
+def _weights(order: int, width: int) -> Array:
+    """Weights of samples at the steps 1, 1/2, 1/4, ... for a derivative at 0 (of unit step).
+
+    Samples are polynomials of the squares: f(t) - f(-t) over 2 t is f' + f''' t^2/6 + ..., and the
+    even part over t^2 is f''/2 + ....
+    """
+    squares = 4.0 ** -np.arange(width)
+    wanted = np.zeros(width)
+    wanted[1 if order == 3 else 0] = {1: 1.0, 2: 2.0, 3: 6.0}[order]
+    return np.asarray(np.linalg.solve(np.vander(squares, increasing=True).T, wanted))
+
+
+def _rounded(value: Array) -> Estimate:
+    return Estimate(np.asarray(value), 4.0 * EPSILON * np.abs(value))
+
+
+def _multilinear(form: Any, *directions: Vector) -> Estimate:
+    """A real multilinear form of complex vectors."""
+    parts = [
+        [(np.real(z), 1.0), (np.imag(z), 1j)] if np.iscomplexobj(z) else [(z, 1.0)]
+        for z in directions
+    ]
+    total: Estimate | None = None
+    for chosen in product(*parts):
+        vectors = [vector for vector, _ in chosen]
+        if all(np.any(z) for z in vectors):
+            factor: complex = 1.0
+            for _, one in chosen:
+                factor = factor * one
+            part: Estimate = form(*vectors) * (factor + 0j)
+            total = part if total is None else total + part
+    if total is None:
+        total = form(*(0.0 * np.real(z) for z in directions))
+    return total

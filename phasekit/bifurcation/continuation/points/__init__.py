@@ -1,0 +1,1 @@
+"""Special points of branches of equilibria, one kind a module."""

@@ -1,0 +1,170 @@
+"""Branch points: located, refined and told apart by their corank and their branches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation import normal_form as forms
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.events import Bracket
+from phasekit.bifurcation.continuation.path import Sample, bracket_root
+from phasekit.bifurcation.continuation.points.around import rays_around
+from phasekit.bifurcation.continuation.points.directions import Directions, directions
+from phasekit.bifurcation.continuation.points.singular import Singular, candidates, refine
+from phasekit.bifurcation.continuation.points.special import (
+    CONVERGED,
+    GUESS,
+    Special,
+    interval_of,
+    reach_of,
+)
+from phasekit.bifurcation.continuation.spectrum import orientation
+from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
+
+Array = npt.NDArray[np.float64]
+
+# A tangent whose part along the parameter is less, on scaled axes, does not move it.
+VERTICAL = 1e-5
+BESIDE = 1e-5  # distance on scaled axes
+NARROW = 1e-3  # part of a bracket to which a change of sign is narrowed before it is refined
+
+
+def branch_point(curve: Curve, bracket: Bracket) -> Special:
+    """The branch point of a bracket in which the determinant of f_u and the tangent changes."""
+    test = determinant_test(curve, bracket)
+    best, left, right = bracket_root(curve, bracket.a, bracket.b, test, steps=10, width=NARROW)
+    if test(bracket.a) * test(bracket.b) < 0.0:
+        middle, width = 0.5 * (left.u + right.u), curve.length(right.u - left.u)
+    else:  # the end of the path lies on it
+        middle, width = best.u, 1e-6
+    point = singular_point(curve, middle, width, reach_of(curve, bracket))
+    if point is None:
+        best, _, _ = bracket_root(curve, left, right, test, steps=60, width=1e-14)
+        return _degenerate(curve, bracket, best)
+    return described(curve, bracket, best, point)
+
+
+def determinant_test(curve: Curve, bracket: Bracket) -> Callable[[Sample], float]:
+    """The determinant of f_u and the tangent, in units of its larger value at the ends."""
+    ends = [orientation(curve, s.tangent, s.slopes)[1] for s in (bracket.a, bracket.b)]
+    unit = np.max(ends)
+
+    def test(s: Sample) -> float:
+        sign, log = orientation(curve, s.tangent, s.slopes)
+        return float(sign * np.exp(np.minimum(log - unit, 50.0)))
+
+    return test
+
+
+def singular_point(
+    curve: Curve, u: Array, width: float, reach: float, least: int = 1
+) -> Singular | None:
+    """The point of the largest corank next to a point that is known within a width."""
+    most = candidates(curve, u, width)
+    for k in range(max(most, least), least - 1, -1):
+        point = refine(curve, u, k, reach)
+        if point is not None:
+            break
+    else:
+        return None
+    # Next to a point of larger corank those of smaller corank look the same.
+    for k in range(candidates(curve, point.u, BESIDE), point.corank, -1):
+        larger = refine(curve, point.u, k, 1e2 * BESIDE)
+        if larger is not None:
+            return larger
+    return point
+
+
+def meets(curve: Curve, point: Singular) -> bool:
+    """Whether f itself vanishes where f_u loses rank."""
+    return float(np.max(np.abs(point.offset))) <= 1e3 * accuracy_of(curve)
+
+
+def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> Special:
+    """A refined point with its kind, its branches and its normal form."""
+    n = curve.n
+    message = ""
+    if not meets(curve, point):
+        message = "the equilibria nearby do not meet: f differs from zero where f_u is singular"
+    u = best.u if message else point.u
+    chord = bracket.b.u - bracket.a.u
+    chord = chord / curve.length(chord)
+    found = Directions([], False) if message else directions(curve, point)
+    own, others = _own(curve, found.tangents, chord)
+    kind, form = "branch_point", {}
+    extra: Array | None = None
+    corank = point.corank
+    if corank == 1:
+        w = point.left[:, 0] / point.rows
+        extra = np.append(w, point.offset[0])
+        if len(others) == 1 and own is not None and not found.message:
+            steep = [abs(t[n]) / curve.scale[n] < VERTICAL for t in (own, others[0])]
+            kind = "pitchfork" if any(steep) else "transcritical"
+            moving = others[0] if steep[0] else own
+            if not all(steep):
+                form = forms.branch_point(
+                    forms.Derivatives(curve, u), moving, pitchfork=kind == "pitchfork"
+                )
+    note = message or found.message or forms.unknown(form)
+    if len(others) > 1 and corank == 1:
+        note = f"{len(others) + 1} branches meet"
+    return Special(
+        kind, u, interval_of(curve, bracket), point.residual,
+        GUESS if message else CONVERGED, note, form,
+        tangent=best.tangent if own is None else own, others=tuple(others), extra=extra,
+        corank=corank,
+    )  # fmt: skip
+
+
+def _own(curve: Curve, tangents: list[Array], chord: Array) -> tuple[Array | None, list[Array]]:
+    """The path's own tangent among those at a point, and the others."""
+    if not tangents:
+        return None, []
+    near = [abs(float(np.dot(curve.weight * t, chord))) for t in tangents]
+    i = int(np.argmax(near))
+    own = tangents[i] if np.dot(curve.weight * tangents[i], chord) >= 0.0 else -tangents[i]
+    return own, [t for j, t in enumerate(tangents) if j != i]
+
+
+def _degenerate(curve: Curve, bracket: Bracket, best: Sample) -> Special:
+    """A point that is not refined, since the equations for it are singular there themselves."""
+    point = null_spaces(curve, best.u)
+    tangents = rays_around(curve, point) if point.corank == 1 else []
+    chord = bracket.b.u - bracket.a.u
+    own, others = _own(curve, tangents, chord / curve.length(chord))
+    message = "no point where f_u is singular was found by Newton's method"
+    if len(others) > 1:
+        message = f"{len(others) + 1} branches meet; {message}"
+    return Special(
+        "branch_point", best.u, interval_of(curve, bracket),
+        float(np.max(np.abs(curve.at(best.u)[0]))), GUESS, message,
+        tangent=best.tangent if own is None else own, others=tuple(others),
+        corank=point.corank,
+    )  # fmt: skip
+
+
+def null_spaces(curve: Curve, u: Array, tolerance: float = 1e-7) -> Singular:
+    """Null spaces of f_u at a point as it stands, by its singular values."""
+    n, m = curve.n, curve.m
+    scale, rows = curve.scale[:m], force_sizes(curve, u)
+    f, slopes = curve.at(u)
+    left, values, right = np.linalg.svd(slopes * scale / rows[:, None])
+    k = max(1, int(np.sum(values <= tolerance * max(1.0, values[0]))))
+    return Singular(
+        np.array(u[:m]), right[n - k :].T * scale[:, None], left[:, n - k :],
+        np.zeros(k), rows, float(np.max(np.abs(f))),
+    )  # fmt: skip
+
+
+def directions_at(curve: Curve, u: Array) -> list[Array]:
+    """Unit tangents of the branches through a point of a branch; at a regular point one tangent."""
+    point = null_spaces(curve, u, 1e-9)
+    scaled = curve.at(u)[1] * curve.scale[: curve.m] / point.rows[:, None]
+    if np.linalg.svd(scaled, compute_uv=False)[-1] > 1e-9:
+        t = point.right[:, -1]
+        return [t / curve.length(t)]
+    found = directions(curve, point)
+    return found.tangents

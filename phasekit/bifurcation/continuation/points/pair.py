@@ -1,0 +1,156 @@
+"""Hopf points and neutral saddles: two eigenvalues whose sum vanishes."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation import normal_form as forms
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.events import Bracket
+from phasekit.bifurcation.continuation.path import Sample, bracket_root
+from phasekit.bifurcation.continuation.points.branch_point import described, meets, singular_point
+from phasekit.bifurcation.continuation.points.special import (
+    CONVERGED,
+    GUESS,
+    Special,
+    interval_of,
+    polish,
+    reach_of,
+    tangent_at,
+)
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
+from phasekit.kernels.defining import HOPF
+
+Array = npt.NDArray[np.float64]
+
+ON = 1e-6  # distance on scaled axes within which a point of larger corank is looked for
+
+
+def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None:
+    """The point of a bracket in which the pair function changes its sign.
+
+    A Hopf point where the two eigenvalues are conjugate, a neutral saddle where they are real; a
+    branch point, unless it is known, or a Bogdanov-Takens point where both vanish.
+    """
+
+    def test(s: Sample) -> float:
+        return float(pair_function(_values(curve, s.slopes)))
+
+    best, left, right = bracket_root(curve, bracket.a, bracket.b, test, steps=10, width=1e-4)
+    u, extra, aux, residual, message = _refined(curve, bracket, best)
+    if message:
+        best, left, right = bracket_root(curve, left, right, test, steps=60, width=1e-14)
+        u = best.u
+    near = max(ON, curve.length(right.u - left.u)) if message else ON
+    point = singular_point(curve, u, near, max(10.0 * near, 1e-4), least=2)
+    if point is not None and meets(curve, point):
+        if any(curve.length(one.u - point.u) < ON and one.corank >= 2 for one in known):
+            return None
+        return described(curve, bracket, best, point)
+    slopes = curve.at(u)[1]
+    values = _values(curve, slopes)
+    i, j = _nearest_pair(values)
+    kappa = float((values[i] * values[j]).real)
+    size = float(np.max(np.abs(values)))
+    accuracy = curve.field.accuracy
+    if _doubtful(curve, u, kappa, best.tangent):
+        return Special(
+            "bogdanov_takens", u, interval_of(curve, bracket), residual, GUESS,
+            "two eigenvalues vanish together", tangent=tangent_at(curve, u, best.tangent), corank=1,
+        )  # fmt: skip
+    kind = "hopf" if values[i].imag != 0.0 else "neutral_saddle"
+    if not message and (extra[-1] > 0.0) != (kind == "hopf"):
+        message = "the defining system led to another pair of eigenvalues"
+    form: dict[str, float] = {}
+    status, note = (GUESS if message else CONVERGED), message
+    if message and abs(values[i] + values[j]) <= 1e2 * accuracy * size:
+        # More pairs at once, or no crossing at all: then Newton's method is lost, bisection not.
+        status, note = CONVERGED, "found by bisection: several pairs, or one that only touches"
+    if kind == "hopf":
+        omega = float(np.sqrt(extra[-1] if not message else kappa))
+        form = {"l1": np.nan, "omega": omega, "d": np.nan}
+        if not message:
+            form = forms.hopf(forms.Derivatives(curve, u), omega)
+            note = forms.unknown(form)
+    return Special(
+        kind, u, interval_of(curve, bracket), residual, status, note, form,
+        tangent=tangent_at(curve, u, best.tangent),
+        extra=None if message else np.concatenate([extra, aux]),
+    )  # fmt: skip
+
+
+def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
+    """A point at which several conjugate pairs cross the imaginary axis together."""
+
+    def test(s: Sample) -> float:
+        values = _values(curve, s.slopes)
+        above = values[values.imag > 0.0]
+        return float(np.sum(above.real[np.argsort(np.abs(above.real))][:count]))
+
+    best, _, _ = bracket_root(curve, bracket.a, bracket.b, test, steps=60, width=1e-14)
+    values = _values(curve, best.slopes)
+    above = values[values.imag > 0.0]
+    close = above[np.argsort(np.abs(above.real))][:count]
+    size = float(np.max(np.abs(values)))
+    # Multiple eigenvalues are known to the root of rounding only; their mean is known better.
+    sharp = len(close) == count and abs(np.mean(close.real)) <= 1e2 * curve.field.accuracy * size
+    omega = float(np.mean(close.imag)) if len(close) else np.nan
+    return Special(
+        "hopf", best.u, interval_of(curve, bracket), float(np.max(np.abs(curve.at(best.u)[0]))),
+        CONVERGED if sharp else GUESS, f"{count} pairs of eigenvalues cross together",
+        {"l1": np.nan, "omega": omega, "d": np.nan}, tangent=best.tangent,
+    )  # fmt: skip
+
+
+def _values(curve: Curve, slopes: Array) -> npt.NDArray[np.complex128]:
+    return np.asarray(eigenvalues_of(slopes[None], accuracy=curve.field.accuracy)[0])
+
+
+def _refined(
+    curve: Curve, bracket: Bracket, best: Sample
+) -> tuple[Array, Array, Array, float, str]:
+    """Newton's method on the defining system: unknowns, extra ones, l, residual, message."""
+    n = curve.n
+    scale = curve.scale[:n]
+    A = best.slopes[:, :n]
+    values, vectors = np.linalg.eig(A)
+    i, j = _nearest_pair(values)
+    kappa = float((values[i] * values[j]).real)
+    q = vectors[:, i] / scale
+    if values[i].imag != 0.0:
+        v = q.real if np.linalg.norm(q.real) >= np.linalg.norm(q.imag) else q.imag
+    else:
+        r = (vectors[:, j] / scale).real
+        v = q.real / np.linalg.norm(q.real) + r / np.linalg.norm(r)
+    v = v / np.linalg.norm(v)
+    y = A @ (v * scale) / scale
+    aux = y - np.dot(v, y) * v
+    aux = aux / np.linalg.norm(aux) / scale
+    extra = np.append(v * scale, kappa)
+    if not (np.isfinite(extra).all() and np.isfinite(aux).all()):
+        return best.u, extra, aux, np.inf, "the two eigenvalues have one eigenvector"
+    u, extra, residual, message = polish(curve, HOPF, best.u, extra, reach_of(curve, bracket), aux)
+    return u, extra, aux, residual, message
+
+
+def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
+    """Whether the product of the two eigenvalues is but what rounding of the unknowns makes it."""
+    step = 1e2 * curve.field.accuracy * curve.length(tangent)
+    changes = []
+    for side in (step, -step):
+        values = _values(curve, curve.at(u + side * tangent[: curve.m])[1])
+        # Of several pairs that cancel at once, the one that is meant.
+        products = (values[:, None] * values)[np.triu_indices(len(values), 1)]
+        changes.append(float(np.min(np.abs(products - kappa))))
+    return abs(kappa) <= max(changes)
+
+
+def _nearest_pair(values: npt.NDArray[np.complex128]) -> tuple[int, int]:
+    """The two eigenvalues, both real or conjugate, whose sum is least in size."""
+    sums = np.abs(values[:, None] + values)
+    real = values.imag == 0.0
+    alike = (real[:, None] & real) | (values[:, None] == np.conj(values))
+    sums[~alike | np.eye(len(values), dtype=bool)] = np.inf
+    i, j = np.unravel_index(np.argmin(sums), sums.shape)
+    return int(min(i, j)), int(max(i, j))

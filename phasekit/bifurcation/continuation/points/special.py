@@ -1,0 +1,93 @@
+"""What is known of a special point, whatever its kind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import TIGHT, Curve, nullspace
+from phasekit.bifurcation.continuation.events import Bracket
+from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.kernels.defining import BRANCH, HOPF
+
+Array = npt.NDArray[np.float64]
+
+CONVERGED, GUESS = "converged", "guess"
+
+
+@dataclass(frozen=True)
+class Special:
+    """A special point: unknowns (x, free parameters), and how well it is known."""
+
+    kind: str
+    u: Array
+    interval: tuple[float, float]
+    residual: float
+    status: str
+    message: str = ""
+    normal_form: dict[str, float] = field(default_factory=dict)
+    tangent: Array | None = None  # of the path
+    others: tuple[Array, ...] = ()  # tangents of the other branches, at a branch point
+    extra: Array | None = None  # the unknowns that its defining system adds
+    corank: int = 0  # of f_x
+
+
+def interval_of(curve: Curve, bracket: Bracket) -> tuple[float, float]:
+    """The values of the parameter at the ends of a bracket."""
+    ends = bracket.a.u[curve.n], bracket.b.u[curve.n]
+    return float(min(ends)), float(max(ends))
+
+
+def reach_of(curve: Curve, bracket: Bracket) -> float:
+    """How far a refined point may lie from where it was bracketed."""
+    return curve.length(bracket.b.u - bracket.a.u) + 1e-7
+
+
+def extended(curve: Curve, kind: int, u: Array, extra: Array, aux: Array | None = None) -> Curve:
+    """The curve's own unknowns with those of a defining system, whose sizes are those of extra.
+
+    A right vector v counts in units of the states, a left one in units of 1/f.
+    """
+    more, n, m = len(extra), curve.n, curve.m
+    sizes = np.ones(more)
+    sizes[:n] = curve.scale[:n]
+    if kind == HOPF:
+        sizes[-1] = max(abs(float(extra[-1])), 1e-300) if extra[-1] else 1.0
+    if kind == BRANCH:
+        sizes[:n] = 1.0 / force_sizes(curve, u)
+    return curve.replace(
+        kind=kind,
+        scale=np.concatenate([curve.scale[:m], sizes]),
+        period=np.concatenate([curve.period[:m], np.zeros(more)]),
+        low=np.concatenate([curve.low[:m], np.full(more, -np.inf)]),
+        high=np.concatenate([curve.high[:m], np.full(more, np.inf)]),
+        aux=aux,
+    )
+
+
+def polish(
+    curve: Curve, kind: int, start: Array, extra: Array, reach: float, aux: Array | None = None
+) -> tuple[Array, Array, float, str]:
+    """Newton's method on a square defining system: unknowns, extra ones, residual, message."""
+    system = extended(curve, kind, start, extra, aux)
+    whole = np.concatenate([start[: curve.m], extra])
+    point = system.refine(whole, tolerance=max(TIGHT, curve.field.accuracy * 0.1))
+    residual = float(np.max(np.abs(point.residual)))
+    if not point.converged or not np.isfinite(residual):
+        return start, extra, residual, "Newton's method on the defining system did not converge"
+    moved = curve.length(point.u[: curve.m] - start[: curve.m])
+    if moved > reach:
+        return start, extra, residual, "the defining system led away from the bracket"
+    return point.u[: curve.m], point.u[curve.m :], residual, ""
+
+
+def tangent_at(curve: Curve, u: Array, near: Array) -> Array:
+    """The unit tangent of the branch at a point, in the direction of another one."""
+    _, slopes = curve.at(u)
+    directions = nullspace(slopes, curve.scale[: curve.m])
+    if len(directions) != 1:
+        return near
+    t = directions[0] / curve.length(directions[0])
+    return np.asarray(t if np.dot(curve.weight * t, near) >= 0.0 else -t)

@@ -1,0 +1,34 @@
+"""Units of equations: sizes of the entries of f and of the rows of its derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.kernels.differences import PLAIN
+
+Array = npt.NDArray[np.float64]
+
+
+def row_sizes(matrix: Array) -> Array:
+    """Largest entries of the rows; 1 for rows that vanish."""
+    sizes = np.max(np.abs(matrix), axis=1)
+    return np.asarray(np.where(sizes > 1e-12 * np.max(sizes, initial=0.0), sizes, 1.0))
+
+
+def force_sizes(curve: Curve, u: Array) -> Array:
+    """Sizes of the entries of f near a point: of its first and second derivatives.
+
+    The second ones count because all first ones of an entry may vanish at a special point.
+    """
+    m = curve.m
+    scale = curve.scale[:m]
+    sizes = np.max(np.abs(curve.at(u)[1] * scale), axis=1)
+    sizes = sizes + np.max(np.abs(curve.bend(u, scale) * scale), axis=1)
+    return np.asarray(np.where((sizes > 0.0) & np.isfinite(sizes), sizes, 1.0))
+
+
+def accuracy_of(curve: Curve) -> float:
+    """Relative accuracy of the derivatives of f, by differences where f comes alone."""
+    return max(curve.field.accuracy, 1e-11 if curve.field.mode == PLAIN else 0.0)

@@ -1,0 +1,181 @@
+"""Points that are given solve f = 0: in any units, far from the origin, however f is given."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+FOLD = 2.0 / (3.0 * np.sqrt(3.0))
+
+
+def follow(f, state, parameters, parameter, x0, span, **options):
+    problem = pk.Problem(f, state, parameters)
+    return pk.continuation(
+        problem, parameter, x0=x0, span=span, options=pk.ContinuationOptions(**options)
+    )
+
+
+def kinds(branch):
+    return [one.kind for one in branch.special_points]
+
+
+@pytest.mark.parametrize("unit", [1e-12, 3e-11, 1e-3, 1e6, 1e12])
+def test_units_of_the_state(unit):
+    """The cusp and the pitchfork in any unit of x: the same points, and residuals at rounding."""
+    cubic = f"mu + x/{unit!r} - (x/{unit!r})**3"
+    branch = follow([cubic], "x", {"mu": -1.0}, "mu", [-1.3 * unit], (-1.5, 1.5))
+    assert kinds(branch) == ["end", "fold", "fold", "end"]
+    assert np.allclose([s["mu"] for s in branch.special("fold")], [FOLD, -FOLD], atol=1e-13)
+    x, mu = branch.points.x.values / unit, branch.points.mu.values
+    terms = np.abs(mu) + np.abs(x) + np.abs(x**3)
+    assert np.max(np.abs(mu + x - x**3) / terms) < 1e-14
+    assert branch.points.residual.max() < 1e-14
+
+    fork = follow([f"mu*x/{unit!r} - (x/{unit!r})**3"], "x", {"mu": -1.0}, "mu", [0.0], (-1.5, 1.5))
+    (point,) = fork.special("BP")
+    side = point.switch()
+    assert np.max(np.abs(side.points.x)) == pytest.approx(np.sqrt(1.5) * unit, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("form", "offset"),
+    [("formula", 1e3), ("formula", 1e6), ("formula", 1e8), ("function", 1e3)],
+)
+def test_far_from_the_origin(form, offset):
+    """A cusp of size 1 far from 0: rounding of x is all that is lost."""
+    f = {
+        "formula": [f"mu + (x-{offset!r}) - (x-{offset!r})**3"],
+        "function": lambda x, mu: [mu + (x[0] - offset) - (x[0] - offset) ** 3],
+    }[form]
+    branch = follow(f, "x", {"mu": -1.0}, "mu", [offset - 1.3], (-1.5, 1.5))
+    assert kinds(branch) == ["end", "fold", "fold", "end"]
+    x, mu = branch.points.x.values - offset, branch.points.mu.values
+    slope = np.abs(1.0 - 3.0 * x**2) + 1e-3
+    assert np.max(np.abs(mu + x - x**3) / (slope * offset + 1.0)) < 1e-14
+
+
+def test_a_tail_has_no_false_end():
+    """However small p = 3 u (1 - u)/(1 - exp(-5 u)) is, it never meets its bound 0."""
+    f = ["b*u*(1-u) - u*v - p*(1-exp(-5*u))", "-v + d*u*v"]
+    branch = follow(f, ("u", "v"), {"p": 0.5, "b": 3.0, "d": 3.0}, "p", [0.8, 0.0], (0.0, 2.0))
+    u, p = branch.points.u.values, branch.points.p.values
+    away = np.abs(u) > 1e-9
+    exact = 3.0 * u[away] * (1.0 - u[away]) / -np.expm1(-5.0 * u[away])
+    # Where p is 1 - u, at the other end, it does meet the bound.
+    assert np.all(np.abs(p[away] - exact) <= 1e-9 * exact + 1e-15)
+    assert u.min() < -100.0
+    assert branch.stops[1].reason != "bound"
+    assert len(branch.special("LP")) == 1
+    assert all(one.status == "converged" for one in branch.special_points)
+
+
+def test_a_bend_that_no_step_sees_is_passed():
+    """A stirred reactor whose derivative by lam changes within 1e-13 of the start."""
+    f = "-0.9-(1+lam)*x+lam*10/(1+lam*10*exp(-3*x/(1+x)))"
+    branch = follow([f], "x", {"lam": 0.0}, "lam", [-0.9], (0.0, 2.0))
+    assert branch.points.lam.max() == 2.0
+    assert [round(s["lam"], 9) for s in branch.special("fold")] == [1.250669355, 0.377651258]
+
+
+def test_the_same_verdict_in_random_units():
+    """Random units of state, parameter and function, and random origins."""
+    rng = np.random.default_rng(7)
+    for _ in range(6):
+        s, q, g = (10.0 ** rng.uniform(-9, 9) for _ in range(3))
+        a = float(rng.uniform(-5, 5))
+        y = f"(x/{s!r} - {a!r})"
+        f = f"{g!r}*(mu/{q!r} + {y} - {y}**3)"
+        branch = follow([f], "x", {"mu": -q}, "mu", [(a - 1.3) * s], (-1.5 * q, 1.5 * q))
+        assert kinds(branch) == ["end", "fold", "fold", "end"]
+        found = np.array([point["mu"] for point in branch.special("fold")]) / q
+        assert np.allclose(found, [FOLD, -FOLD], atol=1e-12)
+        assert branch.points.residual.max() < 1e-13
+
+
+def test_what_f_raises_is_said():
+    def f(x, mu):
+        if x[0] < 0.2:
+            raise ZeroDivisionError("my own words")
+        return [mu - x[0]]
+
+    branch = follow(f, "x", {"mu": 1.0}, "mu", [1.0], (-1.0, 2.0))
+    assert branch.stops[0].reason == "not_finite"
+    assert "my own words" in branch.stops[0].message
+
+    def never(x, mu):
+        raise ValueError("nothing here")
+
+    with pytest.raises(pk.ConvergenceError, match="nothing here") as info:
+        follow(never, "x", {"mu": 1.0}, "mu", [1.0], (-1.0, 2.0))
+    assert isinstance(info.value.__cause__, ValueError)
+
+
+def test_complex_values_are_refused():
+    with pytest.raises(pk.ParameterError, match=r"\bf\b.*real"):
+        follow(lambda x, mu: [mu - x[0] + 0j], "x", {"mu": 1.0}, "mu", [1.0], (-1.0, 2.0))
+
+    def later(x, mu):
+        root = (x[0] - 0.5 + 0j) ** 0.5
+        return np.array([mu - (root if x[0] < 0.5 else root.real)])
+
+    with pytest.raises(pk.ParameterError, match="complex"):
+        follow(later, "x", {"mu": 1.0}, "mu", [1.5], (-1.0, 2.0))
+
+
+def test_a_kink_is_no_converged_fold():
+    branch = follow(lambda x, mu: [mu - abs(x[0])], "x", {"mu": 1.0}, "mu", [1.0], (-1.0, 2.0))
+    assert all(one.status == "guess" and one.message for one in branch.special("LP"))
+
+
+def test_many_states_keep_no_matrices():
+    """Memory of a branch of 60 states grows with the states of a point, not with their square."""
+    n = 60
+    names = [f"u{i}" for i in range(n)]
+
+    def f(u, c):
+        out = -2.0 * u + c * np.exp(u) / (n + 1) ** 2
+        out[1:] += u[:-1]
+        out[:-1] += u[1:]
+        return out
+
+    def jac(u, c):
+        slopes = np.diag(-2.0 + c * np.exp(u) / (n + 1) ** 2)
+        return slopes + np.eye(n, k=1) + np.eye(n, k=-1)
+
+    problem = pk.Problem(f, names, {"c": 0.0}, jac=jac)
+    few = pk.ContinuationOptions(max_points=12, detect=())
+    branch = pk.continuation(problem, "c", x0=np.zeros(n), span=(0.0, 3.0), options=few)
+    kept = sum(t.record.nbytes + t.slopes.nbytes for t in branch.tracks if t is not None)
+    assert kept <= 12 * 8 * (3 * n + 20)
+    assert np.all(branch.points.n_unstable == -1)
+    assert branch.points.residual.max() < 1e-13
+    full = pk.continuation(
+        problem, "c", x0=np.zeros(n), span=(0.0, 3.0), options=pk.ContinuationOptions(max_points=12)
+    )
+    assert np.all(full.points.n_unstable == 0)
+    np.testing.assert_array_equal(full.points.c, branch.points.c)
+    longer = branch.extend(5)
+    whole = pk.continuation(
+        problem, "c", x0=np.zeros(n), span=(0.0, 3.0),
+        options=pk.ContinuationOptions(max_points=17, detect=()),
+    )  # fmt: skip
+    np.testing.assert_array_equal(longer.points.u7, whole.points.u7)
+
+
+def _logistic(x, r):
+    return [r * x[0] * (1.0 - x[0]) - 0.1]
+
+
+@pytest.mark.parametrize("f", [["r*x - x**3"], _logistic])
+def test_problems_travel(f):
+    """Copies and pickles of a problem give the same branch, to the last bit."""
+    problem = pk.Problem(f, "x", {"r": 1.0})
+    branch = pk.continuation(problem, "r", x0=[0.9], span=(0.7, 2.0))
+    for other in (copy.copy(problem), copy.deepcopy(problem), pickle.loads(pickle.dumps(problem))):
+        again = pk.continuation(other, "r", x0=[0.9], span=(0.7, 2.0))
+        np.testing.assert_array_equal(again.points.x, branch.points.x)

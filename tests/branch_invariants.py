@@ -1,0 +1,63 @@
+"""What holds of every branch of equilibria, whatever the system.
+
+`tests/conftest.py` holds every branch that any test computes in its own process against this.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+NOISE = 1e-8  # real parts that are smaller, relative to the largest eigenvalue, have no sign
+SAME = 1e-6  # distance on scaled axes
+
+
+def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bool) -> None:
+    """Hold the special points of a path of equilibria against the eigenvalues at its points."""
+    specials = [one.special for one in placed]
+    for special in specials:
+        assert special.status in ("converged", "guess")
+        assert special.status == "converged" or special.message, special
+        if special.kind == "hopf":
+            assert special.normal_form["omega"] > 0.0, special
+            values = np.linalg.eigvals(curve.at(special.u)[1][:, : curve.n])
+            assert np.any(values.imag != 0.0), (special, values)
+        branching = special.kind in ("branch_point", "pitchfork", "transcritical")
+        if branching and special.status == "converged":
+            assert special.corank >= 1, special
+    _no_twins(curve, path, placed)
+    if not conservative:
+        _every_crossing_is_said(curve, path, placed, eigenvalues)
+
+
+def _no_twins(curve: Any, path: Any, placed: Any) -> None:
+    m = curve.m
+    for i, one in enumerate(placed):
+        for other in placed[i + 1 :]:
+            gap = (one.special.u[:m] - other.special.u[:m]) / curve.scale[:m]
+            alike = one.special.kind == other.special.kind and other.index - one.index <= 1
+            assert not (alike and np.max(np.abs(gap)) < SAME), (one, other)
+
+
+def _every_crossing_is_said(curve: Any, path: Any, placed: Any, eigenvalues: Any) -> None:
+    size = np.max(np.abs(eigenvalues), axis=1)
+    clear = np.min(np.abs(eigenvalues.real), axis=1) > NOISE * size
+    unstable = np.sum(eigenvalues.real > 0.0, axis=1)
+    points = np.flatnonzero(clear)
+    for i, j in zip(points[:-1], points[1:], strict=True):
+        if unstable[i] == unstable[j]:
+            continue
+        between = [one.special for one in placed if i - 1 <= one.index <= j]
+        most = sum(_crossing(one) for one in between)
+        said = any(one.message for one in between)
+        change = abs(int(unstable[j]) - int(unstable[i]))
+        assert most >= change or said, (
+            f"{change} eigenvalues cross between {path.u[i]} and {path.u[j]}, but there is only "
+            f"{[one.kind for one in between]}"
+        )
+
+
+def _crossing(special: Any) -> int:
+    """How many eigenvalues cross at a special point, at most."""
+    return 2 if special.kind == "hopf" else special.corank
