@@ -14,7 +14,8 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import NumberLike
 from phasekit.labelled.identity import model_name
 from phasekit.labelled.pictures import picture
-from phasekit.labelled.system import MODELS, Model
+from phasekit.labelled.registry import model_named
+from phasekit.labelled.system import Model
 
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
@@ -46,12 +47,7 @@ class PhasekitAccessor:
         >>> ds.sel(lam=0.2).phasekit.system()
         Reduced(lam=0.2, psi=0.2, Omega_sq=1.0)
         """
-        name = model_name(self._ds)
-        if name not in MODELS:
-            raise ParameterError(
-                f"ds: got a map of the model {name!r}, wants one of {', '.join(MODELS)}"
-            )
-        return MODELS[name].from_dataset(self._ds)
+        return model_named("ds", model_name(self._ds)).from_dataset(self._ds)
 
     def rotators(
         self,

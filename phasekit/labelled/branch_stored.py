@@ -27,6 +27,7 @@ from phasekit.labelled.arguments import bad
 from phasekit.labelled.branch import NUMBERS
 from phasekit.labelled.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.labelled.problem import Problem
+from phasekit.labelled.registry import model_named
 
 Array = npt.NDArray[np.float64]
 
@@ -72,6 +73,10 @@ class Stored:
     def problem(self) -> Problem:
         """The problem, if it is one of formulas or of a system."""
         with damaged(self.name, "its problem"):
+            name = self.made_of.get("system")
+            if name:
+                model = model_named("problem", name)
+                return Problem.from_system(model(**self.made_of["system_parameters"]))
             problem = Problem.from_specification(self.made_of)
         if problem is None:
             raise ParameterError(

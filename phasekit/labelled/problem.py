@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, Self
@@ -269,12 +268,10 @@ class Problem:
 
     @classmethod
     def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
-        """Make a problem of what `specification` gave; None where f was code."""
+        """Make a problem of what `specification` gave of no system; None where f was code."""
         keys = ("f", "state", "parameters", "periods", "conservative")
         if not isinstance(spec, Mapping) or not spec.keys() >= set(keys):
             raise bad("spec", spec, "what Problem.specification returns")
-        if spec.get("system"):
-            return cls.from_system(_model(spec["system"])(**spec["system_parameters"]))
         if spec["f"] is None:
             return None
         return cls(
@@ -310,18 +307,6 @@ def _made(
     problem = kind(f, state, parameters, jac, periods=periods, conservative=conservative)
     problem._set("system", system)
     return problem
-
-
-def _model(name: str) -> Callable[..., Model]:
-    """A model by its name; models are known once they are imported."""
-    if not isinstance(name, str):
-        raise bad("problem: model", name, "a name")
-    if name not in MODELS:
-        for module in ("models", "guises", "potential_system"):
-            importlib.import_module(f"phasekit.labelled.{module}")
-    if name not in MODELS:
-        raise unknown("problem: model", name, MODELS)
-    return MODELS[name]
 
 
 def as_problem(problem: Any) -> Problem:

@@ -58,7 +58,10 @@ class Model:
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
         """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each."""
-        raise NotImplementedError
+        raise ParameterError(
+            f"v: got {sorted(map(str, v))}, wants the parameters of a system with coefficients "
+            "(A, B, C), which this one has not"
+        )
 
     @property
     def law(self) -> Law:
