@@ -10,7 +10,7 @@ import numpy.typing as npt
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad, reals
 from phasekit.motion.events import instant
-from phasekit.motion.steps import Array, InitialValue, Step, steps
+from phasekit.motion.steps import Array, InitialValue, Pace, Step, steps
 
 
 class Section(NamedTuple):
@@ -107,18 +107,19 @@ def passages(
     """
     times: list[float] = []
     states: list[Array] = []
+    pace = Pace(problem.most, stop)
     for step in steps(problem, stop):
         for (t0, x0), (t1, x1) in _between_turns(problem, step, coordinate):
             sense, first, last = _passed(x0, x1, level, period, direction)
-            if len(times) + last + 1 - first > problem.most:
-                raise ConvergenceError(
-                    f"the section is passed more than {problem.most} times up to "
-                    f"t = {step.stop!r} s of {float(stop)!r} s; try a shorter time"
-                )
+            if pace.taken + last + 1 - first > problem.most:
+                raise _too_many(problem, step.stop, pace)
             for k in range(first, last + 1):
                 passed = level + sense * k * (period or 0.0)
+                before = times[-1] if times else problem.start
                 times.append(_passage(step, coordinate, passed, t0, t1))
                 states.append(step.dense(times[-1]))
+                if pace.is_too_slow(before, times[-1]):
+                    raise _too_many(problem, times[-1], pace)
     return Section(np.array(times), np.reshape(states, (-1, len(problem.state))).T)
 
 
@@ -135,6 +136,13 @@ def _between_turns(
         )
         ends.insert(1, (turn, float(step.dense(turn)[coordinate])))
     return list(zip(ends[:-1], ends[1:], strict=True))
+
+
+def _too_many(problem: InitialValue, t: float, pace: Pace) -> ConvergenceError:
+    return ConvergenceError(
+        f"the motion came to t = {float(t)!r} s of {float(pace.stop)!r} s, and passes the section "
+        f"more than {problem.most} times; try a shorter time"
+    )
 
 
 def _passage(step: Step, coordinate: int, level: float, start: float, stop: float) -> float:

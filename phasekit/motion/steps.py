@@ -53,6 +53,29 @@ class InitialValue:
     """What a message supposes where steps become too short to go on."""
 
 
+@dataclass
+class Pace:
+    """Counts what a motion needs most of: steps, or passages of a section."""
+
+    most: int
+    stop: float
+    taken: int = 0
+    longest: float = 0.0
+    """Time between two of them."""
+
+    def is_too_slow(self, start: float, t: float) -> bool:
+        """Count the one from `start` to `t`; whether the motion is to be given up.
+
+        That is where it needs too many, or will: the rest takes too many even of the longest so
+        far. The more were counted, the sooner that is believed.
+        """
+        self.taken += 1
+        self.longest = max(self.longest, abs(t - start))
+        rest = abs(self.stop - t)
+        foreseen = self.taken >= TRIAL and self.taken * rest > self.longest * self.most**2
+        return rest > 0.0 and (self.taken >= self.most or foreseen)
+
+
 @dataclass(frozen=True)
 class Step:
     """One step of a motion: times, states and rates at its ends."""
@@ -87,8 +110,7 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         If the rates are not finite at the start.
     ConvergenceError
         If the steps become too short to go on, or more of them are needed than the problem
-        allows: also when that is foreseen, as the rest would take too many even of the longest
-        step so far. The more steps were taken, the sooner this is believed.
+        allows, which may be foreseen (`Pace`).
 
     Notes
     -----
@@ -106,20 +128,16 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop), abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
-    taken, longest = 0, 0.0
+    pace = Pace(problem.most, stop)
     while solver.status == "running":
         before, rates_before = solver.y, solver.f
         with np.errstate(all="ignore"):
             message = solver.step()
         if solver.status == "failed":
             raise _stopped(problem, solver.t, stop, message)
-        taken += 1
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
-        longest = max(longest, abs(solver.t - solver.t_old))
-        rest = abs(stop - solver.t)
-        slow = taken >= TRIAL and taken * rest > longest * problem.most**2
-        if solver.status == "running" and (taken >= problem.most or slow):
-            raise _too_long(problem, solver.t, stop, taken, longest)
+        if pace.is_too_slow(solver.t_old, solver.t):
+            raise _too_long(problem, solver.t, pace)
 
 
 def _stopped(problem: InitialValue, t: float, stop: float, message: str) -> ConvergenceError:
@@ -129,11 +147,9 @@ def _stopped(problem: InitialValue, t: float, stop: float, message: str) -> Conv
     )
 
 
-def _too_long(
-    problem: InitialValue, t: float, stop: float, taken: int, longest: float
-) -> ConvergenceError:
+def _too_long(problem: InitialValue, t: float, pace: Pace) -> ConvergenceError:
     return ConvergenceError(
-        f"the integrator came to t = {float(t)!r} s of {float(stop)!r} s in {taken} steps, the "
-        f"longest of {longest:.3g} s, and would need more than {problem.most} in all; try a "
-        "shorter time, a slower motion, or a larger rtol, atol or max_step"
+        f"the integrator came to t = {float(t)!r} s of {float(pace.stop)!r} s in {pace.taken} "
+        f"steps, the longest of {pace.longest:.3g} s, and would need more than {problem.most} in "
+        "all; try a shorter time, a slower motion, or a larger rtol, atol or max_step"
     )

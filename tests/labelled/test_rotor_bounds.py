@@ -42,7 +42,7 @@ def test_without_an_absolute_error_the_motion_is_the_same(start):
 def test_a_wheel_that_passes_a_section_too_often():
     """It turns evenly, so that one step may hold any number of turns."""
     wheel = pk.FreeGyroRotor(DISK.replace(beta=np.pi / 2, e=0.0, a=0.3), 0.1)
-    with pytest.raises(pk.ConvergenceError, match="passed more than 1000000 times"):
+    with pytest.raises(pk.ConvergenceError, match="more than 1000000 times"):
         wheel.poincare(0.1, 1e9, 1e6, section=1.0)
 
 

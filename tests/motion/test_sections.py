@@ -85,9 +85,9 @@ def test_passages_of_a_turning_pendulum():
 
 def test_many_passages_in_one_step_are_foreseen():
     line = InitialValue(lambda t, x: (1e12,), (0.0,))
-    with pytest.raises(pk.ConvergenceError, match="passed more than 1000000 times"):
+    with pytest.raises(pk.ConvergenceError, match="more than 1000000 times"):
         passages(line, 1.0, 0, 0.5, period=1.0)
-    few = InitialValue(lambda t, x: (1.0,), (0.0,), most=50)
-    assert np.allclose(passages(few, 50.2, 0, 0.5, period=1.0).time, np.arange(50) + 0.5)
-    with pytest.raises(pk.ConvergenceError, match="passed more than 50 times"):
-        passages(few, 51.0, 0, 0.5, period=1.0)
+    few = InitialValue(lambda t, x: (1.0,), (0.0,), most=51)
+    assert np.allclose(passages(few, 50.0, 0, 0.5, period=1.0).time, np.arange(50) + 0.5)
+    with pytest.raises(pk.ConvergenceError, match="more than 51 times"):
+        passages(few, 52.0, 0, 0.5, period=1.0)
