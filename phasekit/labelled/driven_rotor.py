@@ -76,7 +76,7 @@ class DrivenRotor:
     def check(self, start: float, state: tuple[float, ...]) -> None:
         """Raise a `ParameterError` if it cannot start in a state."""
         with np.errstate(all="ignore"):
-            rates = self.rates(start, state)[2:]
+            rates = self.rates(start, np.array(state))[2:]  # Python's floats raise on overflow
         if not np.isfinite(rates).all():
             _, phi, omega1, dphi = state
             raise ParameterError(
@@ -109,7 +109,8 @@ def checked_torque(
     if not callable(value):
         return checked_number(argument, value, wants)
     check_call(argument, value, wants)
-    number = value(t, *state)
+    with np.errstate(all="ignore"):
+        number = value(t, *np.array(state))
     if not isinstance(number, (int, float, np.floating, np.integer)) or not np.isfinite(number):
         raise bad(f"{argument} at t = {t!r}", number, "a function that returns a finite number")
     function: StateFunction = value

@@ -30,6 +30,14 @@ def test_endless_motions_end_soon(start):
         start()
 
 
+@pytest.mark.parametrize("speed", [{"dphi0": 1e200}, {"dphi0": 0.0, "omega1": -1e300}])
+def test_speeds_whose_squares_overflow(speed):
+    with pytest.raises(pk.ParameterError, match=r"^phi0, dphi0, omega1: got 0\.5, "):
+        ROTOR.simulate(0.5, t=(0.0, 1.0), **speed)
+    with pytest.raises(pk.ParameterError, match=r"^torque2 at t = 0\.0: got inf, wants"):
+        ROTOR.simulate(0.5, 1e200, (0.0, 1.0), torque2=lambda *x: x[4] ** 2)
+
+
 @pytest.mark.parametrize("start", [(0.5, 0.0), (0.0, 3.0), (0.0, 0.0)])
 def test_without_an_absolute_error_the_motion_is_the_same(start):
     times = np.linspace(0.0, 1.0, 5)
