@@ -177,8 +177,8 @@ class RotorMotions(Model):
         >>> motion = machine.trajectory(
         ...     0.5, 0.0, (0.0, 2.0), events={"turns": lambda t, phi1, phi, omega1, dphi: dphi}
         ... )
-        >>> motion(motion.events.event_time[1].item()).motion_dphi.item().__round__(9)
-        0.0
+        >>> abs(motion(motion.events.event_time[1].item()).motion_dphi.item()) < 1e-9
+        True
         """
         start, stop = _times(span, two=True)
         if isinstance(events, Mapping):

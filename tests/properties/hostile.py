@@ -348,7 +348,7 @@ INSTANCES: dict[str, Callable[[], Any]] = {
 
 
 #: Calls that take longer than a test should: spans over hundreds of decades.
-LONG = {(name, "huge in list") for name in ("branches", "bifurcation_set", "plot.branch_surface")}
+LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surface")}
 
 
 def callables() -> dict[str, Callable[..., Any]]:
