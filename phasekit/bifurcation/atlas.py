@@ -123,6 +123,13 @@ def _arcs(
         grid = np.concatenate([[0.0], tau, [1.0]])
         fine = 0.5 * (grid[cut] + grid[cut + 1])
         more_at, more = _solve(coefficients, limits, fine)
+        # Between neighboring doubles there is nothing to see.
+        ends_at = np.concatenate([limits[:1], at, limits[1:]])
+        new = (more_at != ends_at[cut]) & (more_at != ends_at[cut + 1])
+        if not new.any():
+            return {key: _present(arc) for key, arc in arcs.items()}
+        fine, more_at = fine[new], more_at[new]
+        more = Equilibria(*(column[new] for column in more))
         order = np.argsort(np.concatenate([tau, fine]))
         tau, at = (np.concatenate(pair)[order] for pair in ((tau, fine), (at, more_at)))
         both: Any = zip(points, more, strict=True)

@@ -286,3 +286,12 @@ def test_bad_arguments(arguments, message):
     with pytest.raises(pk.ParameterError) as error:
         branches(*arguments)
     assert message in str(error.value)
+
+
+@pytest.mark.parametrize("span", [(-1e20, 1e20), (-1e100, 1e200)])
+@pytest.mark.parametrize("parameter", ["A", "B", "C"])
+def test_spans_beyond_the_resolution_of_doubles_end_soon(span, parameter):
+    """Between neighboring doubles nothing is refined, and no vertex stands twice."""
+    ds = pk.branches(pk.Coefficients(2.0, 1.0, 0.5), parameter, span)
+    assert 50 < ds.sizes["point"] < 1000
+    assert ds.sizes["special"] >= 2

@@ -1,0 +1,84 @@
+"""Motions from a state, integrated in time: states between the steps, and events on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from scipy.integrate import DenseOutput, OdeSolution
+
+from phasekit.motion.events import Event, Watch
+from phasekit.motion.steps import Array, InitialValue, steps
+
+
+class Occurrences(NamedTuple):
+    """Events in the order in which a motion came to them."""
+
+    name: list[str]
+    time: Array
+    state: Array
+    """Of shape (n, events)."""
+
+
+class Solution(NamedTuple):
+    """One motion."""
+
+    times: Array
+    """Ends of the integrator's steps, the start first."""
+    state: OdeSolution
+    """State at a time, or of shape (n, times) at an array of times between the ends."""
+    events: Occurrences
+
+
+def integrate(
+    problem: InitialValue, stop: float, events: Mapping[str, Event] | None = None
+) -> Solution:
+    """Integrate a motion from its start to another time, before or after it.
+
+    Parameters
+    ----------
+    problem : InitialValue
+        The law and where it starts.
+    stop : float
+        Time to go to, unless an event ends the motion before.
+    events : mapping of str to Event, optional
+        What to look for on the way. A zero at the start counts.
+
+    Raises
+    ------
+    ParameterError, ConvergenceError
+        As `phasekit.motion.steps.steps`.
+
+    Examples
+    --------
+    >>> fall = InitialValue(lambda t, x: (x[1], -9.81), (1.0, 0.0))
+    >>> found = integrate(fall, 10.0, {"floor": Event(lambda t, x: x[0], terminal=1)})
+    >>> found.events.name, found.events.time.round(6), found.times[-1].round(6)
+    (['floor'], array([0.451524]), np.float64(0.451524))
+    """
+    state = np.array(problem.state, dtype=float)
+    watches = {
+        name: Watch(event, event.function(problem.start, state))
+        for name, event in (events or {}).items()
+    }
+    times, segments = [problem.start], list[DenseOutput]()
+    found: list[tuple[str, float]] = []
+    for step in steps(problem, stop):
+        seen = {name: watch.look(step) for name, watch in watches.items()}
+        order = sorted(
+            ((name, when) for name, when in seen.items() if when is not None),
+            key=lambda pair: abs(pair[1] - step.start),
+        )
+        last = [place for place, (name, _) in enumerate(order) if watches[name].ends]
+        found += order[: last[0] + 1] if last else order
+        end = found[-1][1] if last else step.stop
+        if end != times[-1] or not segments:
+            times.append(end)
+            segments.append(step.dense)
+        if last:
+            break
+    motion = OdeSolution(times, segments)
+    when = np.array([t for _, t in found])
+    states = motion(when) if found else np.empty((state.size, 0))
+    return Solution(np.array(times), motion, Occurrences([n for n, _ in found], when, states))

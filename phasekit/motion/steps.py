@@ -1,0 +1,155 @@
+"""One step after another along the motion of a law x' = f(t, x), and a bound on their number."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import DOP853, DenseOutput
+
+from phasekit.errors import ConvergenceError
+from phasekit.inputs import bad
+
+Array = npt.NDArray[np.float64]
+#: A function of (t, x): the rates x' of a law, or one value.
+Rates: TypeAlias = Callable[[float, Any], Any]
+
+#: Steps after which the pace of a motion tells: the first step may be shorter by any factor.
+TRIAL = 1000
+
+
+@dataclass(frozen=True)
+class InitialValue:
+    """An initial-value problem x' = f(t, x), x(start) = state, and how closely it is solved.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> oscillator = InitialValue(lambda t, x: (x[1], -x[0]), (1.0, 0.0))
+    >>> end = [step.after for step in steps(oscillator, np.pi)][-1]
+    >>> end.round(9) + 0.0
+    array([-1.,  0.])
+    """
+
+    rates: Rates
+    """Takes (t, x) with x of shape (n,), returns n rates."""
+    state: Sequence[float]
+    """State at the start."""
+    start: float = 0.0
+    """Time of that state."""
+    rtol: float = 1e-11
+    """Error of a step, relative to the state, that is allowed."""
+    atol: float = 1e-12
+    """The same, absolute."""
+    max_step: float = np.inf
+    """Longest step."""
+    most: int = 1_000_000
+    """Steps that a motion may take."""
+    causes: str = "Rates without bound"
+    """What a message supposes where steps become too short to go on."""
+
+
+@dataclass
+class Pace:
+    """Counts what a motion needs most of: steps, or passages of a section."""
+
+    most: int
+    stop: float
+    taken: int = 0
+    longest: float = 0.0
+    """Time between two of them."""
+
+    def is_too_slow(self, start: float, t: float) -> bool:
+        """Count the one from `start` to `t`; whether the motion is to be given up.
+
+        That is where it needs too many, or will: the rest takes too many even of the longest so
+        far. The more were counted, the sooner that is believed.
+        """
+        self.taken += 1
+        self.longest = max(self.longest, abs(t - start))
+        rest = abs(self.stop - t)
+        foreseen = self.taken >= TRIAL and self.taken * rest > self.longest * self.most**2
+        return rest > 0.0 and (self.taken >= self.most or foreseen)
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a motion: times, states and rates at its ends."""
+
+    start: float
+    stop: float
+    before: Array
+    after: Array
+    rates_before: Array
+    rates_after: Array
+    _solver: DOP853
+
+    @functools.cached_property
+    def dense(self) -> DenseOutput:
+        """State as a function of time in the step; to be asked for before the next step."""
+        return self._solver.dense_output()
+
+
+def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
+    """Step along a motion from its start to another time, before or after it.
+
+    Parameters
+    ----------
+    problem : InitialValue
+        The law and where it starts.
+    stop : float
+        Time to go to.
+
+    Raises
+    ------
+    ParameterError
+        If the rates are not finite at the start.
+    ConvergenceError
+        If the steps become too short to go on, or more of them are needed than the problem
+        allows, which may be foreseen (`Pace`).
+
+    Notes
+    -----
+    The method is the explicit Runge-Kutta method DOP853 of order 8.
+    """
+    with np.errstate(all="ignore"):
+        first = np.asarray(problem.rates(problem.start, np.array(problem.state, dtype=float)))
+    if not np.isfinite(first).all():  # the integrator would not come back from NaN
+        raise bad("state", tuple(problem.state), f"one with finite rates, not {first.tolist()}")
+    # Where a component is zero, no relative error of it can be allowed.
+    atol = max(problem.atol, float(np.finfo(float).tiny))
+    options = {"rtol": problem.rtol, "atol": atol, "max_step": problem.max_step}
+    with np.errstate(all="ignore"):
+        solver = DOP853(problem.rates, problem.start, np.array(problem.state), stop, **options)
+    # Beside a component that is zero, the first step that is proposed may be next to nothing.
+    ulp = np.finfo(float).eps * max(abs(stop), abs(problem.start))
+    solver.h_abs = max(solver.h_abs, ulp)
+    pace = Pace(problem.most, stop)
+    while solver.status == "running":
+        before, rates_before = solver.y, solver.f
+        with np.errstate(all="ignore"):
+            message = solver.step()
+        if solver.status == "failed":
+            raise _stopped(problem, solver.t, stop, message)
+        yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
+        if pace.is_too_slow(solver.t_old, solver.t):
+            raise _too_long(problem, solver.t, pace)
+
+
+def _stopped(problem: InitialValue, t: float, stop: float, message: str) -> ConvergenceError:
+    return ConvergenceError(
+        f"the integrator stopped at t = {float(t)!r} s of {float(stop)!r} s: {message} "
+        f"{problem.causes} may be why; otherwise try a larger rtol"
+    )
+
+
+def _too_long(problem: InitialValue, t: float, pace: Pace) -> ConvergenceError:
+    return ConvergenceError(
+        f"the integrator came to t = {float(t)!r} s of {float(pace.stop)!r} s in {pace.taken} "
+        f"steps, the longest of {pace.longest:.3g} s, and would need more than {problem.most} in "
+        "all; try a shorter time, a slower motion, or a larger rtol, atol or max_step"
+    )
