@@ -86,9 +86,9 @@ def above_level_saddles(phi: float, v: float, w: Array) -> tuple[float, float]:
     rise = energy_between(LOWER_SADDLE, UPPER_SADDLE, w)
     lower = math.cos(phi - w[PHI + LOWER_SADDLE])
     if lower > math.cos(phi - w[PHI + UPPER_SADDLE]):
-        within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
+        within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
         return within, within - rise
-    above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
+    above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     return above + rise, above
 
 
@@ -123,7 +123,7 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     if level:
         within, above = above_level_saddles(phi, v, w)
     else:
-        above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
+        above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if abs(above) <= slack:
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
         return ASYMPTOTIC
@@ -131,22 +131,22 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
         settle(UPPER_SADDLE, above, SINGLE, ROTATION, w)
         return ROTATION
     if single:
-        own = energy_above(LOWER_CENTER, phi, v, w[DOUBLE_TO], w)
+        own = energy_above(LOWER_CENTER, phi, w[ANGLE], v, w[DOUBLE_TO], w)
         if own < -above:
             settle(LOWER_CENTER, own, SINGLE, LIBRATION, w)
         else:
             settle(UPPER_SADDLE, above, SINGLE, LIBRATION, w)
         return LIBRATION
     if not level:
-        within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
+        within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if abs(within) <= slack:
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
-        enclose(energy_above(LOWER_CENTER, phi, v, w[DOUBLE_TO], w), within, above, w)
+        enclose(energy_above(LOWER_CENTER, phi, w[ANGLE], v, w[DOUBLE_TO], w), within, above, w)
         return LIBRATION
     place, center = well(phi, w)
-    own = energy_above(center, phi, v, w[DOUBLE_TO], w)
+    own = energy_above(center, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if own < -within:
         settle(center, own, place, LIBRATION, w)
     else:

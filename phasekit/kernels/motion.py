@@ -159,15 +159,14 @@ def potential_dd(
 @inline
 def phase_at(angle: float, rate: float, w: Array) -> float:
     """Phase in [-pi, pi] of a libration or rotation at an angle, passed with this rate."""
-    apart, _, _ = reduce_angle(angle - w[SIGMA], -w[SIGMA_LOW])
-    half = 0.5 * apart
+    half = 0.5 * (angle - w[SIGMA])
+    if w[MODE] == SWING and w[SIGMA_LOW] != 0.0:
+        half, _, _ = reduce_angle(angle - w[SIGMA], -w[SIGMA_LOW])
+        half *= 0.5
     x = np.float64(math.cos(half))
     y = np.float64(math.sin(half))
     skew = w[SKEW]
     if w[MODE] == TURN:
-        half = 0.5 * (angle - w[SIGMA])
-        x = np.float64(math.cos(half))
-        y = np.float64(math.sin(half))
         near = w[U] * x - y
         reach = skew * (w[U] * x + y)
         far = w[U] * x + y + reach
