@@ -54,6 +54,8 @@ HARMONIC_TO = 1e-30
 SOME, ALL = 1e-3, math.inf
 # Saddles with energies closer than this are level.
 LEVEL_TO = 1e-15
+# What the rounding of an angle changes in the energy above a saddle, in units of -V''.
+NOISE = 2e-31
 # Smaller energies above an equilibrium, degenerate or not, are raised to these, lest they
 # underflow.
 LEAST, TINIEST = 1e-290, 1e-307
@@ -115,16 +117,22 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     if v == 0.0 and slope == 0.0:
         w[MODE] = REST
         return EQUILIBRIUM
-    # What the rounding of the state changes in its energy.
-    slack = 8.0 * ROUNDING * (v * v + abs(slope * phi))
     single = w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]
     level = not single and abs(w[B] if w[A] >= 0.0 else w[C]) < LEVEL_TO
     within = math.nan
+    # What the rounding of the state changes in its energy, and that of angles at a saddle. But
+    # saddles that are almost level are told apart as far as the state does.
+    blur = NOISE
+    unit = max(1.0, abs(phi))
+    if level and energy_between(LOWER_SADDLE, UPPER_SADDLE, w) > 0.0:
+        blur = 0.0
+        unit = abs(phi)
+    slack = 8.0 * ROUNDING * (v * v + abs(slope) * unit)
     if level:
         within, above = above_level_saddles(phi, v, w)
     else:
         above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
-    if abs(above) <= slack:
+    if abs(above) <= slack - blur * w[CURVATURE + UPPER_SADDLE]:
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if above > 0.0:
@@ -139,7 +147,7 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
         return LIBRATION
     if not level:
         within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
-    if abs(within) <= slack:
+    if abs(within) <= slack - blur * w[CURVATURE + LOWER_SADDLE]:
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:

@@ -390,7 +390,10 @@ def shape(w: Array) -> None:
 
 @inline
 def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
-    """Angle from SIGMA and |angular velocity| at the phase with this sine and cosine."""
+    """Angle and |angular velocity| at the phase with this sine and cosine.
+
+    Far from the middle of a libration the angle is measured from the nearer turning point.
+    """
     sn, cn, delta = amplitude(sine, cosine, MEANS, int(w[LEVELS]), w)
     ratio = w[RATIO]
     skew = w[SKEW]
@@ -413,6 +416,11 @@ def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
         bottom = skew * near + both if sn >= 0.0 else skew * near + rest
         top = -top
         rate = 2.0
-    top *= w[U]
-    rate *= w[U] * ratio * delta / (bottom * bottom + top * top)
-    return 2.0 * math.atan2(top, bottom), rate
+    u = w[U]
+    rate *= u * ratio * delta / (bottom * bottom + u * top * (u * top))
+    if w[MODE] == SWING and abs(top) * max(u, 1.0) > 0.5 * bottom:
+        if top > 0.0:
+            reach = 2.0 * ratio * far
+            return w[HIGH] - 2.0 * math.atan2(reach, bottom / u + u * top), rate
+        return w[LOW] + 2.0 * math.atan2(2.0 * near, bottom / u - u * top), rate
+    return w[SIGMA] + 2.0 * math.atan2(u * top, bottom), rate
