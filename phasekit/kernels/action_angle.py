@@ -209,7 +209,8 @@ def find_action(code: int, action: float, w: Array) -> None:
             upper = gap
         new = gap - step
         if action < 0.5 * found:  # far: the action grows like a power of the gap
-            new = gap * math.exp(found * w[OMEGA] / gap * math.log(max(action, 1e-300) / found))
+            power = found * w[OMEGA] / gap * math.log(max(action, 1e-300) / found)
+            new = gap * math.exp(min(power, 0.0))
         # Newton squares the error, but next to a separatrix only that against the distance to it.
         close = abs(step) <= max(1e-8 * min(gap, top - gap), 4e-16 * gap)
         if not (lower < new < upper):
