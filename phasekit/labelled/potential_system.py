@@ -85,6 +85,10 @@ class Potential(Model):
     array([-1.,  0.,  1.])
     >>> pk.separatrices(well).lobe_area.values
     array([[1.33333333, 1.33333333]])
+    >>> well.potential([1.0]), well.gradient([2.0]), well.curvature([1.0])
+    (array([-0.25]), array([6.]), array([2.]))
+    >>> well.problem()
+    Problem(x' = dx, dx' = mu*x - x**3; mu=1.0, conservative)
 
     A pendulum with a second harmonic, for two of its strengths:
 

@@ -60,6 +60,22 @@ class SpecialPoint:
     ``l1 = Re[<p, C(q, q, q*)> - 2 <p, B(q, A^-1 B(q, q*))> + <p, B(q*, (2 i omega - A)^-1
     B(q, q))>]/(2 omega)`` with ``<q, q> = <p, q> = 1`` ([Kuznetsov2004] (5.62)); negative:
     supercritical.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> swallow = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": 0.0, "l": -1.0})
+    >>> branch = pk.continuation(swallow, "l", x0=[0.0], span=(-1, 1))
+    >>> (crossing,) = branch.special("pitchfork")
+    >>> crossing.status, round(crossing.normal_form["c"], 9)
+    ('converged', -1.0)
+    >>> side = crossing.switch()
+    >>> float(abs(side.points.x**2 - side.points.l).max()) < 1e-9
+    True
+    >>> branch = pk.continuation(swallow.replace(l=1.0), "mu", x0=[-1.3], span=(-1, 1))
+    >>> folds = branch.special("fold")[0].curve("l", (-1, 1))
+    >>> [point.kind for point in folds.special_points]
+    ['end', 'cusp', 'end']
     """
 
     kind: str

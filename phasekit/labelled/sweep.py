@@ -188,8 +188,8 @@ def _read(
     kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
     states = {name: value for name, value in kept.items() if name in STATES}
     order = list(dict.fromkeys(dim for name, value in kept.items() for dim in _dims(name, value)))
-    parameters = {name: value for name, value in kept.items() if name not in STATES}
-    return system.replace(**parameters), rows, passes, states, order
+    swept = system.replace(**{name: x for name, x in kept.items() if name not in STATES})
+    return swept, rows, passes_of(swept, rows), states, order  # with what only the axes give
 
 
 def _axes(

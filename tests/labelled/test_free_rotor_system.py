@@ -77,6 +77,18 @@ def test_without_a_momentum_it_is_that_of_omega1():
     assert ds.isel(omega1=0).phasekit.system() == free.replace(omega1=5.0)
 
 
+def test_an_axis_of_momenta_counts_for_a_machine_that_has_none_of_its_own():
+    free = pk.FreeGyroRotor(DISK, 0.02)
+    p = [0.0, 0.1, 5.0]
+    ds = pk.sweep(free, momentum=p, of=("equilibria", "steady_rotations"))
+    assert ds.n_equilibria.dims == ("momentum",)
+    for i, momentum in enumerate(p):
+        one = pk.equilibria(free.replace(momentum=momentum))
+        n = one.sizes["equilibrium"]
+        assert n >= 2
+        np.testing.assert_array_equal(ds.phi.values[i, :n], one.phi.values)
+
+
 def test_two_centers_appear_where_the_bottom_turns():
     """With a = 0 the bottom becomes a saddle at a momentum that V_p'' = 0 gives."""
     rotor = pk.FreeGyroRotor(DISK.replace(a=0.0), 0.02)
