@@ -187,7 +187,7 @@ class MapPlots:
     >>> ax = cell.phase_portrait(ax=axes[0, 0])
     >>> ax = cell.period_energy(ax=axes[0, 1])
     >>> ax = cell.frequency_action(ax=axes[0, 2])
-    >>> ax = cell.hodograph(orbit=(1.0, 0.2), ax=axes[1, 0])
+    >>> ax = cell.hodograph(orbits=(1.0, 0.2), ax=axes[1, 0])
     >>> ax = cell.bearing_forces(orbit=(1.0, 0.2), ax=axes[1, 1])
     >>> ax = cell.force_polygon(1.0, 0.2, ax=axes[1, 2])
     >>> plt.close(figure)
