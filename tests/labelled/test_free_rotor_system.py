@@ -89,6 +89,15 @@ def test_an_axis_of_momenta_counts_for_a_machine_that_has_none_of_its_own():
         np.testing.assert_array_equal(ds.phi.values[i, :n], one.phi.values)
 
 
+def test_what_follows_from_equilibria_needs_no_mention_of_them():
+    p = [0.1, 0.5]
+    alone = pk.sweep(ROTOR, momentum=p, of="support_speed")
+    both = pk.sweep(ROTOR, momentum=p, of=("phi", "support_speed"))
+    assert list(alone.data_vars) == ["support_speed"]
+    assert np.isfinite(alone.support_speed).sum() >= 4
+    np.testing.assert_array_equal(alone.support_speed, both.support_speed)
+
+
 def test_two_centers_appear_where_the_bottom_turns():
     """With a = 0 the bottom becomes a saddle at a momentum that V_p'' = 0 gives."""
     rotor = pk.FreeGyroRotor(DISK.replace(a=0.0), 0.02)
