@@ -84,7 +84,7 @@ class FreeGyroRotor(Model):
         The support's own moment of inertia about the vertical axis, kg m^2, >= 0.
     momentum : float, optional
         Angular momentum about the vertical axis in kg m^2/s, at which the machine is a system of
-        one degree of freedom, with equilibria (the steady rotations), maps and portraits; left out,
+        one degree of freedom, with equilibria (the steady rotations), maps and diagrams; left out,
         that of the support's omega1 with the disk at rest at phi = 0.
 
     Raises

@@ -217,12 +217,6 @@ class Potential(Model):
             values.append(value)
         return values
 
-    def coefficients(self) -> NoReturn:
-        """Raise: a potential has no coefficients (A, B, C)."""
-        raise bad(
-            "system", self, "a system with coefficients (A, B, C); this needs the closed form"
-        )
-
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the parameters: all of them."""
         return tuple(self._values)

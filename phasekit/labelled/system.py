@@ -20,6 +20,7 @@ from phasekit.labelled.arguments import (
     FloatArray,
     NumberLike,
     Value,
+    bad,
     brief,
     named_arguments,
     same,
@@ -151,6 +152,8 @@ class Model:
         Coefficients
             Floats, or DataArrays on the parameters' dims where a parameter is an array.
         """
+        if not issubclass(self.rung, Trigonometric):
+            raise bad("system", self, f"{Trigonometric.called}; this needs the closed form")
         names = self.formula_inputs()
         used = {name: self.parameters[name] for name in names}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -96,6 +97,21 @@ def test_what_follows_from_equilibria_needs_no_mention_of_them():
     assert list(alone.data_vars) == ["support_speed"]
     assert np.isfinite(alone.support_speed).sum() >= 4
     np.testing.assert_array_equal(alone.support_speed, both.support_speed)
+
+
+def test_coefficients_are_refused_and_maps_drawn_without_them():
+    for rotor in (ROTOR, pk.FreeGyroRotor(DISK, 0.02)):
+        for call in (
+            pk.FreeGyroRotor.coefficients,
+            pk.FreeGyroRotor.reduced,
+            pk.plot.phase_portrait,
+        ):
+            with pytest.raises(pk.ParameterError, match="wants a system with coefficients"):
+                call(rotor)
+    ds = pk.sweep(ROTOR, momentum=[0.1, 0.6, 0.8], beta=[0.5, 1.0])
+    ax = ds.phasekit.plot.parameter_map("n_equilibria")
+    assert ax.get_xlabel()
+    plt.close("all")
 
 
 def test_two_centers_appear_where_the_bottom_turns():
