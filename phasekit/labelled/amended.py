@@ -51,6 +51,14 @@ class Amended:
     >>> amended = pk.FreeGyroRotor(disk, 0.02).amended(0.5)
     >>> amended.equilibria().steady_kind.values.tolist()
     [1, 2, 1, 2]
+    >>> top = amended.potential(0.0)  # phi = 0 is a saddle at this momentum
+    >>> abs(amended.gradient(0.0)) < 1e-12, amended.curvature(0.0) < 0.0
+    (True, True)
+    >>> kinetic = 0.5 * amended.effective_inertia(0.3) * amended.phase_velocity(0.3, top) ** 2
+    >>> round(kinetic + amended.potential(0.3) - top, 12)
+    0.0
+    >>> amended.omega1(0.0, 0.0) > 0.0
+    True
     """
 
     p: float
