@@ -208,9 +208,9 @@ def find_action(code: int, action: float, w: Array) -> None:
         else:  # or NaN, on the separatrix within rounding
             upper = gap
         new = gap - step
-        if action < 0.5 * found:  # far: the action grows like a power of the gap
-            power = found * w[OMEGA] / gap * math.log(max(action, 1e-300) / found)
-            new = gap * math.exp(min(power, 0.0))
+        if base == center and action < 0.5 * found:  # the action grows like a power of the gap
+            power = found * w[OMEGA] / gap
+            new = gap * math.exp(min(power * math.log(max(action, 1e-300) / found), 0.0))
         # Newton squares the error, but next to a separatrix only that against the distance to it.
         close = abs(step) <= max(1e-8 * min(gap, top - gap), 4e-16 * gap)
         if not (lower < new < upper):

@@ -228,7 +228,7 @@ def test_no_legend(draw):
 @pytest.mark.parametrize("draw", DRAW)
 @pytest.mark.parametrize("system", [(1.0, 1.0, 0.0), (-1.0, 1.0, 0.0), (1.0, 0.0, 1.0)])
 def test_cusps_are_drawn(draw, system):
-    """At a center-like cusp there are no small oscillations, at a saddle-like one no second well."""
+    """At a center-like cusp there are no small oscillations to begin with."""
     _, ax = plt.subplots()
     draw(pk.Coefficients(*system), 20, ax=ax, legend=False)
     assert len([line for line in ax.lines if len(line.get_xdata()) > 10]) == 2
