@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -31,6 +31,7 @@ from phasekit.labelled.trajectory import (
     strobe,
     trajectory,
 )
+from phasekit.laws.ladder import Lawful, Routhian
 from phasekit.mechanics import two_degrees as mechanics
 from phasekit.mechanics.two_degrees import TwoDegrees
 
@@ -43,7 +44,7 @@ class Accelerations(NamedTuple):
 
 
 @dataclass(frozen=True)
-class FreeGyroRotor:
+class FreeGyroRotor(Lawful):
     """Heavy disk on a support that turns freely about the vertical, or under torques.
 
     The machine of `GyroRotorDisk` with two degrees of freedom: the support's angular velocity
@@ -79,6 +80,8 @@ class FreeGyroRotor:
     Accelerations(domega1=..., ddphi=...)
     """
 
+    rung: ClassVar[type[Routhian]] = Routhian
+
     disk: GyroRotorDisk
     carrier_inertia: float
 
@@ -95,6 +98,16 @@ class FreeGyroRotor:
         wants = "a number >= 0 in kg m2"
         inertia = checked_number("carrier_inertia", self.carrier_inertia, wants, low=0.0)
         object.__setattr__(self, "carrier_inertia", inertia)
+
+    @property
+    def law(self) -> Routhian:
+        """The law of phi at the momentum with which the disk hangs at rest on the support."""
+        return self.amended(self.angular_momentum(0.0, 0.0)).law
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """None: the law has them."""
+        return {}
 
     @functools.cached_property
     def _machine(self) -> TwoDegrees:

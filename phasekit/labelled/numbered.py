@@ -16,7 +16,7 @@ from phasekit.labelled.quantities import LABELS, Labels, Pass, Quantity
 from phasekit.labelled.system import Model
 from phasekit.labelled.tiling import cut, tiles
 from phasekit.phase.numerical import functions
-from phasekit.phase.numerical.formula import Formula, Shape
+from phasekit.phase.numerical.formula import Formula, need_a_stretch
 
 _POINTWISE = (
     "potential",
@@ -54,21 +54,6 @@ def fitted(
         else one
         for one in passes
     ]
-
-
-def need_a_stretch(formula: Formula) -> None:
-    """Refuse to look for the equilibria of a function on the whole line.
-
-    Raises
-    ------
-    ParameterError
-    """
-    if formula.shape is Shape.GENERAL and not formula.bounded:
-        raise ParameterError(
-            f"interval: got None, wants (low, high), the stretch of the line on which the "
-            f"equilibria of {formula.text} are looked for, because it is not a polynomial; or "
-            "give its period, if it has one"
-        )
 
 
 def _most(system: Model, formula: Formula) -> tuple[int, int]:

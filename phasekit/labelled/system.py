@@ -29,7 +29,7 @@ from phasekit.labelled.grid import combine
 from phasekit.labelled.identity import model_name, parameter_values
 from phasekit.labelled.parameter import Parameter, attrs_of
 from phasekit.labelled.quantities import STATES
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.ladder import Conservative, Lawful
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 
@@ -44,7 +44,7 @@ MODELS: dict[str, type[Model]] = {}
 ModelType = TypeVar("ModelType", bound="Model")
 
 
-class Model:
+class Model(Lawful):
     """Base of the systems: frozen, compared by value, rebuilt from any map that they made."""
 
     __slots__ = ()
@@ -52,7 +52,6 @@ class Model:
     declared: ClassVar[tuple[Parameter, ...]]
     #: Parameters for which folds are known in closed form, with the function that solves for each.
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
-    #: The rung of its law, which says what can be computed of it.
     rung: ClassVar[type[Conservative]] = Trigonometric
 
     @staticmethod

@@ -260,3 +260,18 @@ def check_period(formula: Formula, parameters: Values) -> None:
             f"period: got {formula.period!r}, over which {formula.text} does not repeat, wants a "
             "period of the potential, or None for a line"
         )
+
+
+def need_a_stretch(formula: Formula) -> None:
+    """Refuse to look for the equilibria of a function on the whole line.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if formula.shape is Shape.GENERAL and not formula.bounded:
+        raise ParameterError(
+            f"interval: got None, wants (low, high), the stretch of the line on which the "
+            f"equilibria of {formula.text} are looked for, because it is not a polynomial; or "
+            "give its period, if it has one"
+        )
