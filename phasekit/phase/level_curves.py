@@ -94,6 +94,11 @@ class LevelCurves:
             hill, well = np.append(hill, hill[:1]), np.append(well, well[:1])
         return x, height, hill, well
 
+    @property
+    def _count(self) -> int:
+        """Number of knots, each counted once."""
+        return len(self._knots[0]) - (self.answers.period is not None)
+
     @cached_property
     def floor(self) -> float:
         """Least potential that is seen."""
@@ -268,10 +273,11 @@ class LevelCurves:
         round it.
         """
         x, height, hill, well = self._knots
+        own = np.arange(x.size) < self._count
         top = float(np.sqrt(2.0 * max(self.summit - self.floor, 0.0))) or 1.0
         step = spacing * top
         chosen: dict[Any, list[Level]] = {}
-        for i in [*np.flatnonzero(well), *np.flatnonzero(hill)]:
+        for i in [*np.flatnonzero(well & own), *np.flatnonzero(hill & own)]:
             rims, bottom = self._region(i)
             rim = min(
                 (float(height[abs(j) - 1]) for j in rims), default=max(self.summit, height[i])
@@ -291,9 +297,8 @@ class LevelCurves:
 
     def _region(self, i: int) -> tuple[tuple[int, ...], float]:
         """Return the hills that end the region which begins at a knot, and its least potential."""
-        x, height, hill, _ = self._knots
-        period = self.answers.period
-        count = x.size if period is None else x.size - 1
+        _, height, hill, _ = self._knots
+        period, count = self.answers.period, self._count
         slack = _SAME * float(np.max(np.abs(height)))
         rims, bottom = [], float(height[i])
         for side in (-1, 1):

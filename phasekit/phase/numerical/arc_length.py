@@ -5,6 +5,7 @@ Along s, with ds = sqrt(M(x)) dx, the energy M(x) x'^2/2 + V(x) is s'^2/2 + V, s
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,77 +22,115 @@ from phasekit.phase.orbits import Orbits
 
 Array = npt.NDArray[np.float64]
 
-_SAMPLES = 32, 4096
+_LEAST, _MOST = 64, 4096
 _NEWTON = 6
+_ROUNDING = np.finfo(float).eps
+
+
+@dataclass(frozen=True, eq=False)
+class Wave:
+    """A function that grows evenly but for a Fourier sum: rate t + Re sum of c_k exp(2 pi i k t/T).
+
+    Attributes
+    ----------
+    rate : float
+        Mean of the derivative.
+    period : float
+        T.
+    series : numpy.ndarray
+        c_0, c_1, ...
+    """
+
+    rate: float
+    period: float
+    series: npt.NDArray[np.complex128]
+
+    def __call__(self, t: npt.ArrayLike) -> Array:
+        """Return the values at t."""
+        t = np.asarray(t, dtype=float)
+        turn = np.exp(2j * np.pi / self.period * t)
+        total = np.zeros_like(turn)
+        for coefficient in self.series[::-1]:
+            total = total * turn + coefficient
+        return np.asarray(self.rate * t + total.real)
+
+
+def _fourier(
+    function: Callable[[Array], Array], period: float, size: float
+) -> npt.NDArray[np.complex128]:
+    """Coefficients of a periodic function as those of a `Wave`; none if they do not end.
+
+    They end where they are lost beside `size`.
+    """
+    count = _LEAST
+    while count <= _MOST:
+        found = np.fft.rfft(function(period * np.arange(count) / count))[: count // 2] / count
+        found[1:] *= 2.0
+        if np.max(np.abs(found[-count // 8 :])) <= _ROUNDING * size:
+            kept = np.flatnonzero(np.abs(found) > _ROUNDING * size)
+            return found[: kept.max(initial=0) + 1]
+        count *= 2
+    return np.empty(0, complex)
 
 
 @dataclass(frozen=True, eq=False)
 class ArcLength:
-    """The arc length s of a law's coordinate, 0 at x = 0.
+    """The arc length s of a law's coordinate x, 0 at x = 0.
 
     Attributes
     ----------
     law : Routhian
         The law.
-    mean : float
-        Mean of ds/dx.
-    series : numpy.ndarray
-        Fourier coefficients of s - mean x + const, from the first harmonic on.
+    length, place : Wave
+        s of x, and x of s.
     """
 
     law: Routhian
-    mean: float
-    series: npt.NDArray[np.complex128]
+    length: Wave
+    place: Wave
 
     @classmethod
     def of(cls, law: Routhian) -> ArcLength:
-        """Integrate sqrt(M), a Fourier series, term by term.
+        """Integrate sqrt(M), a Fourier series, term by term, and invert the sum.
 
         Raises
         ------
         ParameterError
-            If the inertia or the potential is not finite, or the inertia vanishes somewhere.
+            If the inertia or the potential is not finite, or the inertia all but vanishes.
         """
-        count, most = _SAMPLES
-        wants = "an inertia > 0 at every angle, and a finite energy"
-        while count < most:
-            count *= 2
-            x = law.period * np.arange(count) / count
+
+        def rate(x: Array) -> Array:
             with np.errstate(all="ignore"):
-                inertia, height = law.inertia(x)[0], law.potential(x)[0]
-            if not (np.isfinite(height).all() and np.isfinite(inertia).all() and inertia.min() > 0):
-                break
-            found = np.fft.rfft(np.sqrt(inertia)) / count
-            if np.max(np.abs(found[-count // 8 :])) <= 1e-15 * abs(found[0]):
-                order = np.arange(1, count // 2)
-                series = 2.0 * found[1:-1] * law.period / (2j * np.pi * order)
-                kept = np.flatnonzero(np.abs(found[1:-1]) > 1e-17 * abs(found[0]))
-                size = kept[-1] + 1 if kept.size else 0
-                return cls(law, float(found[0].real), series[:size])
+                finite = np.isfinite(law.potential(x)[0]).all()
+                return np.sqrt(law.inertia(x)[0]) if finite else np.full(x.shape, np.nan)
+
+        mean = float(np.mean(rate(law.period * np.arange(_LEAST) / _LEAST)))
+        rates = _fourier(rate, law.period, mean)
+        if rates.size and mean > 0.0:
+            series = rates * law.period / (2j * np.pi * np.maximum(np.arange(rates.size), 1))
+            series[0] = -series[1:].sum().real
+            length = Wave(float(rates[0].real), law.period, series)
+            turn = length.rate * law.period
+            nodes = np.linspace(0.0, law.period, 16 * (series.size + 4))
+
+            def lag(s: Array) -> Array:
+                x = np.interp(s, length(nodes), nodes)
+                for _ in range(_NEWTON):
+                    x = x - (length(x) - s) / rate(x)
+                return np.asarray(x - s / length.rate)
+
+            with np.errstate(all="ignore"):
+                back = _fourier(lag, turn, law.period)
+            if back.size:
+                return cls(law, length, Wave(1.0 / length.rate, turn, back))
         name, value, _ = law.momentum
+        wants = "an inertia > 0 at every angle, and finite energies"
         raise ParameterError(f"system: got one at {name} = {value:g}, wants {wants}")
 
     @property
     def turn(self) -> float:
         """Arc length of the whole circle."""
-        return self.mean * self.law.period
-
-    def length(self, x: npt.ArrayLike) -> Array:
-        """Return s at x."""
-        x = np.asarray(x, dtype=float)
-        rates = 2j * np.pi / self.law.period * np.arange(1, self.series.size + 1)
-        waves = np.expm1(x[..., np.newaxis] * rates)
-        return np.asarray(self.mean * x + (waves @ self.series).real)
-
-    def place(self, s: npt.ArrayLike) -> Array:
-        """Return x at s."""
-        s = np.asarray(s, dtype=float)
-        nodes = np.linspace(0.0, self.law.period, 16 * (self.series.size + 4))
-        turns = np.floor(s / self.turn)
-        x = turns * self.law.period + np.interp(s - turns * self.turn, self.length(nodes), nodes)
-        for _ in range(_NEWTON):
-            x = x - (self.length(x) - s) / np.sqrt(self.law.inertia(x)[0])
-        return x
+        return self.place.period
 
     def formula(self) -> Formula:
         """The potential along s."""
