@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,9 @@ from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labelled.arguments import bad, numeric, reals
 from phasekit.labelled.grid import variable
 from phasekit.labelled.units import UNITS_OF
+from phasekit.laws.ladder import Lawful, Routhian
 from phasekit.mechanics import two_degrees as mechanics
+from phasekit.mechanics.at_momentum import AtMomentum
 from phasekit.mechanics.two_degrees import TwoDegrees
 
 #: What array functions of the machine take for a state, and return: a number, an array of any
@@ -37,7 +39,7 @@ STEADY = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Amended:
+class Amended(Lawful):
     """The machine at one angular momentum p about the vertical axis: one degree of freedom.
 
     `FreeGyroRotor.amended` makes it. The energy is
@@ -61,11 +63,23 @@ class Amended:
     True
     """
 
+    rung: ClassVar[type[Routhian]] = Routhian
+
     p: float
     """Angular momentum about the vertical axis, kg m^2/s."""
     _machine: TwoDegrees
     _attrs: Mapping[str, str]
     _coords: Mapping[str, xr.Variable]
+
+    @property
+    def law(self) -> Routhian:
+        """The law of the disk's angle."""
+        return AtMomentum(self._machine, self.p)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """None: the law has them."""
+        return {}
 
     def potential(self, phi: States) -> States:
         """Amended potential V_p in J at angles in rad."""

@@ -130,8 +130,11 @@ class FreeGyroRotor(RotorMotions):
 
     @property
     def law(self) -> Law:
-        """Equilibria at a momentum that is kept."""
-        return Routhian()
+        """The law of the disk's angle at the momentum that is kept."""
+        if not all(isinstance(value, float) for value in self.parameters.values()):
+            return Routhian()  # many machines
+        kept: Any = self.momentum
+        return self.amended(self.angular_momentum(0.0, 0.0) if kept is None else kept).law
 
     @property
     def parameters(self) -> dict[str, Value]:

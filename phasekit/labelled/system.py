@@ -30,7 +30,7 @@ from phasekit.labelled.grid import combine
 from phasekit.labelled.identity import parameter_values, refuse_another
 from phasekit.labelled.parameter import Parameter, attrs_of
 from phasekit.labelled.quantities import STATES
-from phasekit.laws.ladder import Law
+from phasekit.laws.ladder import Law, Lawful
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 
@@ -44,7 +44,7 @@ MODELS: dict[str, type[Model]] = {}
 ModelType = TypeVar("ModelType", bound="Model")
 
 
-class Model:
+class Model(Lawful):
     """Base of the systems: frozen, compared by value, rebuilt from any map that they made.
 
     Examples
