@@ -22,6 +22,7 @@ from phasekit.labelled.arguments import (
     Value,
     bad,
     brief,
+    describe,
     named_arguments,
     same,
     unknown,
@@ -71,6 +72,13 @@ class Model(Lawful):
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     #: The rung of its law, which says what can be computed of it.
     rung: ClassVar[type[Law]] = Trigonometric
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        """Let a law that is asked for no parameters say so."""
+        super().__init_subclass__(**keywords)
+        own = cls.__dict__.get("products")
+        if own is not None:
+            cls.products = staticmethod(_of_parameters(own.__func__))  # type: ignore[method-assign]
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -259,6 +267,20 @@ class Model(Lawful):
         # 0.0 is added because -0.0 equals it
         keys = ((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values)
         return hash((type(self).__name__, *keys))
+
+
+def _of_parameters(products: Callable[[Values], Any]) -> Callable[[Values], Any]:
+    @functools.wraps(products)
+    def checked(v: Values) -> Any:
+        try:
+            return products(v)
+        except Exception as error:
+            raise ParameterError(
+                f"v: got {describe(v)}, wants the parameters by name, angles as (sine, cosine, "
+                f"radius): {type(error).__name__}: {error}"
+            ) from error
+
+    return checked
 
 
 def model(cls: type[ModelType]) -> type[ModelType]:
