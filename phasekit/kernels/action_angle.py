@@ -36,6 +36,7 @@ from phasekit.kernels.levels import (
     classify_level,
     well,
 )
+from phasekit.kernels.locate import locate
 from phasekit.kernels.motion import phase_at
 from phasekit.kernels.orbits import finish
 from phasekit.kernels.shape import (
@@ -48,7 +49,6 @@ from phasekit.kernels.shape import (
     Y_PRODUCT,
     M,
     N,
-    locate,
     shape,
 )
 from phasekit.kernels.system import (

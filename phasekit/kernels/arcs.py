@@ -33,11 +33,11 @@ ARC = 12
 MEASURES = 2
 # Mean and mean square of two measures.
 SUMS = 2 * MEASURES
-NODE, SHARE = np.polynomial.legendre.leggauss(8)
+NODE, SHARE = np.polynomial.legendre.leggauss(10)
 # Parts of the double-exponential variable: the whole, the least, and the most at a time and in
 # all. Agreement of a part with its halves, and of all of them, in units of the whole.
 REACHED, LEAST, PARTS, MOST = 3.4, 1e-9, 64, 600
-CLOSE, ENOUGH = 1e-11, 1e-6
+CLOSE, ENOUGH = 3e-11, 1e-6
 
 
 @inline

@@ -46,7 +46,7 @@ LOBES, WINDING, HETEROCLINIC = int(Loop.LOBES), int(Loop.WINDING), int(Loop.HETE
 # Double-exponential nodes: the first level, then those between them, level by level.
 STEP = 1.0 / 5.0
 REACH = 17  # nodes of the first level on either side of the middle: 1e-19 of the arc from its end
-LEVELS = 7
+LEVELS = 4
 TOLERANCE = 1e-8  # of mean square and mean, from level to level
 SAMPLED = 3  # levels that are searched for peaks
 SAMPLES = REACH * 2**SAMPLED + 1  # their nodes, in order along the arc
@@ -55,7 +55,7 @@ WORTH = 0.8  # of the highest peak so far: lower samples are not refined
 REFINEMENTS = 24
 APART = 0.02  # of the arc: nearer local maxima are one
 BRANCHES = 2
-DIP = 0.3  # of the mean: what falls lower almost has a kink
+DIP = 0.2  # of the mean: what falls lower almost has a kink
 
 
 def _nodes() -> tuple[Array, Array]:

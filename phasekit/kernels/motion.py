@@ -46,6 +46,7 @@ from phasekit.kernels.levels import (
     TURN,
     TURNS,
 )
+from phasekit.kernels.locate import locate
 from phasekit.kernels.shape import (
     FIRST,
     LEVELS,
@@ -71,7 +72,6 @@ from phasekit.kernels.shape import (
     N,
     P,
     U,
-    locate,
     refer,
 )
 from phasekit.kernels.system import (
