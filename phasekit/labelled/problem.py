@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labelled.arguments import bad, flag, reals, unknown
-from phasekit.labelled.as_system import stands_on
+from phasekit.labelled.as_system import as_system, stands_on
 from phasekit.labelled.problem_parts import (
     make_field,
     names_of,
@@ -198,7 +198,8 @@ class Problem:
         ParameterError
             If a parameter is an array.
         """
-        law: Any = stands_on(system, Conservative, "continuation").law
+        system = stands_on(as_system(system), Conservative, "continuation")
+        law: Any = system.law
         names = system.formula_inputs()
         values: dict[str, float] = {}
         for key in names:

@@ -77,7 +77,11 @@ def _critical(problem: Problem, parameter: str, span: tuple[float, float]) -> li
     system = problem.system
     if system is None or not issubclass(system.rung, Trigonometric):
         return []
-    if parameter not in system.formula_inputs():
+    declared = {p.name: p for p in system.declared}
+    if (
+        parameter not in system.formula_inputs()
+        or not declared[parameter].valid(np.array(span)).all()
+    ):
         return []
     from phasekit.labelled.atlas import branches
 

@@ -78,7 +78,7 @@ class Model(Lawful):
         super().__init_subclass__(**keywords)
         own = cls.__dict__.get("products")
         if own is not None:
-            cls.products = staticmethod(_of_parameters(own.__func__))  # type: ignore[method-assign]
+            cls.products = staticmethod(_of_parameters(own.__func__))  # type: ignore[assignment, method-assign]
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:

@@ -346,7 +346,7 @@ def test_a_small_file_cannot_ask_for_all_memory(branch, tmp_path):
     meta = json.loads((path / "raw_forward" / "zarr.json").read_text())
     meta["shape"][0] = 10**10
     (path / "raw_forward" / "zarr.json").write_text(json.dumps(meta))
-    with pytest.raises(pk.StoreError, match="is damaged"):
+    with pytest.raises(pk.StoreError, match="is damaged|cannot be read"):
         Branch.load(path)
 
 

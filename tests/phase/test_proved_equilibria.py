@@ -330,7 +330,7 @@ def test_errors_bound_what_is_wrong_of_lennard_jones():
     """The action of E < 0, and the period as its derivative, by mpmath."""
     formula = make_formula("4*(x^-12 - x^-6)", "x", (), None, (0.05, 1e4))
     level = np.array([-0.9, -0.1, -1e-3, -1e-6])
-    got = functions.orbits_at_energy(formula, None, level)
+    got = functions.orbits_at_energy(formula, level)
     assert (got.orbit_kind == OrbitKind.LIBRATION).all()
     with mpmath.workdps(30):
         for energy, period, error in zip(level, got.period, got.period_error, strict=True):

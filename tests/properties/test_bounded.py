@@ -13,6 +13,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
+from phasekit.labelled.dispatch import passes_of
 from phasekit.labelled.quantities import ROWS, STATES
 from phasekit.phase import loads
 
@@ -31,7 +32,7 @@ def extreme(rng, n):
 def swept(system, group, rng):
     """Sweep all parameters and the states that a group needs, cell by cell."""
     axes = {p.name: xr.DataArray(extreme(rng, CELLS), dims="cell") for p in system.declared}
-    for one in system.methods.passes([row for row in ROWS.values() if row.group == group]):
+    for one in passes_of(system, [row for row in ROWS.values() if row.group == group]):
         for name in one.inputs:
             if name in STATES:
                 axes[name] = xr.DataArray(extreme(rng, CELLS), dims="cell")
