@@ -10,23 +10,71 @@ from enum import IntEnum
 
 
 class PhasekitError(Exception):
-    """Base class of everything that phasekit raises on purpose."""
+    """Base class of everything that phasekit raises on purpose.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> try:
+    ...     pk.Reduced(0.1, float("inf"))
+    ... except pk.PhasekitError as error:
+    ...     print(error)
+    psi: got inf, wants a finite number
+    """
 
 
 class ParameterError(PhasekitError, ValueError):
-    """An argument is unusable; the message names it, what it got and what it wants."""
+    """An argument is unusable; the message names it, what it got and what it wants.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> try:
+    ...     pk.Pendulum(length=-1.0)
+    ... except pk.ParameterError as error:
+    ...     print(error)
+    length: got -1.0, wants a number > 0 in m
+    """
 
 
 class ConvergenceError(PhasekitError, RuntimeError):
-    """An iteration ended without reaching its tolerance."""
+    """An iteration ended without reaching its tolerance.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> try:
+    ...     pk.continuation(pk.Problem("1 + x**2", "x", {"p": 0.0}), "p", x0=[1.0], span=(0, 1))
+    ... except pk.ConvergenceError:
+    ...     print("no equilibrium near the start")
+    no equilibrium near the start
+    """
 
 
 class StoreError(PhasekitError, OSError):
-    """A stored map cannot be read, written or continued."""
+    """A stored map cannot be read, written or continued.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> try:
+    ...     pk.open_map("nowhere.zarr")
+    ... except pk.StoreError:
+    ...     print("no map there")
+    no map there
+    """
 
 
 class EquilibriumKind(IntEnum):
-    """Type of an equilibrium, by the sign of V''."""
+    """Type of an equilibrium, by the sign of V''.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ds = pk.equilibria(pk.Reduced(0.4, 0.1))
+    >>> int((ds.kind == pk.EquilibriumKind.SADDLE).sum())
+    2
+    """
 
     NOT_COMPUTED = -1
     ABSENT = 0
@@ -39,6 +87,12 @@ class Topology(IntEnum):
     """What the separatrices of one system look like.
 
     On a line they may close on one side of a saddle alone (homoclinic), or on neither (unbounded).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.Topology(pk.separatrices(pk.Reduced(0.4, 0.1)).topology.item()).name
+    'FIGURE_EIGHT'
     """
 
     NOT_COMPUTED = -1
@@ -54,6 +108,12 @@ class Loop(IntEnum):
     """What the separatrix of one saddle does: close on itself, wind round, or reach a partner.
 
     On a line it may close on one side alone (lobe), or on neither (unbounded).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> [pk.Loop(code).name for code in pk.separatrices(pk.Reduced(0.4, 0.1)).loop.values]
+    ['LOBES', 'WINDING']
     """
 
     ABSENT = 0
@@ -65,7 +125,14 @@ class Loop(IntEnum):
 
 
 class OrbitKind(IntEnum):
-    """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at."""
+    """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.OrbitKind(pk.orbits(pk.Pendulum(length=1.0), 0.0, 9.0).orbit_kind.item()).name
+    'ROTATION'
+    """
 
     NOT_COMPUTED = -1
     EQUILIBRIUM = 0
@@ -76,7 +143,15 @@ class OrbitKind(IntEnum):
 
 
 class OrbitFamily(IntEnum):
-    """Family of orbits: each has orbits of every action between its limits, one of each."""
+    """Family of orbits: each has orbits of every action between its limits, one of each.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ds = pk.action_angle(pk.Pendulum(length=1.0), 0.0, -9.0)
+    >>> pk.OrbitFamily(ds.orbit_family.item()).name
+    'BACKWARD'
+    """
 
     NOT_COMPUTED = -1
     NONE = 0

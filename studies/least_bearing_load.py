@@ -45,8 +45,8 @@ def excess_inside(ds: xr.Dataset) -> float:
     some = ds.isel(beta=slice(None, None, 11), e=slice(None, None, 6))
     disk = some.phasekit.system()
     phi = xr.DataArray(np.linspace(-np.pi, np.pi, 181), dims="at")
-    top = some.saddle_energy.sel(saddle="upper", drop=True)
-    speed = np.sqrt(2.0 * np.maximum(top - pk.potential(disk, phi).potential, 0.0))
+    top = some.saddle_energy.sel(saddle="upper", drop=True).drop_attrs()
+    speed = np.sqrt(2.0 * np.maximum(top - pk.potential(disk, phi).potential.drop_attrs(), 0.0))
     share = xr.DataArray(np.linspace(-1.0, 1.0, 9), dims="share")
     force = pk.bearing_forces(disk, phi, share * speed).force_magnitude
     return float((force.max(["at", "share", "bearing"]) / worst(some)).max())

@@ -28,6 +28,8 @@ def test_the_calls_run_and_give_what_the_comments_say(readme):
     folds = pk.critical(names["disk"], "beta").critical_fold.values / pk.deg
     said = re.search(r"here at ([\d.]+) and ([\d.]+) degrees", block)
     assert [f"{fold:.1f}" for fold in folds] == list(said.groups())
+    counts = pk.sweep(names["rotor"], momentum=[0.0, 4.0]).n_equilibria.values.tolist()
+    assert counts == [int(x) for x in re.search(r"# (\d), later (\d) steady", block).groups()]
 
 
 def test_each_of_the_two_commands_is_one_line_that_does_everything(readme):

@@ -18,6 +18,7 @@ from phasekit.kernels.equilibria import LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER
 from phasekit.kernels.levels import (
     ANGLE,
     AROUND,
+    ASYMPTOTE,
     DIRECTION,
     FREE,
     FREE_FROM,
@@ -42,7 +43,6 @@ from phasekit.kernels.shape import (
     FIRST,
     OMEGA,
     SECOND,
-    SIGMA,
     SLOPE,
     X0,
     Y_PRODUCT,
@@ -200,16 +200,17 @@ def find_action(code: int, action: float, w: Array) -> None:
     last = False
     for _ in range(200):
         found = orbit_at(base, gap, center, w)
-        if found != found or w[MODE] == REST:  # on the separatrix or at rest, within rounding
+        if w[MODE] == REST:
             break
         step = (found - action) * w[OMEGA]
         if found < action:
             lower = gap
-        else:
+        else:  # or NaN, on the separatrix within rounding
             upper = gap
         new = gap - step
-        if action < 0.5 * found:  # far: the action grows like a power of the gap
-            new = gap * math.exp(found * w[OMEGA] / gap * math.log(max(action, 1e-300) / found))
+        if base == center and action < 0.5 * found:  # the action grows like a power of the gap
+            power = found * w[OMEGA] / gap
+            new = gap * math.exp(min(power * math.log(max(action, 1e-300) / found), 0.0))
         # Newton squares the error, but next to a separatrix only that against the distance to it.
         close = abs(step) <= max(1e-8 * min(gap, top - gap), 4e-16 * gap)
         if not (lower < new < upper):
@@ -218,7 +219,8 @@ def find_action(code: int, action: float, w: Array) -> None:
         if last or lower == upper:
             break
         last = close
-    orbit_at(base, gap, center, w)
+    if orbit_at(base, gap, center, w) != action and w[MODE] == ASYMPTOTE:
+        orbit_at(base, lower, center, w)
     if code == BACKWARD:
         w[DIRECTION] = -1.0
 
@@ -247,5 +249,5 @@ def state_at(theta: float, w: Array) -> tuple[float, float]:
     elif mode != SWING:
         return math.nan, math.nan
     local, rate = locate(np.float64(math.sin(theta)), np.float64(math.cos(theta)), w)
-    phi, _, _ = reduce_angle(w[SIGMA] + local, 0.0)
+    phi, _, _ = reduce_angle(local, 0.0)
     return phi, (w[DIRECTION] if mode == TURN else 1.0) * rate / unit + 0.0  # not -0

@@ -54,6 +54,8 @@ HARMONIC_TO = 1e-30
 SOME, ALL = 1e-3, math.inf
 # Saddles with energies closer than this are level.
 LEVEL_TO = 1e-15
+# What the rounding of an angle changes in the energy above a saddle, in units of -V''.
+NOISE = 2e-31
 # Smaller energies above an equilibrium, degenerate or not, are raised to these, lest they
 # underflow.
 LEAST, TINIEST = 1e-290, 1e-307
@@ -86,9 +88,9 @@ def above_level_saddles(phi: float, v: float, w: Array) -> tuple[float, float]:
     rise = energy_between(LOWER_SADDLE, UPPER_SADDLE, w)
     lower = math.cos(phi - w[PHI + LOWER_SADDLE])
     if lower > math.cos(phi - w[PHI + UPPER_SADDLE]):
-        within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
+        within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
         return within, within - rise
-    above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
+    above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     return above + rise, above
 
 
@@ -115,38 +117,44 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     if v == 0.0 and slope == 0.0:
         w[MODE] = REST
         return EQUILIBRIUM
-    # What the rounding of the state changes in its energy.
-    slack = 8.0 * ROUNDING * (v * v + abs(slope * phi))
     single = w[PHI + LOWER_SADDLE] != w[PHI + LOWER_SADDLE]
     level = not single and abs(w[B] if w[A] >= 0.0 else w[C]) < LEVEL_TO
     within = math.nan
+    # What the rounding of the state changes in its energy, and that of angles at a saddle. But
+    # saddles that are almost level are told apart as far as the state does.
+    blur = NOISE
+    unit = max(1.0, abs(phi))
+    if level and energy_between(LOWER_SADDLE, UPPER_SADDLE, w) > 0.0:
+        blur = 0.0
+        unit = abs(phi)
+    slack = 8.0 * ROUNDING * (v * v + abs(slope) * unit)
     if level:
         within, above = above_level_saddles(phi, v, w)
     else:
-        above = energy_above(UPPER_SADDLE, phi, v, w[DOUBLE_TO], w)
-    if abs(above) <= slack:
+        above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
+    if abs(above) <= slack - blur * w[CURVATURE + UPPER_SADDLE]:
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if above > 0.0:
         settle(UPPER_SADDLE, above, SINGLE, ROTATION, w)
         return ROTATION
     if single:
-        own = energy_above(LOWER_CENTER, phi, v, w[DOUBLE_TO], w)
+        own = energy_above(LOWER_CENTER, phi, w[ANGLE], v, w[DOUBLE_TO], w)
         if own < -above:
             settle(LOWER_CENTER, own, SINGLE, LIBRATION, w)
         else:
             settle(UPPER_SADDLE, above, SINGLE, LIBRATION, w)
         return LIBRATION
     if not level:
-        within = energy_above(LOWER_SADDLE, phi, v, w[DOUBLE_TO], w)
-    if abs(within) <= slack:
+        within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
+    if abs(within) <= slack - blur * w[CURVATURE + LOWER_SADDLE]:
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:
-        enclose(energy_above(LOWER_CENTER, phi, v, w[DOUBLE_TO], w), within, above, w)
+        enclose(energy_above(LOWER_CENTER, phi, w[ANGLE], v, w[DOUBLE_TO], w), within, above, w)
         return LIBRATION
     place, center = well(phi, w)
-    own = energy_above(center, phi, v, w[DOUBLE_TO], w)
+    own = energy_above(center, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if own < -within:
         settle(center, own, place, LIBRATION, w)
     else:

@@ -159,15 +159,14 @@ def potential_dd(
 @inline
 def phase_at(angle: float, rate: float, w: Array) -> float:
     """Phase in [-pi, pi] of a libration or rotation at an angle, passed with this rate."""
-    apart, _, _ = reduce_angle(angle - w[SIGMA], -w[SIGMA_LOW])
-    half = 0.5 * apart
+    half = 0.5 * (angle - w[SIGMA])
+    if w[MODE] == SWING and w[SIGMA_LOW] != 0.0:
+        half, _, _ = reduce_angle(angle - w[SIGMA], -w[SIGMA_LOW])
+        half *= 0.5
     x = np.float64(math.cos(half))
     y = np.float64(math.sin(half))
     skew = w[SKEW]
     if w[MODE] == TURN:
-        half = 0.5 * (angle - w[SIGMA])
-        x = np.float64(math.cos(half))
-        y = np.float64(math.sin(half))
         near = w[U] * x - y
         reach = skew * (w[U] * x + y)
         far = w[U] * x + y + reach
@@ -244,7 +243,7 @@ def begin(w: Array) -> None:
         # The lower turning point is at the phase pi, not at the double next to it.
         w[PHASE_LOW] = 0.5 * TWO_PI_LOW * np.sign(w[PHASE]) if abs(w[PHASE]) == PI else 0.0
         turns, local, _ = at_phase(w[PHASE], w[PHASE_LOW], w)
-        w[BASE] = w[TURNS] + np.rint((w[ANGLE] - (w[SIGMA] + local)) / TWO_PI)
+        w[BASE] = w[TURNS] + np.rint((w[ANGLE] - local) / TWO_PI)
         if mode == TURN:
             w[BASE] -= turns
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
@@ -328,9 +327,9 @@ def after(t: float, w: Array) -> tuple[float, float]:
         high, low = dd_add(high, low, w[PHASE], w[PHASE_LOW])
     turns, local, rate = at_phase(high, low, w)
     if mode == SWING:
-        return (w[SIGMA] + local) + w[BASE] * TWO_PI, rate / unit + 0.0  # not -0
+        return local + w[BASE] * TWO_PI, rate / unit + 0.0  # not -0
     turns += w[BASE]
-    return (w[SIGMA] + local + turns * TWO_PI_LOW) + turns * TWO_PI, sense * rate / unit
+    return (local + turns * TWO_PI_LOW) + turns * TWO_PI, sense * rate / unit
 
 
 @inline

@@ -96,8 +96,15 @@ def refer(w: Array) -> None:
 @inline
 def tan_half(y: float, x: float) -> float:
     """Return tan(angle/2) of the angle atan2(y, x), y > 0."""
-    size = np.sqrt(x * x + y * y)
+    size = length(y, x)
     return y / (size + x) if x >= 0.0 else (size - x) / y
+
+
+@inline
+def length(y: float, x: float) -> float:
+    """sqrt(x^2 + y^2) without overflow; y and x are not both 0."""
+    most = max(abs(x), abs(y))
+    return most * np.sqrt(x / most * (x / most) + y / most * (y / most))
 
 
 @routine
@@ -308,8 +315,8 @@ def swing(w: Array) -> None:
     force_high = e + x / (1.0 + z_high * z_high)
     force_low = e + x / (1.0 + z_low * z_low)
     w[RATIO] = np.sqrt(force_high / force_low)
-    w[SPAN] = np.sqrt(disc * disc + (1.0 + own) * (1.0 + own))
-    difference = x * way * sum_ / (w[SPAN] * w[SPAN])
+    w[SPAN] = length(disc, 1.0 + own)
+    difference = x * (way / w[SPAN]) * (sum_ / w[SPAN])
     w[SKEW] = difference / (force_low * (1.0 + w[RATIO]))
     w[TAU] = sum_
     w[Z_HIGH] = z_high
@@ -383,7 +390,10 @@ def shape(w: Array) -> None:
 
 @inline
 def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
-    """Angle from SIGMA and |angular velocity| at the phase with this sine and cosine."""
+    """Angle and |angular velocity| at the phase with this sine and cosine.
+
+    Far from the middle of a libration the angle is measured from the nearer turning point.
+    """
     sn, cn, delta = amplitude(sine, cosine, MEANS, int(w[LEVELS]), w)
     ratio = w[RATIO]
     skew = w[SKEW]
@@ -406,6 +416,11 @@ def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
         bottom = skew * near + both if sn >= 0.0 else skew * near + rest
         top = -top
         rate = 2.0
-    top *= w[U]
-    rate *= w[U] * ratio * delta / (bottom * bottom + top * top)
-    return 2.0 * math.atan2(top, bottom), rate
+    u = w[U]
+    rate *= u * ratio * delta / (bottom * bottom + u * top * (u * top))
+    if w[MODE] == SWING and abs(top) * max(u, 1.0) > 0.5 * bottom:
+        if top > 0.0:
+            reach = 2.0 * ratio * far
+            return w[HIGH] - 2.0 * math.atan2(reach, bottom / u + u * top), rate
+        return w[LOW] + 2.0 * math.atan2(2.0 * near, bottom / u - u * top), rate
+    return w[SIGMA] + 2.0 * math.atan2(u * top, bottom), rate

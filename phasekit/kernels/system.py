@@ -159,15 +159,18 @@ def sharpen(j: int, w: Array) -> None:
 
 
 @routine
-def energy_above(j: int, phi: float, v: float, below: float, w: Array) -> float:
-    """Energy of a state above equilibrium j; with all digits where it is less than ``below``."""
+def energy_above(j: int, phi: float, angle: float, v: float, below: float, w: Array) -> float:
+    """Energy of a state above equilibrium j; with all digits where it is less than ``below``.
+
+    ``angle`` is phi, reduced to a turn.
+    """
     a = w[A]
-    angle, _, _ = reduce_angle(phi - w[PHI + j], 0.0)
-    sine = math.sin(0.5 * angle)
-    bend = w[CURVATURE + j] + a * math.sin(0.5 * angle + 2.0 * w[PHI + j]) * sine
-    gap = 0.5 * v * v + 2.0 * sine * sine * bend
-    if not abs(gap) < below:
-        return gap
+    if below < math.inf:
+        sine = math.sin(0.5 * (angle - w[PHI + j]))
+        bend = w[CURVATURE + j] + a * math.sin(0.5 * (angle + 3.0 * w[PHI + j])) * sine
+        gap = 0.5 * v * v + 2.0 * sine * sine * bend
+        if not abs(gap) < below:
+            return gap
     sharpen(j, w)
     h, low = two_sum(phi, -w[PHI + j])
     h, low, _ = reduce_angle(h, low - w[PHI_LOW + j])

@@ -20,7 +20,15 @@ from phasekit.labelled.system import Model
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
 class PhasekitAccessor:
-    """What a map can do beyond plain xarray."""
+    """What a map can do beyond plain xarray.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ds = pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2, 0.3])
+    >>> pk.equilibria(ds.sel(lam=0.2).phasekit.system()).n_equilibria.item()
+    4
+    """
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds
@@ -152,7 +160,36 @@ class PhasekitAccessor:
 
 
 class MapPlots:
-    """Pictures of a map; each takes the keywords of its namesake in ``phasekit.plot``."""
+    """Pictures of a map; each takes the keywords of its namesake in ``phasekit.plot``.
+
+    Examples
+    --------
+    Pictures of a map over one or two parameters:
+
+    >>> import matplotlib.pyplot as plt
+    >>> import phasekit as pk
+    >>> disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4, m=2, half_span=0.2)
+    >>> ds = pk.sweep(disk, beta=[0.5, 0.7], a=[0.01, 0.024])
+    >>> figure, axes = plt.subplots(1, 3)
+    >>> ax = ds.phasekit.plot.parameter_map("topology", ax=axes[0])
+    >>> ax = ds.phasekit.plot.bearing_load_map(ax=axes[1])
+    >>> ax = ds.isel(a=1).phasekit.plot.bifurcation_diagram(ax=axes[2])
+    >>> plt.close(figure)
+
+    Pictures of one of its cells:
+
+    >>> cell = ds.isel(beta=1, a=1).phasekit.plot
+    >>> figure, axes = plt.subplots(2, 3)
+    >>> ax = cell.phase_portrait(ax=axes[0, 0])
+    >>> ax = cell.period_energy(ax=axes[0, 1])
+    >>> ax = cell.frequency_action(ax=axes[0, 2])
+    >>> ax = cell.hodograph(orbits=(1.0, 0.2), ax=axes[1, 0])
+    >>> ax = cell.bearing_forces(orbit=(1.0, 0.2), ax=axes[1, 1])
+    >>> ax = cell.force_polygon(1.0, 0.2, ax=axes[1, 2])
+    >>> plt.close(figure)
+    >>> well, portrait = cell.potential_well()
+    >>> plt.close(well.figure)
+    """
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
@@ -14,7 +14,9 @@ from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labelled.arguments import bad, numeric, reals
 from phasekit.labelled.grid import variable
 from phasekit.labelled.units import UNITS_OF
+from phasekit.laws.ladder import Lawful, Routhian
 from phasekit.mechanics import two_degrees as mechanics
+from phasekit.mechanics.at_momentum import AtMomentum
 from phasekit.mechanics.two_degrees import TwoDegrees
 
 #: What array functions of the machine take for a state, and return: a number, an array of any
@@ -37,7 +39,7 @@ STEADY = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Amended:
+class Amended(Lawful):
     """The machine at one angular momentum p about the vertical axis: one degree of freedom.
 
     `FreeGyroRotor.amended` makes it. The energy is
@@ -51,13 +53,33 @@ class Amended:
     >>> amended = pk.FreeGyroRotor(disk, 0.02).amended(0.5)
     >>> amended.equilibria().steady_kind.values.tolist()
     [1, 2, 1, 2]
+    >>> top = amended.potential(0.0)  # phi = 0 is a saddle at this momentum
+    >>> abs(amended.gradient(0.0)) < 1e-12, amended.curvature(0.0) < 0.0
+    (True, True)
+    >>> kinetic = 0.5 * amended.effective_inertia(0.3) * amended.phase_velocity(0.3, top) ** 2
+    >>> round(kinetic + amended.potential(0.3) - top, 12)
+    0.0
+    >>> amended.omega1(0.0, 0.0) > 0.0
+    True
     """
+
+    rung: ClassVar[type[Routhian]] = Routhian
 
     p: float
     """Angular momentum about the vertical axis, kg m^2/s."""
     _machine: TwoDegrees
     _attrs: Mapping[str, str]
     _coords: Mapping[str, xr.Variable]
+
+    @property
+    def law(self) -> Routhian:
+        """The law of the disk's angle."""
+        return AtMomentum(self._machine, self.p)
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """None: the law has them."""
+        return {}
 
     def potential(self, phi: States) -> States:
         """Amended potential V_p in J at angles in rad."""

@@ -8,7 +8,7 @@ from typing import Any
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import bad
 from phasekit.labelled.system import MODELS, Model
-from phasekit.laws.ladder import Law
+from phasekit.laws.ladder import Law, Lawful
 
 
 def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
@@ -57,3 +57,21 @@ def stands_on(system: Model, rung: type[Law], what: str) -> Model:
         return system
     because = f"because {what} is in closed form" if rung.labels_fixed else f"for {what}"
     raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}")
+
+
+def single(system: Any) -> tuple[Law, dict[str, float]]:
+    """Return the law of one system, on whatever rung, and its parameters.
+
+    Raises
+    ------
+    ParameterError
+        If it is no system, or a parameter is an array.
+    """
+    found: Lawful = system if isinstance(system, Lawful) else as_system(system)
+    arrays = [name for name, value in found.parameters.items() if not isinstance(value, float)]
+    if arrays:
+        raise ParameterError(
+            f"system: got array parameters ({', '.join(arrays)}), wants a single system; select "
+            "one cell first: ds.isel(...).phasekit.system()"
+        )
+    return found.law, found.parameters

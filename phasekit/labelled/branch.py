@@ -59,6 +59,32 @@ class Branch:
         The free parameter; ``free`` holds all of them.
     problem : Problem or None
         None after loading a branch of a Python function without giving it.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import phasekit as pk
+    >>> cubic = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    >>> short = pk.ContinuationOptions(max_points=5, directions="forward")
+    >>> branch = pk.continuation(cubic, "mu", x0=[-1.3], span=(-1, 1), options=short)
+    >>> branch.special("fold"), branch.stops[1].reason
+    ((), 'max_points')
+    >>> branch = branch.extend(500)
+    >>> [round(fold["mu"], 12) for fold in branch.special("LP")]
+    [0.38490017946, -0.38490017946]
+    >>> branch.to_dataset().special_kind.values.tolist()
+    ['end', 'fold', 'fold', 'end']
+    >>> curve, problem = branch.known()
+    >>> problem is cubic
+    True
+    >>> plt.close(branch.plot().figure)
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     branch.save(f"{folder}/branch.nc")
+    ...     loaded = pk.Branch.load(f"{folder}/branch.nc")
+    >>> loaded.points.equals(branch.points)
+    True
     """
 
     problem: Problem | None

@@ -15,7 +15,7 @@ import numpy as np
 from phasekit.labelled import quantities
 from phasekit.labelled.arguments import bad, one_of
 from phasekit.labelled.as_system import stands_on
-from phasekit.labelled.quantities import LABELS, LAW, Pass, Quantity, plan_passes
+from phasekit.labelled.quantities import LABELS, LAW, ROWS, Pass, Quantity, plan_passes
 from phasekit.labelled.system import Model
 from phasekit.laws.ladder import Law
 
@@ -51,6 +51,16 @@ def passes_of(
             stands_on(system, max(rungs_of(group), key=depth), group)
     states = {*given, *system.parameters}
     return tuple(bound(one, system, states) for one in plan_passes(rows, system.rung))
+
+
+def inputs_of(system: Model, rows: Iterable[Quantity]) -> tuple[Quantity, ...]:
+    """The rows that others are computed from, where labels are numbered: these go along."""
+    rows = tuple(rows)
+    if system.rung.labels_fixed or not all(is_offered(system, row.group) for row in rows):
+        return ()
+    names = (name for one in plan_passes(rows, system.rung) for name in one.inputs)
+    found = {ROWS[name]: None for name in names if name in ROWS and ROWS[name] not in rows}
+    return (*found, *inputs_of(system, (*rows, *found))) if found else ()
 
 
 def rungs_of(group: str) -> set[type[Law]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -45,7 +45,7 @@ class FreeGyroRotor(RotorMotions):
         The support's own moment of inertia about the vertical axis, kg m^2, >= 0.
     momentum : float, optional
         Angular momentum about the vertical axis in kg m^2/s, at which the machine is a system of
-        one degree of freedom, with equilibria (the steady rotations), maps and portraits; left out,
+        one degree of freedom, with equilibria (the steady rotations), maps and diagrams; left out,
         that of the support's omega1 with the disk at rest at phi = 0.
 
     Raises
@@ -67,6 +67,24 @@ class FreeGyroRotor(RotorMotions):
     >>> machine = pk.FreeGyroRotor(disk, carrier_inertia=0.02)
     >>> machine.accelerations(phi=0.5, dphi=0.0)
     Accelerations(domega1=..., ddphi=...)
+    >>> motion = machine.simulate(0.5, 0.0, [0.0, 1.0])
+    >>> end = motion.isel(time=-1)
+    >>> state = (end.motion_phi, end.motion_dphi, end.motion_omega1)
+    >>> abs(float(machine.energy(*state)) - machine.energy(0.5, 0.0)) < 1e-9
+    True
+    >>> machine.mass_matrix(0.5).shape
+    (2, 2)
+
+    At the momentum that it keeps it is a system of one degree of freedom, with equilibria and maps:
+
+    >>> p = machine.angular_momentum(0.5, 0.0)
+    >>> float(machine.amended(p).p) == p
+    True
+    >>> ds = pk.sweep(machine, momentum=[0.0, p])
+    >>> ds.n_equilibria.dims
+    ('momentum',)
+    >>> ds.isel(momentum=1).phasekit.system() == machine.replace(momentum=p)
+    True
     """
 
     disk: GyroRotorDisk
@@ -74,7 +92,7 @@ class FreeGyroRotor(RotorMotions):
     momentum: NumberLike | None = None
 
     declared: ClassVar[tuple[Parameter, ...]] = (
-        *GyroRotorDisk.declared,
+        *(replace(p, optional=p.name == "half_span") for p in GyroRotorDisk.declared),
         Parameter(
             name="carrier_inertia",
             units="kg m2",
@@ -112,8 +130,11 @@ class FreeGyroRotor(RotorMotions):
 
     @property
     def law(self) -> Law:
-        """Equilibria at a momentum that is kept."""
-        return Routhian()
+        """The law of the disk's angle at the momentum that is kept."""
+        if not all(isinstance(value, float) for value in self.parameters.values()):
+            return Routhian()  # many machines
+        kept: Any = self.momentum
+        return self.amended(self.angular_momentum(0.0, 0.0) if kept is None else kept).law
 
     @property
     def parameters(self) -> dict[str, Value]:

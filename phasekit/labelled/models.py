@@ -174,6 +174,13 @@ class GyroRotorDisk(Model):
         -----
         [Veljovic2015] before (12), at the pole O2; the papers' formulas at the mass center hold
         only for e = 0.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> flat = pk.GyroRotorDisk(beta=90 * pk.deg, e=0, a=0, r=0.2, omega1=0, m=3.0)
+        >>> round(flat.inertia().Jn, 12)  # m r^2/2
+        0.06
         """
         if self.m is None:
             raise bad("m", None, "a mass for the moments of inertia", "use disk.replace(m=...)")

@@ -94,6 +94,10 @@ class Potential(Model):
     array([-1.,  0.,  1.])
     >>> pk.separatrices(well).lobe_area.values
     array([[1.33333333, 1.33333333]])
+    >>> well.potential([1.0]), well.gradient([2.0]), well.curvature([1.0])
+    (array([-0.25]), array([6.]), array([2.]))
+    >>> well.problem()
+    Problem(x' = dx, dx' = mu*x - x**3; mu=1.0, conservative)
 
     A pendulum with a second harmonic, for two of its strengths:
 
@@ -221,12 +225,6 @@ class Potential(Model):
                 raise bad(name, value, "a scalar", "for arrays use pk.potential, pk.gradient, ...")
             values.append(value)
         return values
-
-    def coefficients(self) -> NoReturn:
-        """Raise: a potential has no coefficients (A, B, C)."""
-        raise bad(
-            "system", self, "a system with coefficients (A, B, C); this needs the closed form"
-        )
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the parameters: all of them."""

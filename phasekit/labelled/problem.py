@@ -64,6 +64,13 @@ class Problem:
     Problem(x' = l*x + mu - x**3; mu=-1.0, l=1.0)
     >>> float(cusp([2.0])[0])
     -7.0
+    >>> value, slope = cusp.replace(l=2.0).derivatives([2.0])
+    >>> value.item(), slope.item()
+    (-5.0, -10.0)
+    >>> Problem.from_specification(cusp.specification())
+    Problem(x' = l*x + mu - x**3; mu=-1.0, l=1.0)
+    >>> Problem.from_system(pk.Pendulum(length=0.5))
+    Problem(phi' = -V'(phi) of Pendulum(length=0.5, g=9.80665))
     """
 
     __slots__ = (

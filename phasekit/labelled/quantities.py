@@ -609,6 +609,46 @@ PASSES: tuple[Pass, ...] = (
 )
 
 
+def add(row: Quantity, *passes: Pass) -> None:
+    """Add a quantity, a group of its own, with the passes that compute it.
+
+    From then on `sweep` and `quantities` have it; so have worker processes, where this is called
+    in the module that defines the function.
+
+    Parameters
+    ----------
+    row : Quantity
+        The row.
+    *passes : Pass
+        Lines that compute its group, one for each rung of the ladder of laws.
+
+    Raises
+    ------
+    ParameterError
+        If its name or group is taken, a dim is unknown, or no pass computes it.
+
+    Examples
+    --------
+    >>> add(ROWS["phi"], PASSES[0])
+    Traceback (most recent call last):
+    phasekit.errors.ParameterError: row: got 'phi', wants a name that is not taken
+    """
+    global QUANTITIES, PASSES
+    if row.name in {*ROWS, *LABELS, *STATES}:
+        raise bad("row", row.name, "a name that is not taken")
+    if row.group in {other.group for other in QUANTITIES}:
+        raise bad("row", row.name, f"a group of its own; {row.group!r} is taken")
+    for dim in row.dims:
+        if dim not in (row.labels or LABELS):
+            raise unknown("row: dim", dim, row.labels or LABELS)
+    if not passes or any(one.groups != (row.group,) for one in passes):
+        groups = [group for one in passes for group in one.groups]
+        raise bad("passes", groups, f"one or several that compute the group {row.group!r} alone")
+    ROWS[row.name] = row
+    QUANTITIES += (row,)
+    PASSES += passes
+
+
 _NO_LISTS = (bytes, Mapping)
 
 

@@ -73,6 +73,22 @@ class SpecialPoint:
     of f_u (Liapunov-Schmidt). Their quadratic terms decide the directions; where a symmetry leaves
     none of these on the null space of f_x, their cubic terms. At a multiple branch point `message`
     says where directions may be missing.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> swallow = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": 0.0, "l": -1.0})
+    >>> branch = pk.continuation(swallow, "l", x0=[0.0], span=(-1, 1))
+    >>> (crossing,) = branch.special("pitchfork")
+    >>> crossing.status, round(crossing.normal_form["c"], 9)
+    ('converged', -1.0)
+    >>> side = crossing.switch()
+    >>> float(abs(side.points.x**2 - side.points.l).max()) < 1e-9
+    True
+    >>> branch = pk.continuation(swallow.replace(l=1.0), "mu", x0=[-1.3], span=(-1, 1))
+    >>> folds = branch.special("fold")[0].curve("l", (-1, 1))
+    >>> [point.kind for point in folds.special_points]
+    ['end', 'cusp', 'end']
     """
 
     kind: str

@@ -13,7 +13,7 @@ import xarray as xr
 from phasekit.errors import ParameterError
 from phasekit.labelled.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labelled.as_system import as_system
-from phasekit.labelled.dispatch import is_offered, passes_of
+from phasekit.labelled.dispatch import inputs_of, is_offered, passes_of
 from phasekit.labelled.evaluate import Layout, evaluate, lay_out, leaves
 from phasekit.labelled.job import Job, plan_job
 from phasekit.labelled.memory import refuse_too_large
@@ -139,7 +139,12 @@ def sweep(
     dtypes = check_dtypes(dtype, rows)
     rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     target = None if place is None else WholeTarget(place, overwrite=overwrite)
-    ds = evaluate(swept, rows, passes, states=states, order=order, progress=progress)
+    more = inputs_of(swept, rows)
+    ds = evaluate(swept, (*rows, *more), passes, states=states, order=order, progress=progress)
+    if more:
+        own = {dim for row in rows for dim in row.dims}
+        unasked = {row.name for row in more} | {dim for row in more for dim in row.dims} - own
+        ds = ds.drop_vars(sorted(unasked))
     if target is not None:
         target.write(ds)
     return ds
@@ -183,13 +188,14 @@ def _read(
     rows = select(of)
     if of is OFFERED:
         rows = tuple(row for row in rows if is_offered(system, row.group))
-    passes = passes_of(system, rows)
+    along = (*rows, *inputs_of(system, rows))
+    passes = passes_of(system, along)
     needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
     kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
     states = {name: value for name, value in kept.items() if name in STATES}
     order = list(dict.fromkeys(dim for name, value in kept.items() for dim in _dims(name, value)))
-    parameters = {name: value for name, value in kept.items() if name not in STATES}
-    return system.replace(**parameters), rows, passes, states, order
+    swept = system.replace(**{name: x for name, x in kept.items() if name not in STATES})
+    return swept, rows, passes_of(swept, along), states, order  # with what only the axes give
 
 
 def _axes(

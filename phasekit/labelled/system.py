@@ -20,6 +20,7 @@ from phasekit.labelled.arguments import (
     FloatArray,
     NumberLike,
     Value,
+    bad,
     brief,
     named_arguments,
     same,
@@ -29,7 +30,7 @@ from phasekit.labelled.grid import combine
 from phasekit.labelled.identity import parameter_values, refuse_another
 from phasekit.labelled.parameter import Parameter, attrs_of
 from phasekit.labelled.quantities import STATES
-from phasekit.laws.ladder import Law
+from phasekit.laws.ladder import Law, Lawful
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 
@@ -40,12 +41,28 @@ if TYPE_CHECKING:
 #: Every model by its name, as maps store it.
 MODELS: dict[str, type[Model]] = {}
 
-
 ModelType = TypeVar("ModelType", bound="Model")
 
 
-class Model:
-    """Base of the systems: frozen, compared by value, rebuilt from any map that they made."""
+class Model(Lawful):
+    """Base of the systems: frozen, compared by value, rebuilt from any map that they made.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> import phasekit as pk
+    >>> magnet = pk.StonerWohlfarth(K=-2.0, h_x=1.0, h_y=0.5)
+    >>> magnet.coefficients(), magnet.reduced()
+    (Coefficients(A=4.0, B=1.0, C=0.5), Reduced(lam=0.25, psi=0.125, Omega_sq=4.0))
+    >>> made_by = {"phasekit_model": "StonerWohlfarth", "phasekit_schema": "1"}
+    >>> ds = xr.Dataset(coords=magnet.replace(h_x=3.0).parameters, attrs=made_by)
+    >>> magnet.from_dataset(ds)
+    StonerWohlfarth(K=-2.0, h_x=3.0, h_y=0.5)
+    >>> magnet.formula_inputs(), magnet.unit_of("K"), magnet.products(magnet.parameters)
+    (('K', 'h_x', 'h_y'), 's-2', (4.0, 1.0, 0.5, 1))
+    >>> law, K = magnet.trigonometric(), magnet.in_domain("K", 1.0)
+    >>> A, B, C = magnet.valid_coefficients({"K": K, "h_x": 1.0, "h_y": 2.0})
+    """
 
     __slots__ = ()
 
@@ -138,6 +155,8 @@ class Model:
         Coefficients
             Floats, or DataArrays on the parameters' dims where a parameter is an array.
         """
+        if not issubclass(self.rung, Trigonometric):
+            raise bad("system", self, f"{Trigonometric.called}; this needs the closed form")
         names = self.formula_inputs()
         used = {name: self.parameters[name] for name in names}
 
@@ -162,7 +181,27 @@ class Model:
         ParameterError
             If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
         """
-        return reduce(self)
+        A, B, C = self.coefficients()
+        if isinstance(A, float) and A == 0.0:
+            raise ParameterError(
+                "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "
+                "use .coefficients(), which has no such limit"
+            )
+
+        def divide(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
+            with np.errstate(all="ignore"):
+                lam, psi = (np.where(A == 0, np.nan, x / A) for x in (B, C))
+                return lam, psi, A + 0 * (B + C)
+
+        attrs = attrs_of(*self.declared, *Reduced.declared)
+        values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
+        if not all(np.isfinite(value) for value in values if isinstance(value, float)):
+            raise ParameterError(
+                f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which "
+                "lambda = B/A and psi = C/A are finite; use .coefficients(), which has no such "
+                "limit"
+            )
+        return Reduced(*values)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore a pickled model; its arrays are read-only again."""
@@ -360,32 +399,3 @@ class Reduced(Model):
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
         """[Veljovic2015] (12)."""
         return v["Omega_sq"], v["lam"] * v["Omega_sq"], v["psi"] * v["Omega_sq"], 1
-
-
-def reduce(system: Model) -> Reduced:
-    """Return a system in the papers' reduced form; cells with ``A = 0`` become NaN.
-
-    Raises
-    ------
-    ParameterError
-        If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
-    """
-    A, B, C = system.coefficients()
-    if isinstance(A, float) and A == 0.0:
-        raise ParameterError(
-            "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "
-            "use .coefficients(), which has no such limit"
-        )
-
-    def divide(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
-        with np.errstate(all="ignore"):
-            return np.where(A == 0, np.nan, B / A), np.where(A == 0, np.nan, C / A), A + 0 * (B + C)
-
-    attrs = attrs_of(*system.declared, *Reduced.declared)
-    values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
-    if not all(np.isfinite(value) for value in values if isinstance(value, float)):
-        raise ParameterError(
-            f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which lambda = B/A and "
-            "psi = C/A are finite; use .coefficients(), which has no such limit"
-        )
-    return Reduced(*values)

@@ -45,9 +45,26 @@ class Autonomous(Law):
 
 
 class Routhian(Autonomous):
-    """One degree of freedom that a kept momentum leaves of two, with an amended potential."""
+    """One degree of freedom left by constant momenta, with an inertia M: M(x) x'^2/2 + V(x)."""
 
-    called: ClassVar[str] = "a system with a momentum that is kept"
+    called: ClassVar[str] = "a system at constant momenta"
+    #: Name of the coordinate, and its period.
+    coordinate: str
+    period: float
+    #: The momentum that is constant: its name, value and unit.
+    momentum: tuple[str, float, str]
+
+    def potential(self, x: Any) -> tuple[Any, Any, Any]:
+        """V and its first two derivatives."""
+        raise NotImplementedError
+
+    def inertia(self, x: Any) -> tuple[Any, Any]:
+        """M > 0 and its derivative."""
+        raise NotImplementedError
+
+    def equilibria(self) -> Any:
+        """phi, kind, energy and curvature of all equilibria, in the order of phi."""
+        raise NotImplementedError
 
 
 class Conservative(Autonomous):
@@ -60,4 +77,23 @@ class Conservative(Autonomous):
 
     def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V' as a sympy expression of real symbols: of the coordinate and the parameters."""
+        raise NotImplementedError
+
+
+class Lawful:
+    """What has a law: systems, and what motion at constant momenta is."""
+
+    __slots__ = ()
+
+    #: The rung of its law, which says what can be computed of it.
+    rung: ClassVar[type[Law]] = Law
+
+    @property
+    def law(self) -> Law:
+        """The law, and what follows from it."""
+        raise NotImplementedError
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters of the law by name."""
         raise NotImplementedError

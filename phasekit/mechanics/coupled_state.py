@@ -74,8 +74,8 @@ class CoupledRotationState(Frozen):
     45.0
     >>> state.fixed_bearings((0, 0, -20), 0.25).F_B1.round(12).tolist()
     [0.0, -36.4, 0.0]
-    >>> machine.at(domega1=2.0).drive_torque((0, 0, -20)).item()
-    1.0
+    >>> machine.at(domega1=2.0).drive_torque((0, 0, -20)).item(), state.power((0, 0, -20)).item()
+    (1.0, 0.0)
     >>> state.rotators["R01"].tolist(), state.angular_velocities()["R01"].item()
     ([0.0, -9.0, 0.0], 3.0)
     """

@@ -16,6 +16,7 @@ from phasekit.phase.states import Systems, flat, systems
 
 Array = npt.NDArray[np.float64]
 TWO_PI = 2.0 * np.pi
+ROUNDINGS = 8.0 * 2.0**-52
 
 
 class Angles(NamedTuple):
@@ -164,7 +165,9 @@ def state_of(
     member = flat(family, shape)
     value = flat(action, shape)
     least, most = (limit[index, member.astype(int) + 1] for limit in _limits(cells))
-    member[~((value >= least) & (value <= most))] = np.nan
+    # Actions next to a separatrix are those on it within rounding.
+    member[~((value >= least * (1.0 - ROUNDINGS)) & (value <= most * (1.0 + ROUNDINGS)))] = np.nan
+    value = np.clip(value, least, most)
     arrays = (*cells.arrays, index, member, value, flat(angle, shape))
     out = (np.empty(value.size), np.empty(value.size))
     launch(kernels.state_of, arrays, value.size, (out,), threads)

@@ -190,7 +190,7 @@ def energy_rises(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
 
     Examples
     --------
-    >>> energy_rises(2.0, 1.0, 0.0).tolist()
+    >>> energy_rises(2.0, 1.0, 0.0).round(12).tolist()
     [0.25, 0.25, 2.0, 2.25]
     """
     cells = systems(A, B, C, None)

@@ -19,10 +19,10 @@ from phasekit.labelled.machine import FRAMES
 from phasekit.labelled.machine import bearing_forces as forces_of
 from phasekit.labelled.motion import flow
 from phasekit.labelled.orbits import orbits
+from phasekit.phase.level_curves import LevelCurves
 from phasekit.plot import labels, strokes, style
 from phasekit.plot.history import TIME
-from phasekit.plot.landscape import Landscape, is_turn
-from phasekit.plot.portrait import starts_of
+from phasekit.plot.portrait import curves_of, starts_of
 
 FloatArray = NDArray[np.float64]
 Frame = Literal["disk", "carrier"]
@@ -156,7 +156,7 @@ def _loads(
         if orbit is not None:
             raise bad("orbit", orbit, "None beside a motion, which is one")
         return _along_motion(disk, frame)
-    land = Landscape.of(disk)
+    land = curves_of(disk)
     if orbit is None:
         raise bad("orbit", None, "initial conditions (phi0, dphi0) in rad and rad/s")
     starts = starts_of(land, orbit)
@@ -176,16 +176,16 @@ def _loads(
 
 
 def _states(
-    disk: Any, land: Landscape, phi0: float, dphi0: float
+    disk: Any, land: LevelCurves, phi0: float, dphi0: float
 ) -> tuple[FloatArray, FloatArray, list[slice]]:
     """Return the states of an orbit, forth and back if it swings."""
     kind = orbits(disk, phi0, dphi0).orbit_kind
     energy = land.energy(phi0, dphi0)
-    arc = land.basin_of(energy, phi0)
-    if int(kind) == OrbitKind.EQUILIBRIUM or arc is None:
+    arcs = land.arcs_of((energy, phi0))
+    if int(kind) == OrbitKind.EQUILIBRIUM or not arcs:
         return np.array([phi0]), np.array([dphi0]), [slice(0, 1)]
-    phi, speed = land.loop(arc, energy)
-    if is_turn(arc):
+    phi, speed = land.curve(arcs[0], energy)
+    if arcs[0] == land.window:
         way = slice(None) if dphi0 >= 0.0 else slice(None, None, -1)
         return phi[way], float(np.copysign(1.0, dphi0)) * speed[way], [slice(0, phi.size)]
     phi, speed = strokes.closed(phi, speed)

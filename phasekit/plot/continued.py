@@ -102,6 +102,14 @@ def branch(
     ------
     ParameterError
         If an argument is unusable.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> cubic = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    >>> ax = pk.plot.branch(pk.continuation(cubic, "mu", x0=[-1.3], span=(-1, 1)))
+    >>> [text.get_text() for text in ax.texts]
+    ['LP', 'LP']
     """
     flag("labels", labels)
     flag("legend", legend)

@@ -16,12 +16,12 @@ from phasekit.labelled.arguments import bad, flag, unknown
 from phasekit.labelled.as_system import as_system
 from phasekit.labelled.integral import gradient
 from phasekit.labelled.machine import is_disk, rotators
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.rotators import ROTATORS
 from phasekit.phase.potential import gradient as slope
 from phasekit.plot import labels, strokes, style
 from phasekit.plot.history import TIME, motions_of
-from phasekit.plot.landscape import Arc, Landscape, is_turn
-from phasekit.plot.portrait import levels_of, starts_of
+from phasekit.plot.portrait import curves_of, levels_of, starts_of
 
 FloatArray = NDArray[np.float64]
 Plane = tuple[str, str]
@@ -155,14 +155,14 @@ class _Tip:
     """Where the tip of a rotator of one system lies at given states."""
 
     def __init__(self, system: Any, rotator: str, plane: Plane | None) -> None:
-        self.land = Landscape.of(system)
+        self.system = as_system(system, rung=Trigonometric, what="a hodograph")
+        self.land = curves_of(self.system)
         self.rotator, self.plane = rotator, plane
         self.disk = None if plane is None else _disk(system)
 
     def __call__(self, phi: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self.plane is None or self.disk is None:
-            land = self.land
-            return -slope(land.A, land.B, land.C, phi), speed**2
+            return -slope(*self.system.coefficients(), phi), speed**2
         tips = rotators(self.disk, phi, speed).rotator.sel(rotator_name=self.rotator)
         first, second = (tips.sel(carrier_axis=name).values for name in self.plane)
         return first, second
@@ -184,34 +184,23 @@ def _draw_levels(
     starts = starts_of(land, orbits)
     chosen = [] if energies is None and orbits is not None else levels_of(land, energies)
     for level in chosen:
-        for arc in strokes.level_arcs(land, level):
-            look = style.ROTATION if is_turn(arc) else style.LEVEL
-            for u, v in tip.branches(*land.loop(arc, level[0]), is_turn(arc)):
+        for arc in land.arcs_of(level):
+            look = strokes.level_look(land, arc)
+            for u, v in tip.branches(*land.curve(arc, level[0]), land.turns(arc)):
                 _stroke(ax, u, v, zorder=1, **look)
     handles = _draw_separatrices(ax, tip) if energies is None and orbits is None else []
     for number, start in enumerate(starts):
         handles += _draw_orbit(ax, tip, start, number, factor)
-    if tip.plane is None and land.phi.size:
+    if tip.plane is None and land.answers.phi.size:
         handles += ax.plot(0.0, 0.0, zorder=5, **style.ORIGIN)
     return handles
 
 
 def _draw_separatrices(ax: Axes, tip: _Tip) -> list[Artist]:
-    land, handles = tip.land, {}
-    looks = {
-        Loop.LOBES: style.EIGHT,
-        Loop.WINDING: style.WINDING,
-        Loop.HETEROCLINIC: style.CYCLE,
-    }
-    for saddle in (1, 0):
-        loop = Loop(int(land.separatrices.loop[saddle]))
-        if loop == Loop.ABSENT:
-            continue
-        winding = loop == Loop.WINDING
-        halves = [land.winding(saddle)] if winding else [land.lobe(saddle, s) for s in (0, 1)]
-        for phi, speed in halves:
-            for u, v in tip.branches(phi, speed, winding):
-                (handles[loop],) = _stroke(ax, u, v, zorder=3, **looks[loop])
+    handles: dict[Loop, Artist] = {}
+    for energy, arc, loop in tip.land.separatrices:
+        for u, v in tip.branches(*tip.land.curve(arc, energy), loop == Loop.WINDING):
+            (handles[loop],) = _stroke(ax, u, v, zorder=3, **strokes.LOOPS[loop])
     return list(handles.values())
 
 
@@ -220,17 +209,16 @@ def _draw_orbit(
 ) -> list[Artist]:
     land, look = tip.land, strokes.orbit_look(number)
     energy = land.energy(*start)
-    arc: Arc | None = land.basin_of(energy, start[0])
-    if arc is not None:
-        phi, speed = land.loop(arc, energy)
-        if is_turn(arc):
+    for arc in strokes.orbit_arcs(land, start):
+        phi, speed = land.curve(arc, energy)
+        if arc == land.window:
             curves = [tip(phi, speed if start[1] >= 0.0 else -speed)]
         else:
             curves = tip.branches(phi, speed, False)
         for u, v in curves:
             _stroke(ax, u, v, zorder=4, **look)
     u, v = tip(np.array([start[0]]), np.array([start[1]]))
-    name = strokes.start_name(start, factor)
+    name = strokes.start_name(land, start, factor)
     (handle,) = ax.plot(u, v, zorder=6, label=name, **strokes.START, **look)
     return [handle]
 

@@ -12,10 +12,11 @@ from matplotlib.lines import Line2D
 
 from phasekit.errors import EquilibriumKind
 from phasekit.labelled.arguments import FloatArray, bad
+from phasekit.labelled.as_system import as_system, single
 from phasekit.labelled.families import orbit_families
 from phasekit.labelled.phase_space import equilibria, separatrices
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot import style
-from phasekit.plot.landscape import scalar_coefficients
 
 # Where a family begins: the row of its center among the equilibria.
 CENTERS = {"lower_well": 0, "upper_well": 2}
@@ -168,7 +169,8 @@ def _families(
     system: Any, n: int, energy_max: float | None
 ) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
     """Return the families of orbits of one system, its equilibria and its separatrices."""
-    if not any(scalar_coefficients(system)):
+    single(system)
+    if not any(as_system(system, rung=Trigonometric, what="a family of orbits").coefficients()):
         raise bad("system", system, "a system with a force, for without one nothing oscillates")
     families = orbit_families(system, n, energy_max=energy_max)
     return families, equilibria(system), separatrices(system)

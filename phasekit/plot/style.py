@@ -370,6 +370,11 @@ def unwrapped_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
         axis.set_major_formatter(FuncFormatter(multiple_of_pi))
 
 
+def inked(look: Look) -> Look:
+    """Return a look whose black is the color of text, which is light in dark styles."""
+    return {**look, "color": plt.rcParams["text.color"]} if look["color"] == BLACK else look
+
+
 def log_limits(values: Any) -> tuple[float, float] | None:
     """Return the least and the greatest of the finite values > 0, None where there are none."""
     finite = np.asarray(values)[np.isfinite(values) & (np.asarray(values) > 0.0)]
@@ -425,14 +430,18 @@ def legend_below(ax: Axes, handles: list[Artist]) -> None:
     lines = text.get_text().count("\n") + 1
     points = 22.0 + 1.35 * lines * float(text.get_fontsize())
     offset = ScaledTranslation(0.0, -points / 72.0, ax.figure.dpi_scale_trans)
-    ax.legend(
-        handles=handles,
-        loc="upper center",
-        bbox_to_anchor=(0.5, 0.0),
-        bbox_transform=ax.transAxes + offset,
-        ncols=min(3, len(handles)),
-        frameon=False,
-        borderaxespad=0.0,
-        fontsize="small",
-        handlelength=2.6,
-    )
+    for columns in range(min(3, len(handles)), 0, -1):
+        legend = ax.legend(
+            handles=handles,
+            loc="upper center",
+            bbox_to_anchor=(0.5, 0.0),
+            bbox_transform=ax.transAxes + offset,
+            ncols=columns,
+            frameon=False,
+            borderaxespad=0.0,
+            fontsize="small",
+            handlelength=2.6,
+        )
+        # A wider one would be cut, or leave no room for the axes.
+        if legend.get_window_extent().width <= 1.25 * ax.get_window_extent().width:
+            break

@@ -10,11 +10,9 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from phasekit.errors import Loop
-from phasekit.labelled.potential_system import Potential
-from phasekit.plot import potential, strokes, style
-from phasekit.plot.landscape import Arc, Landscape, Level, is_turn
-from phasekit.plot.portrait import levels_of, phase_portrait, starts_of
-from phasekit.plot.terrain import Terrain
+from phasekit.phase.level_curves import Arc
+from phasekit.plot import labels, strokes, style
+from phasekit.plot.portrait import Picture, phase_portrait
 
 
 def potential_well(
@@ -34,7 +32,7 @@ def potential_well(
     Parameters
     ----------
     system
-        A system whose parameters are scalars.
+        As in :func:`phase_portrait`.
     energies, orbits, angles, legend
         As in :func:`phase_portrait`.
     ax : Axes or pair of Axes, optional
@@ -55,7 +53,7 @@ def potential_well(
     -----
     The layout is that of Fig. 4 of [Veljovic2015]. The potential is
     :math:`V = -B\cos\varphi + \tfrac{A}{2}\cos^2\varphi - C\sin\varphi`, eq. (15) there plus the
-    constant :math:`A/2`.
+    constant :math:`A/2`; of a machine on a free support it is the amended one, in J.
 
     Examples
     --------
@@ -64,48 +62,39 @@ def potential_well(
     >>> well.get_xlim() == portrait.get_xlim()
     True
     """
-    land = Terrain.of(system) if isinstance(system, Potential) else Landscape.of(system)
-    factor = style.angle_factor(angles)
-    chosen, starts = levels_of(land, energies), starts_of(land, orbits)
-    if isinstance(land, Terrain):
-        potential.scale_of(land, angles)
-    panels = _panels(ax)
-    well = panels[0]
-    if isinstance(land, Terrain):
-        potential.draw_well(well, land, chosen, starts, factor)
-    else:
-        _draw_well(well, land, chosen, starts, angles)
-    if len(panels) == 1:
+    picture = Picture.of(system, energies, orbits, angles)
+    well, *others = _panels(ax)
+    _draw_well(well, picture)
+    if not others:
         return well
     well.set_xlabel("")
     well.tick_params(labelbottom=False)
     portrait = phase_portrait(
-        system, energies=energies, orbits=orbits, angles=angles, legend=legend, ax=panels[1]
+        system, energies=energies, orbits=orbits, angles=angles, legend=legend, ax=others[0]
     )
     return well, portrait
 
 
-def _draw_well(
-    well: Axes,
-    land: Landscape,
-    chosen: list[Level],
-    starts: list[tuple[float, float]],
-    angles: style.Angles,
-) -> None:
-    factor = style.angle_factor(angles)
-    phi = np.linspace(-np.pi, np.pi, 721)
-    height = land.potential(phi)
-    _draw_chords(well, land, chosen, starts, factor)
-    well.plot(phi * factor, height, color=style.BLACK, linewidth=1.8, zorder=3)
+def _draw_well(well: Axes, picture: Picture) -> None:
+    land, factor = picture.land, picture.factor
+    x = np.linspace(*land.window, 1201)
+    height = land.answers.potential(x)
+    _draw_chords(well, picture)
+    curve = style.inked({"color": style.BLACK, "linewidth": 1.8})
+    well.plot(x * factor, height, zorder=3, **curve)
     strokes.draw_points(well, land, factor, on_potential=True)
-    low, high = float(height.min()), float(height.max())
-    span = high - low if high > low else 1.0
+    # Where V falls without bound, or is steep at the window's ends, show what has a structure.
+    marks = np.append(land.answers.energy, land.summit)
+    span = float(np.ptp(marks)) or float(np.ptp(height)) or 1.0
+    low = max(float(height.min()), float(marks.min()) - 0.2 * span)
+    high = min(float(height.max()), float(marks.max()) + 0.8 * span)
     # A fast rotation lies far above the well; following it would flatten what is to be seen.
-    tallest = min(max([high, *(land.energy(*start) for start in starts)]), high + 1.5 * span)
-    well.set_ylim(low - 0.1 * span, tallest + 0.2 * span)
-    style.circle_axis(well, "x", angles)
-    well.set_ylabel("$V$ (s$^{-2}$)")
-    well.set_xlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
+    reached = max([high, *(land.energy(*start) for start in picture.starts)])
+    well.set_ylim(low - 0.1 * span, min(reached, high + 1.5 * span) + 0.2 * span)
+    picture.coordinate_axis(well)
+    known = land.answers
+    symbol = "V" if known.momentum is None else f"V_{{{known.momentum[0]}}}"
+    well.set_ylabel(f"${symbol}$" + (f" ({labels.unit_text(known.units)})" if known.units else ""))
 
 
 def _panels(ax: Any) -> list[Axes]:
@@ -119,38 +108,27 @@ def _panels(ax: Any) -> list[Axes]:
     return [style.check_axes(ax, "ax (or each of a pair)")]
 
 
-def _draw_chords(
-    ax: Axes,
-    land: Landscape,
-    chosen: list[Level],
-    starts: list[tuple[float, float]],
-    factor: float,
-) -> None:
+def _draw_chords(ax: Axes, picture: Picture) -> None:
     """Draw every energy over the arcs where it is reached: levels, saddles, orbits."""
+    land, factor = picture.land, picture.factor
+    period = land.answers.period
 
-    def chord(energy: float, arcs: list[Arc], zorder: float, look: style.Look) -> None:
-        for arc in arcs:
-            x, y = strokes.round_the_cylinder(np.array(arc), np.full(2, energy))
-            ax.plot(x * factor, y, zorder=zorder, **look)
+    def chord(energy: float, arc: Arc, zorder: float, look: style.Look) -> None:
+        x, y = strokes.round_the_cylinder(np.array(arc), np.full(2, energy), period)
+        ax.plot(x * factor, y, zorder=zorder, **look)
 
-    for level in chosen:
-        arcs = strokes.level_arcs(land, level)
-        turning = bool(arcs) and is_turn(arcs[0])
-        chord(level[0], arcs, 1, style.ROTATION if turning else style.LEVEL)
-    looks = {Loop.LOBES: style.EIGHT, Loop.WINDING: style.WINDING, Loop.HETEROCLINIC: style.CYCLE}
-    for saddle in (1, 0):
-        loop = land.separatrices.loop[saddle]
-        if loop == Loop.ABSENT:
-            continue
-        energy = float(land.separatrices.saddle_energy[saddle])
-        chord(energy, land.basins(energy), 2 + 0.5 * saddle, looks[Loop(int(loop))])
+    for level in picture.levels:
+        for arc in land.arcs_of(level):
+            chord(level[0], arc, 1, strokes.level_look(land, arc))
+    for energy, arc, loop in land.separatrices:
+        chord(energy, arc, 2.5 if loop == Loop.WINDING else 2.0, style.inked(strokes.LOOPS[loop]))
         if loop == Loop.LOBES:
-            for side in (0, 1):
-                phi, _ = land.lobe(saddle, side)
-                for turn in strokes.turns_in_sight(phi):
-                    x = (phi + turn) * factor
-                    ax.fill_between(x, land.potential(phi), energy, zorder=0.5, **style.EIGHT_FILL)
-    for number, (phi0, speed0) in enumerate(starts):
-        energy = land.energy(phi0, speed0)
-        arc = land.basin_of(energy, phi0)
-        chord(energy, [] if arc is None else [arc], 4, strokes.orbit_look(number))
+            phi, _ = land.curve(arc, energy)
+            for turn in strokes.turns_in_sight(phi, period):
+                x = (phi + turn) * factor
+                ax.fill_between(
+                    x, land.answers.potential(phi), energy, zorder=0.5, **style.EIGHT_FILL
+                )
+    for number, start in enumerate(picture.starts):
+        for arc in strokes.orbit_arcs(land, start):
+            chord(land.energy(*start), arc, 4, strokes.orbit_look(number))

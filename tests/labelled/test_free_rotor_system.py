@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -75,6 +76,42 @@ def test_without_a_momentum_it_is_that_of_omega1():
     ds = pk.sweep(free, omega1=[5.0, 15.0])
     assert "momentum" not in ds.coords
     assert ds.isel(omega1=0).phasekit.system() == free.replace(omega1=5.0)
+
+
+def test_an_axis_of_momenta_counts_for_a_machine_that_has_none_of_its_own():
+    free = pk.FreeGyroRotor(DISK, 0.02)
+    p = [0.0, 0.1, 5.0]
+    ds = pk.sweep(free, momentum=p, of=("equilibria", "steady_rotations"))
+    assert ds.n_equilibria.dims == ("momentum",)
+    for i, momentum in enumerate(p):
+        one = pk.equilibria(free.replace(momentum=momentum))
+        n = one.sizes["equilibrium"]
+        assert n >= 2
+        np.testing.assert_array_equal(ds.phi.values[i, :n], one.phi.values)
+
+
+def test_what_follows_from_equilibria_needs_no_mention_of_them():
+    p = [0.1, 0.5]
+    alone = pk.sweep(ROTOR, momentum=p, of="support_speed")
+    both = pk.sweep(ROTOR, momentum=p, of=("phi", "support_speed"))
+    assert list(alone.data_vars) == ["support_speed"]
+    assert np.isfinite(alone.support_speed).sum() >= 4
+    np.testing.assert_array_equal(alone.support_speed, both.support_speed)
+
+
+def test_coefficients_are_refused_and_maps_drawn_without_them():
+    for rotor in (ROTOR, pk.FreeGyroRotor(DISK, 0.02)):
+        for call in (
+            pk.FreeGyroRotor.coefficients,
+            pk.FreeGyroRotor.reduced,
+            pk.plot.phase_portrait,
+        ):
+            with pytest.raises(pk.ParameterError, match="wants a system with coefficients"):
+                call(rotor)
+    ds = pk.sweep(ROTOR, momentum=[0.1, 0.6, 0.8], beta=[0.5, 1.0])
+    ax = ds.phasekit.plot.parameter_map("n_equilibria")
+    assert ax.get_xlabel()
+    plt.close("all")
 
 
 def test_two_centers_appear_where_the_bottom_turns():

@@ -223,3 +223,13 @@ def test_wrong_arguments_are_named(draw, system, options, message):
 @pytest.mark.parametrize("draw", DRAW)
 def test_no_legend(draw):
     assert draw(EIGHT, legend=False).get_legend() is None
+
+
+@pytest.mark.parametrize("draw", DRAW)
+@pytest.mark.parametrize("system", [(1.0, 1.0, 0.0), (-1.0, 1.0, 0.0), (1.0, 0.0, 1.0)])
+def test_cusps_are_drawn(draw, system):
+    """At a center-like cusp there are no small oscillations to begin with."""
+    _, ax = plt.subplots()
+    draw(pk.Coefficients(*system), 20, ax=ax, legend=False)
+    assert len([line for line in ax.lines if len(line.get_xdata()) > 10]) == 2
+    assert np.isfinite([*ax.get_xlim(), *ax.get_ylim()]).all()

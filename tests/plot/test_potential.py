@@ -7,7 +7,7 @@ import pytest
 import phasekit as pk
 from phasekit.labelled.potential_system import Potential
 from phasekit.plot import style
-from phasekit.plot.terrain import Terrain
+from phasekit.plot.portrait import curves_of
 
 WELL = Potential("x^4/4 - x^2/2", "x")
 CUBIC = Potential("x^2/2 - x^3/3", "x")
@@ -94,7 +94,7 @@ INNER, OUTER = np.sqrt(1.0 + np.array([-1.0, 1.0]) * np.sqrt(0.6))
 
 
 def test_arcs_are_where_the_potential_is_lower():
-    land = Terrain.of(WELL)
+    land = curves_of(WELL)
     np.testing.assert_allclose(land.arcs(-0.1), [(-OUTER, -INNER), (INNER, OUTER)], rtol=1e-14)
     np.testing.assert_allclose(land.arcs(0.0), [(-(2**0.5), 0.0), (0.0, 2**0.5)], atol=1e-15)
     assert land.arcs(-1.0) == []

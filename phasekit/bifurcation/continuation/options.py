@@ -65,8 +65,11 @@ class ContinuationOptions:
 
     Examples
     --------
-    >>> ContinuationOptions(max_step=0.01).max_step
+    >>> options = ContinuationOptions(max_step=0.01)
+    >>> options.max_step
     0.01
+    >>> ContinuationOptions(**options.as_dict()) == options
+    True
     """
 
     max_step: float = 0.05

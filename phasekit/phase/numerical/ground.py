@@ -89,9 +89,9 @@ class Anchor:
         return result
 
 
-def survey(systems: Systems) -> Ground:
-    """Find the equilibria of systems, and how far from each of them Gauss' rule holds."""
-    points = equilibria(systems)
+def survey(systems: Systems, points: Equilibria | None = None) -> Ground:
+    """Find the equilibria of systems, if not known, and how far from each Gauss' rule holds."""
+    points = equilibria(systems) if points is None else points
     x = points.phi
     low, high = systems.formula.ends
     period = systems.formula.period

@@ -1,0 +1,179 @@
+"""What is known of one system of one degree of freedom, on whatever rung of the ladder of laws.
+
+Each rung answers by its own methods: the trigonometric law in closed form, any other conservative
+one numerically, and motion at constant momenta along its arc length. One system, plain arrays.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import Loop, ParameterError
+from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.trigonometric import Trigonometric
+from phasekit.phase import potential as closed_form
+from phasekit.phase.numerical import functions
+from phasekit.phase.numerical.arc_length import ArcLength
+from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.separatrices import separatrices
+from phasekit.phase.orbits import orbits
+from phasekit.phase.separatrices import Separatrices, phase_space
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """A law with its parameters: energy M(x) x'^2/2 + V(x), equilibria and separatrices.
+
+    Attributes
+    ----------
+    coordinate : str
+        Name of x.
+    period : float or None
+        Length of the circle, None on a line.
+    ends : (float, float)
+        Where the coordinate lies, infinite on a line.
+    units : str
+        Unit of V; empty where it may be any.
+    phi, kind, energy : numpy.ndarray
+        Equilibria that are there, by their coordinate.
+    saddle_phi, saddle_energy, loop, turning_offset : numpy.ndarray
+        Saddles that are there, the highest first; the offsets have the last axis side.
+    potential, inertia : callable
+        V and M of arrays.
+    orbit : callable
+        `Orbits` of a state (x, x').
+    momentum : (str, float, str), optional
+        Name, value and unit of the momentum that is constant.
+    """
+
+    coordinate: str
+    period: float | None
+    ends: tuple[float, float]
+    units: str
+    phi: Array
+    kind: npt.NDArray[np.int8]
+    energy: Array
+    saddle_phi: Array
+    saddle_energy: Array
+    loop: npt.NDArray[np.int8]
+    turning_offset: Array
+    potential: Callable[[Any], Array]
+    orbit: Callable[[float, float], Any]
+    inertia: Callable[[Any], Array] = np.ones_like
+    momentum: tuple[str, float, str] | None = None
+
+    @property
+    def is_angle(self) -> bool:
+        """Whether the coordinate is an angle in rad."""
+        return _is_turn(self.period)
+
+
+@functools.singledispatch
+def answers(law: Law, values: Mapping[str, float]) -> Answers:
+    """Return what is known of a law at values of its parameters; the most special rung answers.
+
+    Raises
+    ------
+    ParameterError
+        If the law has more than one degree of freedom, or the values are out of bounds.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> law = pk.Coefficients.trigonometric()
+    >>> answers(law, {"A": 2.0, "B": 1.0, "C": 0.0}).phi.round(3).tolist()
+    [-1.047, 0.0, 1.047, 3.142]
+    """
+    raise ParameterError(f"system: got {law.called}, wants one of one degree of freedom")
+
+
+@answers.register
+def _(law: Trigonometric, values: Mapping[str, float]) -> Answers:
+    own = {name: np.asarray(values[name]) for name in law.parameters}
+    A, B, C = map(float, law.coefficients(own))
+    # No potential spans more than this; its square root is a speed.
+    if not np.isfinite(4.0 * abs(A) + 4.0 * abs(B) + 4.0 * abs(C)):
+        raise ParameterError(
+            f"system: got coefficients {A!r}, {B!r}, {C!r}, wants a potential of finite differences"
+        )
+    points, loops = phase_space(A, B, C)
+    return Answers(
+        coordinate=law.coordinate,
+        period=law.period,
+        ends=(-np.pi, np.pi),
+        units="s-2",
+        potential=lambda x: closed_form.potential(A, B, C, x),
+        orbit=lambda x, v: orbits(A, B, C, x, v),
+        **_present(points),
+        **_highest_first(loops),
+    )
+
+
+@answers.register(Conservative)
+def _(law: Formula, values: Mapping[str, float]) -> Answers:
+    law.check_searchable()
+    own = [values[name] for name in law.names]
+    points, loops = functions.phase_space(law, *own)
+    return Answers(
+        coordinate=law.coordinate,
+        period=law.period,
+        ends=law.ends,
+        units="s-2" if _is_turn(law.period) else "",
+        potential=lambda x: law.values(x, *own),
+        orbit=lambda x, v: functions.orbits(law, *own, x, v),
+        **_present(points),
+        **_highest_first(loops),
+    )
+
+
+@answers.register
+def _(law: Routhian, values: Mapping[str, float]) -> Answers:
+    path = ArcLength.of(law)
+    ground = path.ground()
+    found = separatrices(ground)
+    loops = Separatrices._make(field[0] for field in found)
+    saddle = loops.saddle_phi[:, np.newaxis]
+    own = path.place(loops.saddle_phi)
+    offset = path.place(saddle + loops.turning_offset) - own[:, np.newaxis]
+    half = 0.5 * law.period
+    own = half - (half - own) % law.period
+    return Answers(
+        coordinate=law.coordinate,
+        period=law.period,
+        ends=(-half, half),
+        units="J",
+        potential=lambda x: np.asarray(law.potential(x)[0]),
+        orbit=functools.partial(path.orbit, ground),
+        inertia=lambda x: np.asarray(law.inertia(x)[0]),
+        momentum=law.momentum,
+        **_present(law.equilibria()),
+        **_highest_first(loops._replace(saddle_phi=own, turning_offset=offset)),
+    )
+
+
+def _is_turn(period: float | None) -> bool:
+    return period is not None and math.isclose(period, 2.0 * math.pi, rel_tol=1e-12)
+
+
+def _present(points: Any) -> dict[str, Any]:
+    """Equilibria that are there, by phi."""
+    there = np.flatnonzero(np.isfinite(points.phi))
+    order = there[np.argsort(points.phi[there])]
+    return {name: getattr(points, name)[order] for name in ("phi", "kind", "energy")}
+
+
+def _highest_first(loops: Any) -> dict[str, Any]:
+    """Saddles that are there, by their energy."""
+    there = np.flatnonzero(loops.loop > Loop.ABSENT)
+    order = there[np.argsort(-loops.saddle_energy[there], kind="stable")]
+    names = ("saddle_phi", "saddle_energy", "loop", "turning_offset")
+    return {name: getattr(loops, name)[order] for name in names}

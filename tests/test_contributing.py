@@ -1,0 +1,149 @@
+"""The worked examples of the contributing guide run as they stand, and do what they say."""
+
+import re
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.labelled import quantities
+from phasekit.labelled.quantities import Pass, Quantity
+from phasekit.labelled.system import MODELS
+from phasekit.laws.ladder import Conservative
+
+matplotlib.use("Agg")
+GUIDE = Path(__file__).parents[1] / "docs" / "contributing.md"
+SECTIONS = dict(
+    re.findall(
+        r"^## ([^\n]+)\n(.*?)(?=^## |\Z)", GUIDE.read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+)
+
+
+@pytest.fixture(autouse=True)
+def registries(monkeypatch):
+    """The tables and registries as they were before."""
+    models, rows = dict(MODELS), dict(quantities.ROWS)
+    monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
+    monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
+    yield
+    for registry, before in ((MODELS, models), (quantities.ROWS, rows)):
+        registry.clear()
+        registry.update(before)
+    plt.close("all")
+
+
+def run(heading):
+    """The names that the example of a section makes."""
+    (block,) = re.findall(r"```python\n(.*?)```", SECTIONS[heading], re.DOTALL)
+    names = {"__name__": "example"}
+    exec(compile(block, f"{GUIDE.name}: {heading}", "exec"), names)
+    return names
+
+
+def test_every_example_of_the_guide_is_run_here():
+    with_code = {heading for heading, text in SECTIONS.items() if "```python" in text}
+    assert with_code == {
+        "A new quantity",
+        "A new system",
+        "A new picture",
+        "Your own equations, with damping",
+    }
+
+
+def test_a_quantity_is_a_row_and_a_pass():
+    names = run("A new quantity")
+    ds = names["ds"]
+    assert ds.rotation_speed.dims == ("beta",)
+    assert ds.rotation_speed.attrs["units"] == "s-1"
+    assert "rotation_speed" in pk.quantities()
+    for cell in (ds.isel(beta=i) for i in range(ds.sizes["beta"])):
+        # A little faster, it goes round; a little slower, it turns back.
+        center = cell.phi.sel(equilibrium="lower_center").item()
+        speeds = cell.rotation_speed.item() * np.array([1 + 1e-9, 1 - 1e-9])
+        kinds = pk.orbits(cell.phasekit.system(), [center, center], speeds).orbit_kind
+        assert kinds.values.tolist() == [pk.OrbitKind.ROTATION, pk.OrbitKind.LIBRATION]
+    with pytest.raises(pk.ParameterError, match="wants a system with coefficients"):
+        pk.sweep(pk.Potential("k*x**2", "x", {"k": 1.0}), k=[1.0, 2.0], of="rotation_speed")
+
+
+def test_a_quantity_of_any_potential_is_one_of_the_disk_too():
+    row = Quantity("depth", "depth", (), "float64", "s-2", "least energy", "min V", "-")
+    line = Pass(
+        lambda energy: np.fmin.reduce(energy, axis=-1), ("energy",), ("depth",), Conservative
+    )
+    quantities.add(row, line)
+    well = pk.Potential("x^4/4 - k*x^2/2", "x", {"k": 1.0})
+    np.testing.assert_allclose(pk.sweep(well, k=[1.0, 2.0], of="depth").depth, [-0.25, -1.0])
+    swings = pk.sweep(pk.Pendulum(length=1.0), g=[1.0, 2.0], of="depth")
+    np.testing.assert_allclose(swings.depth, [-1.0, -2.0])
+
+
+ROW = Quantity("depth", "depth", ("saddle",), "float64", "s-2", "depth", "V(1)", "-")
+
+
+@pytest.mark.parametrize(
+    ("row", "passes", "message"),
+    [
+        ({"name": "phi"}, [("depth",)], "row: got 'phi', wants a name that is not taken"),
+        ({"name": "saddle"}, [("depth",)], "wants a name that is not taken"),
+        ({"name": "time"}, [("depth",)], "wants a name that is not taken"),
+        ({"group": "orbits"}, [("orbits",)], "wants a group of its own; 'orbits' is taken"),
+        ({"dims": ("sadle",)}, [("depth",)], "did you mean 'saddle'"),
+        ({}, [], r"passes: got \[\], wants one or several that compute the group 'depth'"),
+        ({}, [("depth",), ("width",)], r"passes: got \['depth', 'width'\], wants one or several"),
+    ],
+)
+def test_what_cannot_be_added_is_refused_and_changes_nothing(row, passes, message):
+    before = (dict(quantities.ROWS), quantities.QUANTITIES, quantities.PASSES)
+    changed = {name: row.get(name, getattr(ROW, name)) for name in ROW.__slots__}
+    lines = [Pass(np.abs, ("energy",), groups) for groups in passes]
+    with pytest.raises(pk.ParameterError, match=message):
+        quantities.add(Quantity(**changed), *lines)
+    assert (quantities.ROWS, quantities.QUANTITIES, quantities.PASSES) == before
+
+
+def test_a_system_is_one_class():
+    satellite = run("A new system")["satellite"]
+    k, torque = satellite.shape, satellite.magnet
+    # It flips where the gravity gradient is as strong as the magnet: 3 n^2 k = torque.
+    critical = pk.critical(satellite, "rate").critical_fold.sel(fold="minus").item()
+    assert critical == pytest.approx(np.sqrt(torque / (3.0 * k)), rel=1e-14)
+    fold = pk.critical(satellite, "magnet").critical_fold.sel(fold="minus").item()
+    assert fold == pytest.approx(3.0 * satellite.rate**2 * k, rel=1e-14)
+    counts = [pk.equilibria(satellite.replace(magnet=fold * x)).n_equilibria for x in (0.9, 1.1)]
+    assert [count.item() for count in counts] == [4, 2]
+    ds = pk.sweep(satellite, shape=[0.2, 0.8])
+    assert ds.isel(shape=1).phasekit.system() == satellite
+    assert pk.plot.phase_portrait(satellite).lines
+    with pytest.raises(pk.ParameterError, match="shape: got 2, wants a number from -1 to 1"):
+        satellite.replace(shape=2)
+
+
+def test_a_picture_draws_what_is_there_as_numbers():
+    names = run("A new picture")
+    lines = {line.get_label(): line for line in names["ax"].lines}
+    assert list(lines) == ["left", "right"]
+    for side, line in lines.items():
+        areas = names["ds"].lobe_area.sel(saddle="lower", side=side)
+        assert np.isfinite(areas).sum() > 10
+        np.testing.assert_array_equal(line.get_ydata(), areas)
+    np.testing.assert_allclose(lines["left"].get_xdata(), np.linspace(10, 80, 71), rtol=1e-14)
+    assert "°" in names["ax"].get_xlabel()
+    _, ax = plt.subplots()
+    assert names["lobe_areas"](names["ds"], "beta", ax=ax) is ax
+
+
+def test_damping_moves_no_fold_and_makes_centers_foci():
+    names = run("Your own equations, with damping")
+    fold, branch = names["fold"], names["branch"]
+    critical = pk.critical(names["undamped"], "B").critical_fold.sel(fold="plus").item()
+    assert fold.status == "converged"
+    assert fold["B"] == pytest.approx(critical, rel=1e-12)
+    np.testing.assert_allclose(np.sort(fold.eigenvalues.real), [-0.3, 0.0], atol=1e-9)
+    center = names["damped"].derivatives([names["start"], 0.0])[1]
+    np.testing.assert_allclose(np.linalg.eigvals(center).real, [-0.15, -0.15], rtol=1e-12)
+    assert set(branch.points.n_unstable.values) == {0, 1}

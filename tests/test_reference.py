@@ -1,0 +1,183 @@
+"""Every public name has a page and an example that runs; every row of the tables has its line."""
+
+import importlib.util
+import inspect
+import re
+from enum import IntEnum
+from pathlib import Path
+
+import pytest
+
+import phasekit as pk
+from phasekit.labelled.branch_points import LABELS
+from phasekit.labelled.quantities import PASSES, QUANTITIES
+from phasekit.labelled.system import MODELS
+from phasekit.laws.trigonometric import Trigonometric
+
+DOCS = Path(__file__).parents[1] / "docs"
+#: What has no docstring of its own: numbers, a string, a module.
+PLAIN = {"__version__", "deg", "plot", "rpm"}
+
+
+@pytest.fixture(scope="module")
+def tables():
+    spec = importlib.util.spec_from_file_location("tables", DOCS / "tables.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.fixture(scope="module")
+def pages(tables):
+    return tables.pages()
+
+
+def listed():
+    """Names with a page of their own: entries of the lists of docs/api.md."""
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    blocks = re.findall(r":toctree: generated\n\n(.*?)```", text, re.DOTALL)
+    return [name for block in blocks for name in block.split()]
+
+
+def find(name):
+    thing = pk
+    for part in name.split("."):
+        if inspect.ismodule(thing) and not hasattr(thing, part):
+            importlib.import_module(f"{thing.__name__}.{part}")
+        thing = getattr(thing, part)
+    return thing
+
+
+def examples(thing):
+    """The lines of a docstring that run."""
+    doc = thing.__doc__ or ""
+    return "\n".join(line for line in doc.splitlines() if line.lstrip().startswith((">>>", "...")))
+
+
+def methods(cls):
+    """Public methods that a class has of phasekit, not those of int, tuple or Exception."""
+    for name in dir(cls):
+        raw = inspect.getattr_static(cls, name)
+        function = getattr(raw, "__func__", raw)
+        if not name.startswith("_") and inspect.isfunction(function):
+            if function.__module__.startswith("phasekit"):
+                yield name
+
+
+def is_shown(cls, name):
+    """Whether a method, or a class that has it, shows in an example how it is called."""
+    owners = [owner for owner in cls.__mro__ if hasattr(owner, name)]
+    own = [owner.__dict__[name] for owner in owners if name in owner.__dict__]
+    calls = any(re.search(rf"\.{name}\(", examples(owner)) for owner in owners)
+    return calls or any(examples(getattr(raw, "__func__", raw)) for raw in own)
+
+
+def test_every_public_name_has_a_page():
+    names = listed()
+    assert len(names) == len(set(names))
+    wanted = {*pk.__all__} - PLAIN | {f"plot.{name}" for name in pk.plot.__all__}
+    assert len(wanted) > 60
+    assert wanted <= set(names), sorted(wanted - set(names))
+    assert {"labelled.accessor.PhasekitAccessor", "labelled.accessor.MapPlots"} <= set(names)
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    assert all(f"`pk.{name}`" in text for name in PLAIN - {"plot"})
+
+
+@pytest.mark.parametrize("name", listed())
+def test_everything_with_a_page_has_an_example(name):
+    thing = find(name)
+    assert examples(thing), name
+    if inspect.isclass(thing):
+        bare = [method for method in methods(thing) if not is_shown(thing, method)]
+        assert not bare, f"{name}: no example of {', '.join(bare)}"
+
+
+def test_an_example_is_missed_where_there_is_none():
+    class Bare:
+        """Says nothing.
+
+        >>> Bare().shown()
+        """
+
+        def shown(self):
+            """Is shown above."""
+
+        def alone(self):
+            """Is not."""
+
+    assert [is_shown(Bare, name) for name in ("shown", "alone")] == [True, False]
+
+
+def test_all_pages_are_linked(pages):
+    index = (DOCS / "index.md").read_text(encoding="utf-8")
+    api = (DOCS / "api.md").read_text(encoding="utf-8")
+    for name in pages:
+        assert f"\ngenerated/{name}\n" in index
+        assert f"(generated/{name}.md)" in api
+
+
+def cells(line):
+    return [cell.strip().replace(r"\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+
+
+def test_each_row_of_the_table_is_on_its_page_with_its_group(pages):
+    sections = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", pages["quantities"], re.M | re.S))
+    assert len(QUANTITIES) > 80
+    for row in QUANTITIES:
+        (line,) = re.findall(rf"^\| `{row.name}` \|.*$", sections[row.group], re.MULTILINE)
+        found = cells(line)
+        assert f"`{row.units}`" in found
+        assert any(cell.startswith(f"`{row.equation}`") for cell in found)
+        assert all(f"`{dim}`" in line for dim in row.dims)
+    for one in PASSES:
+        for group in set(one.groups) - {"labels"}:
+            (line,) = (
+                x
+                for x in sections[group].splitlines()
+                if x.endswith(f"`{one.function.replace(':', '.')}` |") and one.of.called in x
+            )
+            assert all(f"`{name}`" in line for name in one.inputs if name != "law")
+
+
+def test_tables_have_as_many_cells_in_each_line(pages):
+    for text in pages.values():
+        for block in re.findall(r"(?:^\|.*\|\n)+", text, re.MULTILINE):
+            widths = {len(cells(line)) for line in block.splitlines()}
+            assert len(widths) == 1
+            assert widths.pop() > 1
+
+
+def test_each_system_has_its_parameters_and_its_law(pages, tables):
+    sections = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", pages["systems"], re.M | re.S))
+    assert set(sections) == {name for name in MODELS if hasattr(pk, name)}
+    for name, cls in MODELS.items():
+        for parameter in cls.declared:
+            (line,) = re.findall(rf"^\| `{parameter.name}` \|.*$", sections[name], re.MULTILINE)
+            assert f"`{parameter.units}`" in line
+            assert tables.plain(parameter.wants) in line
+        assert ("A &= " in sections[name]) == (cls.rung is Trigonometric)
+    assert r"B &= \frac{g}{\mathrm{length}}" in sections["Pendulum"]
+    assert "| mass of the disk | a number \\> 0 in kg |  |" in sections["FreeGyroRotor"]
+
+
+def test_every_kind_of_special_point_has_a_line(pages):
+    for kind, label in LABELS.items():
+        assert f"| `{kind}` | `{label}` |" in pages["special_points"]
+    assert "| `no_force` | `NF` |" in pages["special_points"]
+
+
+def test_every_code_has_a_line(pages):
+    enums = [thing for name in pk.__all__ if inspect.isclass(thing := getattr(pk, name))]
+    enums = [thing for thing in enums if issubclass(thing, IntEnum)]
+    assert len(enums) == 5
+    for cls in enums:
+        section = pages["codes"].partition(f"## {cls.__name__}\n")[2].partition("\n## ")[0]
+        lines = [f"| {one.value} | `{one.name.lower()}` |" for one in cls]
+        assert [x for x in section.splitlines() if re.match(r"\| -?\d", x)] == lines
+
+
+def test_a_map_of_a_free_rotor_without_its_mass_says_so():
+    disk = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.05, r=0.1, omega1=6.0, m=2.0)
+    ds = pk.sweep(pk.FreeGyroRotor(disk, 0.02), momentum=[0.0, 0.1])
+    with pytest.raises(pk.ParameterError, match="no coordinate 'm'"):
+        ds.drop_vars("m").phasekit.system()
