@@ -34,7 +34,7 @@ def describe(value: object) -> str:
     >>> describe(30), describe([[1, 2], [3, 4]]), describe(None)
     ('30', 'a 2-D list of shape (2, 2)', 'None')
     """
-    if isinstance(value, np.ma.core.MaskedConstant):
+    if isinstance(value, np.ma.MaskedArray) and value.ndim == 0 and value.mask:
         return "a masked value"
     if is_labelled(value):
         labelled: Any = value

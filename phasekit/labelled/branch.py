@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from os import PathLike
 from types import MappingProxyType
 from typing import Any
@@ -218,6 +218,12 @@ class Branch:
         loaded: Branch = module.load(path, problem, record)
         return loaded
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made again of what was traced, as when a branch is loaded."""
+        curve, problem = self.known()
+        kept = {f.name: getattr(curve, f.name) for f in fields(curve) if f.name != "field"}
+        return _again, (problem, kept, self.start, self.tracks, dict(self.record))
+
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""
         u = {name: self._points[name].values for name in self.free}
@@ -262,6 +268,16 @@ def make_branch(
     )
     object.__setattr__(branch, "special_points", made)
     return branch
+
+
+def _again(
+    problem: Problem,
+    curve: Mapping[str, Any],
+    start: Sample,
+    tracks: tuple[Track | None, Track | None],
+    record: Record,
+) -> Branch:
+    return make_branch(problem, Curve(problem.field, **curve), start, *tracks, record)
 
 
 def _ends(curve: Curve, path: Path) -> list[Placed]:

@@ -43,6 +43,8 @@ class MapInfo:
     @property
     def verdict(self) -> str:
         """What is known of a map in which no damage was found."""
+        if any(variable.encoding.get("fletcher32") for variable in self.ds.variables.values()):
+            return "verified: the arrays are as they were written"
         without = "all files can be read; they have no checksums"
         if self.plan is None or not any(part.checked for part in self.plan.parts):
             return f"verified: {without}"

@@ -211,6 +211,8 @@ def place_of(store: Any) -> Place:
     ------
     ParameterError
         If it is neither a path, nor a URL, nor a zarr store.
+    StoreError
+        If nothing can be there.
     """
     if not isinstance(store, (str, os.PathLike)):
         if _is_zarr_store(store):
@@ -228,8 +230,11 @@ def place_of(store: Any) -> Place:
         text = url2pathname(parts.path)
     try:
         path = Path(text).expanduser()
+        path.exists()
     except RuntimeError as error:  # no such user
         raise bad("store", text, f"a path that can exist: {error}") from None
+    except OSError as error:  # a name that is too long, or a folder that may not be looked into
+        raise StoreError(f"store: {text:.80} cannot be reached: {error.strerror}") from error
     return Place(str(path), path=path.absolute(), key=str(path.absolute()))
 
 

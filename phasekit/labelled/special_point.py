@@ -166,6 +166,11 @@ class SpecialPoint:
         """The curve of such points in this branch's parameter and a second one."""
         return _module("point_curve")(self, parameter, span, options=options)  # type: ignore[no-any-return]
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold their branch, of which they are the same point."""
+        places = (i for i, one in enumerate(self.branch.special_points) if one is self)
+        return _point_of, (self.branch, next(places))
+
     def __repr__(self) -> str:
         """Write kind, place and how well it is known."""
         where = [f"{name}={self.parameters[name]:.10g}" for name in self.branch.free]
@@ -178,6 +183,10 @@ class SpecialPoint:
         notes += [self.message] if self.message else []
         text = f"{self.label} {self.kind} at {', '.join(where)}"
         return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
+
+
+def _point_of(branch: Branch, place: int) -> SpecialPoint:
+    return branch.special_points[place]
 
 
 def _module(name: str) -> Callable[..., Any]:

@@ -66,7 +66,8 @@ class WholeTarget:
                 if self.path.suffix == ZARR:
                     ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
                 else:
-                    ds.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
+                    checked = _with_checksums(ds)
+                    checked.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
                 self._refuse_existing()  # it may have appeared while the map was computed
                 if self.path.is_dir():
                     self.path.rename(Path(scratch) / "replaced")
@@ -75,6 +76,15 @@ class WholeTarget:
             if isinstance(error, StoreError):
                 raise
             raise StoreError(f"store: {self.path} was not written: {error}") from error
+
+
+def _with_checksums(ds: xr.Dataset) -> xr.Dataset:
+    """Ask for checksums of arrays in HDF5, which has none for scalars and strings."""
+    ds = ds.copy()
+    for variable in ds.variables.values():
+        if variable.size and variable.ndim and variable.dtype.kind in "biuf":
+            variable.encoding = {**variable.encoding, "fletcher32": True}
+    return ds
 
 
 def target_of(store: Any) -> Place:
@@ -102,8 +112,8 @@ def open_map(
         Chunks of dask arrays, as in `xarray.open_dataset`. Default: no dask; values are read
         when they are used.
     verify : bool, default False
-        Read all files at once and compare their checksums. Stores of phasekit before checksums
-        and netCDF files are only read through.
+        Read all files at once and compare their checksums, which in netCDF files only arrays of
+        numbers have. Files of phasekit before checksums are only read through.
 
     Returns
     -------

@@ -24,7 +24,7 @@ from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.separatrices import separatrices
 from phasekit.phase.orbits import orbits
-from phasekit.phase.separatrices import Separatrices, phase_space
+from phasekit.phase.separatrices import phase_space
 
 Array = npt.NDArray[np.float64]
 
@@ -140,7 +140,7 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
     path = ArcLength.of(law)
     ground = path.ground()
     found = separatrices(ground)
-    loops = Separatrices._make(field[0] for field in found)
+    loops = found._make(field[0] for field in found)
     saddle = loops.saddle_phi[:, np.newaxis]
     own = path.place(loops.saddle_phi)
     offset = path.place(saddle + loops.turning_offset) - own[:, np.newaxis]

@@ -179,3 +179,23 @@ def test_problems_travel(f):
     for other in (copy.copy(problem), copy.deepcopy(problem), pickle.loads(pickle.dumps(problem))):
         again = pk.continuation(other, "r", x0=[0.9], span=(0.7, 2.0))
         np.testing.assert_array_equal(again.points.x, branch.points.x)
+
+
+@pytest.mark.parametrize("f", [["r*x - x**3"], _logistic])
+def test_branches_and_special_points_travel(f):
+    """Copies and pickles of a branch hold the same points, and go on as it does."""
+    options = pk.ContinuationOptions(max_points=40, bounds={"x": (-3.0, 3.0)}, scales={"x": 2.0})
+    branch = pk.continuation(
+        pk.Problem(f, "x", {"r": 1.0}), "r", x0=[0.9], span=(-1.0, 2.0), options=options
+    )
+    number = next(i for i, s in enumerate(branch.special_points) if s.kind != "end")
+    special = branch.special_points[number]
+    for travel in (copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))):
+        again = travel(branch)
+        assert again.to_dataset().identical(branch.to_dataset())
+        assert repr(again) == repr(branch)
+        assert again.curve.options == options
+        point = travel(special)
+        assert point is point.branch.special_points[number]
+        assert repr(point) == repr(special)
+        np.testing.assert_array_equal(point.directions, special.directions)

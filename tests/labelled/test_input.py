@@ -128,6 +128,8 @@ def test_masked_parameters_and_states_are_invalid_cells():
 def test_a_masked_scalar_is_refused():
     with pytest.raises(pk.ParameterError, match=r"^phi: got a masked value, wants a finite number"):
         pk.potential(C, np.ma.masked)
+    with pytest.raises(pk.ParameterError, match=r"^phi: got a masked value, wants a finite number"):
+        pk.potential(C, np.ma.array(0.2, mask=True))
 
 
 def test_masks_on_the_mechanics_floor():

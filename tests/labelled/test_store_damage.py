@@ -672,3 +672,28 @@ def test_damage_of_stores_without_checksums(tmp_path):
 
 def test_sizes_are_of_the_place(store):
     assert place_of(store).size() == sum(map(len, content(store).values()))
+
+
+def test_bits_that_flip_in_arrays_of_netcdf_files_are_noticed(tmp_path, capsys):
+    path = tmp_path / "map.nc"
+    ds = pk.sweep(pk.Reduced(0.1, 0.2), lam=np.linspace(0.1, 0.9, 9), store=path).load()
+    ds.close()
+    assert main(["info", str(path), "--verify"]) == 0
+    assert "verified: the arrays are as they were written" in capsys.readouterr().out
+    intact = path.read_bytes()
+    for name in ("lam", "phi", "n_equilibria"):
+        place = intact.index(ds[name].values.tobytes())
+        data = bytearray(intact)
+        data[place + ds[name].nbytes // 2] ^= 4
+        path.write_bytes(data)
+        with pytest.raises(pk.StoreError, match="cannot be read"):
+            pk.open_map(path, verify=True)
+        assert main(["info", str(path), "--verify"]) == 2
+
+
+@pytest.mark.parametrize(
+    "call", [pk.open_map, lambda p: pk.sweep(pk.Reduced(1, 1), {"lam": [1]}, store=p)]
+)
+def test_names_that_are_too_long_are_refused(call, tmp_path):
+    with pytest.raises(pk.StoreError, match="cannot be reached: File name too long"):
+        call(tmp_path / f"{'x' * 300}.zarr")

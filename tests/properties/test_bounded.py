@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labelled.dispatch import passes_of
+from phasekit.labelled.dispatch import is_offered, passes_of
 from phasekit.labelled.quantities import ROWS, STATES
 from phasekit.phase import loads
 
@@ -39,7 +39,7 @@ def swept(system, group, rng):
     return pk.sweep(system, axes, of=group)
 
 
-GROUPS = dict.fromkeys(row.group for row in pk.quantities().values())
+GROUPS = dict.fromkeys(row.group for row in pk.quantities().values() if is_offered(DISK, row.group))
 LOADS = [group for group in GROUPS if "forces" in group or "rotators" in group]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -133,6 +134,10 @@ class ContinuationOptions:
             if not scales[name] > 0.0:
                 raise bad("scales", value, f"for {name} a number > 0")
         object.__setattr__(self, "scales", MappingProxyType(scales))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made from the values."""
+        return functools.partial(type(self), **self.as_dict()), ()
 
     def as_dict(self) -> dict[str, Any]:
         """The options as plain values, which make the same options again."""

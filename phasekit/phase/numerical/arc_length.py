@@ -18,7 +18,6 @@ from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula, Shape
 from phasekit.phase.numerical.ground import Ground, survey
 from phasekit.phase.numerical.systems import Systems
-from phasekit.phase.orbits import Orbits
 
 Array = npt.NDArray[np.float64]
 
@@ -163,13 +162,18 @@ class ArcLength:
         center = np.where(kind == EquilibriumKind.CENTER, rate, np.nan)
         saddle = np.where(kind == EquilibriumKind.SADDLE, rate, np.nan)
         columns = (place[order], kind, energy, curvature, center, saddle)
-        points = Equilibria._make([a[np.newaxis] for a in columns] + [np.array([phi.size])])
+        points = Equilibria(
+            *(a[np.newaxis] for a in columns),
+            n_equilibria=np.array([phi.size], np.int16),
+            complete=np.array([True]),
+            gaps=np.full((1, 2), np.nan),
+        )
         return survey(Systems(self.formula(), (), 1), points)
 
-    def orbit(self, ground: Ground, x: float, v: float) -> Orbits:
+    def orbit(self, ground: Ground, x: float, v: float) -> rounds.Orbits:
         """The orbit through a state (x, x')."""
         speed = v * np.sqrt(self.law.inertia(x)[0])
         found = rounds.orbits(ground, self.length([x]), np.array([speed]))
         ends = (self.place(found.phi_min), self.place(found.phi_max))
         found = found._replace(phi_min=ends[0], phi_max=ends[1])
-        return Orbits._make(field[0] for field in found)
+        return rounds.Orbits._make(field[0] for field in found)

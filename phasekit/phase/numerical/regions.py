@@ -241,9 +241,14 @@ class Regions(Bounds):
 
 @functools.lru_cache(maxsize=128)
 def slope_regions(formula: Formula) -> Regions | None:
-    """Bounds of V' over rectangles of (x, parameters); None where a function has no rule."""
+    """Bounds of V' over rectangles of (x, parameters); None where a function has no rule.
+
+    One that is not given by an expression has none.
+    """
     import sympy as sp
 
+    if formula.expression is None:
+        return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
     try:
         return Regions((sp.diff(formula.expression, x),), (x, *parameters))
