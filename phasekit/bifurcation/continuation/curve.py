@@ -226,8 +226,12 @@ class Curve:
             else:
                 value = np.abs(self.values(points))
                 terms = np.empty_like(value)
-                for k, point in enumerate(points):
-                    terms[k] = np.abs(slopes[k]) @ np.abs(point)
+                chunk = max(1, MOST // (n * m))
+                for k in range(0, len(points), chunk):
+                    some = slice(k, k + chunk)
+                    terms[some] = np.einsum(
+                        "kij,kj->ki", np.abs(slopes[some]), np.abs(points[some])
+                    )
             return np.asarray(
                 np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
             )

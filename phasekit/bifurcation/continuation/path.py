@@ -32,6 +32,7 @@ class Path:
     info: Array
     start: int
     stops: tuple[Stop, Stop]
+    eigenvalues: npt.NDArray[np.complex128] | None = None  # of f_x, where slopes are kept
 
     @property
     def count(self) -> int:
@@ -74,16 +75,18 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
         stops = (forward.stop, forward.stop)
     u = table[:, :size]
     slopes: Array | Slopes = Slopes(curve, u)
+    values = None
     if curve.keeps:
         kept = [start.slopes.reshape(1, -1)]
         if backward is not None:
             kept.insert(0, backward.slopes[::-1])
         if forward is not None:
             kept.append(forward.slopes)
-        slopes = _sharpened(curve, u, np.concatenate(kept).reshape(-1, n, m))
+        slopes, values = _sharpened(curve, u, np.concatenate(kept).reshape(-1, n, m))
     return Path(
-        u, table[:, size : 2 * size], slopes, table[:, -trace.RECORDED :], len(behind), stops
-    )
+        u, table[:, size : 2 * size], slopes, table[:, -trace.RECORDED :], len(behind), stops,
+        values,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -106,21 +109,26 @@ class Slopes:
             yield slice(first, min(first + step, len(self.u)))
 
 
-def _sharpened(curve: Curve, u: Array, slopes: Array) -> Array:
+def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArray[np.complex128]]:
     """Derivatives at the points themselves, where the sign of an eigenvalue could hang on it.
+
+    And the eigenvalues.
 
     A trace leaves those of the point before the last Newton step. On curves of special points an
     eigenvalue is zero everywhere, and its sign says nothing.
     """
+    accuracy = curve.field.accuracy
+    values = eigenvalues_of(slopes, accuracy=accuracy)
     if curve.kind != EQUILIBRIUM:
-        return slopes
-    values = eigenvalues_of(slopes)
+        return slopes, values
     size = np.max(np.abs(values), axis=1)
     with np.errstate(all="ignore"):
         doubtful = np.min(np.abs(values.real), axis=1) < DOUBTFUL * np.nanmax(size)
-    for i in np.flatnonzero(doubtful):
-        slopes[i] = curve.at(u[i])[1]
-    return slopes
+    if doubtful.any():
+        for i in np.flatnonzero(doubtful):
+            slopes[i] = curve.at(u[i])[1]
+        values = eigenvalues_of(slopes, accuracy=accuracy)
+    return slopes, values
 
 
 def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | None:
