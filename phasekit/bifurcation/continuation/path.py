@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.kernels import trace
-from phasekit.kernels.defining import EQUILIBRIUM
+from phasekit.kernels.defining import EQUILIBRIUM, HOPF
 
 Array = npt.NDArray[np.float64]
 
@@ -146,11 +146,31 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
         + h * s * (1.0 - s) * ((1.0 - s) * a.tangent - s * b.tangent)
     )
     guess += (s - np.dot(row, guess - a.u) / np.dot(row, chord)) * chord
+    if curve.kind == HOPF:
+        curve, guess = _in_phase(curve, a if s < 0.5 else b, guess)
     point = curve.refine(guess, row)
     if not point.converged or curve.length(point.u - guess) > 0.5 * h:
         return None
     sign = 1.0 if np.dot(row, point.tangent) >= 0.0 else -1.0
     return Sample(point.u, sign * point.tangent, point.slopes)
+
+
+def _in_phase(curve: Curve, near: Sample, guess: Array) -> tuple[Curve, Array]:
+    """A Hopf curve whose phase condition is that of a point of it, and v as it is there.
+
+    A trace turns v in its plane from time to time.
+    """
+    n, m = curve.n, curve.m
+    sizes = curve.scale[m : m + n]
+    v = near.u[m : m + n] / sizes
+    y = near.slopes[:, :n] @ (v * sizes) / sizes
+    y = y - np.dot(v, y) / np.dot(v, v) * v
+    length = float(np.linalg.norm(y))
+    if not length > 0.0:
+        return curve, guess
+    guess = guess.copy()
+    guess[m : m + n] = near.u[m : m + n]
+    return curve.replace(aux=y / length / sizes), guess
 
 
 def bracket_root(

@@ -141,7 +141,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
 def _null_spaces(bordered: Array, n: int, m: int, k: int) -> tuple[Array, Array, Array] | None:
     """Phi, G and Psi of a bordered matrix, None if it is singular itself."""
     try:
-        inverse = np.linalg.inv(bordered)
+        inverse = np.asarray(np.linalg.inv(bordered), dtype=float)
     except np.linalg.LinAlgError:
         return None
     if not np.isfinite(inverse).all():
