@@ -9,13 +9,20 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.bifurcation.continuation.fields import SymbolicField
+
 NOISE = 1e-8  # real parts that are smaller, relative to the largest eigenvalue, have no sign
 SAME = 1e-6  # distance on scaled axes
+ROUNDING = 1e-13  # of a formula, relative to its terms
 
 
 def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bool) -> None:
     """Hold the special points of a path of equilibria against the eigenvalues at its points."""
     specials = [one.special for one in placed]
+    if isinstance(curve.field, SymbolicField):
+        residuals = curve.residuals(path.u, path.slopes)
+        worst = int(np.argmax(residuals))
+        assert residuals[worst] <= ROUNDING, (path.u[worst], residuals[worst])
     for special in specials:
         assert special.status in ("converged", "guess")
         assert special.status == "converged" or special.message, special

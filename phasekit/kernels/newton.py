@@ -23,6 +23,7 @@ LITTLE = 0.1  # of an unknown
 NOTHING = 1e-30  # of an unknown's scale
 NEIGHBOURS = 8
 APART = 4.2e-14  # of unknowns; no power of two, which would show the same rounding everywhere
+FEW = 6  # unknowns up to which Python's own numbers are faster than NumPy's arrays
 RAISED = 1e-10  # tolerances from here on are for noisy functions
 # Why it fails: steps that do not shrink, a singular matrix, f that is not finite.
 DIVERGED, SINGULAR, NO_NUMBER = -1, -2, -3
@@ -125,6 +126,8 @@ def settled(
     here: what is small against its scale may still have changed by much. After some steps,
     ``late``, what is next to nothing on its scale is taken for zero.
     """
+    if n <= FEW:
+        return _settled(w.tolist(), jac, rows, n, u, scale, b, factor, late)
     scales = w[scale : scale + n]
     steps, sizes = np.abs(scales * w[b : b + 2 * n : 2]), np.abs(w[u : u + n])
     nothing = NOTHING if late else 0.0

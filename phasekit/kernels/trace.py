@@ -325,7 +325,11 @@ def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
 
 @routine
 def turn_phase(w: Array, n: int, m: int, size: int, aux: int, base: int, y: int) -> None:
-    """Keep the phase condition l.v = 0 of a Hopf curve away from where it decides nothing."""
+    """Keep v of a Hopf curve off eigenvectors, and the phase condition l.v = 0 one that decides.
+
+    Where v is an eigenvector, as it may become on neutral saddles, the curve meets one on which
+    only one eigenvalue counts. In the invariant plane, v is turned to where f_x turns it most.
+    """
     scale = SCALE * size + m  # of v
     along = 0.0
     large = 0.0
@@ -342,6 +346,23 @@ def turn_phase(w: Array, n: int, m: int, size: int, aux: int, base: int, y: int)
         square += w[y + i] * w[y + i]
         product += w[aux + i] * w[scale + i] * w[y + i]
     root = np.sqrt(square)
-    if root > 1e-6 * large and abs(product) < 0.5 * root:
-        for i in range(n):
-            w[aux + i] = w[y + i] / (root * w[scale + i])
+    if not root > 1e-6 * large:
+        return
+    # f_x on the plane, by v and what is across it: trace zero, determinant k.
+    back = -(w[m + n] + along * along) / root
+    even, odd = 0.5 * (root - back), 0.5 * (root + back)
+    amplitude = np.sqrt(odd * odd + along * along)
+    sign = 1.0 if even >= 0.0 else -1.0
+    turned = root < 0.5 * (abs(even) + amplitude)
+    if not turned and abs(product) >= 0.5 * root:
+        return
+    angle = 0.5 * np.arctan2(-sign * along, sign * odd) if turned else 0.0
+    c, s = np.cos(angle), np.sin(angle)
+    for i in range(n):
+        v, across = w[m + i] / w[scale + i], w[y + i] / root
+        w[m + i] = (c * v + s * across) * w[scale + i]
+        w[aux + i] = (c * across - s * v) / w[scale + i]
+        if turned:  # it is predicted to stay
+            w[size + m + i] = 0.0
+            w[2 * size + m + i] = 0.0
+    w[7 * size + SIDE] = 0.0  # the determinant is another one

@@ -105,7 +105,7 @@ def points_of(
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
     """Eigenvalues of f_x at a point; NaN where f is not finite."""
-    return np.asarray(eigenvalues_of(curve.at(u)[1][None])[0])
+    return np.asarray(eigenvalues_of(curve.at(u)[1][None], accuracy=curve.field.accuracy)[0])
 
 
 def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDArray[np.int8]:

@@ -409,3 +409,13 @@ def test_two_brusselators_part():
         x = [float(side.points[name][i]) for name in ("x", "y", "u", "v")]
         value = f(x, B=float(side.points.B[i]), A=1.0, d=0.2, D=1.0)
         assert np.abs(value).max() < 1e-10
+
+
+def test_a_branch_that_ends_in_what_differences_miss_says_so():
+    def f(x, p):
+        return [p - x[0] + 1e-6 * np.sin(x[0] / 1e-7)]
+
+    problem = pk.Problem(f, state="x", parameters={"p": 0.5})
+    branch = pk.continuation(problem, "p", x0=[0.5], span=(0.4, 1.5))
+    assert [stop.reason for stop in branch.stops] == ["stuck", "stuck"]
+    assert all("derivatives are differences" in stop.message for stop in branch.stops)

@@ -10,6 +10,8 @@ from published import compare, reference
 from published.compare import kind_of
 from published.systems import SYSTEMS
 
+import phasekit as pk
+
 
 def special(branch, kind, index=0):
     found = [one for one in branch.special_points if kind_of(one) == kind]
@@ -124,3 +126,24 @@ def test_two_bogdanov_takens_points_a_hair_apart(gap, centre):
     found = sorted(one.parameters["m"] for one in curve.special("BT"))
     assert np.allclose(found, [centre - 0.5 * gap, centre + 0.5 * gap], atol=1e-8)
     assert len(found) == 2
+
+
+@pytest.mark.parametrize("max_step", [0.05, 0.1, 0.5])
+@pytest.mark.parametrize("index", [0, 1])
+def test_hopf_curves_pass_into_neutral_saddles_whatever_the_step(index, max_step):
+    """Beyond a Bogdanov-Takens point no eigenvector becomes a solution of its own."""
+    branch = compare.follow(SYSTEMS["CO oxidation, k = 0.4"])
+    options = pk.ContinuationOptions(max_step=max_step)
+    curve = special(branch, "hopf", index).curve("k", (0.1, 2.0), options=options)
+    assert [stop.reason for stop in curve.stops] == ["bound", "bound"], curve
+    found = sorted(
+        (kind_of(one), round(one.parameters["k"], 5))
+        for one in curve.special_points
+        if one.kind != "end"
+    )
+    assert found == [
+        ("bogdanov_takens", 0.72234),
+        ("bogdanov_takens", 0.9714),
+        ("generalized_hopf", 0.23249),
+        ("generalized_hopf", 0.30588),
+    ]

@@ -106,10 +106,12 @@ class PythonField(Field):
         super().__init__(states, parameters)
         self.function, self.jacobian = function, jacobian
         self.scale = np.ones(len(states) + len(parameters))
+        self.sizes: list[float] = self.scale.tolist()
 
     def prepare(self, scale: Array) -> None:
         """Take the scales of the unknowns, for differences."""
         self.scale = np.asarray(scale, dtype=float)
+        self.sizes = self.scale.tolist()
 
     def value(self, x: Array, p: Mapping[str, float]) -> Array:
         """F as an array of its own; NaN where it has no value. Warnings are the caller's."""
@@ -187,7 +189,7 @@ class PythonField(Field):
                     shifted[j] += h
                     return self.value(shifted, p)
 
-                size = _power(max(abs(values[j]), self.scale[j]))
+                size = _power(max(abs(values[j]), self.sizes[j]))
                 if sharp:
                     slopes[:, j] = _slope(at, middle, size)
                 else:
@@ -239,7 +241,7 @@ class PythonField(Field):
 
 def _power(h: float) -> float:
     """The power of two below: what is added to a number of its size is then exact."""
-    return 2.0 ** math.floor(math.log2(h))
+    return math.ldexp(0.5, math.frexp(h)[1])
 
 
 def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
@@ -275,6 +277,8 @@ def _numbers(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
     """What a function returned as an array of its own, of real numbers."""
     try:
         numbers = np.array(result)
+        if numbers.dtype == float and numbers.shape == shape:
+            return numbers
         if numbers.dtype.kind == "c":
             raise ParameterError(
                 f"{argument}: returned complex numbers, {str(numbers)[:80]}, wants real ones"

@@ -226,8 +226,12 @@ class Curve:
             else:
                 value = np.abs(self.values(points))
                 terms = np.empty_like(value)
-                for k, point in enumerate(points):
-                    terms[k] = np.abs(slopes[k]) @ np.abs(point)
+                chunk = max(1, MOST // (n * m))
+                for k in range(0, len(points), chunk):
+                    some = slice(k, k + chunk)
+                    terms[some] = np.einsum(
+                        "kij,kj->ki", np.abs(slopes[some]), np.abs(points[some])
+                    )
             return np.asarray(
                 np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
             )
@@ -347,13 +351,23 @@ class Curve:
                 f"within {step}",
                 trace.CROSSES: f"branches cross or pass each other within {step}",
             }
-            return Stop("stuck", f"{words[which]} at {where}")
+            return Stop("stuck", f"{words[which]} at {where}{self._differences()}")
         if reason == trace.NOT_FINITE:
             failure = self.field.failure
             said = "" if failure is None else f": it raised {type(failure).__name__}: {failure}"
             return Stop("not_finite", f"f is not finite beyond {where}{said}")
         return Stop(
             "max_points", f"max_points were computed, the last at {where}; extend() goes on"
+        )
+
+    def _differences(self) -> str:
+        """What else may end a curve whose derivatives are differences, in words."""
+        if isinstance(self.field, SymbolicField) or getattr(self.field, "jacobian", None):
+            return ""
+        width = 2.0 * differences.COARSE
+        return (
+            f"; derivatives are differences over {width:.0e} of an unknown and miss what f does "
+            "within less: a formula or jac knows them"
         )
 
     def replace(self, **changes: Any) -> Curve:

@@ -82,7 +82,8 @@ class Derivatives:
         self.exact = isinstance(curve.field, SymbolicField)
         self.reach = np.maximum(np.abs(self.u), curve.scale[: curve.m])
         self.value, self.slopes = curve.at(self.u)
-        self._lines: dict[bytes, tuple[Estimate, Estimate, Estimate]] = {}
+        # By line: samples by level, and derivatives by order.
+        self._lines: dict[bytes, tuple[dict[int, tuple[Array, Array]], dict[int, Estimate]]] = {}
         self._noise: Array | None = None
 
     def first(self, a: Vector) -> Estimate:
@@ -93,7 +94,7 @@ class Derivatives:
         a = self._full(a)
         if self.exact:
             return _rounded(self.slopes @ a)
-        return self._along(a)[0]
+        return self._along(a, 1)
 
     def second(self, a: Vector, b: Vector) -> Estimate:
         """B(a, b): the second derivative of f along a and b."""
@@ -106,8 +107,8 @@ class Derivatives:
         if size == 0.0:
             return self._nothing()
         if np.array_equal(a, b):
-            return size * self._along(a)[1]
-        return (self._along(a + b)[1] - self._along(a - b)[1]) * (0.25 * size)
+            return size * self._along(a, 2)
+        return (self._along(a + b, 2) - self._along(a - b, 2)) * (0.25 * size)
 
     def third(self, a: Vector, b: Vector, c: Vector) -> Estimate:
         """C(a, b, c): the third derivative of f along a, b and c."""
@@ -125,11 +126,11 @@ class Derivatives:
             a, c = c, a
         if np.array_equal(a, b):  # C(a, a, c)
             if np.array_equal(b, c):
-                return size * self._along(a)[2]
-            total = self._along(a + c)[2] - self._along(a - c)[2]
-            return (size / 6.0) * (total - 2.0 * self._along(c)[2])
-        total = self._along(a + b + c)[2] - self._along(a + b - c)[2]
-        total = total - self._along(a - b + c)[2] + self._along(a - b - c)[2]
+                return size * self._along(a, 3)
+            total = self._along(a + c, 3) - self._along(a - c, 3)
+            return (size / 6.0) * (total - 2.0 * self._along(c, 3))
+        total = self._along(a + b + c, 3) - self._along(a + b - c, 3)
+        total = total - self._along(a - b + c, 3) + self._along(a - b - c, 3)
         return (size / 24.0) * total
 
     def _full(self, z: Array) -> Array:
@@ -147,31 +148,30 @@ class Derivatives:
             return list(directions), 0.0
         return [z / s for z, s in zip(directions, lengths, strict=True)], float(np.prod(lengths))
 
-    def _along(self, z: Array) -> tuple[Estimate, Estimate, Estimate]:
-        """The first three derivatives of f along a line; the sign of z does not matter."""
+    def _along(self, z: Array, order: int) -> Estimate:
+        """The derivative of f of an order along a line; of even ones z's sign does not matter."""
         lead = z[np.flatnonzero(z)[:1]]
         if not len(lead):
-            return (self._nothing(),) * 3
+            return self._nothing()
         sign = float(np.sign(lead[0]))
         z = z * sign
-        key = z.tobytes()
-        if key not in self._lines:
+        samples, results = self._lines.setdefault(z.tobytes(), ({}, {}))
+        if order not in results:
             with np.errstate(all="ignore"):
-                self._lines[key] = self._sampled(z)
-        one, two, three = self._lines[key]
-        return sign * one, two, sign * three
+                results[order] = self._sampled(z, order, samples)
+        return sign**order * results[order]
 
-    def _sampled(self, z: Array) -> tuple[Estimate, Estimate, Estimate]:
+    def _sampled(self, z: Array, order: int, samples: dict[int, tuple[Array, Array]]) -> Estimate:
         given = self.curve.field.slopes_along(self.curve.par, self.curve.active, self.u, z)
         length = float(np.max(np.abs(z) / self.reach))
         first, last = 1, LEVELS
-        samples: dict[int, tuple[Array, Array]] = {}
         while True:
-            missing = [k for k in range(first, last + 1) if k not in samples]
-            steps = [s * 2.0**-k / length for k in missing for s in (1.0, -1.0)]
-            found = self._values(self.u + np.array(steps)[:, None] * z, given)
-            samples.update({k: (found[2 * i], found[2 * i + 1]) for i, k in enumerate(missing)})
             levels = range(first, last + 1)
+            missing = [k for k in levels if k not in samples]
+            steps = [s * 2.0**-k / length for k in missing for s in (1.0, -1.0)]
+            if missing:
+                found = self._values(self.u + np.array(steps)[:, None] * z, given)
+                samples.update({k: (found[2 * i], found[2 * i + 1]) for i, k in enumerate(missing)})
             ahead, behind = (np.array([samples[k][s] for k in levels]) for s in (0, 1))
             ladder = _Ladder(
                 np.array([2.0**-k / length for k in levels]), ahead, behind,
@@ -179,17 +179,13 @@ class Derivatives:
                 # Terms of f may cancel, as along a null vector, where their rounding does not.
                 np.abs(self.slopes) @ np.abs(z) if given is None else np.zeros(self.curve.n),
             )  # fmt: skip
-            orders = (1, 2, 3) if given is None else (0, 1, 2)
-            results = [ladder.derivative(order) for order in orders]
-            finest = max(place for _, place, _ in results[-2:])
+            estimate, finest, wide = ladder.derivative(order if given is None else order - 1)
             if finest >= len(ladder.steps) - 3 and last < FARTHEST:
                 last += MORE
-            elif any(wide for _, _, wide in results[-2:]) and first > 1 - 2 * MORE:
+            elif wide and first > 1 - 2 * MORE:
                 first -= MORE
             else:
-                break
-        one, two, three = (estimate for estimate, _, _ in results)
-        return one, two, three
+                return estimate
 
     def _values(self, points: Array, given: Any) -> Array:
         if given is None:

@@ -62,9 +62,9 @@ def brackets(
 def _all_tests(curve: Curve, path: Path, *, pairs: bool) -> Tests:
     """The test functions of all points; of many states, of some at a time."""
     if isinstance(path.slopes, np.ndarray):
-        return test_functions(curve, path.tangent, path.slopes, pairs=pairs)
+        return test_functions(curve, path.tangent, path.slopes, path.eigenvalues, pairs=pairs)
     parts = [
-        test_functions(curve, path.tangent[some], path.slopes[some], pairs=pairs)
+        test_functions(curve, path.tangent[some], path.slopes[some], None, pairs=pairs)
         for some in path.slopes.chunks()
     ]
     return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
@@ -156,7 +156,9 @@ class _Seek:
     def tests(self, sample: Sample) -> Tests:
         key = id(sample)
         if key not in self.seen:
-            tests = test_functions(self.curve, sample.tangent, sample.slopes, pairs=self.pairs)
+            tests = test_functions(
+                self.curve, sample.tangent, sample.slopes, None, pairs=self.pairs
+            )
             self.seen[key] = (sample, tests)
         return self.seen[key][1]
 

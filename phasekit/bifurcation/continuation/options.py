@@ -29,7 +29,8 @@ class ContinuationOptions:
     ----------
     max_step : float, default 0.05
         Longest step. Make it smaller where a branch jumps to another one or for a smoother
-        picture; larger for long, dull branches.
+        picture; larger for long, dull branches. What is narrower than a step, and leaves no trace
+        at its ends, is passed unseen.
     min_step : float, default 1e-9
         Shortest step, below which the branch ends as stuck. Rarely changed.
     initial_step : float, default 0.01

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.kernels import trace
-from phasekit.kernels.defining import EQUILIBRIUM
+from phasekit.kernels.defining import EQUILIBRIUM, HOPF
 
 Array = npt.NDArray[np.float64]
 
@@ -32,6 +32,7 @@ class Path:
     info: Array
     start: int
     stops: tuple[Stop, Stop]
+    eigenvalues: npt.NDArray[np.complex128] | None = None  # of f_x, where slopes are kept
 
     @property
     def count(self) -> int:
@@ -74,16 +75,18 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
         stops = (forward.stop, forward.stop)
     u = table[:, :size]
     slopes: Array | Slopes = Slopes(curve, u)
+    values = None
     if curve.keeps:
         kept = [start.slopes.reshape(1, -1)]
         if backward is not None:
             kept.insert(0, backward.slopes[::-1])
         if forward is not None:
             kept.append(forward.slopes)
-        slopes = _sharpened(curve, u, np.concatenate(kept).reshape(-1, n, m))
+        slopes, values = _sharpened(curve, u, np.concatenate(kept).reshape(-1, n, m))
     return Path(
-        u, table[:, size : 2 * size], slopes, table[:, -trace.RECORDED :], len(behind), stops
-    )
+        u, table[:, size : 2 * size], slopes, table[:, -trace.RECORDED :], len(behind), stops,
+        values,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -106,21 +109,26 @@ class Slopes:
             yield slice(first, min(first + step, len(self.u)))
 
 
-def _sharpened(curve: Curve, u: Array, slopes: Array) -> Array:
+def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArray[np.complex128]]:
     """Derivatives at the points themselves, where the sign of an eigenvalue could hang on it.
+
+    And the eigenvalues.
 
     A trace leaves those of the point before the last Newton step. On curves of special points an
     eigenvalue is zero everywhere, and its sign says nothing.
     """
+    accuracy = curve.field.accuracy
+    values = eigenvalues_of(slopes, accuracy=accuracy)
     if curve.kind != EQUILIBRIUM:
-        return slopes
-    values = eigenvalues_of(slopes)
+        return slopes, values
     size = np.max(np.abs(values), axis=1)
     with np.errstate(all="ignore"):
         doubtful = np.min(np.abs(values.real), axis=1) < DOUBTFUL * np.nanmax(size)
-    for i in np.flatnonzero(doubtful):
-        slopes[i] = curve.at(u[i])[1]
-    return slopes
+    if doubtful.any():
+        for i in np.flatnonzero(doubtful):
+            slopes[i] = curve.at(u[i])[1]
+        values = eigenvalues_of(slopes, accuracy=accuracy)
+    return slopes, values
 
 
 def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | None:
@@ -138,11 +146,31 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
         + h * s * (1.0 - s) * ((1.0 - s) * a.tangent - s * b.tangent)
     )
     guess += (s - np.dot(row, guess - a.u) / np.dot(row, chord)) * chord
+    if curve.kind == HOPF:
+        curve, guess = _in_phase(curve, a if s < 0.5 else b, guess)
     point = curve.refine(guess, row)
     if not point.converged or curve.length(point.u - guess) > 0.5 * h:
         return None
     sign = 1.0 if np.dot(row, point.tangent) >= 0.0 else -1.0
     return Sample(point.u, sign * point.tangent, point.slopes)
+
+
+def _in_phase(curve: Curve, near: Sample, guess: Array) -> tuple[Curve, Array]:
+    """A Hopf curve whose phase condition is that of a point of it, and v as it is there.
+
+    A trace turns v in its plane from time to time.
+    """
+    n, m = curve.n, curve.m
+    sizes = curve.scale[m : m + n]
+    v = near.u[m : m + n] / sizes
+    y = near.slopes[:, :n] @ (v * sizes) / sizes
+    y = y - np.dot(v, y) / np.dot(v, v) * v
+    length = float(np.linalg.norm(y))
+    if not length > 0.0:
+        return curve, guess
+    guess = guess.copy()
+    guess[m : m + n] = near.u[m : m + n]
+    return curve.replace(aux=y / length / sizes), guess
 
 
 def bracket_root(

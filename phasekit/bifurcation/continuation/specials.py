@@ -13,7 +13,6 @@ from phasekit.bifurcation.continuation.events import Bracket, brackets
 from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.kernels.defining import EQUILIBRIUM
 
 Array = npt.NDArray[np.float64]
@@ -45,11 +44,12 @@ def _find(
     if curve.kind != EQUILIBRIUM:
         from phasekit.bifurcation.continuation.codimension_two import find_on
 
-        return find_on(curve, path), eigenvalues_of(path.slopes[:])
+        assert path.eigenvalues is not None
+        return find_on(curve, path), path.eigenvalues
     if not detect:
-        if not curve.keeps:  # nothing is asked for that takes long
+        if path.eigenvalues is None:  # nothing is asked for that takes long
             return [], np.full((path.count, curve.n), np.nan, dtype=complex)
-        return [], eigenvalues_of(path.slopes[:])
+        return [], path.eigenvalues
     found, eigenvalues = brackets(curve, path, detect, conservative)
     placed: list[Placed] = []
     for bracket in found:

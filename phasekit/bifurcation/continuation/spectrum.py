@@ -10,6 +10,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 
 Array = npt.NDArray[np.float64]
+OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
 
 
@@ -85,6 +86,11 @@ def _in_even_units(matrices: Array) -> Array:
     """
     if not matrices.size or _symmetric(matrices, 0.0).all():
         return matrices
+    # No units change the sign of A_ij A_ji.
+    products = matrices * np.swapaxes(matrices, -1, -2)
+    size = np.max(np.abs(matrices), axis=(-2, -1))
+    if np.all(np.min(products, axis=(-2, -1)) < -((OPPOSITE * size) ** 2)):
+        return matrices
     sizes = np.abs(matrices).reshape(-1, *matrices.shape[-2:]).sum(axis=0)
     both = np.sqrt(sizes * sizes.T)
     if not np.any(both):
@@ -147,13 +153,15 @@ def test_functions(
     curve: Curve,
     tangent: Array,
     slopes: Array,
+    values: npt.NDArray[np.complex128] | None,
     *,
     pairs: bool,
 ) -> Tests:
-    """The test functions of points with their tangents and derivatives of f."""
+    """The test functions of points with their tangents, derivatives of f and eigenvalues."""
     n = curve.n
     sign, log = orientation(curve, tangent, slopes)
-    values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
+    if values is None:
+        values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
     return Tests(
         tangent[..., n] / curve.scale[n],
         sign,

@@ -140,21 +140,10 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
 
 def _null_spaces(bordered: Array, n: int, m: int, k: int) -> tuple[Array, Array, Array] | None:
     """Phi, G and Psi of a bordered matrix, None if it is singular itself."""
-    from scipy.linalg import LinAlgWarning, lu_factor, lu_solve
-
-    size = n + k + 1
-    with np.errstate(all="ignore"):
-        import warnings
-
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", LinAlgWarning)
-            factors = lu_factor(bordered)
-        ahead = np.zeros((size, k + 1))
-        ahead[n:] = np.eye(k + 1)
-        solution = lu_solve(factors, ahead)
-        across = np.zeros((size, k))
-        across[m:] = np.eye(k)
-        adjoint = lu_solve(factors, across, trans=1)
-    if not (np.isfinite(solution).all() and np.isfinite(adjoint).all()):
+    try:
+        inverse = np.asarray(np.linalg.inv(bordered), dtype=float)
+    except np.linalg.LinAlgError:
         return None
-    return solution[:m], solution[m:], adjoint[:n]
+    if not np.isfinite(inverse).all():
+        return None
+    return inverse[:m, n:], inverse[m:, n:], inverse[m:, :n].T
