@@ -84,7 +84,7 @@ class Model(Lawful):
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
         """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each."""
         raise ParameterError(
-            f"v: got {sorted(map(str, v))}, wants the parameters of a system with coefficients "
+            f"v: got {describe(v)}, wants the parameters of a system with coefficients "
             "(A, B, C), which this one has not"
         )
 

@@ -140,7 +140,7 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
     path = ArcLength.of(law)
     ground = path.ground()
     found = separatrices(ground)
-    loops = found._make(field[0] for field in found)
+    loops: Any = type(found)(*(field[0] for field in found))
     saddle = loops.saddle_phi[:, np.newaxis]
     own = path.place(loops.saddle_phi)
     offset = path.place(saddle + loops.turning_offset) - own[:, np.newaxis]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -162,12 +163,10 @@ class ArcLength:
         center = np.where(kind == EquilibriumKind.CENTER, rate, np.nan)
         saddle = np.where(kind == EquilibriumKind.SADDLE, rate, np.nan)
         columns = (place[order], kind, energy, curvature, center, saddle)
-        points = Equilibria(
-            *(a[np.newaxis] for a in columns),
-            n_equilibria=np.array([phi.size], np.int16),
-            complete=np.array([True]),
-            gaps=np.full((1, 2), np.nan),
-        )
+        rows: Any = (a[np.newaxis] for a in columns)
+        # All of them, and no stretch that may hold others.
+        count, gaps = np.array([phi.size], np.int16), np.full((1, 2), np.nan)
+        points = Equilibria._make((*rows, count, np.array([True]), gaps))
         return survey(Systems(self.formula(), (), 1), points)
 
     def orbit(self, ground: Ground, x: float, v: float) -> rounds.Orbits:
