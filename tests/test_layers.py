@@ -13,6 +13,18 @@ ROOT = Path(phasekit.__file__).parent
 MODULE = re.compile(r"(phasekit(?:\.[a-z_]\w*)+)(?::\w*)?")
 #: The one stair up: results draw themselves.
 STAIRS = {("phasekit.labelled.pictures", "phasekit.plot")}
+#: The one circle that is left: branches and special points go on by what stands above them.
+BRANCHES = {
+    f"phasekit.labelled.{name}"
+    for name in (
+        "branch",
+        "branch_store",
+        "branch_stored",
+        "continuation",
+        "point_curves",
+        "special_point",
+    )
+}
 #: The package's own table of public names.
 ROOF = "phasekit.__init__"
 
@@ -96,7 +108,7 @@ def test_no_module_is_on_no_floor():
             assert floor_of(module, heights) >= 0, module
 
 
-def test_there_is_no_import_circle():
+def test_there_is_no_other_import_circle():
     """Imports for types and inside functions count, and so do modules that strings name."""
     everything = modules()
     arrows = {
@@ -108,8 +120,8 @@ def test_there_is_no_import_circle():
         for module, path in everything.items()
         if module != ROOF
     }
-    circles = [sorted(c) for c in strongly_connected(arrows) if len(c) > 1]
-    assert circles == []
+    circles = [c for c in strongly_connected(arrows) if len(c) > 1]
+    assert circles == [BRANCHES]
 
 
 def strongly_connected(arrows: dict[str, set[str]]) -> list[set[str]]:

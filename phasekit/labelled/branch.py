@@ -15,8 +15,9 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.path import Path, Sample, join
+from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.bifurcation.continuation.specials import Placed, find
+from phasekit.bifurcation.continuation.specials import find
 from phasekit.bifurcation.continuation.start import go_on
 from phasekit.errors import ParameterError
 from phasekit.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF

@@ -11,7 +11,7 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.path import Path
-from phasekit.bifurcation.continuation.specials import Placed
+from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 from phasekit.errors import EquilibriumKind
 from phasekit.kernels import trace

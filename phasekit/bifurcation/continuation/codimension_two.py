@@ -11,13 +11,13 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
+from phasekit.bifurcation.continuation.placed import Placed, unique
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
     Special,
     extended,
 )
-from phasekit.bifurcation.continuation.specials import Placed, unique
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
 from phasekit.bifurcation.continuation.units import force_sizes
 from phasekit.kernels.defining import BRANCH, FOLD, HOPF

@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.compare import turned
+from phasekit.bifurcation.continuation.codimension_two import find_on
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
 from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
-from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
+from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
+from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.kernels.defining import EQUILIBRIUM
 
 Array = npt.NDArray[np.float64]
-SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
-STAYS = 1e-3  # distance within which a path that passes a special point has not left it
-TURNS = 1e-4  # part of a unit tangent along the parameter, on scaled axes
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A special point and where it stands: after which point of the path, how far along."""
-
-    index: int
-    along: float
-    special: Special
 
 
 def find(
@@ -42,8 +29,6 @@ def _find(
     curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
 ) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
     if curve.kind != EQUILIBRIUM:
-        from phasekit.bifurcation.continuation.codimension_two import find_on
-
         assert path.eigenvalues is not None
         return find_on(curve, path), path.eigenvalues
     if not detect:
@@ -84,69 +69,7 @@ def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Place
         along = float(np.dot(curve.weight * chord, gap)) / square if square else 0.0
         one = Placed(i, along, special)
         first = one if first is None else first
-        if _inside(one):
+        if inside(one):
             return one
     assert first is not None
     return first
-
-
-def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
-    """In order along the path, each once: next to some, all test functions change their signs."""
-    placed = sorted(placed, key=lambda one: (one.index, one.along))
-    kept: list[Placed] = []
-    for one in placed:
-        twin = None
-        for i in range(len(kept) - 1, max(-1, len(kept) - 4), -1):
-            other = kept[i]
-            alike = other.special.kind == one.special.kind and _distance(curve, one, other) < SAME
-            if alike and _stays(curve, path, other, one):
-                twin = i
-        if twin is None:
-            kept.append(one)
-        elif kept[twin].special.status != "converged" and one.special.status == "converged":
-            kept[twin] = one
-        elif not _inside(kept[twin]) and _inside(one):
-            kept[twin] = one
-    return [one for one in kept if not _echo(curve, one, kept)]
-
-
-def _inside(one: Placed) -> bool:
-    """Whether a point stands between the two points of the path that it is placed at."""
-    return -1e-6 <= one.along <= 1.0 + 1e-6
-
-
-def _stays(curve: Curve, path: Path, one: Placed, other: Placed) -> bool:
-    """Whether the path stays next to a special point up to where it is seen again."""
-    if other.index - one.index <= 2:
-        return True
-    m = curve.m
-    gap = turned(curve, path.u[one.index + 1 : other.index, :m] - one.special.u[:m])
-    return bool(np.max(np.abs(gap / curve.scale[:m])) < STAYS)
-
-
-def _distance(curve: Curve, one: Placed, other: Placed) -> float:
-    """Distance on scaled axes, angles modulo their periods."""
-    m = curve.m
-    gap = turned(curve, one.special.u[:m] - other.special.u[:m])
-    return float(np.sqrt(np.sum((gap / curve.scale[:m]) ** 2)))
-
-
-def _echo(curve: Curve, one: Placed, all_: list[Placed]) -> bool:
-    """Whether a fold is but the turn of a pitchfork's side branch at the pitchfork itself."""
-    if one.special.status != CONVERGED and one.special.extra is None:  # a multiple point
-        for other in all_:
-            if other.special.status == CONVERGED and _distance(curve, one, other) < 1e-4:
-                return True
-    if one.special.kind == "neutral_saddle" and one.special.status != CONVERGED:
-        # Next to a multiple branch point sums of eigenvalues are those of rounding errors.
-        if any(o.special.corank > 1 and _distance(curve, one, o) < STAYS for o in all_):
-            return True
-    if one.special.kind != "fold":
-        return False
-    for other in all_:
-        t = other.special.tangent
-        if other.special.kind in ("pitchfork", "branch_point") and t is not None:
-            flat = abs(t[curve.n]) / curve.scale[curve.n] < TURNS
-            if flat and _distance(curve, one, other) < 1e2 * SAME:
-                return True
-    return False
