@@ -232,6 +232,9 @@ class Curve:
                     terms[some] = np.einsum(
                         "kij,kj->ki", np.abs(slopes[some]), np.abs(points[some])
                     )
+            if isinstance(slopes, np.ndarray):  # what Newton's method takes for zero
+                nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
+                value[value <= nothing] = 0.0
             return np.asarray(
                 np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
             )
