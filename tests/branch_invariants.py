@@ -13,7 +13,6 @@ from phasekit.bifurcation.continuation.fields import SymbolicField
 
 NOISE = 1e-8  # real parts that are smaller, relative to the largest eigenvalue, have no sign
 SAME = 1e-6  # distance on scaled axes
-ROUNDING = 1e-12  # of a formula, relative to what its derivatives make of the unknowns
 
 
 def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bool) -> None:
@@ -37,12 +36,12 @@ def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bo
 
 
 def _every_point_is_one(curve: Any, path: Any) -> None:
-    """At every tenth point f is but rounding of the unknowns, in units of their scales at least."""
-    m = curve.m
+    """At every tenth point f is what unknowns within the tolerance of the curve leave of it."""
+    m, bound = curve.m, 10.0 * curve.options.tolerance
     for u in path.u[::10, :m]:
         value, slopes = curve.at(u)
         terms = np.abs(slopes) @ np.maximum(np.abs(u), curve.scale[:m])
-        assert np.all(np.abs(value) <= ROUNDING * terms), (u, value, terms)
+        assert np.all(np.abs(value) <= bound * terms), (u, value, terms)
 
 
 def _no_twins(curve: Any, path: Any, placed: Any) -> None:
