@@ -56,7 +56,7 @@ def test_far_from_the_origin(form, offset):
     assert kinds(branch) == ["end", "fold", "fold", "end"]
     x, mu = branch.points.x.values - offset, branch.points.mu.values
     slope = np.abs(1.0 - 3.0 * x**2) + 1e-3
-    assert np.max(np.abs(mu + x - x**3) / (slope * offset + 1.0)) < 1e-12
+    assert np.max(np.abs(mu + x - x**3) / (slope * offset + 1.0)) < 3e-13
 
 
 def test_a_tail_has_no_false_end():
@@ -66,11 +66,13 @@ def test_a_tail_has_no_false_end():
     u, p = branch.points.u.values, branch.points.p.values
     away = np.abs(u) > 1e-9
     exact = 3.0 * u[away] * (1.0 - u[away]) / -np.expm1(-5.0 * u[away])
+    assert away.sum() > 10
     # Where p is 1 - u, at the other end, it does meet the bound.
     assert np.all(np.abs(p[away] - exact) <= 1e-9 * exact + 1e-15)
     assert u.min() < -100.0
     assert branch.stops[1].reason != "bound"
     assert len(branch.special("LP")) == 1
+    assert len(branch.special_points) >= 2
     assert all(one.status == "converged" for one in branch.special_points)
 
 
@@ -152,11 +154,13 @@ def test_many_states_keep_no_matrices():
     branch = pk.continuation(problem, "c", x0=np.zeros(n), span=(0.0, 3.0), options=few)
     kept = sum(t.record.nbytes + t.slopes.nbytes for t in branch.tracks if t is not None)
     assert kept <= 12 * 8 * (3 * n + 20)
+    assert branch.points.sizes["point"] > 1
     assert np.all(branch.points.n_unstable == -1)
     assert branch.points.residual.max() < 1e-13
     full = pk.continuation(
         problem, "c", x0=np.zeros(n), span=(0.0, 3.0), options=pk.ContinuationOptions(max_points=12)
     )
+    assert full.points.sizes["point"] > 1
     assert np.all(full.points.n_unstable == 0)
     np.testing.assert_array_equal(full.points.c, branch.points.c)
     longer = branch.extend(5)
