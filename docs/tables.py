@@ -14,12 +14,13 @@ import sympy
 import phasekit as pk
 from phasekit import errors
 from phasekit.labelled.atlas import SPECIAL
-from phasekit.labelled.branch_points import LABELS as TRACED
-from phasekit.labelled.loci import CURVES
-from phasekit.labelled.quantities import LABELS, LAW, PASSES, QUANTITIES, STATES, Pass, Quantity
-from phasekit.labelled.system import MODELS, Model
+from phasekit.labelled.bifurcation_set import CURVES
+from phasekit.labelled.continuation.branch_points import LABELS as TRACED
+from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.systems.system import MODELS, Model
+from phasekit.table.quantities import LAW, PASSES, QUANTITIES, Pass, Quantity
 
 
 class Point(NamedTuple):

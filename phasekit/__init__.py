@@ -36,26 +36,22 @@ if TYPE_CHECKING:
     from phasekit.labelled.asymptotics import near_center as near_center
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
     from phasekit.labelled.atlas import branches as branches
-    from phasekit.labelled.branch import Branch as Branch
-    from phasekit.labelled.continuation import continuation as continuation
+    from phasekit.labelled.bifurcation_set import bifurcation_set as bifurcation_set
+    from phasekit.labelled.continuation.branch import Branch as Branch
+    from phasekit.labelled.continuation.continuation import continuation as continuation
+    from phasekit.labelled.continuation.diagram import diagram as diagram
+    from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
-    from phasekit.labelled.diagram import diagram as diagram
-    from phasekit.labelled.eights import figure_eights as figure_eights
+    from phasekit.labelled.energy import curvature as curvature
+    from phasekit.labelled.energy import energy as energy
+    from phasekit.labelled.energy import gradient as gradient
+    from phasekit.labelled.energy import phase_velocity as phase_velocity
+    from phasekit.labelled.energy import potential as potential
     from phasekit.labelled.families import orbit_families as orbit_families
-    from phasekit.labelled.free_rotor import FreeGyroRotor as FreeGyroRotor
-    from phasekit.labelled.guises import ParticleOnCircle as ParticleOnCircle
-    from phasekit.labelled.guises import Pendulum as Pendulum
-    from phasekit.labelled.guises import StonerWohlfarth as StonerWohlfarth
-    from phasekit.labelled.integral import curvature as curvature
-    from phasekit.labelled.integral import energy as energy
-    from phasekit.labelled.integral import gradient as gradient
-    from phasekit.labelled.integral import phase_velocity as phase_velocity
-    from phasekit.labelled.integral import potential as potential
-    from phasekit.labelled.loci import bifurcation_set as bifurcation_set
-    from phasekit.labelled.machine import bearing_forces as bearing_forces
-    from phasekit.labelled.machine import fixed_bearing_forces as fixed_bearing_forces
-    from phasekit.labelled.machine import rotators as rotators
-    from phasekit.labelled.models import GyroRotorDisk as GyroRotorDisk
+    from phasekit.labelled.figure_eights import figure_eights as figure_eights
+    from phasekit.labelled.loads import bearing_forces as bearing_forces
+    from phasekit.labelled.loads import fixed_bearing_forces as fixed_bearing_forces
+    from phasekit.labelled.loads import rotators as rotators
     from phasekit.labelled.motion import flow as flow
     from phasekit.labelled.motion import separatrix_motion as separatrix_motion
     from phasekit.labelled.orbits import action_angle as action_angle
@@ -63,16 +59,20 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
-    from phasekit.labelled.potential_system import Potential as Potential
-    from phasekit.labelled.problem import Problem as Problem
-    from phasekit.labelled.quantities import quantities as quantities
-    from phasekit.labelled.special_point import SpecialPoint as SpecialPoint
-    from phasekit.labelled.store import open_map as open_map
-    from phasekit.labelled.sweep import sweep as sweep
-    from phasekit.labelled.system import Coefficients as Coefficients
-    from phasekit.labelled.system import Reduced as Reduced
+    from phasekit.maps.sweep import sweep as sweep
+    from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
     from phasekit.mechanics.rigid_body import RigidBody as RigidBody
+    from phasekit.systems.analogues import ParticleOnCircle as ParticleOnCircle
+    from phasekit.systems.analogues import Pendulum as Pendulum
+    from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
+    from phasekit.systems.disk import GyroRotorDisk as GyroRotorDisk
+    from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
+    from phasekit.systems.potential import Potential as Potential
+    from phasekit.systems.problem import Problem as Problem
+    from phasekit.systems.system import Coefficients as Coefficients
+    from phasekit.systems.system import Reduced as Reduced
+    from phasekit.table.quantities import quantities as quantities
 
 _MODULES = {
     "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),
@@ -89,34 +89,34 @@ _MODULES = {
     ),
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.atlas": ("branches",),
-    "phasekit.labelled.branch": ("Branch",),
-    "phasekit.labelled.continuation": ("continuation",),
+    "phasekit.labelled.continuation.branch": ("Branch",),
+    "phasekit.labelled.continuation.continuation": ("continuation",),
     "phasekit.labelled.critical": ("critical",),
-    "phasekit.labelled.diagram": ("diagram",),
-    "phasekit.labelled.eights": ("figure_eights",),
+    "phasekit.labelled.continuation.diagram": ("diagram",),
+    "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
-    "phasekit.labelled.free_rotor": ("FreeGyroRotor",),
-    "phasekit.labelled.guises": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
-    "phasekit.labelled.integral": (
+    "phasekit.systems.free_rotor": ("FreeGyroRotor",),
+    "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
+    "phasekit.labelled.energy": (
         "curvature",
         "energy",
         "gradient",
         "phase_velocity",
         "potential",
     ),
-    "phasekit.labelled.loci": ("bifurcation_set",),
-    "phasekit.labelled.machine": ("bearing_forces", "fixed_bearing_forces", "rotators"),
-    "phasekit.labelled.models": ("GyroRotorDisk",),
+    "phasekit.labelled.bifurcation_set": ("bifurcation_set",),
+    "phasekit.labelled.loads": ("bearing_forces", "fixed_bearing_forces", "rotators"),
+    "phasekit.systems.disk": ("GyroRotorDisk",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
-    "phasekit.labelled.potential_system": ("Potential",),
-    "phasekit.labelled.problem": ("Problem",),
-    "phasekit.labelled.quantities": ("quantities",),
-    "phasekit.labelled.special_point": ("SpecialPoint",),
-    "phasekit.labelled.store": ("open_map",),
-    "phasekit.labelled.sweep": ("sweep",),
-    "phasekit.labelled.system": ("Coefficients", "Reduced"),
+    "phasekit.systems.potential": ("Potential",),
+    "phasekit.systems.problem": ("Problem",),
+    "phasekit.table.quantities": ("quantities",),
+    "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
+    "phasekit.maps.whole": ("open_map",),
+    "phasekit.maps.sweep": ("sweep",),
+    "phasekit.systems.system": ("Coefficients", "Reduced"),
     "phasekit.mechanics.coupled_rotation": ("CoupledRotation",),
     "phasekit.mechanics.rigid_body": ("RigidBody",),
 }
@@ -131,6 +131,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'phasekit' has no attribute {name!r}")
     value = getattr(importlib.import_module(_HOME[name]), name)
+    if "xarray" in sys.modules:
+        importlib.import_module("phasekit.labelled.accessor")
     globals()[name] = value  # later uses find it without coming here
     return value
 

@@ -14,7 +14,7 @@ import picture
 
 import phasekit as pk
 from phasekit.plot import period_energy, potential_well
-from phasekit.plot.style import FAMILIES, WALLS
+from phasekit.plot.parts.style import FAMILIES, WALLS
 
 SYSTEM = pk.Coefficients(A=1.3, B=0.2, C=0.15)
 ENERGY = 0.25

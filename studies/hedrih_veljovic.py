@@ -22,7 +22,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 import phasekit as pk
-from phasekit.plot.style import circle_axis
+from phasekit.plot.parts.style import circle_axis
 
 Array = NDArray[np.float64]
 Formula = Callable[[pk.GyroRotorDisk, Array, Array], Array]

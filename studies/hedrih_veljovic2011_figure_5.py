@@ -15,7 +15,7 @@ import numpy as np
 from hedrih_veljovic import DISK, Array, acceleration, draw, explain, over_e, panels, save
 
 import phasekit as pk
-from phasekit.plot.style import circle_axis
+from phasekit.plot.parts.style import circle_axis
 
 FAMILIES = {
     "e": over_e(),

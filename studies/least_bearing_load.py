@@ -25,7 +25,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.plot import bearing_load_map
-from phasekit.plot.style import BLACK, BLUE, GREEN, ORANGE, VERMILLION
+from phasekit.plot.parts.style import BLACK, BLUE, GREEN, ORANGE, VERMILLION
 
 ROTOR = pk.GyroRotorDisk(
     beta=70 * pk.deg, e=0.06, a=0.024, r=0.2, omega1=300 * pk.rpm, m=2.0, half_span=0.2

@@ -11,8 +11,12 @@ from hypothesis import settings
 
 # numba's cache of a kernel knows the file of that kernel only, not the files that it calls into:
 # after an edit there, old and new machine code would run side by side. So tests cache by content.
-KERNELS = Path(__file__).parent.parent / "phasekit" / "kernels"
-CONTENT = hashlib.sha256(b"".join(path.read_bytes() for path in sorted(KERNELS.glob("*.py"))))
+COMPILED = (
+    text
+    for path in sorted((Path(__file__).parents[1] / "phasekit").rglob("*.py"))
+    if b"phasekit.numerics" in (text := path.read_bytes()) or path.parent.name == "numerics"
+)
+CONTENT = hashlib.sha256(b"".join(COMPILED))
 os.environ.setdefault(
     "NUMBA_CACHE_DIR",
     f"{tempfile.gettempdir()}/phasekit-{getpass.getuser()}/{CONTENT.hexdigest()[:16]}",
@@ -27,10 +31,10 @@ settings.load_profile("phasekit")
 @pytest.fixture(autouse=True, scope="session")
 def every_branch_is_checked():
     """Hold each branch of equilibria that a test computes against what holds of all of them."""
-    import branch_invariants
+    from witnesses import branch_invariants
 
-    from phasekit.kernels.defining import EQUILIBRIUM
-    from phasekit.labelled import branch
+    from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+    from phasekit.labelled.continuation import branch
 
     find = branch.find
 

@@ -200,7 +200,7 @@ def test_sweep_says_beforehand_what_it_takes(tmp_path, capsys, monkeypatch):
     assert "MB before compression) and less than 1 s on 1 process" in out
     assert "the disk has" in out
     assert [path.name for path in tmp_path.iterdir()] == ["map.toml"]
-    monkeypatch.setattr("phasekit.labelled.place.Place.free_bytes", lambda self: 1000)
+    monkeypatch.setattr("phasekit.maps.place.Place.free_bytes", lambda self: 1000)
     assert "the map will not fit: it takes about" in refused(capsys, "sweep", "map.toml")
     assert main(["sweep", "map.toml", "--force"]) == 0
     assert main(["sweep", "map.toml", "--estimate"]) == 0

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.labelled import quantities
-from phasekit.labelled.quantities import Pass, Quantity
-from phasekit.labelled.system import MODELS
 from phasekit.laws.ladder import Conservative
+from phasekit.systems.system import MODELS
+from phasekit.table import quantities
+from phasekit.table.quantities import Pass, Quantity
 
 matplotlib.use("Agg")
 GUIDE = Path(__file__).parents[1] / "docs" / "contributing.md"

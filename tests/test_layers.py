@@ -15,7 +15,7 @@ MODULE = re.compile(r"(phasekit(?:\.[a-z_]\w*)+)(?::\w*)?")
 STAIRS = {("phasekit.labelled.pictures", "phasekit.plot")}
 #: The one circle that is left: branches and special points go on by what stands above them.
 BRANCHES = {
-    f"phasekit.labelled.{name}"
+    f"phasekit.labelled.continuation.{name}"
     for name in (
         "branch",
         "branch_store",

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 import phasekit as pk
-from phasekit.labelled.branch_points import LABELS
-from phasekit.labelled.quantities import PASSES, QUANTITIES
-from phasekit.labelled.system import MODELS
+from phasekit.labelled.continuation.branch_points import LABELS
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.systems.system import MODELS
+from phasekit.table.quantities import PASSES, QUANTITIES
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: What has no docstring of its own: numbers, a string, a module.

@@ -1,1 +1,1 @@
-"""Critical values and loci, arrays only."""
+"""Bifurcations, arrays only: of the trigonometric law exactly, of any equations by continuation."""

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from phasekit.cli import Parser
 from phasekit.cli.values import glue_negative_values, is_range, number, span
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.arguments import unknown
-from phasekit.labelled.system import MODELS, Model
+from phasekit.labels.arguments import unknown
+from phasekit.systems.system import MODELS, Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -135,7 +135,7 @@ def say_invalid(ds: xr.Dataset) -> None:
     """Say how many cells of a map hold nothing, if any."""
     if "n_equilibria" not in ds:
         return
-    from phasekit.labelled.tiling import tiles
+    from phasekit.cells.tiling import tiles
 
     counts = ds["n_equilibria"]
     invalid = sum(int((counts[tile].values == -1).sum()) for tile in tiles(counts.shape, 1 << 24))

@@ -33,9 +33,9 @@ import numpy as np
 from phasekit.cli import Parser, common
 from phasekit.cli.values import between, number
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.arguments import unknown
-from phasekit.labelled.quantities import STATES
-from phasekit.labelled.system import Model
+from phasekit.labels.arguments import unknown
+from phasekit.labels.coordinates import STATES
+from phasekit.systems.system import Model
 
 KEYS = (
     "model", "store", "of", "chunks", "workers", "scheduler", "dtype", "parameters", "axes",
@@ -93,7 +93,7 @@ def run(argv: Sequence[str]) -> None:
 
 def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], options: Any) -> None:
     from phasekit import sweep
-    from phasekit.labelled.sweep import plan_sweep
+    from phasekit.maps.sweep import plan_sweep
 
     store = recipe["store"]
     what = {"of": recipe.get("of", ("equilibria", "separatrices")), "store": store}
@@ -127,8 +127,8 @@ def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], optio
 
 
 def _say_estimate(job: Any, workers: Any) -> None:
-    from phasekit.kernels.launch import cpus
-    from phasekit.labelled.memory import human
+    from phasekit.labels.memory import human
+    from phasekit.numerics.launch import cpus
 
     if not job.count:
         common.say("nothing is left to compute")

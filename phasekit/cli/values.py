@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.units import UNITS, usual
+from phasekit.labels.units import UNITS, usual
 
 #: Most values that a range may have.
 LONGEST = 10_000_000

@@ -11,11 +11,11 @@ from typing import Any
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.arguments import NumberLike
-from phasekit.labelled.identity import model_name
 from phasekit.labelled.pictures import picture
-from phasekit.labelled.registry import model_named
-from phasekit.labelled.system import Model
+from phasekit.labels.arguments import NumberLike
+from phasekit.systems.identity import model_name
+from phasekit.systems.registry import model_named
+from phasekit.systems.system import Model
 
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
@@ -148,7 +148,7 @@ class PhasekitAccessor:
         return self._on_map("forces", on, phi0, dphi0, parameters)
 
     def _on_map(self, what: str, on: str, phi0: Any, dphi0: Any, parameters: Any) -> xr.Dataset:
-        from phasekit.labelled.machine import on_map
+        from phasekit.labelled.loads import on_map
 
         system = self.system().replace(**parameters)
         return on_map(self._ds, system, what, on, phi0, dphi0)

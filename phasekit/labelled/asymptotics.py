@@ -6,9 +6,9 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.labelled.arguments import NumberLike
-from phasekit.labelled.quantities import select
-from phasekit.labelled.states import at_states
+from phasekit.cells.states import at_states
+from phasekit.labels.arguments import NumberLike
+from phasekit.table.quantities import select
 
 
 def near_center(system: Any, energy: NumberLike) -> xr.Dataset:

@@ -8,17 +8,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.atlas import Curve, atlas
-from phasekit.bifurcation.paths import Path
-from phasekit.bifurcation.survey import Meeting
+from phasekit.bifurcation.exact.atlas import Curve, atlas
+from phasekit.bifurcation.exact.line import Path
+from phasekit.bifurcation.exact.meetings import Meeting
+from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.arguments import FloatArray, bad, pair, unknown
-from phasekit.labelled.as_system import as_system
-from phasekit.labelled.grid import variable
-from phasekit.labelled.quantities import FROM_MOTION, LABELS, ROWS
-from phasekit.labelled.schema import LABEL_DTYPE, dataset_attrs, input_attrs
-from phasekit.labelled.system import Model
+from phasekit.labels.arguments import FloatArray, bad, pair, unknown
+from phasekit.labels.coordinates import LABELS
+from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.systems.as_system import as_system
+from phasekit.systems.system import Model
+from phasekit.table.quantities import FROM_MOTION, ROWS
 
 #: What special points are called in pictures.
 SPECIAL = {

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.critical import critical_reduced
-from phasekit.bifurcation.fold_values import fold_values
-from phasekit.labelled.arguments import FloatArray, unknown
-from phasekit.labelled.as_system import as_system
-from phasekit.labelled.evaluate import evaluate
-from phasekit.labelled.quantities import ROWS, Pass
-from phasekit.labelled.system import Model
+from phasekit.bifurcation.exact.critical import critical_reduced
+from phasekit.bifurcation.exact.fold_values import fold_values
+from phasekit.cells.evaluate import evaluate
+from phasekit.labels.arguments import FloatArray, unknown
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.systems.as_system import as_system
+from phasekit.systems.system import Model
+from phasekit.table.quantities import ROWS, Pass
 
 _CRITICAL = ("critical_fold", "critical_sign_change")
 

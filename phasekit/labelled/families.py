@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.states import at_states
 from phasekit.errors import EquilibriumKind, ParameterError, Topology
-from phasekit.labelled.arguments import FloatArray, number, whole
-from phasekit.labelled.as_system import as_system
-from phasekit.labelled.quantities import ROWS, Pass
-from phasekit.labelled.states import at_states
+from phasekit.labels.arguments import FloatArray, number, whole
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.phase.orbits import energy_rises, orbits_at_gap
-from phasekit.phase.separatrices import phase_space
+from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
+from phasekit.phase.exact.separatrices import phase_space
+from phasekit.systems.as_system import as_system
+from phasekit.table.quantities import ROWS, Pass
 
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
 CLUSTER = 4

@@ -8,20 +8,21 @@ from typing import Any
 
 import xarray as xr
 
+from phasekit.cells.evaluate import lay_out
 from phasekit.labelled.accessor import PhasekitAccessor
-from phasekit.labelled.arrays import read_plan
-from phasekit.labelled.estimate import Estimate
-from phasekit.labelled.evaluate import lay_out
-from phasekit.labelled.identity import SCHEMA
-from phasekit.labelled.job import Job, Left
-from phasekit.labelled.marks import marks_of
-from phasekit.labelled.memory import human
-from phasekit.labelled.partial import COMPUTED
-from phasekit.labelled.place import Place, place_of
-from phasekit.labelled.plan import Plan
-from phasekit.labelled.quantities import STATES, plan_passes
-from phasekit.labelled.store import open_map
-from phasekit.labelled.system import MODELS
+from phasekit.labels.coordinates import STATES
+from phasekit.labels.memory import human
+from phasekit.maps.estimate import Estimate
+from phasekit.maps.job import Job, Left
+from phasekit.maps.marks import marks_of
+from phasekit.maps.place import Place, place_of
+from phasekit.maps.plan import Plan
+from phasekit.maps.stored_arrays import read_plan
+from phasekit.maps.unfinished import COMPUTED
+from phasekit.maps.whole import open_map
+from phasekit.systems.identity import SCHEMA
+from phasekit.systems.system import MODELS
+from phasekit.table.quantities import plan_passes
 
 
 @dataclass(frozen=True)
@@ -58,7 +59,7 @@ class MapInfo:
         return "\n".join(self._lines())
 
     def _lines(self) -> list[str]:
-        from phasekit.kernels.launch import cpus
+        from phasekit.numerics.launch import cpus
 
         ds = self.ds
         model = str(ds.attrs["phasekit_model"])

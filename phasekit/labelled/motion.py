@@ -9,12 +9,12 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.labelled.arguments import NumberLike
-from phasekit.labelled.as_system import as_system
-from phasekit.labelled.dispatch import pass_from
+from phasekit.cells.dispatch import pass_from
+from phasekit.cells.states import at_states
 from phasekit.labelled.orbits import noted
-from phasekit.labelled.quantities import select
-from phasekit.labelled.states import at_states
+from phasekit.labels.arguments import NumberLike
+from phasekit.systems.as_system import as_system
+from phasekit.table.quantities import select
 
 
 def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.Dataset:

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.dispatch import SIDES, pass_from
+from phasekit.cells.states import at_states
 from phasekit.errors import OrbitFamily, ParameterError
-from phasekit.labelled.arguments import NumberLike, bad, describe, numeric, one_of
-from phasekit.labelled.as_system import as_system
-from phasekit.labelled.dispatch import SIDES, pass_from
-from phasekit.labelled.quantities import select
-from phasekit.labelled.states import at_states
+from phasekit.labels.arguments import NumberLike, bad, describe, numeric, one_of
+from phasekit.systems.as_system import as_system
+from phasekit.table.quantities import select
 
 #: Families that have orbits of given action.
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}

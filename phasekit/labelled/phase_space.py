@@ -9,10 +9,10 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.labelled.as_system import as_system
-from phasekit.labelled.dispatch import passes_of
-from phasekit.labelled.evaluate import evaluate
-from phasekit.labelled.quantities import select
+from phasekit.cells.dispatch import passes_of
+from phasekit.cells.evaluate import evaluate
+from phasekit.systems.as_system import as_system
+from phasekit.table.quantities import select
 
 
 def equilibria(system: Any) -> xr.Dataset:

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.kernels import machine as kernels
-from phasekit.mechanics.machine import at_states, machine_table
+from phasekit.mechanics import disk_states as kernels
+from phasekit.mechanics.disk_table import at_states, machine_table
 
 Array = npt.NDArray[np.float64]
 

@@ -18,13 +18,13 @@ import numpy.typing as npt
 from phasekit.errors import Loop, ParameterError
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.phase import potential as closed_form
+from phasekit.phase.exact import potential as closed_form
+from phasekit.phase.exact.orbits import orbits
+from phasekit.phase.exact.separatrices import phase_space
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.separatrices import separatrices
-from phasekit.phase.orbits import orbits
-from phasekit.phase.separatrices import phase_space
 
 Array = npt.NDArray[np.float64]
 

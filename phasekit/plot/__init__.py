@@ -1,18 +1,18 @@
 """Pictures of systems and of Datasets: every function takes ``ax=`` and returns the Axes."""
 
-from phasekit.plot.bearing_loads import bearing_forces
-from phasekit.plot.continued import branch
-from phasekit.plot.diagram import bifurcation_diagram
-from phasekit.plot.history import time_history
-from phasekit.plot.hodographs import hodograph
-from phasekit.plot.load_map import bearing_load_map
-from phasekit.plot.loci import bifurcation_set
-from phasekit.plot.maps import parameter_map
+from phasekit.plot.bearing_forces import bearing_forces
+from phasekit.plot.bearing_load_map import bearing_load_map
+from phasekit.plot.bifurcation_diagram import bifurcation_diagram
+from phasekit.plot.bifurcation_set import bifurcation_set
+from phasekit.plot.branch import branch
+from phasekit.plot.branch_surface import branch_surface
+from phasekit.plot.force_polygon import force_polygon
+from phasekit.plot.hodograph import hodograph
+from phasekit.plot.parameter_map import parameter_map
 from phasekit.plot.periods import frequency_action, period_energy
-from phasekit.plot.polygon import force_polygon
-from phasekit.plot.portrait import phase_portrait
-from phasekit.plot.surface import branch_surface
-from phasekit.plot.well import potential_well
+from phasekit.plot.phase_portrait import phase_portrait
+from phasekit.plot.potential_well import potential_well
+from phasekit.plot.time_history import time_history
 
 __all__ = [
     "bearing_forces",

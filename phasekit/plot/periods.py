@@ -11,12 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.arguments import FloatArray, bad
-from phasekit.labelled.as_system import as_system, single
 from phasekit.labelled.families import orbit_families
 from phasekit.labelled.phase_space import equilibria, separatrices
+from phasekit.labels.arguments import FloatArray, bad
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.plot import style
+from phasekit.plot.parts import style
+from phasekit.systems.as_system import as_system, single
 
 # Where a family begins: the row of its center among the equilibria.
 CENTERS = {"lower_well": 0, "upper_well": 2}

@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.loads.functions import separatrix_forces
 from phasekit.mechanics.bearings import bearing_forces
 from phasekit.mechanics.disk import disk_coefficients, disk_inertia
 from phasekit.mechanics.rotators import rotators
-from phasekit.phase.flow import separatrix_motion
-from phasekit.phase.loads import separatrix_forces
-from phasekit.phase.separatrices import separatrices
+from phasekit.phase.exact.flow import separatrix_motion
+from phasekit.phase.exact.separatrices import separatrices
 
 Disk = dict[str, Any]
 

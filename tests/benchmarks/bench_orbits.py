@@ -18,8 +18,8 @@ import pytest
 from benchmarks import rivals_orbits as rivals
 from scipy.optimize import brentq
 
-from phasekit.phase.flow import flow
-from phasekit.phase.orbits import orbits
+from phasekit.phase.exact.flow import flow
+from phasekit.phase.exact.orbits import orbits
 
 Orbits = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 Row = tuple[float, np.ndarray, np.ndarray | None]

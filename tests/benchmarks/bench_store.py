@@ -29,10 +29,10 @@ from zarr.codecs import BloscCodec, ZstdCodec
 from zarr.storage import LocalStore, MemoryStore
 
 import phasekit as pk
-from phasekit.kernels.launch import one_thread
-from phasekit.labelled.arrays import codec, codecs
-from phasekit.labelled.quantities import plan_passes, select
-from phasekit.labelled.tile import PIECE, compute_cells
+from phasekit.maps.stored_arrays import codec, codecs
+from phasekit.maps.tile import PIECE, compute_cells
+from phasekit.numerics.launch import one_thread
+from phasekit.table.quantities import plan_passes, select
 
 DISK = {"beta": 0.3, "e": 0.00115, "a": 0.002, "r": 0.2, "omega1": 2.5, "m": 1.5, "half_span": 0.1}
 CODES = ["n_equilibria", "topology", "figure_eight"]
@@ -294,7 +294,7 @@ def test_checksums(
     subject: str, side: int, scratch: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Writing and reading a tile without and with them, alternately, and looking at them alone."""
-    from phasekit.labelled.marks import sound
+    from phasekit.maps.marks import sound
 
     tile = OneTile(subject)
     cells = prod(tile.shape)

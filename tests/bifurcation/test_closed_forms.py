@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 import sympy
 
-from phasekit.bifurcation.closed_forms import (
+from phasekit.bifurcation.exact.critical import critical_disk
+from phasekit.bifurcation.exact.normal_forms import (
     cubic_coefficient,
     fold_angle,
     normal_form,
     quadratic_coefficient,
 )
-from phasekit.bifurcation.critical import critical_disk
-from phasekit.labelled.system import MODELS
+from phasekit.systems.system import MODELS
 
 LAWS = {name: model.trigonometric() for name, model in MODELS.items() if model.rung.derived}
 

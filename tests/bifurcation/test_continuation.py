@@ -11,7 +11,10 @@ from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
-from phasekit.bifurcation.continuation.machine import compile_expressions
+from phasekit.bifurcation.continuation.kernels import defining
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
+from phasekit.bifurcation.continuation.kernels.newton import refine
+from phasekit.bifurcation.continuation.machine_code import compile_expressions
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
@@ -19,9 +22,6 @@ from phasekit.bifurcation.continuation.spectrum import (
     pair_function,
 )
 from phasekit.errors import ParameterError
-from phasekit.kernels import defining
-from phasekit.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
-from phasekit.kernels.newton import refine
 from phasekit.laws.formulas import read_formula as parse
 from phasekit.laws.formulas import symbols_of
 

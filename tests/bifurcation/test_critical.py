@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mpf
+from witnesses import oracle
 
-from phasekit.bifurcation.critical import critical_disk, critical_reduced
+from phasekit.bifurcation.exact.critical import critical_disk, critical_reduced
 from phasekit.errors import ParameterError
 from phasekit.mechanics.disk import disk_coefficients
-from phasekit.phase.equilibria import equilibria
+from phasekit.phase.exact.equilibria import equilibria
 
 NAMES = ("beta", "e", "a", "r", "omega1", "g")
 SLOTS = ("minus", "plus", "sign_change")

@@ -10,7 +10,7 @@ import pytest
 import phasekit as pk
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
-from phasekit.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 
 
 def derivatives(f, x, parameters, scale=None, jac=None):

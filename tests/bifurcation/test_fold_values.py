@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.critical import critical_disk
-from phasekit.bifurcation.fold_values import fold_values
+from phasekit.bifurcation.exact.critical import critical_disk
+from phasekit.bifurcation.exact.fold_values import fold_values
 
 
 def random_disk(rng):

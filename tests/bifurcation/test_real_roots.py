@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy
 
-from phasekit.bifurcation.real_roots import (
+from phasekit.bifurcation.exact.real_roots import (
     common_divisor,
     interpolate,
     multiply,

@@ -5,8 +5,8 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labelled.quantities import ROWS, select
-from phasekit.phase import asymptotics as floor
+from phasekit.phase.exact import asymptotics as floor
+from phasekit.table.quantities import ROWS, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)
 SINGLE = pk.Coefficients(0.4, 1.2, 0.7)

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.atlas import atlas
-from phasekit.bifurcation.paths import Path
+from phasekit.bifurcation.exact.atlas import atlas
+from phasekit.bifurcation.exact.line import Path
 from phasekit.labelled.atlas import branches
 from phasekit.laws.trigonometric import law
 

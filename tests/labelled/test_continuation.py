@@ -12,11 +12,11 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.labelled.branch import Branch
-from phasekit.labelled.continuation import continuation
-from phasekit.labelled.diagram import diagram
-from phasekit.labelled.eights import figure_eights
-from phasekit.labelled.problem import Problem
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.continuation import continuation
+from phasekit.labelled.continuation.diagram import diagram
+from phasekit.labelled.figure_eights import figure_eights
+from phasekit.systems.problem import Problem
 
 matplotlib.use("Agg")
 

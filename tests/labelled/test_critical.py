@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.critical import critical_disk, critical_reduced
+from phasekit.bifurcation.exact.critical import critical_disk, critical_reduced
 
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5, g=9.81)
 UNITS = {"beta": "rad", "e": "m", "a": "m", "omega1": "s-1", "lam": "1", "psi": "1"}
@@ -57,7 +57,7 @@ def test_the_axis_of_the_parameter_itself_does_not_count():
 
 def test_attributes_of_the_table_are_left_alone():
     pk.critical(DISK, "beta")
-    from phasekit.labelled.quantities import ROWS
+    from phasekit.table.quantities import ROWS
 
     assert ROWS["critical_fold"].units == "1"
     assert "parameter" not in ROWS["critical_fold"].attrs

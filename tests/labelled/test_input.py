@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labelled.arguments import number, numeric, pair, whole
+from phasekit.labels.arguments import number, numeric, pair, whole
 from phasekit.mechanics.bearings import bearing_forces
 from phasekit.mechanics.disk import disk_coefficients
 from phasekit.mechanics.rotators import rotators

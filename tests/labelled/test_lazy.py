@@ -5,7 +5,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labelled import memory
+from phasekit.labels import memory
 
 pytest.importorskip("dask")
 

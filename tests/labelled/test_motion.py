@@ -6,8 +6,8 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
-from phasekit.labelled.quantities import ROWS, select
-from phasekit.phase import flow as floor
+from phasekit.phase.exact import flow as floor
+from phasekit.table.quantities import ROWS, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)
 SINGLE = pk.Coefficients(0.4, 1.2, 0.7)
@@ -96,7 +96,7 @@ def test_motions_in_a_sweep():
 
 
 def test_tiles_in_threads_make_the_same_motion(monkeypatch):
-    from phasekit.labelled import tiling
+    from phasekit.cells import tiling
 
     swept = DISK.replace(beta=np.linspace(0, 1.5, 5))
     whole = pk.flow(swept, PHI, DPHI, T)

@@ -6,9 +6,10 @@ import xarray as xr
 from scipy.special import ellipe, ellipk
 
 import phasekit as pk
-from phasekit.labelled.quantities import LABELS, ROWS, STATES, plan_passes, select
-from phasekit.phase import action_angle as angle_floor
-from phasekit.phase import orbits as floor
+from phasekit.labels.coordinates import LABELS, STATES
+from phasekit.phase.exact import action_angle as angle_floor
+from phasekit.phase.exact import orbits as floor
+from phasekit.table.quantities import ROWS, plan_passes, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)  # figure-eight
 SINGLE = pk.Coefficients(0.4, 1.2, 0.7)  # one saddle
@@ -385,7 +386,7 @@ def test_lazy_equals_eager(call):
 
 
 def test_states_of_tiles_and_threads(monkeypatch):
-    from phasekit.labelled import tiling
+    from phasekit.cells import tiling
 
     axes = {"beta": np.linspace(0.0, 1.5, 5), "state_phi": PHI, "state_dphi": DPHI}
     of = ["orbits", "action_angle"]

@@ -6,18 +6,18 @@ import json
 from pathlib import Path
 
 import numpy as np
-import particles
 import pytest
-from disk_forces import Disk, Motion
 from mpmath import mp, mpf
+from witnesses import particles
+from witnesses.disk_forces import Disk, Motion
 
-from phasekit.kernels import launch
 from phasekit.mechanics.bearings import bearing_forces, fixed_bearing_forces
 from phasekit.mechanics.coupled_rotation import CoupledRotation
 from phasekit.mechanics.disk import disk_coefficients
 from phasekit.mechanics.rigid_body import RigidBody
 from phasekit.mechanics.rotators import rotators
-from phasekit.phase.flow import flow
+from phasekit.numerics import launch
+from phasekit.phase.exact.flow import flow
 
 DATA = Path(__file__).parents[1] / "data"
 CASES = [

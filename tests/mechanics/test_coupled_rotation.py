@@ -8,9 +8,9 @@ import pickle
 from pathlib import Path
 
 import numpy as np
-import particles
 import pytest
 from mpmath import mp, mpf
+from witnesses import particles
 
 from phasekit.errors import ParameterError
 from phasekit.mechanics.coupled_rotation import CoupledRotation

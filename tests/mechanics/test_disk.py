@@ -8,10 +8,10 @@ rotations; it does not use any formula of the papers.
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 import sympy as sp
 from mpmath import mp, mpf
+from witnesses import oracle
 
 from phasekit.mechanics.disk import disk_coefficients, disk_inertia, disk_mixing
 

@@ -12,7 +12,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from errata import (
+from witnesses.errata import (
     ACROSS,
     ALONG,
     FAILS,

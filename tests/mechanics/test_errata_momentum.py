@@ -10,9 +10,20 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import particles
 import pytest
-from errata import HOLDS, UP, Formula, Machine, cross, decide, deviation, machines, norm, unit
+from witnesses import particles
+from witnesses.errata import (
+    HOLDS,
+    UP,
+    Formula,
+    Machine,
+    cross,
+    decide,
+    deviation,
+    machines,
+    norm,
+    unit,
+)
 
 from phasekit.mechanics.coupled_rotation import CoupledRotation
 from phasekit.mechanics.rigid_body import RigidBody

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from errata import (
+from witnesses.errata import (
     ALONG,
     HOLDS,
     UP,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from errata import (
+from witnesses.errata import (
     ACROSS,
     ALONG,
     HOLDS,

@@ -6,7 +6,7 @@ MuJoCo gets bodies and hinges only (`mujoco_mechanism`), so nothing is shared bu
 from __future__ import annotations
 
 import numpy as np
-from mujoco_mechanism import Mechanism  # skips this module where MuJoCo is missing
+from witnesses.mujoco_mechanism import Mechanism  # skips this module where MuJoCo is missing
 
 import phasekit as pk
 from phasekit.mechanics import two_degrees as machines

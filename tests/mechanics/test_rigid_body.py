@@ -9,9 +9,9 @@ import pickle
 from pathlib import Path
 
 import numpy as np
-import particles
 import pytest
 from mpmath import mpf
+from witnesses import particles
 
 from phasekit.errors import ParameterError
 from phasekit.mechanics.rigid_body import RigidBody

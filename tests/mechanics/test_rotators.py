@@ -6,16 +6,16 @@ import json
 from pathlib import Path
 
 import numpy as np
-import particles
 import pytest
 from mpmath import mp, mpf
+from witnesses import particles
 
-from phasekit.kernels import launch
 from phasekit.mechanics.coupled_rotation import CoupledRotation
 from phasekit.mechanics.disk import disk_coefficients
 from phasekit.mechanics.rigid_body import RigidBody
 from phasekit.mechanics.rotators import ROTATORS, rotators
-from phasekit.phase.flow import flow
+from phasekit.numerics import launch
+from phasekit.phase.exact.flow import flow
 
 DATA = Path(__file__).parents[1] / "data"
 CASES = [

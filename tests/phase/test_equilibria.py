@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mpf
 from properties.strategies import FAMILIES
+from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, ParameterError
-from phasekit.phase.equilibria import equilibria
+from phasekit.phase.exact.equilibria import equilibria
 
 UNIT = 2.0**-53
 LC, LS, UC, US = range(4)

@@ -7,17 +7,17 @@ rounding of the state and the time becomes on the way: the variation is taken fr
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mp, mpf
-from orbit_oracle import flow as taylor
-from orbit_oracle import flow_at, orbit
 from properties.strategies import FAMILIES
 from scipy.integrate import solve_ivp
+from witnesses import oracle
+from witnesses.orbit_oracle import flow as taylor
+from witnesses.orbit_oracle import flow_at, orbit
 
 from phasekit.errors import OrbitKind, ParameterError
-from phasekit.phase.flow import flow
-from phasekit.phase.orbits import orbits
+from phasekit.phase.exact.flow import flow
+from phasekit.phase.exact.orbits import orbits
 
 UNIT = 2.0**-53
 RECORDED = oracle.cases("flow")

@@ -14,10 +14,10 @@ from phasekit.errors import (
     ParameterError,
     Topology,
 )
-from phasekit.phase import equilibria as closed_equilibria
-from phasekit.phase import flow as closed_flow
-from phasekit.phase import orbits as closed_orbits
-from phasekit.phase import separatrices as closed_separatrices
+from phasekit.phase.exact import equilibria as closed_equilibria
+from phasekit.phase.exact import flow as closed_flow
+from phasekit.phase.exact import orbits as closed_orbits
+from phasekit.phase.exact import separatrices as closed_separatrices
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.collocation import integrate
 from phasekit.phase.numerical.formula import Shape, make_formula

@@ -14,15 +14,15 @@ from __future__ import annotations
 import functools
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mp, mpf
-from orbit_oracle import orbit
 from properties.strategies import FAMILIES
 from scipy.special import ellipe, ellipk, ellipkm1
+from witnesses import oracle
+from witnesses.orbit_oracle import orbit
 
 from phasekit.errors import OrbitKind, ParameterError
-from phasekit.phase.orbits import orbits, orbits_at_energy, orbits_at_gap
+from phasekit.phase.exact.orbits import orbits, orbits_at_energy, orbits_at_gap
 
 UNIT = 2.0**-53
 RELATIVE = 2e-14

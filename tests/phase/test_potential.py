@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mp, mpf
 from properties.strategies import systems
+from witnesses import oracle
 
-from phasekit.phase.potential import curvature, energy, gradient, phase_velocity, potential
+from phasekit.phase.exact.potential import curvature, energy, gradient, phase_velocity, potential
 
 UNIT = 2.0**-53
 SAMPLES = 300

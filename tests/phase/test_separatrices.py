@@ -7,13 +7,13 @@ coefficients are exact doubles, so nothing of what is tested is ill-conditioned 
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mpf
 from properties.strategies import FAMILIES
+from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.separatrices import phase_space, separatrices
+from phasekit.phase.exact.separatrices import phase_space, separatrices
 
 UNIT = 2.0**-53
 RELATIVE = mpf("1e-12")

@@ -8,11 +8,11 @@ from scipy.integrate import quad
 
 import phasekit as pk
 from phasekit.errors import Loop
-from phasekit.labelled.potential_system import Potential
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.phase.answers import answers
-from phasekit.plot import style
-from phasekit.plot.portrait import curves_of
+from phasekit.plot.parts import style
+from phasekit.plot.phase_portrait import curves_of
+from phasekit.systems.potential import Potential
 
 DISK = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.01, r=0.1, omega1=15.0, m=2.0)
 ROTOR = pk.FreeGyroRotor(DISK, 0.02)

@@ -6,8 +6,8 @@ import pytest
 from scipy.special import ellipe, ellipk
 
 import phasekit as pk
-from phasekit.phase.orbits import orbits_at_energy
-from phasekit.plot import style
+from phasekit.phase.exact.orbits import orbits_at_energy
+from phasekit.plot.parts import style
 
 EIGHT = pk.Coefficients(3.7, 1.3, 0.4)
 WINDING = pk.Coefficients(1.1, 2.3, 0.6)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.labelled.potential_system import Potential
-from phasekit.plot import style
-from phasekit.plot.portrait import curves_of
+from phasekit.plot.parts import style
+from phasekit.plot.phase_portrait import curves_of
+from phasekit.systems.potential import Potential
 
 WELL = Potential("x^4/4 - x^2/2", "x")
 CUBIC = Potential("x^2/2 - x^3/3", "x")

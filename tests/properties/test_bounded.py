@@ -13,9 +13,10 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.labelled.dispatch import is_offered, passes_of
-from phasekit.labelled.quantities import ROWS, STATES
-from phasekit.phase import loads
+from phasekit.cells.dispatch import is_offered, passes_of
+from phasekit.labels.coordinates import STATES
+from phasekit.loads import functions
+from phasekit.table.quantities import ROWS
 
 CELLS = int(os.environ.get("PHASEKIT_EXTREME", "6"))
 SPECIAL = [0.0, -0.0, 1e16, 1e300, -1e300, 1.7e308, 5e-324, np.inf, -np.inf, np.nan]
@@ -67,15 +68,15 @@ def test_every_group_ends(system, groups):
 def test_loads_that_overflow_are_sampled_once(changed, monkeypatch):
     """More samples cannot settle what is infinite."""
     sampled = []
-    whole = loads._sampled
+    whole = functions._sampled
 
     def counted(table, start, period, *rest):
         sampled.append(period.size)
         return whole(table, start, period, *rest)
 
-    monkeypatch.setattr(loads, "_sampled", counted)
+    monkeypatch.setattr(functions, "_sampled", counted)
     disk = {"beta": 0.7, "e": 0.05, "a": 0.024, "r": 0.2, "omega1": 31.4, "m": 2.0, "g": 9.81}
     disk = {**disk, "half_span": 0.2, **changed}
-    over = loads.orbit_forces(*disk.values(), [0.5, 1.0], [1.0, -2.0])
+    over = functions.orbit_forces(*disk.values(), [0.5, 1.0], [1.0, -2.0])
     assert not np.isfinite(over.mean).any()
     assert sum(sampled) == 2

@@ -8,14 +8,14 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import oracle
 import pytest
 from properties.extended import cos_sin
 from properties.strategies import number_of_systems, systems
+from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.equilibria import equilibria
-from phasekit.phase.separatrices import phase_space
+from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.separatrices import phase_space
 
 UNIT = 2.0**-53
 LC, LS, UC, US = range(4)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-import oracle
 import pytest
 from mpmath import mp, mpf
 from properties.extended import derivatives
 from properties.strategies import FAMILIES, systems
+from witnesses import oracle
 
 DIGITS = mpf(10) ** -22
 

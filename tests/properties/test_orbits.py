@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from properties.strategies import FAMILIES, number_of_systems, systems
 
 from phasekit.errors import OrbitFamily, OrbitKind
-from phasekit.phase.action_angle import action_angle, action_limits, state_of
-from phasekit.phase.equilibria import equilibria
-from phasekit.phase.flow import flow
-from phasekit.phase.orbits import orbits
+from phasekit.phase.exact.action_angle import action_angle, action_limits, state_of
+from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.flow import flow
+from phasekit.phase.exact.orbits import orbits
 
 UNIT = 2.0**-53
 EXAMPLES = settings(max_examples=100)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import oracle
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from properties.extended import derivatives
+from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.separatrices import phase_space
+from phasekit.phase.exact.separatrices import phase_space
 
 UNIT = 2.0**-53
 EXAMPLES = settings(max_examples=300)

@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from kill_harness import content, local_cluster
+from witnesses.kill_harness import content, local_cluster
 
 import phasekit as pk
-from phasekit.labelled import tile as tiles
+from phasekit.maps import tile as tiles
 
 pytest.importorskip("zarr")
 pytest.importorskip("dask")

@@ -10,13 +10,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import oracle
 import pytest
 from properties.extended import derivatives
 from properties.strategies import number_of_systems, systems
+from witnesses import oracle
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.equilibria import equilibria
+from phasekit.phase.exact.equilibria import equilibria
 
 CENTER, SADDLE = int(EquilibriumKind.CENTER), int(EquilibriumKind.SADDLE)
 ABSENT, DEGENERATE = int(EquilibriumKind.ABSENT), int(EquilibriumKind.DEGENERATE)

@@ -11,8 +11,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
-from phasekit.kernels import differences
-from phasekit.kernels.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
+from phasekit.numerics import differences
+from phasekit.numerics.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
 
 Array = npt.NDArray[np.float64]
 
@@ -245,7 +245,7 @@ def _power(h: float) -> float:
 
 
 def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
-    """The slope of a function at 0, as `phasekit.kernels.differences` takes it."""
+    """The slope of a function at 0, as `phasekit.numerics.differences` takes it."""
     h = FINE * size
     fine, wide = ((at(k * h) - at(-k * h)) / (2.0 * k * h) for k in (1.0, 2.0))
     slope, least = fine.copy(), np.full_like(middle, np.inf)

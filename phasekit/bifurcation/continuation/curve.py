@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
+from phasekit.bifurcation.continuation.kernels import defining, newton, trace
+from phasekit.bifurcation.continuation.kernels import state as state_places
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.kernels import defining, differences, newton, trace
-from phasekit.kernels import state as state_places
-from phasekit.kernels.defining import EQUILIBRIUM
-from phasekit.kernels.state import NUMBERS, VECTORS
+from phasekit.numerics import differences
 
 Array = npt.NDArray[np.float64]
 

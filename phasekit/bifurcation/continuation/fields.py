@@ -1,8 +1,8 @@
 """Right-hand sides in the form that the stepping code calls.
 
 A `Field` is f(x, p) with all its parameters. `first(active)` and `second(active)` are what the
-kernels of `phasekit.kernels.trace` take: functions of the unknowns u = (x, free parameters) that
-write f with its derivatives by u, row by row; the second goes on with the derivatives of f_u z.
+kernels of a trace take: functions of the unknowns u = (x, free parameters) that write f with its
+derivatives by u, row by row; the second goes on with the derivatives of f_u z.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.kernels.differences import DERIVED
+from phasekit.numerics.differences import DERIVED
 
 Array = npt.NDArray[np.float64]
 
@@ -95,7 +95,7 @@ def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
     """
     import sympy
 
-    from phasekit.bifurcation.continuation.machine import COMPILED, DIFFERENTIABLE
+    from phasekit.bifurcation.continuation.machine_code import COMPILED, DIFFERENTIABLE
 
     for part in expression.atoms(sympy.Function):
         name = type(part).__name__
@@ -146,7 +146,7 @@ def _first(
     parameters: tuple[str, ...],
     active: tuple[int, ...],
 ) -> int:
-    from phasekit.bifurcation.continuation.machine import compile_expressions
+    from phasekit.bifurcation.continuation.machine_code import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
     entries, count = _jet(expressions, u)
@@ -162,7 +162,7 @@ def _second(
 ) -> int:
     import sympy
 
-    from phasekit.bifurcation.continuation.machine import compile_expressions
+    from phasekit.bifurcation.continuation.machine_code import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
@@ -183,7 +183,7 @@ def _terms(
     parameters: tuple[str, ...],
     active: tuple[int, ...],
 ) -> int:
-    from phasekit.bifurcation.continuation.machine import compile_expressions
+    from phasekit.bifurcation.continuation.machine_code import compile_expressions
 
     _, places = _unknowns(states, parameters, active)
     return compile_expressions([*expressions, *map(_magnitude, expressions)], places)
@@ -211,7 +211,7 @@ def _third(
 ) -> int:
     import sympy
 
-    from phasekit.bifurcation.continuation.machine import compile_expressions
+    from phasekit.bifurcation.continuation.machine_code import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(3 * len(u))]

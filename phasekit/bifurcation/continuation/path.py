@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
+from phasekit.bifurcation.continuation.kernels import trace
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
-from phasekit.kernels import trace
-from phasekit.kernels.defining import EQUILIBRIUM, HOPF
 
 Array = npt.NDArray[np.float64]
 

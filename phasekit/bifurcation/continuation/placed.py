@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.compare import turned
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
+from phasekit.bifurcation.continuation.same_path import turned
 
 SAME = 1e-6  # points of one kind that are closer, on scaled axes, are one
 STAYS = 1e-3  # distance within which a path that passes a special point has not left it

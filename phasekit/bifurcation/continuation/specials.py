@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.codimension_two import find_on
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.two_parameters import find_on
 
 Array = npt.NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.kernels.differences import PLAIN
+from phasekit.numerics.differences import PLAIN
 
 Array = npt.NDArray[np.float64]
 

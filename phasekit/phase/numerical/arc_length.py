@@ -15,9 +15,9 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.laws.ladder import Routhian
 from phasekit.phase.numerical import orbits as rounds
+from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula, Shape
-from phasekit.phase.numerical.ground import Ground, survey
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]

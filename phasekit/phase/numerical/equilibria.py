@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.numerical.candidates import noise_at, partition
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.isolation import bracketed, isolate, slope_bounds
+from phasekit.phase.numerical.partition import noise_at, partition
 from phasekit.phase.numerical.series import Roots, exact_heights, of_fourier_sums, of_polynomials
 from phasekit.phase.numerical.systems import Index, Systems
 

@@ -14,19 +14,19 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.flow import Motion
+from phasekit.phase.exact.flow import Motion
 from phasekit.phase.numerical import motion as motions
 from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical import separatrices as loops
-from phasekit.phase.numerical.arcs import distances
+from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
 from phasekit.phase.numerical.formula import Formula
-from phasekit.phase.numerical.ground import Ground, survey
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.orbits import Orbits
 from phasekit.phase.numerical.separatrices import Separatrices
 from phasekit.phase.numerical.systems import Systems, make_systems
+from phasekit.phase.numerical.turning_points import distances
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]

@@ -15,9 +15,9 @@ import numpy.typing as npt
 
 from phasekit.errors import OrbitKind
 from phasekit.phase.numerical.collocation import integrate
-from phasekit.phase.numerical.ground import Ground
+from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.orbits import orbits_of, resting_ends, states_of
-from phasekit.phase.numerical.pieces import speeds
+from phasekit.phase.numerical.quadrature import speeds
 from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.separatrices import Branch, branch_of
 
@@ -27,7 +27,7 @@ _EPS = float(np.finfo(float).eps)
 
 
 class MotionWithErrors(NamedTuple):
-    """States along a motion, as of `phasekit.phase.flow`, with estimates of their errors.
+    """States along a motion, as of `phasekit.phase.exact.flow`, with estimates of their errors.
 
     Errors are infinite where a bounded motion took too many steps, NaN where there is no state.
     """

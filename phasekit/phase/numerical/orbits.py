@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, OrbitKind
-from phasekit.phase.numerical.arcs import End, find_end
-from phasekit.phase.numerical.ground import Anchor, Ground
+from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.periods import librations, rotations
 from phasekit.phase.numerical.systems import Systems
+from phasekit.phase.numerical.turning_points import End, find_end
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -20,7 +20,7 @@ _EPS = float(np.finfo(float).eps)
 
 
 class Orbits(NamedTuple):
-    """Orbits of systems, as of `phasekit.phase.orbits`, with estimates of errors."""
+    """Orbits of systems, as of `phasekit.phase.exact.orbits`, with estimates of errors."""
 
     orbit_kind: npt.NDArray[np.int8]
     """`OrbitKind`."""

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.numerical.ground import Anchor, Ground
-from phasekit.phase.numerical.pieces import Pieces
+from phasekit.phase.numerical.differences import Anchor, Ground
+from phasekit.phase.numerical.quadrature import Pieces
 from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.systems import Index
 

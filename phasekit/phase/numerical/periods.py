@@ -16,12 +16,12 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.numerical.arcs import End
+from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.formula import Shape
-from phasekit.phase.numerical.ground import Ground
 from phasekit.phase.numerical.panels import Integrals, integrate
-from phasekit.phase.numerical.pieces import between, round_the_circle
+from phasekit.phase.numerical.quadrature import between, round_the_circle
 from phasekit.phase.numerical.systems import Index
+from phasekit.phase.numerical.turning_points import End
 
 Array = npt.NDArray[np.float64]
 

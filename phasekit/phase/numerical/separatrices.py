@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.phase.numerical.arcs import End, distances, find_end
-from phasekit.phase.numerical.ground import Anchor, Ground
+from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.panels import integrate
 from phasekit.phase.numerical.periods import WORST
-from phasekit.phase.numerical.pieces import between
+from phasekit.phase.numerical.quadrature import between
+from phasekit.phase.numerical.turning_points import End, distances, find_end
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -23,7 +23,7 @@ SIDES = (-1.0, 1.0)
 
 
 class Separatrices(NamedTuple):
-    """Separatrices of systems, as of `phasekit.phase.separatrices`, with estimates of errors."""
+    """Separatrices of systems, as in closed form, with estimates of errors."""
 
     topology: npt.NDArray[np.int8]
     """`Topology`."""

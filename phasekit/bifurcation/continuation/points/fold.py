@@ -8,6 +8,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
+from phasekit.bifurcation.continuation.kernels.defining import FOLD
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
 from phasekit.bifurcation.continuation.points.branch_point import (
     described,
@@ -24,7 +25,6 @@ from phasekit.bifurcation.continuation.points.special import (
     tangent_at,
 )
 from phasekit.bifurcation.continuation.units import force_sizes
-from phasekit.kernels.defining import FOLD
 
 Array = npt.NDArray[np.float64]
 

@@ -9,8 +9,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import TIGHT, Curve, nullspace
 from phasekit.bifurcation.continuation.events import Bracket
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
 from phasekit.bifurcation.continuation.units import force_sizes
-from phasekit.kernels.defining import BRANCH, HOPF
 
 Array = npt.NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""Compiled continuation: defining systems, Newton's method and the walk along a curve."""

@@ -1,0 +1,216 @@
+"""Defining systems of curves and points of equilibria: G(u) = 0 with its Jacobian.
+
+The unknowns are u = (x, p, ...) with the state x, the free parameters p and what else a kind needs:
+
+- EQUILIBRIUM: f(x, p) = 0.
+- FOLD: f = 0, f_x v = 0, v.v = 1 with u = (x, p, v).
+- HOPF: f = 0, (f_x^2 + k) v = 0, v.v = 1, l.v = 0 with u = (x, p, v, k): eigenvalues +-sqrt(-k),
+  so a Hopf point where k = omega^2 > 0 and a neutral saddle where k < 0; l is held fixed.
+- BRANCH: f + b w = 0, w f_x = 0, w f_q = 0, w.w = 1 with u = (x, p, w, b), q the first free
+  parameter: a branch point where b = 0.
+
+Norms of v and w are taken in units of their scales. With one free parameter the last three are
+square and define a point; with two they define a curve ([Govaerts2000] chapters 4 and 6,
+[Kuznetsov2004] chapter 10).
+
+Everything lies in one flat work array: what `places` returns is where each piece begins.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.kernels.state import NUMBERS, SCALE, VECTORS
+from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.differences import DERIVED, bend, jet, spare_size
+
+EQUILIBRIUM, FOLD, HOPF, BRANCH = range(4)
+
+
+def unknowns(kind: int, n: int, free: int) -> int:
+    """Number of unknowns of a defining system."""
+    return n + free + (0, n, n + 1, n + 1)[kind]
+
+
+def equations(kind: int, n: int) -> int:
+    """Number of equations of a defining system."""
+    return n if kind == EQUILIBRIUM else (2 * n + 1 if kind == FOLD else 2 * n + 2)
+
+
+def work_size(kind: int, n: int, free: int) -> int:
+    """Length of the work array."""
+    size, rows = unknowns(kind, n, free), equations(kind, n)
+    m = n + free
+    kept = VECTORS * size + NUMBERS + n
+    return (
+        kept
+        + 6 * size
+        + size * size
+        + 2 * size
+        + n
+        + n * m
+        + rows
+        + rows * size
+        + (n * m + n * n + m + spare_size(n, m))
+    )
+
+
+@routine
+def places(kind: int, n: int, free: int) -> tuple[int, ...]:
+    """Where the pieces of the work array begin.
+
+    In order: l, six vectors, matrix and right sides of a Newton step, f with its derivatives and,
+    right after them, what `bend` gives; G and its Jacobian, a square, a direction z, spare vectors.
+    """
+    m = n + free
+    size = m
+    rows = n
+    if kind == FOLD:
+        size = m + n
+        rows = 2 * n + 1
+    elif kind != EQUILIBRIUM:
+        size = m + n + 1
+        rows = 2 * n + 2
+    aux = VECTORS * size + NUMBERS
+    vectors = aux + n
+    matrix = vectors + 6 * size
+    right = matrix + size * size
+    jet_ = right + 2 * size
+    bent = jet_ + n + n * m
+    g = bent + n * m
+    jacobian = g + rows
+    if kind == EQUILIBRIUM:  # f and its derivatives are the system
+        g = jet_
+        jacobian = jet_ + n
+    square = bent + n * m + rows + rows * size
+    z = square + n * n
+    spare = z + m
+    return size, rows, aux, vectors, matrix, right, jet_, g, jacobian, bent, square, z, spare
+
+
+@routine
+def evaluate(
+    first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array, u: int
+) -> None:
+    """G and its Jacobian at the unknowns that begin at u, into their places."""
+    size, rows, aux, _, _, _, base, g, jac, bent, square, z, spare = places(kind, n, active.size)
+    scale = SCALE * size
+    m = n + active.size
+    v = u + m
+    f = base
+    if kind == EQUILIBRIUM:
+        jet(first, mode, n, w, u, par, active, scale, f, spare)
+        return
+    for i in range(m):
+        w[z + i] = w[v + i] if i < n and kind != BRANCH else 0.0
+    if kind == BRANCH or mode != DERIVED:
+        jet(first, mode, n, w, u, par, active, scale, f, spare)
+    if kind != BRANCH:
+        bend(first, second, mode, n, w, u, par, active, scale, z, f, spare)
+    base += n  # the derivatives
+    for i in range(rows * size):
+        w[jac + i] = 0.0
+    for i in range(n):
+        w[g + i] = w[f + i]
+        for j in range(m):
+            w[jac + i * size + j] = w[base + i * m + j]
+    last = rows - 1
+    w[g + last] = -1.0
+    for i in range(n):  # the norm of v in units of its own scales
+        part = w[v + i] / w[scale + m + i]
+        w[g + last] += part * part
+        w[jac + last * size + m + i] = 2.0 * part / w[scale + m + i]
+    extra = w[u + size - 1]
+    if kind == BRANCH:
+        for i in range(n):
+            w[g + i] += extra * w[v + i]
+            w[jac + i * size + m + i] = extra
+            w[jac + i * size + m + n] = w[v + i]
+        for k in range(n + 1):
+            w[z + k] = 1.0
+            bend(first, second, mode, n, w, u, par, active, scale, z, f, spare)
+            w[z + k] = 0.0
+            row = jac + (n + k) * size
+            w[g + n + k] = 0.0
+            for i in range(n):
+                w[g + n + k] += w[v + i] * w[base + i * m + k]
+                w[row + m + i] = w[base + i * m + k]
+                for j in range(m):
+                    w[row + j] += w[v + i] * w[bent + i * m + j]
+        return
+    for i in range(n):  # f_x v
+        w[z + i] = 0.0
+        for j in range(n):
+            w[z + i] += w[base + i * m + j] * w[v + j]
+    if kind == FOLD:
+        for i in range(n):
+            row = jac + (n + i) * size
+            w[g + n + i] = w[z + i]
+            for j in range(m):
+                w[row + j] = w[bent + i * m + j]
+            for j in range(n):
+                w[row + m + j] = w[base + i * m + j]
+        return
+    for i in range(n):
+        row = jac + (n + i) * size
+        for k in range(n):
+            value = w[base + i * m + k]
+            for j in range(m):
+                w[row + j] += value * w[bent + k * m + j]
+            for j in range(n):
+                w[row + m + j] += value * w[base + k * m + j]
+        w[row + m + i] += extra
+        w[row + m + n] = w[v + i]
+        w[g + n + i] = 0.0
+        for j in range(n):
+            w[g + n + i] += w[row + m + j] * w[v + j]
+    bend(first, second, mode, n, w, u, par, active, scale, z, f, spare)
+    row = jac + 2 * n * size
+    w[g + 2 * n] = 0.0
+    # The norm of v is the last equation, the phase the one before it.
+    for i in range(n):
+        for j in range(m):
+            w[jac + (n + i) * size + j] += w[bent + i * m + j]
+        w[g + 2 * n] += w[aux + i] * w[v + i]
+        w[row + m + i] = w[aux + i]
+
+
+@kernel
+def first_derivatives(
+    first: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any, scale: int, out: int,
+    spare: int,
+) -> None:  # fmt: skip
+    """`jet`, called from outside."""
+    jet(first, mode, n, w, u, par, active, scale, out, spare)
+
+
+@kernel
+def second_derivatives(
+    first: Any, second: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any,
+    scale: int, z: int, out: int, spare: int,
+) -> None:  # fmt: skip
+    """`bend`, called from outside."""
+    bend(first, second, mode, n, w, u, par, active, scale, z, out, spare)
+
+
+@kernel
+def bend_all(
+    first: Any, second: Any, mode: int, n: int, par: Array, active: Any, scale: Array,
+    points: Array, directions: Array, out: Array,
+) -> None:  # fmt: skip
+    """The derivatives of f_u z at many points, each with its own z."""
+    m = n + active.size
+    base = 3 * m
+    bent = base + n + n * m
+    w = np.zeros(bent + n * m + m + 7 * n)
+    for j in range(m):
+        w[m + j] = scale[j]
+    for k in range(points.shape[0]):
+        for j in range(m):
+            w[j] = points[k, j]
+            w[2 * m + j] = directions[k, j]
+        bend(first, second, mode, n, w, 0, par, active, m, 2 * m, base, bent + n * m)
+        for j in range(n * m):
+            out[k, j] = w[bent + j]

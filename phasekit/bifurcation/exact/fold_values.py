@@ -1,0 +1,124 @@
+"""Folds and the change of sign of A along any parameter of any law, by exact arithmetic.
+
+Where no closed form is known: with A, B and C polynomials of the parameter, or of the tangent of
+half an angle, all roots of the discriminant that are not negative are isolated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.exact.critical import Critical
+from phasekit.bifurcation.exact.line import Path
+from phasekit.bifurcation.exact.real_roots import Rational, multiply, unit_roots, value, whole
+from phasekit.laws.trigonometric import Trigonometric
+
+# Roots in (2^-OCTAVES, 1] are found to 2^-FINEST, which leaves 60 bits to each.
+OCTAVES, FINEST = 20, 80
+
+
+def fold_values(
+    law: Trigonometric, parameter: str, values: Mapping[str, npt.ArrayLike]
+) -> Critical:
+    """Least positive values of a parameter at which equilibria merge, or A changes sign.
+
+    Parameters
+    ----------
+    law : Trigonometric
+        The system's law.
+    parameter : str
+        What to solve for; its own values are not used.
+    values : mapping
+        The law's parameters; they broadcast.
+
+    Returns
+    -------
+    minus, plus, sign_change : ndarray
+        The least fold with A < 0, the least with A > 0, and the least value where A = 0; NaN
+        where there is none. In the parameter's unit, inside its domain (angles up to pi/2), to
+        rounding. Where B and C vanish for every value, equilibria merge where A changes sign.
+
+    Examples
+    --------
+    >>> from phasekit.laws.trigonometric import law
+    >>> ball = law(
+    ...     lambda v: (v["w"] * v["w"], v["g"], 0 * v["g"], 1),
+    ...     (("w", "s-1", -np.inf, np.inf), ("g", "s-2", -np.inf, np.inf)),
+    ... )
+    >>> [float(x) for x in fold_values(ball, "w", {"w": 0.0, "g": 4.0})]
+    [nan, 2.0, nan]
+    """
+    names = [name for name in law.parameters if name != parameter]
+    arrays = np.broadcast_arrays(*(np.asarray(values[name], float) for name in names), 0.0)
+    shape = arrays[0].shape
+    found = np.full((3, arrays[0].size), np.nan)
+    for place, cell in enumerate(zip(*(array.ravel().tolist() for array in arrays), strict=True)):
+        if all(map(math.isfinite, cell)):
+            found[:, place] = _of_one(law, parameter, dict(zip(names, cell, strict=False)))
+    minus, plus, sign_change = found.reshape(3, *shape)
+    return minus, plus, sign_change
+
+
+def _of_one(law: Trigonometric, parameter: str, values: dict[str, float]) -> list[float]:
+    low, high = (max(0.0, end) for end in law.domains[parameter])
+    if parameter in law.angles:
+        high = min(high, math.pi / 2)
+    span = (low, high) if parameter in law.angles else (0.0, 1.0)
+    path = Path(law, values, parameter, span)
+    A, B, C = path.products
+    whole_A = multiply(A, path.common)
+    flat = not any(B) and not any(C)
+    at_zero = [x for x in _non_negative_roots(whole_A) if _turns(whole_A, x)]
+    folds: tuple[list[Fraction], list[Fraction]] = (at_zero, at_zero) if flat else ([], [])
+    if not flat:
+        for x in _non_negative_roots(path.discriminant):
+            if sign := path.sign(A, x):
+                folds[sign > 0].append(x)
+    parameters = ([_at(path, x) for x in slot] for slot in (*folds, at_zero))
+    return [min((x for x in slot if low <= x <= high), default=math.nan) for slot in parameters]
+
+
+def _at(path: Path, x: Fraction) -> float:
+    """The parameter at x in units of the span; of an angle NaN beyond it."""
+    if path.parameter not in path.law.angles:
+        return float(x)
+    return path.at(x) if x <= 1 else math.nan
+
+
+def _turns(polynomial: Sequence[Rational], x: Fraction) -> bool:
+    """Whether a polynomial has different signs on both sides of a root."""
+    gap = Fraction(1, 1 << (FINEST // 2))
+    step = gap * x if x else gap**20
+    left, right = value(polynomial, x - step), value(polynomial, x + step)
+    return (left < 0) != (right < 0)
+
+
+def _non_negative_roots(polynomial: Sequence[Rational]) -> list[Fraction]:
+    """All roots >= 0 of a polynomial in rising order, each to full relative precision."""
+    power = whole(polynomial)
+    if len(power) < 2:
+        return []
+    roots = _roots_to_one(power) + [1 / x for x in _roots_to_one(power[::-1]) if x]
+    return sorted(set(roots))
+
+
+def _roots_to_one(power: list[int]) -> list[Fraction]:
+    """Roots in [0, 1], those near zero magnified before they are found."""
+    at_zero = next((k for k, c in enumerate(power) if c), 0)
+    power = power[at_zero:]
+    roots = [Fraction(0)] if at_zero else []
+    unit = Fraction(1)
+    while len(power) > 1:
+        found = unit_roots(power, FINEST)
+        near = Fraction(1, 1 << OCTAVES)
+        roots += [x * unit for x in found if x > near]
+        if not any(x <= near for x in found):
+            break
+        power = whole([c * near**k for k, c in enumerate(power)])
+        unit *= near
+    return roots

@@ -1,0 +1,72 @@
+"""The schema of labelled results: coordinates, attributes, and reading them back.
+
+Attributes are strings, or int8 arrays for flag values, and hold nothing that changes from run to
+run: two identical computations make identical Datasets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.labels.coordinates import LABELS, STATES
+from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
+from phasekit.systems.system import Model
+from phasekit.table.quantities import ROWS, Quantity
+
+
+def dataset_attrs(system: Model) -> dict[str, str]:
+    """Return the attributes of a Dataset: model, schema and versions."""
+    return {
+        MODEL: type(system).__name__,
+        **system.definition,
+        SCHEMA: SCHEMA_VERSION,
+        **versions(),
+    }
+
+
+def label_coords(rows: Iterable[Quantity]) -> dict[str, xr.Variable]:
+    """Return the label coordinates of the rows' dims: names, or numbers."""
+    coords = {}
+    for row in rows:
+        for dim in row.dims:
+            labels, long_name = row.labels_of(dim)
+            dtype: Any = LABEL_DTYPE if any(isinstance(x, str) for x in labels) else np.int64
+            coords[dim] = variable((dim,), np.array(labels, dtype), {"long_name": long_name})
+    return coords
+
+
+def input_attrs(system: Model, name: str) -> dict[str, str]:
+    """Return long_name and units of a parameter's or state's coordinate."""
+    for parameter in system.declared:
+        if parameter.name == name:
+            return {"long_name": parameter.long_name, "units": parameter.units}
+    if name in STATES:
+        return {"long_name": STATES[name][1], "units": STATES[name][0]}
+    return {}
+
+
+def restore(ds: xr.Dataset) -> xr.Dataset:
+    """Give a Dataset that was read from a store the form in which it was written.
+
+    netCDF returns fixed-width labels; zarr returns flag values as lists, and variables in the
+    order of the files in a folder.
+    """
+    coords = {
+        dim: variable(map(str, ds[dim].dims), ds[dim].values.astype(LABEL_DTYPE), ds[dim].attrs)
+        for dim in LABELS
+        if dim in ds.coords and ds[dim].dtype != LABEL_DTYPE and ds[dim].dtype.kind not in "iu"
+    }
+    known = [name for name in ROWS if name in ds.data_vars]
+    ordered = ds[known + [name for name in ds.data_vars if name not in known]]
+    # With those on which no variable depends, which a selection drops.
+    ds = ordered.assign_coords({**ds.coords, **coords})
+    for name in ds.data_vars:
+        flags = ROWS[str(name)].flags if str(name) in ROWS else None
+        if flags is not None and "flag_values" in ds[name].attrs:
+            ds[name].attrs["flag_values"] = np.asarray(ds[name].attrs["flag_values"], np.int8)
+    return ds

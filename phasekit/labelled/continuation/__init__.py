@@ -1,0 +1,1 @@
+"""Continuation with labels: branches, special points, diagrams, and the files they are kept in."""

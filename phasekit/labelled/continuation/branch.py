@@ -1,0 +1,298 @@
+"""`Branch`: a traced curve with its special points; immutable, exportable, resumable."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from os import PathLike
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
+from phasekit.bifurcation.continuation.path import Path, Sample, join
+from phasekit.bifurcation.continuation.placed import Placed
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.specials import find
+from phasekit.bifurcation.continuation.start import go_on
+from phasekit.errors import ParameterError
+from phasekit.labelled.continuation.branch_points import LABELS, points_of
+from phasekit.labelled.continuation.special_point import SpecialPoint, special_point
+from phasekit.labelled.pictures import picture
+from phasekit.labels.arguments import bad, whole
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+Record = Mapping[str, Any]
+
+KINDS = {EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point"}
+NUMBERS = {name: number for number, name in KINDS.items()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch:
+    """A curve of equilibria (or of folds, Hopf or branch points), with its special points.
+
+    Made by `continuation`, `SpecialPoint.switch`, `SpecialPoint.curve` and `diagram`.
+
+    Attributes
+    ----------
+    points : xarray.Dataset
+        On the dim ``point``, in order along the curve: the free parameters and states by name,
+        ``arclength`` (0 at the start, on scaled axes), ``n_unstable`` (number of eigenvalues with
+        a positive real part) or, of a conservative problem, ``kind`` (`EquilibriumKind`),
+        ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
+        empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
+        beside that of the terms that cancel in it), and what was recorded.
+    special_points : tuple of SpecialPoint
+        In order along the curve.
+    stops : tuple of Stop
+        Why the curve ends, at its first and at its last point: ``reason`` (bound, closed,
+        max_points, stuck, not_finite, start) and ``message``.
+    kind : str
+        equilibrium, fold, hopf or branch_point.
+    parameter : str
+        The free parameter; ``free`` holds all of them.
+    problem : Problem or None
+        None after loading a branch of a Python function without giving it.
+
+    Examples
+    --------
+    >>> import matplotlib.pyplot as plt
+    >>> import phasekit as pk
+    >>> cubic = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    >>> short = pk.ContinuationOptions(max_points=5, directions="forward")
+    >>> branch = pk.continuation(cubic, "mu", x0=[-1.3], span=(-1, 1), options=short)
+    >>> branch.special("fold"), branch.stops[1].reason
+    ((), 'max_points')
+    >>> branch = branch.extend(500)
+    >>> [round(fold["mu"], 12) for fold in branch.special("LP")]
+    [0.38490017946, -0.38490017946]
+    >>> branch.to_dataset().special_kind.values.tolist()
+    ['end', 'fold', 'fold', 'end']
+    >>> curve, problem = branch.known()
+    >>> problem is cubic
+    True
+    >>> plt.close(branch.plot().figure)
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     branch.save(f"{folder}/branch.nc")
+    ...     loaded = pk.Branch.load(f"{folder}/branch.nc")
+    >>> loaded.points.equals(branch.points)
+    True
+    """
+
+    problem: Problem | None
+    free: tuple[str, ...]
+    problem_state: tuple[str, ...]
+    curve: Curve | None
+    start: Sample
+    tracks: tuple[Track | None, Track | None]
+    _points: xr.Dataset
+    special_points: tuple[SpecialPoint, ...]
+    stops: tuple[Stop, Stop]
+    kind: str
+    record: Record
+
+    @property
+    def points(self) -> xr.Dataset:
+        """The points, as a Dataset of its own that shares the (read-only) values."""
+        return self._points.copy()
+
+    @property
+    def parameter(self) -> str:
+        """The (first) free parameter."""
+        return self.free[0]
+
+    @property
+    def closed(self) -> bool:
+        """Whether the curve ends on its start."""
+        return self.stops[1].reason == "closed"
+
+    def to_dataset(self) -> xr.Dataset:
+        """The points with the special points beside them, on the dim ``special_point``.
+
+        Returns
+        -------
+        xarray.Dataset
+            `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
+            parameter and state, ``special_residual``, ``special_status``, ``special_corank``,
+            ``special_index`` (the point of the curve), ``special_interval`` on
+            (``special_point``, ``end``).
+        """
+        ds = self.points
+        dim = "special_point"
+        text = np.dtypes.StringDType()
+        specials = self.special_points
+
+        def strings(values: list[str]) -> tuple[str, Any]:
+            return dim, np.array(values, dtype=text)
+
+        ds["special_kind"] = strings([s.kind for s in specials])
+        ds["special_label"] = strings([s.label for s in specials])
+        ds["special_status"] = strings([s.status for s in specials])
+        ds["special_message"] = strings([s.message for s in specials])
+        for name in (*self.free, *self.problem_state):
+            ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
+        ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
+        ds["special_corank"] = (dim, np.array([s.corank for s in specials], dtype=np.int64))
+        ds["special_index"] = (dim, np.array([s.index for s in specials], dtype=np.int64))
+        ds["special_interval"] = (
+            (dim, "end"),
+            np.array([s.interval for s in specials]).reshape(-1, 2),
+        )
+        return ds
+
+    def special(self, label: str) -> tuple[SpecialPoint, ...]:
+        """The special points of one label (LP, BP, H, ...) or kind (fold, pitchfork, ...)."""
+        if not isinstance(label, str) or label not in {*LABELS, *LABELS.values()}:
+            raise bad("label", label, f"one of {', '.join(dict.fromkeys(LABELS.values()))}")
+        return tuple(s for s in self.special_points if label in (s.label, s.kind))
+
+    def plot(self, ax: Any = None, **keywords: Any) -> Any:
+        """Draw the curve with its special points: see `phasekit.plot.branch`."""
+        return picture("branch")(self, ax=ax, **keywords)
+
+    def extend(self, points: int | None = None) -> Branch:
+        """Go on where the curve ended for its number of points; a new branch.
+
+        Its points are, bit for bit, those of a branch that was never interrupted.
+
+        Parameters
+        ----------
+        points : int, optional
+            How many more at most in each direction; default: the option max_points.
+
+        Raises
+        ------
+        ParameterError
+            If no end can be extended, or the problem is not known.
+        """
+        curve, problem = self.known()
+        if all(track is None or track.stop.reason != "max_points" for track in self.tracks):
+            reasons = "; ".join(stop.message for stop in self.stops)
+            raise ParameterError(
+                f"extend: the branch ended for other reasons than max_points: {reasons}"
+            )
+        count = curve.options.max_points if points is None else points
+        count = whole("points", count, "a whole number >= 1")
+        backward, forward = (go_on(curve, track, count) for track in self.tracks)
+        if forward is not None and forward.stop.reason == "closed":
+            backward = None
+        return make_branch(problem, curve, self.start, backward, forward, self.record)
+
+    def known(self) -> tuple[Curve, Problem]:
+        """The curve and the problem, or the error that they are not known."""
+        if self.curve is None or self.problem is None:
+            raise ParameterError(
+                "problem: the branch was loaded without its problem, which is Python code; "
+                "use Branch.load(path, problem=...)"
+            )
+        return self.curve, self.problem
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""
+        importlib.import_module("phasekit.labelled.continuation.branch_store").save(
+            self, path, overwrite
+        )
+
+    @staticmethod
+    def load(
+        path: str | PathLike[str], *, problem: Any = None, record: Record | None = None
+    ) -> Branch:
+        """Load a saved branch.
+
+        Parameters
+        ----------
+        path : path
+            What `save` wrote.
+        problem : Problem, optional
+            Needed to go on where f is Python or compiled code, which is not saved.
+        record : mapping, optional
+            The functions that were recorded, needed to extend a branch that has some.
+        """
+        module = importlib.import_module("phasekit.labelled.continuation.branch_store")
+        loaded: Branch = module.load(path, problem, record)
+        return loaded
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made again of what was traced, as when a branch is loaded."""
+        curve, problem = self.known()
+        kept = {f.name: getattr(curve, f.name) for f in fields(curve) if f.name != "field"}
+        return _again, (problem, kept, self.start, self.tracks, dict(self.record))
+
+    def __repr__(self) -> str:
+        """Write what it is, its range, its special points and why it ends."""
+        u = {name: self._points[name].values for name in self.free}
+        ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
+        of = {"equilibrium": "equilibria"}.get(self.kind, f"{self.kind} points")
+        lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
+        shown = [s for s in self.special_points if s.kind != "end"]
+        lines += [f"  {special!r}" for special in shown[:20]]
+        lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []
+        if self.closed:
+            lines.append(f"  closed: {self.stops[1].message}")
+        else:
+            lines += [
+                f"  {name}: {stop.message}"
+                for name, stop in zip(("first", "last"), self.stops, strict=True)
+            ]
+        return "\n".join(lines) + ">"
+
+
+def make_branch(
+    problem: Problem,
+    curve: Curve,
+    start: Sample,
+    backward: Track | None,
+    forward: Track | None,
+    record: Record,
+) -> Branch:
+    """A branch of what was traced: special points are looked for, quantities recorded."""
+    path = join(curve, start, backward, forward)
+    placed, eigenvalues = find(curve, path, curve.options.detect, problem.conservative)
+    names = tuple(curve.field.parameters[i] for i in curve.active)
+    specials = [*placed, *_ends(curve, path)]
+    specials.sort(key=lambda one: (one.index, one.along))
+    points, places = points_of(problem, curve, path, specials, eigenvalues, record)
+    branch = Branch(
+        problem, names, curve.field.states, curve, start, (backward, forward), points, (),
+        path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
+    )  # fmt: skip
+    made = tuple(
+        special_point(problem, curve, one.special, place, branch)
+        for one, place in zip(specials, places, strict=True)
+    )
+    object.__setattr__(branch, "special_points", made)
+    return branch
+
+
+def _again(
+    problem: Problem,
+    curve: Mapping[str, Any],
+    start: Sample,
+    tracks: tuple[Track | None, Track | None],
+    record: Record,
+) -> Branch:
+    return make_branch(problem, Curve(problem.field, **curve), start, *tracks, record)
+
+
+def _ends(curve: Curve, path: Path) -> list[Placed]:
+    if path.closed:
+        return []
+    found = []
+    for i, along, stop in ((0, -np.inf, path.stops[0]), (path.count - 1, np.inf, path.stops[1])):
+        u = path.u[i, : curve.m]
+        at = float(u[curve.n])
+        residual = float(np.max(np.abs(curve.at(u)[0])))
+        special = Special(
+            "end", u, (at, at), residual, "converged", stop.message, tangent=path.tangent[i]
+        )
+        found.append(Placed(i, along, special))
+    return found

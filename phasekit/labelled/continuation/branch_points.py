@@ -1,0 +1,200 @@
+"""The points of a branch as a Dataset, special points in their places."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels import trace
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
+from phasekit.bifurcation.continuation.path import Path
+from phasekit.bifurcation.continuation.placed import Placed
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.errors import EquilibriumKind
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+Record = Mapping[str, Any]
+
+#: What special points are called, by their kind.
+LABELS = {
+    "fold": "LP",
+    "branch_point": "BP",
+    "pitchfork": "BP",
+    "transcritical": "BP",
+    "hopf": "H",
+    "neutral_saddle": "NS",
+    "cusp": "CP",
+    "bogdanov_takens": "BT",
+    "generalized_hopf": "GH",
+    "zero_hopf": "ZH",
+    "end": "EP",
+}
+
+
+def wrap(value: FloatArray, period: float) -> FloatArray:
+    """An angle in (-period/2, period/2]."""
+    return np.asarray(value - period * np.ceil(value / period - 0.5))
+
+
+def points_of(
+    problem: Problem,
+    curve: Curve,
+    path: Path,
+    specials: list[Placed],
+    eigenvalues: npt.NDArray[np.complex128],
+    record: Record,
+) -> tuple[xr.Dataset, list[int]]:
+    """The points of a path with its special points among them, and the places of these."""
+    n, m = curve.n, curve.m
+    inner = [one for one in specials if one.special.kind != "end"]
+    where = np.array([one.index + 1 for one in inner], dtype=np.int64)
+    total = path.count + len(inner)
+    # Places of the path's own points, and of special points, among all.
+    shift = np.searchsorted(where, np.arange(path.count), side="right")
+    own = np.arange(path.count) + shift
+    mine = where + np.arange(len(inner))
+    u = np.empty((total, m))
+    t = np.empty((total, m))
+    info = np.zeros((total, trace.RECORDED))
+    values = np.empty((total, n), dtype=complex)
+    u[own], t[own], info[own], values[own] = (
+        path.u[:, :m],
+        path.tangent[:, :m],
+        path.info,
+        eigenvalues,
+    )
+    label = np.full(total, "", dtype=np.dtypes.StringDType())
+    for i, one in zip(mine, inner, strict=True):
+        s = one.special
+        before = path.u[one.index]
+        u[i] = s.u[:m]
+        # On the turn of the circle that the path is on.
+        for j in range(n):
+            if curve.period[j] > 0.0:
+                u[i, j] += curve.period[j] * np.round((before[j] - u[i, j]) / curve.period[j])
+        t[i] = (s.tangent if s.tangent is not None else path.tangent[one.index])[:m]
+        values[i] = eigenvalues_at(curve, s.u)
+        gap = np.zeros(curve.size)
+        gap[:m] = u[i] - before[:m]
+        info[i, trace.ARCLENGTH] = path.info[one.index, trace.ARCLENGTH] + curve.length(gap)
+        label[i] = LABELS[s.kind]
+    places = []
+    seen = 0
+    for one in specials:
+        if one.special.kind == "end":
+            places.append(0 if one.along < 0 else total - 1)
+        else:
+            places.append(int(mine[seen]))
+            seen += 1
+    for one, place in zip(specials, places, strict=True):
+        label[place] = LABELS[one.special.kind]
+    kappa = np.full(total, np.nan)
+    if curve.kind == HOPF:
+        kappa[own] = path.u[:, -1]
+    residual = np.empty(total)
+    residual[own] = curve.residuals(path.u, path.slopes)
+    residual[mine] = curve.residuals(u[mine], [curve.at(point)[1] for point in u[mine]])
+    return _dataset(problem, curve, u, t, info, values, label, record, kappa, residual), places
+
+
+def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
+    """Eigenvalues of f_x at a point; NaN where f is not finite."""
+    return np.asarray(eigenvalues_of(curve.at(u)[1][None], accuracy=curve.field.accuracy)[0])
+
+
+def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDArray[np.int8]:
+    """Center, saddle or degenerate, by the eigenvalues of a conservative problem."""
+    if n == 1:  # f is the force -V', so the eigenvalue is -V''
+        kind = np.where(values[:, 0].real > 0.0, EquilibriumKind.SADDLE, EquilibriumKind.CENTER)
+    else:
+        size = np.max(np.abs(values), axis=1)
+        real = np.max(np.abs(values.real), axis=1) > 1e-7 * np.where(size > 0.0, size, 1.0)
+        kind = np.where(real, EquilibriumKind.SADDLE, EquilibriumKind.CENTER)
+    kind[np.isin(label, ["LP", "BP", "CP"])] = EquilibriumKind.DEGENERATE
+    return kind.astype(np.int8)
+
+
+def _dataset(
+    problem: Problem,
+    curve: Curve,
+    u: FloatArray,
+    t: FloatArray,
+    info: FloatArray,
+    values: npt.NDArray[np.complex128],
+    label: Any,
+    record: Record,
+    kappa: FloatArray,
+    residual: FloatArray,
+) -> xr.Dataset:
+    n = curve.n
+    names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
+    dim = "point"
+    data: dict[str, Any] = {}
+    for i in [*range(n, curve.m), *range(n)]:
+        column = u[:, i].copy()
+        if curve.period[i] > 0.0:
+            column = wrap(column, float(curve.period[i]))
+        data[names[i]] = (dim, column, _attrs(problem, names[i]))
+    if problem.conservative and curve.kind == EQUILIBRIUM:
+        flags = {
+            "long_name": "kind of the equilibrium",
+            "flag_values": np.array([k.value for k in EquilibriumKind], dtype=np.int8),
+            "flag_meanings": " ".join(k.name.lower() for k in EquilibriumKind),
+        }
+        data["kind"] = (dim, kinds_of(values, label, n), flags)
+    else:
+        critical = np.isin(label, ["LP", "BP", "H", "NS"]) | (curve.kind != EQUILIBRIUM)
+        size = np.max(np.abs(values), axis=1, keepdims=True)
+        floor = np.where(critical[:, None], 1e-6, 0.0) * size
+        unstable = np.sum(values.real > floor, axis=1).astype(np.int64)
+        unstable[np.isnan(values).any(axis=1)] = -1
+        data["n_unstable"] = (
+            dim, unstable,
+            {"long_name": "number of eigenvalues with a positive real part; -1: not known"},
+        )  # fmt: skip
+    if curve.kind == HOPF:
+        pair = np.where(
+            np.isnan(kappa), "", np.where(kappa > 0.0, "hopf", "neutral_saddle")
+        ).astype(np.dtypes.StringDType())
+        data["kind_of_pair"] = (dim, pair, {"long_name": "Hopf point or neutral saddle"})
+    data["arclength"] = (
+        dim, info[:, trace.ARCLENGTH].copy(), {"long_name": "arclength on scaled axes"},
+    )  # fmt: skip
+    data["special"] = (dim, label, {"long_name": "label of a special point"})
+    data["tangent"] = (
+        (dim, "unknown"), t.copy(), {"long_name": "unit tangent on scaled axes, unscaled"},
+    )  # fmt: skip
+    data["step"] = (dim, info[:, trace.STEP_LENGTH].copy(), {"long_name": "length of the step"})
+    data["residual"] = (
+        dim, residual, {"long_name": "largest size of f beside that of its terms"},
+    )  # fmt: skip
+    data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
+    coords: dict[str, Any] = {"unknown": np.array(names, dtype=np.dtypes.StringDType())}
+    for name, value in problem.parameters.items():
+        if name not in data:
+            coords[name] = ((), value, _attrs(problem, name))
+    ds = xr.Dataset(data, coords)
+    if record:
+        from phasekit.labelled.continuation.recording import recorded
+
+        ds = ds.assign(recorded(problem, ds, names[n:], record))
+    for array in ds.variables.values():
+        if isinstance(array.data, np.ndarray):
+            array.data.flags.writeable = False
+    return ds
+
+
+def _attrs(problem: Problem, name: str) -> dict[str, str]:
+    if problem.system is not None:
+        from phasekit.cells.schema import input_attrs
+
+        if name == "phi":
+            return {"long_name": "angle of the equilibrium", "units": "rad"}
+        return input_attrs(problem.system, name)
+    return {}

@@ -1,0 +1,129 @@
+"""Branches on disk: everything that they hold, to the last bit."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from os import PathLike, fspath
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.errors import StoreError
+from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.branch_stored import ARRAYS, Stored, damaged
+from phasekit.labels.arguments import bad, flag
+from phasekit.maps.stored_arrays import reason
+from phasekit.maps.whole import WholeTarget, target_of
+from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
+from phasekit.systems.problem import as_problem
+
+_NAME = "Branch"
+
+
+def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
+    """Write a branch: its points as a Dataset, and what it takes to go on."""
+    curve, problem = branch.known()
+    flag("overwrite", overwrite)
+    target = WholeTarget(target_of(path), overwrite=overwrite)
+    ds = branch.to_dataset()
+    for name, array in {
+        **{f"curve_{name}": getattr(curve, name) for name in ARRAYS},
+        "curve_aux": np.zeros(0) if curve.aux is None else curve.aux,
+        "start_u": branch.start.u,
+        "start_tangent": branch.start.tangent,
+        "start_slopes": branch.start.slopes,
+    }.items():
+        ds[f"raw_{name}"] = (tuple(f"raw_{name}_{k}" for k in range(array.ndim)), array)
+    for name, track in zip(("backward", "forward"), branch.tracks, strict=True):
+        if track is not None:
+            ds[f"raw_{name}"] = ((f"raw_{name}_point", f"raw_{name}_column"), track.record)
+            if track.slopes.shape[1]:
+                ds[f"raw_{name}_slopes"] = (
+                    (f"raw_{name}_point", f"raw_{name}_slope"), track.slopes,
+                )  # fmt: skip
+            ds[f"raw_{name}_state"] = ((f"raw_{name}_entry",), track.state)
+    spec = {
+        "problem": problem.specification(),
+        "free": list(branch.free),
+        "kind": branch.kind,
+        "options": curve.options.as_dict(),
+        "stops": [
+            None if track is None else [track.stop.reason, track.stop.message]
+            for track in branch.tracks
+        ],
+        "record": {name: function is None for name, function in branch.record.items()},
+    }
+    ds.attrs = {
+        MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
+    }  # fmt: skip
+    target.write(ds)
+
+
+def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
+    """Read a branch and make it again of what was traced.
+
+    Raises
+    ------
+    StoreError
+        If nothing is there, or what is there is damaged or was made by another version.
+    ParameterError
+        If the problem or the functions to record are needed, or are not those of the branch.
+    """
+    if record is not None and not isinstance(record, Mapping):
+        raise bad("record", record, "a mapping from names to functions, or None")
+    place = _place(path)
+    with _open(place) as ds:
+        stored = Stored(ds, str(place), _bytes(place))
+        given = None if problem is None else as_problem(problem)
+        if given is not None:
+            stored.refuse_other(given)
+        else:
+            given = stored.problem()
+        functions = stored.functions(record or {})
+        curve = stored.curve(given)
+        start, tracks = stored.traces(curve)
+    if problem is not None or any(functions.values()):
+        return make_branch(given, curve, start, *tracks, functions)  # what f raises is the user's
+    with damaged(str(place), "its points"):
+        return make_branch(given, curve, start, *tracks, functions)
+
+
+def _place(path: Any) -> Path:
+    try:
+        text = fspath(path)
+    except TypeError:
+        raise bad("path", path, "a path that ends in .zarr or .nc") from None
+    if not isinstance(text, str) or not text or "\0" in text:
+        raise bad("path", path, "a path that ends in .zarr or .nc, without null bytes")
+    try:
+        place = Path(text).expanduser()
+    except RuntimeError as error:
+        raise bad("path", path, f"a path that can exist: {error}") from None
+    if not place.exists():
+        raise StoreError(f"path: {place} does not exist")
+    return place
+
+
+def _bytes(place: Path) -> int:
+    files = place.rglob("*") if place.is_dir() else [place]
+    return sum(file.stat().st_size for file in files if file.is_file())
+
+
+def _open(place: Path) -> xr.Dataset:
+    """Open what is there, without reading its arrays."""
+    ds: xr.Dataset
+    try:
+        if place.is_dir():
+            # Format 2 has codecs that unpickle what they read; branches are of format 3.
+            ds = xr.open_zarr(place, consolidated=False, chunks=None, zarr_format=3)
+        else:
+            ds = xr.open_dataset(place, engine="h5netcdf")
+    except Exception as error:  # whatever is made of files that are not what they were
+        raise StoreError(f"path: {place} cannot be read: {reason(error)}") from error
+    if str(ds.attrs.get(MODEL)) != _NAME or "branch" not in ds.attrs:
+        ds.close()
+        raise StoreError(f"path: {place} holds no branch of phasekit")
+    return ds

@@ -1,0 +1,237 @@
+"""`continuation`: from a problem and a parameter to a branch of equilibria."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
+from phasekit.errors import ParameterError
+from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labels.arguments import bad, numeric, pair, unknown
+from phasekit.systems.problem import Problem, as_problem
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def continuation(
+    problem: Any,
+    parameter: str,
+    *,
+    x0: Any = None,
+    span: Sequence[float],
+    record: Mapping[str, Callable[..., Any]] | Sequence[str] | None = None,
+    options: ContinuationOptions | None = None,
+) -> Branch:
+    """Follow a branch of equilibria along a parameter, through its folds, to the ends of a span.
+
+    Parameters
+    ----------
+    problem : Problem or system
+        The system, at the parameters of the start. A system of phasekit (a disk, coefficients, ...)
+        with scalar parameters is ``phi' = -V'(phi)`` on the circle.
+    parameter : str
+        The parameter that varies. It starts at the problem's own value.
+    x0 : array_like or str, optional
+        The state to start from, which is corrected to an equilibrium first; default zeros. Of a
+        system also one of its labels: lower_center (the default), lower_saddle, upper_center,
+        upper_saddle.
+    span : (float, float)
+        Lowest and highest value of the parameter; it holds the problem's own.
+    record : mapping of str to callable, or sequence of str, optional
+        Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
+        names of quantities.
+    options : ContinuationOptions, optional
+        Steps, tolerances, bounds, directions.
+
+    Returns
+    -------
+    Branch
+        The points on both sides of the start, up to the ends of the span or whatever stops the
+        branch before, and the special points on them.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+    ConvergenceError
+        If no equilibrium is found from x0.
+
+    Notes
+    -----
+    Pseudo-arclength continuation with an adaptive step and Newton's method on the bordered system
+    ([AllgowerGeorg1990] chapters 2 to 6). Special points are bracketed by changes of sign of test
+    functions, also of several in one step, and refined on the systems that define them
+    ([Govaerts2000], [Kuznetsov2004] chapter 10). Whatever stops it is said in ``stops``.
+
+    Examples
+    --------
+    >>> from phasekit.systems.problem import Problem
+    >>> cusp = Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 1.0})
+    >>> branch = continuation(cusp, "mu", x0=[-1.3], span=(-1.0, 1.0))
+    >>> [round(point.parameters["mu"], 10) for point in branch.special("fold")]
+    [0.3849001795, -0.3849001795]
+    """
+    problem = as_problem(problem)
+    options = check_options(options)
+    low, high = _span(problem, parameter, span)
+    guess = _start(problem, x0)
+    curve = equilibrium_curve(problem, parameter, (low, high), options)
+    u = np.append(guess, problem.parameters[parameter])
+    _check_values(problem, guess)
+    where = ", ".join(
+        f"{name} = {value:.6g}" for name, value in zip([*problem.state, parameter], u, strict=True)
+    )
+    for i, name in enumerate(problem.state):
+        if not curve.low[i] <= guess[i] <= curve.high[i]:
+            raise bad("x0", guess, f"{name} within its bounds {options.bounds[name]}")
+    for i, name in enumerate(problem.state):
+        curve.scale[i] = options.scales.get(name, max(abs(guess[i]), 1e-3))
+        if curve.period[i] > 0.0:
+            curve.scale[i] = curve.period[i] / (2.0 * np.pi)
+    u = settle(curve, u, where)
+    given = {problem.state.index(name): s for name, s in options.scales.items()}
+    curve = scaled(curve, u, given)
+    start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
+    backward, forward = run(curve, start, options.directions)
+    return make_branch(problem, curve, start, backward, forward, _record(problem, record))
+
+
+def equilibrium_curve(
+    problem: Problem, parameter: str, span: tuple[float, float], options: ContinuationOptions
+) -> Curve:
+    """The curve of equilibria in one parameter, its states not yet scaled."""
+    n = len(problem.state)
+    names = list(problem.parameters)
+    for name in (*options.bounds, *options.scales):
+        if name not in problem.state and name not in names:
+            raise unknown("bounds and scales: state", name, [*problem.state, *names])
+    bounds = [options.bounds.get(name, (-np.inf, np.inf)) for name in problem.state]
+    low, high = span
+    return Curve(
+        field=problem.field,
+        kind=EQUILIBRIUM,
+        par=np.array(list(problem.parameters.values())),
+        active=(names.index(parameter),),
+        scale=np.append(np.ones(n), high - low),
+        period=np.array([*(problem.periods.get(name, 0.0) for name in problem.state), 0.0]),
+        low=np.array([*(pair[0] for pair in bounds), low]),
+        high=np.array([*(pair[1] for pair in bounds), high]),
+        options=options,
+    )
+
+
+def check_options(options: Any) -> ContinuationOptions:
+    """Options, by default all defaults."""
+    if options is None:
+        return ContinuationOptions()
+    if not isinstance(options, ContinuationOptions):
+        raise bad("options", options, "pk.ContinuationOptions(...)")
+    return options
+
+
+def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter") -> str:
+    """A parameter of the problem by its name."""
+    if not isinstance(parameter, str) or parameter not in problem.parameters:
+        raise unknown(f"{argument} of the problem", parameter, problem.parameters)
+    return parameter
+
+
+def check_span(span: Any, units: str | None = None) -> tuple[float, float]:
+    """Two numbers, the lower one first."""
+    wants = "two numbers (low, high), finite, with low < high"
+    low, high = pair("span", span, wants, units)
+    if not low < high:
+        raise bad("span", span, wants)
+    return low, high
+
+
+def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:
+    check_parameter(problem, parameter)
+    system = problem.system
+    low, high = check_span(span, None if system is None else system.unit_of(parameter))
+    for declared in () if system is None else system.declared:
+        if declared.name == parameter and not (declared.valid(low) and declared.valid(high)):
+            raise bad("span", (low, high), f"values of {parameter}, each {declared.wants}")
+    value = problem.parameters[parameter]
+    if not low <= value <= high:
+        raise bad(
+            "span", (low, high), f"a span that holds the problem's own {parameter} = {value:.9g}",
+            f"start elsewhere with problem.replace({parameter}=...)",
+        )  # fmt: skip
+    return low, high
+
+
+def _start(problem: Problem, x0: Any) -> FloatArray:
+    n = len(problem.state)
+    if problem.system is not None and (x0 is None or isinstance(x0, str)):
+        return _labelled_start(problem, x0)
+    if x0 is None:
+        return np.zeros(n)
+    if isinstance(x0, Mapping):
+        missing = [name for name in problem.state if name not in x0]
+        extra = [name for name in x0 if name not in problem.state]
+        if missing or extra:
+            raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
+        x0 = [x0[name] for name in problem.state]
+    names = ", ".join(problem.state)
+    guess = np.atleast_1d(numeric("x0", x0, None, f"{n} numbers: {names}"))
+    if guess.shape != (n,) or not np.isfinite(guess).all():
+        raise bad("x0", x0, f"{n} finite numbers: {names}")
+    return guess
+
+
+def _labelled_start(problem: Problem, x0: str | None) -> FloatArray:
+    """An equilibrium of a system by its label; the first that exists if there is none."""
+    from phasekit.labelled.phase_space import equilibria
+
+    ds = equilibria(problem.system)
+    labels = [str(label) for label in ds.equilibrium.values]
+    there = [name for name, phi in zip(labels, ds.phi.values, strict=True) if np.isfinite(phi)]
+    if x0 is None and there:
+        x0 = there[0]
+    if x0 is not None and x0 not in labels:
+        raise unknown("x0: equilibrium", x0, labels)
+    if x0 not in there:
+        raise bad("x0", x0, f"an equilibrium that exists here: {', '.join(there) or 'none'}")
+    return np.array([float(ds.phi.values[labels.index(x0)])])
+
+
+def _check_values(problem: Problem, guess: FloatArray) -> None:
+    """What a Python function returns, before any work."""
+    if problem.kind != "python":
+        return
+    n = len(problem.state)
+    for argument, function, shape in (("f", problem.f, (n,)), ("jac", problem.jac, (n, n))):
+        if function is None:
+            continue
+        try:
+            value = function(guess.copy(), **problem.parameters)
+        except (ArithmeticError, ValueError):
+            continue  # not defined there: the start will say so
+        found = np.asarray(value)
+        if found.dtype.kind not in "biuf" and found.dtype != object:
+            raise bad(argument, value, f"real numbers of shape {shape} to be returned")
+        try:
+            found = np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            raise bad(argument, value, f"numbers of shape {shape} to be returned") from None
+        if found.size != n ** len(shape) or (found.ndim > 1 and found.shape not in (shape, (n, 1))):
+            raise ParameterError(
+                f"{argument}: returned numbers of shape {found.shape} at x0, wants {shape}"
+            )
+
+
+def _record(problem: Problem, record: Any) -> Mapping[str, Any]:
+    if record is None:
+        return {}
+    from phasekit.labelled.continuation.recording import check_record
+
+    return check_record(problem, record)

@@ -1,0 +1,198 @@
+"""`diagram`: all branches that hang together, by switching at every branch point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.path import Path, join
+from phasekit.bifurcation.continuation.same_path import lies_on, turned
+from phasekit.errors import ConvergenceError
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.continuation import check_parameter, check_span, continuation
+from phasekit.labelled.continuation.point_curves import switch
+from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labels.arguments import bad, reals, whole
+from phasekit.systems.problem import Problem, as_problem
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def diagram(
+    problem: Any,
+    parameter: str,
+    *,
+    x0: Any = None,
+    span: Sequence[float],
+    depth: int = 3,
+    record: Any = None,
+    options: ContinuationOptions | None = None,
+) -> tuple[Branch, ...]:
+    """Follow all branches of equilibria that hang together, each once.
+
+    Parameters
+    ----------
+    problem : Problem or system
+        The system, at the parameters of the start.
+    parameter : str
+        The parameter that varies.
+    x0 : array_like, optional
+        A state to start from, or several (rows; with one state, the entries). Of a system and of
+        one formula that is a polynomial or a Fourier sum of its state all equilibria are found
+        without it, also those on isolated branches (see Notes).
+    span : (float, float)
+        Lowest and highest value of the parameter.
+    depth : int, default 3
+        How many times branches are switched in a row: 0 follows the starts only.
+    record : mapping or sequence of str, optional
+        As in `continuation`.
+    options : ContinuationOptions, optional
+        As in `continuation`.
+
+    Returns
+    -------
+    tuple of Branch
+        Without duplicates: a branch that was reached before is recognised by its curve.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+    ConvergenceError
+        If no equilibrium is found from any x0.
+
+    Notes
+    -----
+    The equilibria of a system are computed in closed form between all values of the parameter at
+    which any of them meet (see `branches`), so that no branch is missed. Those of polynomials and
+    Fourier sums are computed algebraically at 33 values spread over the span: an isolated branch is
+    missed only if it lies between two of these.
+
+    Examples
+    --------
+    >>> from phasekit.systems.problem import Problem
+    >>> pitchfork = Problem("l*x - x**3", state="x", parameters={"l": -1.0})
+    >>> [len(branch.special("BP")) for branch in diagram(pitchfork, "l", span=(-1.0, 1.0))]
+    [1, 1]
+    """
+    problem = as_problem(problem)
+    check_parameter(problem, parameter)
+    system = problem.system
+    low, high = check_span(span, None if system is None else system.unit_of(parameter))
+    depth = whole("depth", depth, "a whole number >= 0", 0)
+    branches: list[Branch] = []
+    failures: list[ConvergenceError] = []
+    for start, guess in _starts(problem, parameter, x0, (low, high)):
+        if branches and _known(branches, start, guess, parameter):
+            continue
+        try:
+            branch = continuation(
+                start, parameter, x0=guess, span=(low, high), record=record, options=options
+            )
+        except ConvergenceError as error:
+            failures.append(error)
+            continue
+        if not _repeats(branches, branch):
+            branches.append(branch)
+            _grow(branches, len(branches) - 1, depth)
+    if not branches:
+        if failures:
+            raise failures[0]
+        raise ConvergenceError("x0: the system has no equilibrium in the span")
+    return tuple(branches)
+
+
+def _grow(branches: list[Branch], first: int, depth: int) -> None:
+    """Switch at every branch point of the branches from `first` on, to a depth."""
+    queue = [(branches[first], 0)]
+    done: list[SpecialPoint] = []
+    while queue:
+        branch, level = queue.pop(0)
+        if level >= depth:
+            continue
+        for point in branch.special("BP"):
+            if any(_same(point, other) for other in done):
+                continue
+            done.append(point)
+            for i, tangent in enumerate(point.special.others):
+                if _led(branches, point, tangent):
+                    continue
+                other = switch(point, direction=i)
+                branches.append(other)
+                queue.append((other, level + 1))
+
+
+def path_of(branch: Branch) -> tuple[Curve, Path]:
+    """The traced path of a branch."""
+    curve, _ = branch.known()
+    return curve, join(curve, branch.start, *branch.tracks)
+
+
+def _same(a: SpecialPoint, b: SpecialPoint) -> bool:
+    curve, _ = a.branch.known()
+    gap = turned(curve, a.special.u[: curve.m] - b.special.u[: curve.m])
+    return bool(np.max(np.abs(gap / curve.scale[: curve.m])) < 1e-6)
+
+
+def _led(branches: list[Branch], point: SpecialPoint, t: FloatArray) -> bool:
+    """Whether both ways along another branch are known already."""
+    curve, _ = point.branch.known()
+    for sign in (1.0, -1.0):
+        step = sign * curve.options.initial_step * t
+        probe = curve.refine(point.special.u + step, curve.weight * t)
+        if not probe.converged:
+            return False
+        u = probe.u
+        inside = np.all((u >= curve.low) & (u <= curve.high))
+        if inside and not any(lies_on(*path_of(branch), u) for branch in branches):
+            return False
+    return True
+
+
+def _repeats(branches: list[Branch], fresh: Branch) -> bool:
+    """Whether a branch is one of those known: its start and its middle lie on one of them."""
+    _, path = path_of(fresh)
+    u = path.u[path.count // 2]
+    return any(lies_on(*path_of(branch), u) for branch in branches)
+
+
+def _known(branches: list[Branch], start: Problem, guess: Any, parameter: str) -> bool:
+    curve, _ = branches[0].known()
+    row = np.zeros(curve.size)
+    row[curve.n] = 1.0
+    u = np.append(np.atleast_1d(guess), start.parameters[parameter])
+    point = curve.refine(u, row)
+    if not point.converged:
+        return False
+    return any(lies_on(*path_of(branch), point.u) for branch in branches)
+
+
+def _starts(
+    problem: Problem, parameter: str, x0: Any, span: tuple[float, float]
+) -> list[tuple[Problem, FloatArray]]:
+    """Problems at a value of the parameter, and guesses there."""
+    n = len(problem.state)
+    own = problem.parameters[parameter]
+    if x0 is not None:
+        wants = f"one state of {n} finite numbers, or several as rows"
+        rows = np.atleast_1d(reals("x0", getattr(x0, "values", x0), wants))
+        rows = rows.reshape(-1, 1) if n == 1 else np.atleast_2d(rows)
+        if rows.ndim != 2 or rows.shape[1] != n or not rows.size or not np.isfinite(rows).all():
+            raise bad("x0", x0, wants)
+        return [(problem, row) for row in rows]
+    from phasekit.labelled.continuation.all_equilibria import equilibria_at, values_between
+
+    values = values_between(problem, parameter, span)
+    if values is None:
+        return [(problem, np.zeros(n))]
+    inside = span[0] <= own <= span[1]
+    values = np.concatenate([[own] if inside else [], values])
+    return [
+        (problem.replace(**{parameter: at}), np.array([x]))
+        for at, x in equilibria_at(problem, parameter, values)
+    ]

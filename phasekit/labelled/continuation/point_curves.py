@@ -1,0 +1,141 @@
+"""From a special point onwards: the other branch, and the curve in two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, FOLD, HOPF
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.start import run
+from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
+from phasekit.errors import ConvergenceError
+from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.branch_points import LABELS
+from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labels.arguments import bad
+
+_CURVES = {
+    "fold": FOLD,
+    "hopf": HOPF,
+    "neutral_saddle": HOPF,
+    "branch_point": BRANCH,
+    "pitchfork": BRANCH,
+    "transcritical": BRANCH,
+}
+
+
+def point_curve(
+    point: SpecialPoint,
+    parameter: str,
+    span: Sequence[float],
+    *,
+    options: ContinuationOptions | None = None,
+) -> Branch:
+    """The curve of folds, Hopf or branch points through one, in two parameters.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        A fold, Hopf point, neutral saddle or branch point of a branch of equilibria.
+    parameter : str
+        The second parameter. The first, that of the branch, is free within ten times its span,
+        unless `options` bounds it.
+    span : (float, float)
+        Lowest and highest value of the second parameter; it holds its value at the point.
+    options : ContinuationOptions, optional
+        Default: those of the branch.
+
+    Returns
+    -------
+    Branch
+        Its special points are cusps (CP), Bogdanov-Takens (BT), generalized Hopf (GH) and
+        zero-Hopf (ZH) points. A Hopf curve goes on beyond a Bogdanov-Takens point as a curve of
+        neutral saddles; ``points.kind_of_pair`` tells which.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable or the point cannot be continued.
+    ConvergenceError
+        If there is no curve through the point: a branch point that another parameter destroys.
+    """
+    if point.kind not in _CURVES:
+        raise bad("point", point.kind, f"one of {', '.join(_CURVES)}")
+    if point.branch.kind != "equilibrium":
+        raise bad("point", point.branch.kind, "a point of a branch of equilibria")
+    curve, problem = point.branch.known()
+    if point.corank > 1:
+        raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
+    if point.special.extra is None or point.status != "converged":
+        raise bad("point", point.status, "a point that has converged", point.message)
+    check_parameter(problem, parameter)
+    if parameter == point.branch.parameter:
+        raise bad("parameter", parameter, "another one than that of the branch")
+    low, high = check_span(span)
+    value = problem.parameters[parameter]
+    if not low <= value <= high:
+        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
+    options = curve.options if options is None else check_options(options)
+    n = curve.n
+    names = list(problem.parameters)
+    own_low, own_high = float(curve.low[n]), float(curve.high[n])
+    width = own_high - own_low
+    bounds = options.bounds.get(
+        point.branch.parameter, (own_low - 10.0 * width, own_high + 10.0 * width)
+    )
+    made = curve.replace(
+        active=(curve.active[0], names.index(parameter)),
+        scale=np.append(curve.scale[: n + 1], high - low),
+        period=np.append(curve.period[: n + 1], 0.0),
+        low=np.concatenate([curve.low[:n], [bounds[0], low]]),
+        high=np.concatenate([curve.high[:n], [bounds[1], high]]),
+        options=options,
+    )
+    begun = two_parameter_curve(made, point.special, _CURVES[point.kind])
+    if begun is None:
+        raise ConvergenceError(
+            f"curve: no curve of {point.kind} points leads on from {point!r} when {parameter} "
+            "moves; a branch point that no symmetry holds is destroyed by a second parameter"
+        )
+    made, start = begun
+    backward, forward = run(made, start, options.directions)
+    return make_branch(problem, made, start, backward, forward, {})
+
+
+def switch(
+    point: SpecialPoint, *, direction: int = 0, options: ContinuationOptions | None = None
+) -> Branch:
+    """Another branch through a branch point, followed to both sides.
+
+    Parameters
+    ----------
+    point : SpecialPoint
+        A branch point, pitchfork or transcritical point.
+    direction : int, default 0
+        Which of ``point.directions``.
+    options : ContinuationOptions, optional
+        Default: those of the branch.
+
+    Raises
+    ------
+    ParameterError
+        If it is no branch point, or the direction of the other branch is not known.
+    """
+    if LABELS.get(point.kind) != "BP":
+        raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
+    curve, problem = point.branch.known()
+    others = point.special.others
+    if not others:
+        raise bad("point", point.status, "a branch point whose directions are known", point.message)
+    whole = isinstance(direction, (int, np.integer)) and not isinstance(direction, bool)
+    if not whole or not 0 <= direction < len(others):
+        raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
+    options = curve.options if options is None else check_options(options)
+    curve = curve.replace(options=options)
+    start = Sample(point.special.u, others[direction], curve.at(point.special.u)[1])
+    backward, forward = run(curve, start, options.directions)
+    return make_branch(problem, curve, start, backward, forward, point.branch.record)

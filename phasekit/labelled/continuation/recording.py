@@ -1,0 +1,127 @@
+"""Quantities recorded along a branch: functions of the user, or quantities by name."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import bad, unknown
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Quantities of a system at rest, by the function of phasekit that has them at a state.
+_AT_REST: dict[str, tuple[str, str]] = {
+    "energy_integral": ("phasekit.labelled.energy", "energy"),
+    "potential": ("phasekit.labelled.energy", "potential"),
+    "potential_curvature": ("phasekit.labelled.energy", "curvature"),
+    "force": ("phasekit.labelled.loads", "bearing_forces"),
+    "force_magnitude": ("phasekit.labelled.loads", "bearing_forces"),
+    "force_axial": ("phasekit.labelled.loads", "bearing_forces"),
+    "deviation_couple": ("phasekit.labelled.loads", "bearing_forces"),
+    "drive_torque": ("phasekit.labelled.loads", "bearing_forces"),
+}
+
+
+def offered() -> list[str]:
+    """Names of quantities that can be recorded of a system."""
+    return [name for name, (module, _) in _AT_REST.items() if importlib.util.find_spec(module)]
+
+
+def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
+    """Names -> functions, or names of quantities -> None."""
+    if isinstance(record, str):
+        record = [record]
+    if isinstance(record, Mapping):
+        taken = [*problem.state, *problem.parameters, "kind", "n_unstable", "special", "tangent"]
+        for name, function in record.items():
+            if not isinstance(name, str) or not name.isidentifier() or name in taken:
+                raise bad("record", name, "names that are identifiers and not taken")
+            if not callable(function):
+                raise bad(f"record[{name!r}]", function, "a function q(x, **parameters)")
+        return dict(record)
+    if not isinstance(record, Sequence):
+        raise bad("record", record, "a mapping from names to functions, or names of quantities")
+    if problem.system is None:
+        raise bad(
+            "record", list(record), "a mapping from names to functions q(x, **parameters)",
+            "names alone are quantities of systems such as the disk",
+        )  # fmt: skip
+    for name in record:
+        if name not in offered():
+            raise unknown("record: quantity", name, offered())
+        _at_rest(problem.system, name, 0.0)  # what is missing is said before any work
+    return dict.fromkeys(record)
+
+
+def recorded(
+    problem: Problem, ds: xr.Dataset, free: Sequence[str], record: Mapping[str, Any]
+) -> dict[str, Any]:
+    """The recorded quantities as variables on the dim ``point``."""
+    made: dict[str, Any] = {}
+    for name, function in record.items():
+        if function is None:
+            made[name] = _quantity(problem, ds, free, name)
+        else:
+            made[name] = _values(problem, ds, free, name, function)
+    return made
+
+
+def _values(
+    problem: Problem, ds: xr.Dataset, free: Sequence[str], name: str, function: Callable[..., Any]
+) -> xr.DataArray:
+    x = np.array([ds[state].values for state in problem.state])
+    varying = {key: ds[key].values for key in free}
+    fixed = {key: value for key, value in problem.parameters.items() if key not in varying}
+    count = x.shape[1]
+
+    def one(i: int) -> Any:
+        at = {key: float(values[i]) for key, values in varying.items()}
+        return np.asarray(function(x[:, i].copy(), **fixed, **at), dtype=float)
+
+    try:
+        with np.errstate(all="ignore"):
+            first = one(0)
+    except TypeError as error:
+        raise ParameterError(
+            f"record[{name!r}]: cannot be called as q(x, **parameters): {error}"
+        ) from error
+    values = None
+    try:  # all points at once, if that gives the same
+        with np.errstate(all="ignore"):
+            whole = np.asarray(function(x.copy(), **fixed, **varying), dtype=float)
+            whole = np.moveaxis(whole, -1, 0) if whole.ndim > 1 else whole
+            checked = whole.shape == (count, *first.shape) and all(
+                np.array_equal(whole[i], one(i), equal_nan=True) for i in {0, count // 2, count - 1}
+            )
+            values = whole if checked and count > 3 else None
+    except Exception:  # noqa: BLE001 - a function of single points; it is called point by point
+        values = None
+    if values is None:
+        with np.errstate(all="ignore"):
+            values = np.array([one(i) for i in range(count)])
+    dims = ("point", *(f"{name}_{k}" for k in range(values.ndim - 1)))
+    return xr.DataArray(values, dims=dims)
+
+
+def _quantity(problem: Problem, ds: xr.Dataset, free: Sequence[str], name: str) -> xr.DataArray:
+    assert problem.system is not None
+    changes = {key: xr.DataArray(ds[key].values, dims="point") for key in free}
+    phi = xr.DataArray(ds[problem.state[0]].values, dims="point")
+    array = _at_rest(problem.system.replace(**changes), name, phi).transpose("point", ...)
+    return array.drop_vars([c for c in array.coords if c not in array.dims])
+
+
+def _at_rest(system: Any, name: str, phi: Any) -> xr.DataArray:
+    """A quantity of a system at rest at phi."""
+    module, attribute = _AT_REST[name]
+    function = getattr(importlib.import_module(module), attribute)
+    rest = () if attribute in ("potential", "curvature") else (phi * 0.0,)
+    found: xr.DataArray = function(system, phi, *rest)[name]
+    return found

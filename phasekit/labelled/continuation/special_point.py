@@ -1,0 +1,216 @@
+"""`SpecialPoint`: where something happens on a branch."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.labelled.continuation.branch_points import LABELS, eigenvalues_at, wrap
+from phasekit.systems.problem import Problem
+
+if TYPE_CHECKING:
+    from phasekit.labelled.continuation.branch import Branch
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpecialPoint:
+    """A point of a branch where something happens.
+
+    Attributes
+    ----------
+    kind : str
+        fold, branch_point, pitchfork, transcritical, hopf, neutral_saddle, cusp,
+        bogdanov_takens, generalized_hopf, zero_hopf or end.
+    label : str
+        LP, BP (also pitchfork and transcritical), H, NS, CP, BT, GH, ZH or EP.
+    x : ndarray
+        The state.
+    parameters : mapping of str to float
+        All parameters there.
+    interval : tuple of float
+        The values of the (first) free parameter at the two points of the branch between which it
+        was found; a fold may lie beside it by the square of the step.
+    residual : float
+        Largest residual of the equations that define it, in the units of f.
+    status : {"converged", "guess"}
+        Whether these equations were solved to rounding. A guess is a point of the branch.
+    message : str
+        Why it is a guess, or why the branch ends.
+    normal_form : mapping of str to float
+        Coefficients on the center manifold, p the parameter, critical eigenvector of unit length:
+        fold ``xi' = b (p - p0) + a xi^2``; transcritical ``xi' = d (p - p0) xi + a xi^2``;
+        pitchfork ``xi' = d (p - p0) xi + c xi^3`` (supercritical: c < 0); Hopf: ``l1``, the first
+        Lyapunov coefficient (divided by 2 omega once, see Notes), ``omega`` and ``d``, the speed
+        at which the real part grows with the parameter. A coefficient that is not known is NaN,
+        and `message` says why.
+    eigenvalues : ndarray
+        Eigenvalues of f_x.
+    corank : int
+        Dimension of the null space of f_x: 1 at folds and simple branch points, more at multiple
+        branch points, 0 at Hopf points and ends.
+    directions : ndarray, shape (branch, unknown)
+        At a branch point the unit tangents (on scaled axes, unscaled; states, then the parameter)
+        of the other branches through it, which `switch` follows: all real solutions of the reduced
+        equations (see Notes).
+
+    Notes
+    -----
+    ``l1 = Re[<p, C(q, q, q*)> - 2 <p, B(q, A^-1 B(q, q*))> + <p, B(q*, (2 i omega - A)^-1
+    B(q, q))>]/(2 omega)`` with ``<q, q> = <p, q> = 1`` ([Kuznetsov2004] (5.62)); negative:
+    supercritical.
+
+    At a branch point of corank k the equations are reduced to k equations on the k + 1 null vectors
+    of f_u (Liapunov-Schmidt). Their quadratic terms decide the directions; where a symmetry leaves
+    none of these on the null space of f_x, their cubic terms. At a multiple branch point `message`
+    says where directions may be missing.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> swallow = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": 0.0, "l": -1.0})
+    >>> branch = pk.continuation(swallow, "l", x0=[0.0], span=(-1, 1))
+    >>> (crossing,) = branch.special("pitchfork")
+    >>> crossing.status, round(crossing.normal_form["c"], 9)
+    ('converged', -1.0)
+    >>> side = crossing.switch()
+    >>> float(abs(side.points.x**2 - side.points.l).max()) < 1e-9
+    True
+    >>> branch = pk.continuation(swallow.replace(l=1.0), "mu", x0=[-1.3], span=(-1, 1))
+    >>> folds = branch.special("fold")[0].curve("l", (-1, 1))
+    >>> [point.kind for point in folds.special_points]
+    ['end', 'cusp', 'end']
+    """
+
+    kind: str
+    x: FloatArray
+    parameters: Mapping[str, float]
+    interval: tuple[float, float]
+    residual: float
+    status: str
+    message: str
+    normal_form: Mapping[str, float]
+    eigenvalues: npt.NDArray[np.complex128]
+    index: int
+    special: Special
+    branch: Branch
+
+    @property
+    def corank(self) -> int:
+        """Dimension of the null space of f_x."""
+        return self.special.corank
+
+    @property
+    def directions(self) -> FloatArray:
+        """Unit tangents of the other branches through a branch point, one a row."""
+        n = len(self.x) + 1
+        return np.array([t[:n] for t in self.special.others]).reshape(-1, n)
+
+    @property
+    def label(self) -> str:
+        """LP, BP, H, NS, CP, BT, GH, ZH or EP."""
+        return LABELS[self.kind]
+
+    def __getitem__(self, name: str) -> float:
+        """A state or parameter by name."""
+        if name in self.branch.problem_state:
+            return float(self.x[self.branch.problem_state.index(name)])
+        return self.parameters[name]
+
+    def switch(self, *, direction: int = 0, options: Any = None) -> Branch:
+        """Another branch through a branch point.
+
+        Parameters
+        ----------
+        direction : int, default 0
+            Which one where there are several: a row of `directions`.
+        options : ContinuationOptions, optional
+            Default: those of the branch.
+
+        Raises
+        ------
+        ParameterError
+            If it is no branch point, or the direction is not known.
+
+        See Also
+        --------
+        continuation, diagram
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> triangle = pk.Problem(
+        ...     ["l*x + x**2 - y**2 - x*(x**2 + y**2)", "l*y - 2*x*y - y*(x**2 + y**2)"],
+        ...     state=("x", "y"), parameters={"l": -1.0},
+        ... )
+        >>> branch = pk.continuation(triangle, "l", x0=[0.0, 0.0], span=(-1.0, 1.0))
+        >>> (point,) = branch.special("BP")
+        >>> point.corank, len(point.directions)
+        (2, 3)
+        >>> sides = [point.switch(direction=i) for i in range(3)]
+        """
+        return _module("switch")(  # type: ignore[no-any-return]
+            self, direction=direction, options=options
+        )
+
+    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Branch:
+        """The curve of such points in this branch's parameter and a second one."""
+        return _module("point_curve")(self, parameter, span, options=options)  # type: ignore[no-any-return]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold their branch, of which they are the same point."""
+        places = (i for i, one in enumerate(self.branch.special_points) if one is self)
+        return _point_of, (self.branch, next(places))
+
+    def __repr__(self) -> str:
+        """Write kind, place and how well it is known."""
+        where = [f"{name}={self.parameters[name]:.10g}" for name in self.branch.free]
+        where += [
+            f"{n}={v:.6g}" for n, v in zip(self.branch.problem_state[:4], self.x, strict=False)
+        ]
+        notes = [f"{name}={value:.6g}" for name, value in self.normal_form.items()]
+        notes += [f"corank={self.corank}"] if self.corank > 1 else []
+        notes += [self.status] if self.status != "converged" else []
+        notes += [self.message] if self.message else []
+        text = f"{self.label} {self.kind} at {', '.join(where)}"
+        return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
+
+
+def _point_of(branch: Branch, place: int) -> SpecialPoint:
+    return branch.special_points[place]
+
+
+def _module(name: str) -> Callable[..., Any]:
+    function: Callable[..., Any] = getattr(
+        importlib.import_module("phasekit.labelled.continuation.point_curves"), name
+    )
+    return function
+
+
+def special_point(
+    problem: Problem, curve: Curve, special: Special, index: int, branch: Branch
+) -> SpecialPoint:
+    """A special point of a branch, angles wrapped."""
+    n = curve.n
+    parameters = dict(problem.parameters)
+    for i, name in enumerate(branch.free):
+        parameters[name] = float(special.u[n + i])
+    x = special.u[:n].copy()
+    for j in range(n):
+        if curve.period[j] > 0.0:
+            x[j] = wrap(x[j], float(curve.period[j]))
+    x.flags.writeable = False
+    return SpecialPoint(
+        special.kind, x, MappingProxyType(parameters), special.interval, special.residual,
+        special.status, special.message, MappingProxyType(dict(special.normal_form)),
+        eigenvalues_at(curve, special.u), index, special, branch,
+    )  # fmt: skip

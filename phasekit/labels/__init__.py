@@ -1,0 +1,1 @@
+"""What the labelled floors are made of: arguments, units and grids of labelled arrays."""

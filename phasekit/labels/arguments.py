@@ -1,0 +1,230 @@
+"""What an argument may be, and the messages for what it may not.
+
+Every message says which argument, what it got, what it wants, and what to do next. Model
+parameters and states share `numeric`; a parameter's own domain is checked where it is declared
+(`phasekit.systems.system`).
+"""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from phasekit.errors import ParameterError
+from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
+from phasekit.labels.units import factor
+
+__all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "describe", "flag", "numeric"]
+__all__ += ["named", "number", "one_of", "pair", "reals", "same", "unknown", "whole"]
+
+#: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
+NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
+#: What is kept of it: a float, a read-only 1-D array, or a DataArray of float64.
+Value: TypeAlias = float | FloatArray | xr.DataArray
+
+
+def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
+    """Return the error for a name that is not one of `valid`, with the nearest of them.
+
+    >>> print(unknown("axis", "bata", ["beta", "e"]))
+    axis 'bata' is unknown; did you mean 'beta'? Valid are: beta, e
+    """
+    names = list(dict.fromkeys(valid))
+    text = f"{what} {describe(name)} is unknown"
+    near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
+    text += f"; did you mean {near[0]!r}? Valid are: " if near else "; valid are: "
+    return ParameterError(text + ", ".join(names))
+
+
+#: What `numeric` takes.
+WANTS = "a real number, a 1-D list or array of them, or a DataArray"
+
+
+def named(what: str, name: Any, valid: Iterable[str]) -> str:
+    """Return a name that is one of `valid`; otherwise raise what `unknown` returns."""
+    names = list(valid)
+    if not isinstance(name, str) or name not in names:
+        raise unknown(what, name, names)
+    return name
+
+
+def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANTS) -> Value:
+    """Return `value` as a float, a read-only 1-D float64 array or a float64 DataArray.
+
+    Parameters
+    ----------
+    argument : str
+        Name used in messages.
+    value : float, 1-D array_like or xarray.DataArray
+        Real numbers. Bools, strings, None, complex numbers, dates, bare arrays of two and more
+        dimensions and empty arrays are refused. A scalar must be finite; an array may hold
+        NaN, infinity and masked values, which become invalid cells.
+    units : str or None, optional
+        The unit that is wanted; a DataArray whose attribute ``units`` is another one is converted.
+        None: any unit, to SI units; by default units do not matter.
+    wants : str, optional
+        What messages say is wanted.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if isinstance(value, xr.DataArray):
+        return _data_array(argument, value, wants, units)
+    if isinstance(value, (xr.Dataset, xr.Variable, Mapping)):
+        hint = "name its dims in a DataArray" if isinstance(value, xr.Variable) else ""
+        raise bad(argument, value, wants, hint or "name one variable of it")
+    if isinstance(value, (list, tuple)) and xr.DataArray in set(map(type, value)):
+        value = [_single(argument, item, units) for item in value]
+    array = reals(argument, value, wants)
+    if array.ndim == 0:
+        if not np.isfinite(array):
+            raise bad(argument, value, "a finite number")
+        return float(array)
+    if array.ndim > 1:
+        hint = f"name the dimensions: xr.DataArray({argument}, dims=(...))"
+        raise bad(argument, value, wants, hint if wants is WANTS else "")
+    if array.size == 0:
+        raise bad(argument, value, "at least one value")
+    array.flags.writeable = False
+    return array
+
+
+def _single(argument: str, item: Any, units: str | None) -> Any:
+    """Return an item of a list as a number; what is none is left to be refused."""
+    if not isinstance(item, xr.DataArray) or item.ndim or item.dtype.kind not in "iuf":
+        return item.values if isinstance(item, xr.DataArray) else item
+    return float(_converted(argument, item.variable.astype(np.float64), units).values)
+
+
+def _data_array(argument: str, value: xr.DataArray, wants: str, units: str | None) -> Value:
+    if value.dtype.kind not in "iuf" or hasattr(value.variable._data, "magnitude"):
+        raise bad(argument, value, wants)
+    if value.size == 0:
+        raise bad(argument, value, "at least one value")
+    if not all(isinstance(dim, str) for dim in value.dims):
+        raise bad(argument, value, "dims that are strings")
+    if len(set(value.dims)) < value.ndim:
+        raise bad(argument, value, "dims that differ")
+    with np.errstate(over="ignore"):  # of numbers in extended precision
+        kept = _converted(argument, value.variable.astype(np.float64), units)
+    if value.ndim == 0:
+        number = float(kept.values)
+        if not np.isfinite(number):
+            raise bad(argument, value, "a finite number")
+        return number
+    # Only the coordinates of its own dims travel on: others (the fixed parameters of the map
+    # that it was taken from, say) would contradict the system that it is put into.
+    coords: dict[Any, Any] = {
+        dim: value.coords[dim] for dim in value.dims if _is_plain_axis(value, dim)
+    }
+    axis = coords.get(value.dims[0])
+    if value.ndim == 1 and kept.chunks is None and axis is not None:
+        # An axis that is its own coordinate stays so in other units.
+        if not kept.equals(value.variable) and value.variable.equals(axis.variable):  # type: ignore[no-untyped-call]
+            coords = {value.dims[0]: kept}
+    return xr.DataArray(kept, coords=coords, name=argument)
+
+
+def _converted(argument: str, value: xr.Variable, units: str | None) -> xr.Variable:
+    """Return numbers in the unit that is wanted, from the one that their attributes name."""
+    given = value.attrs.get("units", units)
+    if given in (None, "", units) or units == "":
+        return value
+    times = factor(argument, given, units)
+    # 1.153 mm divided by 1000 is rounded once.
+    data = value.data / float(1 / times) if 1 / times % 1 == 0 else value.data * float(times)
+    attrs = {key: item for key, item in value.attrs.items() if key != "units"}
+    return xr.Variable(value.dims, data, attrs if units is None else {**attrs, "units": units})
+
+
+def _is_plain_axis(value: xr.DataArray, dim: Any) -> bool:
+    return dim in value.xindexes and len(value.xindexes.get_all_coords(dim)) == 1
+
+
+def number(
+    argument: str, value: Any, wants: str = "a finite number", units: str | None = ""
+) -> float:
+    """Return one finite number.
+
+    >>> number("radius", 3)
+    3.0
+    """
+    kept = numeric(argument, value, units, wants)
+    if not isinstance(kept, float):
+        raise bad(argument, value, wants)
+    return kept
+
+
+def pair(argument: str, value: Any, wants: str, units: str | None = "") -> tuple[float, float]:
+    """Return two finite numbers.
+
+    >>> pair("span", [0, 1.5], "two numbers")
+    (0.0, 1.5)
+    """
+    if isinstance(value, (list, tuple)):
+        if len(value) != 2:
+            raise bad(argument, value, wants)
+        first, second = (number(argument, end, wants, units) for end in value)
+        return first, second
+    ends = np.asarray(numeric(argument, value, units, wants))
+    if ends.shape != (2,) or not np.isfinite(ends).all():
+        raise bad(argument, value, wants)
+    return float(ends[0]), float(ends[1])
+
+
+def same(left: Value | None, right: Value | None) -> bool:
+    """Whether two kept values are equal: NaN equals NaN, dims and coordinates count.
+
+    >>> same(np.array([1.0, np.nan]), np.array([1.0, np.nan])), same(1.0, np.array([1.0]))
+    (True, False)
+    """
+    if isinstance(left, xr.DataArray) and isinstance(right, xr.DataArray):
+        return bool(left.equals(right))
+    if isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
+        return np.array_equal(left, right, equal_nan=True)
+    if isinstance(left, (xr.DataArray, np.ndarray)) or isinstance(
+        right, (xr.DataArray, np.ndarray)
+    ):
+        return False
+    return left == right
+
+
+def brief(value: Value) -> str:
+    """Write a kept value for a representation: short arrays in full, long ones by their ends."""
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, np.ndarray):
+        if value.size <= SHOWN:
+            return repr(value.tolist())
+        return f"<{value.size} values, {value[0]:.6g} to {value[-1]:.6g}>"
+    sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
+    return f"<{'lazy ' if value.chunks is not None else ''}DataArray ({sizes})>"
+
+
+def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., Any]:
+    """Make a call with an unknown, missing or surplus argument raise a `ParameterError`."""
+    signature = inspect.signature(function)
+    expected = dict(list(signature.parameters.items())[1:])  # without self or cls
+
+    @functools.wraps(function)
+    def checked(first: Any, *args: Any, **kwargs: Any) -> Any:
+        for name in kwargs:
+            if name not in expected:
+                raise unknown(f"parameter of {title}", name, expected)
+        try:
+            signature.bind(first, *args, **kwargs)
+        except TypeError as error:
+            raise ParameterError(
+                f"{title}: {error}; its parameters are {', '.join(expected)}"
+            ) from None
+        return function(first, *args, **kwargs)
+
+    return checked

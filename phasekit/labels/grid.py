@@ -1,0 +1,190 @@
+"""Cells of a map: parameters and states aligned by the names of their dims.
+
+A scalar has no dim, a bare 1-D array lies on a dim of its own (named after the parameter, or
+`point` for states), a DataArray keeps its dims. `Grid` holds all of them as xarray Variables, so
+that one place knows how cells are laid out; what is computed on them is not its business.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import FloatArray, Value, describe
+from phasekit.labels.memory import refuse_too_large
+
+#: Dtype of label coordinates: variable-length strings, the only ones that zarr v3 stores without a
+#: warning. From 2026.9 on xarray reads them back from zarr as they were written; netCDF gives
+#: fixed-width ones, which `restore` turns back.
+LABEL_DTYPE = np.dtypes.StringDType()
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Inputs by name, on common named dims."""
+
+    sizes: dict[str, int]  # the dims in their order
+    inputs: dict[str, xr.Variable]  # float64
+    coords: dict[str, xr.Variable]  # of the dims alone
+
+    @property
+    def lazy(self) -> bool:
+        """Whether an input is chunked, so that nothing may be computed now."""
+        return any(given.chunks is not None for given in self.inputs.values())
+
+    def dims_of(self, names: Iterable[str]) -> tuple[str, ...]:
+        """Dims on which the named inputs depend, in the grid's order."""
+        used = {dim for name in names for dim in self.inputs[name].dims}
+        return tuple(dim for dim in self.sizes if dim in used)
+
+    def aligned(self, name: str, dims: Sequence[str]) -> FloatArray:
+        """One input as an array with an axis for each of `dims`, of length 1 where it has none."""
+        given = self.inputs[name]
+        ordered = given.transpose(*(dim for dim in dims if dim in given.dims))
+        shape = tuple(given.sizes.get(dim, 1) for dim in dims)
+        return np.reshape(np.asarray(ordered.data), shape)
+
+
+def variable(dims: Iterable[str], data: Any, attrs: Mapping[str, Any] | None = None) -> xr.Variable:
+    """Make a Variable of an array, which is not copied.
+
+    The fast path skips the conversion of foreign types, for which xarray imports all of
+    dask.array: a good part of the time to the first result of a process.
+    """
+    if not hasattr(data, "chunks"):
+        data = np.asarray(data)
+    return xr.Variable(tuple(dims), data, attrs, fastpath=True)
+
+
+def make_grid(
+    values: Mapping[str, Value],
+    *,
+    axis: Mapping[str, str] | None = None,
+    called: Mapping[str, str] | None = None,
+    order: Sequence[str] = (),
+) -> Grid:
+    """Lay out values on named dims.
+
+    Parameters
+    ----------
+    values : mapping of str to Value
+        Inputs by name, as `numeric` keeps them.
+    axis : mapping of str to str, optional
+        The dim of a bare array, where that is not its own name.
+    called : mapping of str to str, optional
+        What messages call an input, where that is not its own name.
+    order : sequence of str
+        Dims that come first; the others follow as they appear.
+
+    Raises
+    ------
+    ParameterError
+        If two inputs disagree on a dim's size or coordinate, or a dim has the name of an input
+        that does not lie along it.
+    """
+    axis, called = axis or {}, called or {}
+    inputs = {name: _variable(name, value, axis.get(name, name)) for name, value in values.items()}
+    owner: dict[str, str] = {}
+    found: dict[str, int] = {}
+    for name, given in inputs.items():
+        argument = called.get(name, name)
+        for dim, size in given.sizes.items():
+            _check_size(str(dim), size, argument, found, owner)
+            if str(dim) in inputs and inputs[str(dim)].dims != (dim,):
+                raise ParameterError(
+                    f"{argument}: got the dim {dim!r}, but {dim!r} is an input that does not lie "
+                    f"along it; rename the dim or give {dim} as its axis"
+                )
+    sizes = {dim: found[dim] for dim in order if dim in found}
+    sizes.update(found)
+    return Grid(sizes, inputs, _dim_coords(values, inputs, called))
+
+
+def _variable(name: str, value: Value, dim: str) -> xr.Variable:
+    if isinstance(value, xr.DataArray):
+        return value.variable
+    return variable(() if isinstance(value, float) else (dim,), value)
+
+
+def _check_size(
+    dim: str, size: int, name: str, found: dict[str, int], owner: dict[str, str]
+) -> None:
+    if found.setdefault(dim, size) != size:
+        raise ParameterError(
+            f"{name}: got {size} values along {dim!r}, wants {found[dim]} as {owner[dim]} has; "
+            f"arrays pair along a dim only when their lengths are equal"
+        )
+    owner.setdefault(dim, name)
+
+
+def _dim_coords(
+    values: Mapping[str, Value], inputs: Mapping[str, xr.Variable], called: Mapping[str, str]
+) -> dict[str, xr.Variable]:
+    """Coordinates of the dims: an axis is its own, others come with the DataArrays."""
+    coords: dict[str, xr.Variable] = {}
+    for name, given in inputs.items():
+        if given.dims == (name,):
+            coords[name] = variable((name,), np.asarray(given.data))
+    for name, value in values.items():
+        if not isinstance(value, xr.DataArray):
+            continue
+        argument = called.get(name, name)
+        for dim in map(str, value.dims):
+            if dim not in value.coords:
+                continue
+            coord = value.coords[dim].variable
+            known = coords.setdefault(dim, coord)
+            if not known.to_base_variable().equals(coord.to_base_variable()):  # type: ignore[no-untyped-call]
+                raise ParameterError(
+                    f"{argument}: got {describe(value)} whose coordinate {dim!r} differs from that "
+                    f"of another argument; align them with xr.align, or select the same {dim} first"
+                )
+    return coords
+
+
+def combine(
+    function: Callable[..., tuple[Any, ...]],
+    values: Mapping[str, Value],
+    names: Sequence[str],
+    attrs: Mapping[str, Mapping[str, str]],
+    order: Sequence[str] = (),
+) -> tuple[Any, ...]:
+    """Apply an array function to values: floats in, floats out; arrays in, DataArrays out.
+
+    The function takes the values as they come and returns an array for each of `names`; `attrs`
+    holds the attributes of values and results by name, and `order` tells which dims come first.
+    """
+    if all(isinstance(value, float) for value in values.values()):
+        return tuple(float(result) for result in function(*values.values()))
+    grid = make_grid(values, order=order)
+    if not grid.lazy:
+        refuse_too_large(dict.fromkeys(names, 8 * prod(grid.sizes.values())), grid.sizes)
+    results = xr.apply_ufunc(
+        functools.partial(_broadcast, function),
+        *grid.inputs.values(),
+        output_core_dims=[[] for _ in names],
+        dask="parallelized",
+        output_dtypes=[np.float64 for _ in names],
+    )
+    coords = {
+        name: variable(map(str, given.dims), given.data, attrs.get(name, given.attrs))
+        for name, given in {**grid.inputs, **grid.coords}.items()
+    }
+    results = results if isinstance(results, tuple) else (results,)
+    return tuple(
+        xr.DataArray(result.transpose(*grid.sizes), coords=coords, name=name, attrs=attrs.get(name))
+        for result, name in zip(results, names, strict=True)
+    )
+
+
+def _broadcast(function: Callable[..., tuple[Any, ...]], *arrays: FloatArray) -> Any:
+    shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
+    results = tuple(np.array(np.broadcast_to(result, shape)) for result in function(*arrays))
+    return results if len(results) > 1 else results[0]

@@ -1,0 +1,1 @@
+"""Bearing forces and rotators along the motions of the disk, arrays only."""

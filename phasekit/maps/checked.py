@@ -1,0 +1,129 @@
+"""Zarr stores that look at what passes through them: what was written, and whether it is read.
+
+What is written is recorded with its checksum, in the mark of its tile. What is read is compared
+with that, so that a file that is gone, was changed or stands in the place of another raises, and
+never gives values.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import AsyncIterator, Iterable, Iterator, Mapping
+from typing import Any
+
+from zarr.storage import WrapperStore
+
+from phasekit.errors import StoreError
+from phasekit.labels.coordinates import LABELS
+from phasekit.maps import files
+from phasekit.maps.damage import AGAIN, damage, place
+from phasekit.maps.marks import Chunk, Index, Mark
+from phasekit.maps.plan import Plan
+from phasekit.maps.plan_file import GROUP
+
+
+class Recording(WrapperStore[Any]):
+    """A store that remembers size and checksum of each file that is written."""
+
+    def __init__(self, store: Any) -> None:
+        super().__init__(store)
+        self.written: dict[str, Chunk] = {}
+
+    async def set(self, key: str, value: Any) -> None:
+        """Write, and remember."""
+        await super().set(key, value)
+        self.written[key] = Chunk.of(value.as_numpy_array())
+
+
+class Checked(WrapperStore[Any]):
+    """A store for reading a map, which raises a `StoreError` where it is not what was written.
+
+    Parameters
+    ----------
+    store
+        The zarr store.
+    plan : Plan
+        Files that it knows as they were before a change are given as they were.
+    name : str
+        What messages call the store.
+    """
+
+    def __init__(self, store: Any, plan: Plan, name: str) -> None:
+        super().__init__(store)
+        self.plan, self.name = plan, name
+        self.parts = plan.quantities
+        self.marks: dict[str, Mapping[Index, Mark]] = {}  # by part
+        self.kept = dict(self._documents())
+        self.known = {key.split("/")[0] for key in plan.documents} | {GROUP, "zarr.json"}
+        self.known |= {*plan.quantities, *plan.arrays, *plan.scalars, *LABELS}
+
+    def with_read_only(self, read_only: bool = False) -> Checked:
+        """Return itself: it only reads."""
+        return self
+
+    async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
+        """Return what is stored, if it is what was written."""
+        if prototype is None:
+            from zarr.core.buffer import default_buffer_prototype
+
+            prototype = default_buffer_prototype()
+        if key in self.kept:
+            kept = self.kept[key]
+            return None if kept is None else prototype.buffer.from_bytes(kept)
+        chunk = self._chunk(key)
+        if chunk is not None:
+            return await self._result(key, *chunk, prototype)
+        return await self._store.get(key, prototype, byte_range)
+
+    def _documents(self) -> Iterator[tuple[str, bytes | None]]:
+        """Read what is known beforehand, here: what zarr's tasks raise is told twice."""
+        yield from self.plan.before.items()
+        expected = self.plan.documents
+        for key, data in files.read_all(self._store, expected.keys() - self.plan.before.keys()):
+            wrong = "is gone" if data is None else "is not what it was when it was written"
+            if data is None or hashlib.sha256(data).hexdigest() != expected[key]:
+                raise StoreError(
+                    f"store: {self.name} is damaged: {key} {wrong}; put the file back, choose "
+                    "another name, or pass overwrite=True"
+                )
+            yield key, data
+
+    def _chunk(self, key: str) -> tuple[str, Index] | None:
+        """Return the quantity and the tile of a chunk's file."""
+        name, _, file = key.partition("/")
+        part = self.parts.get(name)
+        if part is None or not (file == "c" or file.startswith("c.")):
+            return None
+        return name, tuple(map(int, file.split(".")[1 : 1 + len(part.dims)]))
+
+    async def _result(self, key: str, name: str, index: Index, prototype: Any) -> Any:
+        part = self.parts[name]
+        mark = self.marks.get(part.name, {}).get(index)
+        if mark is None:
+            return None  # not computed: it may be half written
+        try:
+            found = await self._store.get(key, prototype)
+        except OSError as error:  # of the disk
+            raise StoreError(f"store: {self.name}: {key} cannot be read: {error}") from error
+        wrong = await damage(found, mark, name, prototype)
+        if wrong is not None:
+            raise StoreError(
+                f"store: {self.name} is damaged, or was changed after it was opened: {name} in "
+                f"the tile {place(part, index, self.plan.sizes)} {wrong}; {AGAIN}, and open the "
+                "map again"
+            )
+        return found
+
+    async def _get_many(self, requests: Iterable[Any]) -> Any:
+        for key, prototype, byte_range in requests:
+            yield key, await self.get(key, prototype, byte_range)
+
+    def list_dir(self, prefix: str) -> AsyncIterator[str]:
+        """List what belongs to the map."""
+        listed = super().list_dir(prefix)
+        return listed if prefix.strip("/") or not self.plan.documents else self._own(listed)
+
+    async def _own(self, listed: AsyncIterator[str]) -> AsyncIterator[str]:
+        async for name in listed:
+            if name in self.known:
+                yield name

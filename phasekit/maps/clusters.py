@@ -1,0 +1,74 @@
+"""Running tiles on the workers of a dask cluster."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import contextlib
+from collections.abc import Generator, Iterable, Iterator
+from itertools import islice
+from typing import Any
+
+from phasekit.errors import StoreError
+from phasekit.labels.arguments import bad
+from phasekit.maps.tile import Tile, compute
+
+
+@contextlib.contextmanager
+def connected(client: Any) -> Iterator[Any]:
+    """Give a dask client for a client or the address of a scheduler."""
+    try:
+        import distributed
+    except ImportError:
+        raise StoreError(
+            "client: clusters need dask: pip install 'phasekit[distributed]'"
+        ) from None
+    if isinstance(client, distributed.Client):
+        if client.status != "running":
+            raise StoreError(f"client: it is {client.status}, wants one that is connected")
+        yield client
+        return
+    if not isinstance(client, str) or not client:
+        raise bad("client", client, "a dask.distributed.Client or the address of a scheduler")
+    try:
+        made: Any = distributed.Client(client, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
+    except (OSError, ValueError) as error:
+        raise StoreError(f"client: no scheduler answers at {client}: {error}") from error
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+def on_cluster(tiles: Iterable[Tile], client: Any) -> Generator[Tile, None, None]:
+    """Compute tiles on the workers of a dask cluster, which gives those of a lost one to others."""
+    import distributed
+
+    source = iter(tiles)
+    running: dict[str, tuple[Any, Tile]] = {}
+    finished: Any = distributed.as_completed(loop=client.loop)  # type: ignore[no-untyped-call]
+
+    def feed() -> None:
+        enough = 2 * max(sum(client.nthreads().values()), 1)
+        for tile in islice(source, max(enough - len(running), 0)):
+            future = client.submit(compute, tile, pure=False)
+            running[future.key] = future, tile
+            finished.add(future)
+
+    try:
+        feed()
+        for future in finished:
+            future.result()
+            yield running.pop(future.key)[1]
+            feed()
+    except StoreError:  # of a tile
+        raise
+    except (concurrent.futures.CancelledError, OSError) as error:
+        raise StoreError(f"the connection to the scheduler was lost: {error}") from error
+    except distributed.KilledWorker as error:
+        raise StoreError(
+            f"workers of the cluster were killed, or had no memory left: {error}; take smaller "
+            "chunks= or workers with more memory"
+        ) from error
+    finally:
+        with contextlib.suppress(Exception):  # the scheduler may be gone
+            client.cancel([future for future, _ in running.values()])

@@ -1,0 +1,182 @@
+"""How large a stored map will be, and how long it will take, from a sample of its cells."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import prod
+from typing import Any
+
+from phasekit.cells.tiling import cut
+from phasekit.errors import StoreError
+from phasekit.labels.memory import human
+from phasekit.maps.place import Place
+from phasekit.maps.stored_arrays import codecs
+from phasekit.maps.tile import Tile, compute_cells, release_buffers
+from phasekit.table.quantities import Quantity
+
+#: Cells of the first sample, more than are ever computed without compiling the kernels. Those that
+#: are timed follow, evenly over the tiles that are left, as large as takes `SAMPLE_SECONDS`.
+SAMPLE_CELLS = 1 << 14
+SAMPLES = 4
+SAMPLE_SECONDS = 0.1
+LEAST_CELLS, MOST_CELLS = 1 << 13, 1 << 17
+
+#: Bytes that a file takes at least.
+FILE_BYTES = 4096
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What is left of a map to compute."""
+
+    cells: int
+    tiles: int
+    raw: int  # bytes of the results
+    stored: int  # bytes on the disk
+    seconds: float  # of one process
+
+    def describe(self, workers: int) -> str:
+        """Say it in a line, with the time that a number of processes takes."""
+        workers = max(min(workers, self.tiles), 1)
+        return (
+            f"about {human(self.stored)} ({human(self.raw)} before compression) and "
+            f"{duration(self.seconds / workers)} on {workers} "
+            f"{'process' if workers == 1 else 'processes'}"
+        )
+
+
+def duration(seconds: float) -> str:
+    """Write a time as people say it.
+
+    >>> duration(0.2), duration(100.0), duration(7200.0), duration(400_000.0)
+    ('less than 1 s', '1.7 min', '2 h', '4.6 days')
+    """
+    if seconds < 1.0:
+        return "less than 1 s"
+    for unit, length in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * length:
+            return f"{seconds / length:.2g} {unit}"
+    return f"{seconds:.0f} s"
+
+
+@dataclass(frozen=True)
+class Share:
+    """What is left of one part, and some of its tiles to take samples of."""
+
+    cells: int
+    tiles: int
+    rows: Sequence[Quantity]
+    samples: Sequence[Tile]
+
+    @property
+    def raw(self) -> int:
+        """Bytes before compression."""
+        return self.cells * sum(row.cell_bytes for row in self.rows)
+
+    @property
+    def overhead(self) -> int:
+        """Bytes that files and folders take beside what is in them, at most."""
+        return FILE_BYTES * (self.tiles * (len(self.rows) + 1) + 2 * len(self.rows))
+
+
+def estimate(shares: Sequence[Share]) -> Estimate:
+    """Estimate what is left, from samples."""
+    stored = seconds = 0.0
+    for share in shares:
+        ratio, rate = _sample(share.samples)
+        stored += share.raw * ratio + share.overhead
+        seconds += share.cells * rate
+    return Estimate(
+        sum(share.cells for share in shares),
+        sum(share.tiles for share in shares),
+        sum(share.raw for share in shares),
+        int(stored),
+        seconds,
+    )
+
+
+def _sample(chosen: Sequence[Tile]) -> tuple[float, float]:
+    """Return the compressed part of the bytes, and seconds a cell, of some cells of tiles."""
+    from phasekit.numerics.launch import one_thread
+
+    bytes_written = raw = cells = 0
+    seconds = 0.0
+    with one_thread():
+        _timed(chosen[0], SAMPLE_CELLS)  # loads or compiles the kernels
+        took, results = _timed(chosen[0], SAMPLE_CELLS)
+        first = chosen[0].rows[0]
+        taken = results[first.name].size // prod(first.label_shape)
+        room = int(taken * SAMPLE_SECONDS / max(took, 1e-9))
+        for tile in chosen:
+            took, results = _timed(tile, min(max(room, LEAST_CELLS), MOST_CELLS))
+            seconds += took
+            for row in tile.rows:
+                size, took = _written(row, results[row.name])
+                bytes_written += size
+                seconds += took
+                raw += results[row.name].nbytes
+            cells += results[first.name].size // prod(first.label_shape)
+    release_buffers()
+    return bytes_written / max(raw, 1), seconds / max(cells, 1)
+
+
+def _timed(tile: Tile, most: int) -> tuple[float, dict[str, Any]]:
+    """Compute some cells in the middle of a tile; return the seconds and the results."""
+    box = _middle(tile.shape, most)
+    shape = tuple(part.stop - part.start for part in box)
+    inputs = {name: cut(array, box) for name, array in tile.inputs.items()}
+    start = time.perf_counter()
+    results = compute_cells(tile.model, tile.passes, tile.rows, inputs, shape)
+    return time.perf_counter() - start, results
+
+
+def _middle(shape: tuple[int, ...], most: int) -> tuple[slice, ...]:
+    """Return a box of at most so many cells in the middle of a tile, whole along the last dims."""
+    room, parts = most, []
+    for size in reversed(shape):
+        taken = max(min(size, room), 1)
+        room //= taken
+        start = (size - taken) // 2
+        parts.append(slice(start, start + taken))
+    return tuple(reversed(parts))
+
+
+def _written(row: Quantity, result: Any) -> tuple[int, float]:
+    """Return the bytes that a result takes when it is compressed, and the seconds."""
+    import zarr
+    from zarr.storage import MemoryStore
+
+    kept: dict[str, Any] = {}
+    array = zarr.create_array(
+        MemoryStore(kept),
+        shape=result.shape,
+        chunks=result.shape,
+        dtype=row.dtype,
+        compressors=codecs(),
+        config={"write_empty_chunks": True},
+    )
+    before = sum(len(value) for value in kept.values())
+    start = time.perf_counter()
+    array[...] = result
+    took = time.perf_counter() - start
+    return sum(len(value) for value in kept.values()) - before, took
+
+
+def refuse_too_large_for(place: Place, needed: Estimate, freed: int = 0) -> None:
+    """Refuse a map that will not fit on the disk.
+
+    Raises
+    ------
+    StoreError
+    """
+    free = place.free_bytes()
+    if free is None or needed.stored <= free + freed:
+        return
+    raise StoreError(
+        f"store: the map will not fit: it takes about {human(needed.stored)} more "
+        f"({human(needed.raw)} before compression), and {place.name} lies on a disk that has "
+        f"{human(free + freed)} left; make room, name fewer quantities in of=, take "
+        "dtype='float32' or coarser axes, or pass force=True to begin nevertheless"
+    )

@@ -1,0 +1,150 @@
+"""The parts of a stored map: quantities on the same dims, and how they are cut into tiles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from math import prod
+
+from phasekit.cells.evaluate import Box
+from phasekit.errors import ParameterError
+from phasekit.labels.memory import SHARE, available_memory, human
+from phasekit.table.quantities import ROWS, Pass, Quantity, plan_passes
+
+#: Cells of a tile, where its results stay below `MOST_BYTES`. Small maps are cut as well, so that
+#: there is work for several processes, but not into tiles below `FEWEST_CELLS`.
+MOST_CELLS = 1 << 20
+FEWEST_CELLS = 1 << 16
+FEWEST_TILES = 16
+MOST_BYTES = 1 << 27
+
+#: A map that is made longer is cut again if its tiles are more than so many, and than so many
+#: times those that it would have if it were new, and at most a quarter of it is there.
+MANY_TILES = 1 << 10
+TOO_SMALL = 16
+
+
+@dataclass(frozen=True)
+class Part:
+    """Quantities that are computed together, tile by tile."""
+
+    name: str
+    dims: tuple[str, ...]
+    chunks: tuple[int, ...]
+    quantities: dict[str, str]  # name -> dtype
+    complete: bool = False
+    #: Parameters and states from which it is computed; None in stores that have no checksums.
+    inputs: tuple[str, ...] | None = None
+
+    @property
+    def checked(self) -> bool:
+        """Whether its chunks carry checksums, and the marks of its tiles record them."""
+        return self.inputs is not None
+
+    @property
+    def rows(self) -> tuple[Quantity, ...]:
+        """The rows of the table, with the dtypes that are stored."""
+        return tuple(replace(ROWS[name], dtype=dtype) for name, dtype in self.quantities.items())
+
+    @property
+    def passes(self) -> tuple[Pass, ...]:
+        """The passes that compute it."""
+        return plan_passes(self.rows)
+
+    @property
+    def cell_bytes(self) -> int:
+        """Bytes of a cell, uncompressed."""
+        return sum(row.cell_bytes for row in self.rows)
+
+    def grid(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
+        """Return the number of tiles along each dim."""
+        return tuple(-(-sizes[dim] // n) for dim, n in zip(self.dims, self.chunks, strict=True))
+
+    def cells(self, sizes: Mapping[str, int]) -> int:
+        """Return the number of cells."""
+        return prod(sizes[dim] for dim in self.dims)
+
+    def region(self, index: Iterable[int], sizes: Mapping[str, int]) -> tuple[slice, ...]:
+        """Return where a tile lies."""
+        return tuple(
+            slice(i * n, min((i + 1) * n, sizes[dim]))
+            for i, n, dim in zip(index, self.chunks, self.dims, strict=True)
+        )
+
+
+def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str, int]) -> Part:
+    """Cut the dims that the call leaves open into tiles that are about as long in each.
+
+    Raises
+    ------
+    ParameterError
+        If the call asks for tiles that do not fit into memory, or arrays have no room.
+    """
+    quantities = {row.name: row.dtype for row in box.rows}
+    whole = prod(sizes[dim] for dim in box.dims)
+    if whole * max(prod(row.label_shape) for row in box.rows) >= 2**63:
+        axes = " x ".join(f"{dim} {sizes[dim]}" for dim in box.dims)
+        raise ParameterError(
+            f"axes: got {axes} = {whole:.3g} cells, wants fewer than 2^63 numbers in an array "
+            "(9.2e18): such a map fits nowhere; take coarser axes or fewer of them"
+        )
+    cells = min(
+        MOST_CELLS,
+        MOST_BYTES // sum(row.cell_bytes for row in box.rows),
+        max(FEWEST_CELLS, whole // FEWEST_TILES),
+    )
+    found = {
+        dim: sizes[dim] if chunks[dim] == -1 else chunks[dim] for dim in box.dims if dim in chunks
+    }
+    room = max(cells // prod(found.values()), 1)
+    open_dims = sorted((dim for dim in box.dims if dim not in found), key=lambda dim: sizes[dim])
+    for place, dim in enumerate(open_dims):  # the shortest first: what it leaves, others take
+        step = max(int(room ** (1.0 / (len(open_dims) - place)) + 1e-9), 1)
+        pieces = -(-sizes[dim] // step)
+        found[dim] = -(-sizes[dim] // pieces)
+        room = max(room // found[dim], 1)
+    chunks_of = tuple(found[dim] for dim in box.dims)
+    part = Part(name, box.dims, chunks_of, quantities, inputs=tuple(sorted(box.names)))
+    _refuse_large_tiles(part)
+    return part
+
+
+def cut_again(
+    part: Part,
+    names: Iterable[str],
+    before: Mapping[str, int],
+    sizes: Mapping[str, int],
+    chunks: Mapping[str, int],
+) -> Part:
+    """Return a part of a map that is made longer, cut as if it were new if its tiles are too small.
+
+    Parameters
+    ----------
+    names : iterable of str
+        The inputs on which it depends.
+    before, sizes : mapping of str to int
+        Sizes of the dims, as they were and as they will be.
+    chunks : mapping of str to int
+        Sizes of tiles that the call asks for; what it names stays as it is.
+    """
+    tiles = prod(part.grid(sizes))
+    if tiles <= MANY_TILES or 4 * part.cells(before) > part.cells(sizes):
+        return part
+    if not chunks.keys().isdisjoint(part.dims):
+        return part
+    fresh = new_part(part.name, Box(part.dims, (), part.rows, tuple(names)), sizes, {})
+    return fresh if tiles > TOO_SMALL * prod(fresh.grid(sizes)) else part
+
+
+def _refuse_large_tiles(part: Part) -> None:
+    """Refuse tiles that no process could hold; those cut here are never as large."""
+    needed = prod(part.chunks) * part.cell_bytes
+    available = available_memory() if needed > MOST_BYTES else None
+    if available is None or needed <= SHARE * available:
+        return
+    tile = " x ".join(f"{dim} {n}" for dim, n in zip(part.dims, part.chunks, strict=True))
+    raise ParameterError(
+        f"chunks: got tiles of {tile} cells, {human(needed)} of results, wants at most "
+        f"{human(int(SHARE * available))}, {SHARE:.0%} of the memory that is free; chunks= is the "
+        "length of a tile along each dim: take a smaller one, or leave it out"
+    )

@@ -1,0 +1,233 @@
+"""What a stored map consists of, and whether a sweep may continue it.
+
+A plan says the model, its fixed parameters, fingerprints of its axes, and the parts. A part is a
+set of quantities on the same dims, computed by one call, tile by tile. A call that asks for more
+quantities adds parts; one with longer axes makes its arrays longer; any other difference is
+refused, and named.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.evaluate import Layout
+from phasekit.errors import StoreError
+from phasekit.labels.coordinates import STATES
+from phasekit.maps.parts import Part, cut_again, new_part
+
+#: Version of the layout of stores. In layout 1 nothing had checksums.
+LAYOUT = 2
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A stored map: what it is made of, and how it is cut."""
+
+    model: str
+    scalars: dict[str, float]
+    arrays: dict[str, dict[str, Any]]  # name -> dims and fingerprint of its values
+    sizes: dict[str, int]
+    parts: tuple[Part, ...]
+    ready: bool = False  # whether all arrays are in place
+    earlier: tuple[dict[str, int], ...] = ()  # sizes of which tiles at the end may be left
+    #: SHA-256 of each file that describes the arrays or holds a coordinate.
+    documents: dict[str, str] = field(default_factory=dict)
+    #: Where the arrays are being changed: these files as they were, None for those that were not.
+    before: dict[str, bytes | None] = field(default_factory=dict, compare=False)
+
+    @property
+    def quantities(self) -> dict[str, Part]:
+        """The part of each quantity."""
+        return {name: part for part in self.parts for name in part.quantities}
+
+    @cached_property
+    def generation(self) -> str:
+        """A digest of all that decides what is in the arrays: that of another map is another."""
+        parts = [
+            [part.name, part.dims, part.chunks, part.quantities, part.inputs] for part in self.parts
+        ]
+        made_of = [self.model, self.scalars, self.arrays, self.sizes, parts]
+        return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
+
+
+def new_plan(layout: Layout) -> Plan:
+    """Return the plan of a layout, without parts."""
+    inputs = layout.grid.inputs
+    scalars = {name: float(x.data) for name, x in inputs.items() if not x.dims}
+    arrays = {
+        name: {"dims": list(map(str, x.dims)), "sha256": fingerprint(x)}
+        for name, x in {**layout.grid.coords, **inputs}.items()
+        if x.dims
+    }
+    return Plan(type(layout.system).__name__, scalars, arrays, dict(layout.grid.sizes), ())
+
+
+def fingerprint(values: xr.Variable) -> str:
+    """Return a digest of values that tells any two apart, to the last bit."""
+    array = np.asarray(values.data)
+    if array.dtype.kind in "mM":
+        array = array.astype(f"{array.dtype.kind}8[ns]")
+    if array.dtype.kind in "fiubmM":
+        kind = array.dtype.newbyteorder("<")
+        data = np.ascontiguousarray(array.astype(kind)).tobytes()
+    else:
+        kind, data = np.dtype(object), repr(list(map(str, array.ravel().tolist()))).encode()
+    return hashlib.sha256(kind.str.encode() + repr(array.shape).encode() + data).hexdigest()
+
+
+def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]) -> Plan:
+    """Return the plan of a stored map that a call continues: the same, or with longer axes.
+
+    Tiles that are far too small for longer axes are chosen anew, unless the call names `chunks`.
+
+    Raises
+    ------
+    StoreError
+        If the call is for another map, with all differences.
+    """
+    wanted = new_plan(layout)
+    found = list(_differences(stored, wanted, layout))
+    if found:
+        raise StoreError(
+            f"store: {name} holds another map than the call asks for: {'; '.join(found)}; make "
+            "the call as it was, choose another name, or pass overwrite=True"
+        )
+    sizes = {**stored.sizes, **{dim: wanted.sizes[dim] for dim in wanted.sizes}}
+    grown = [dim for dim in stored.sizes if sizes[dim] != stored.sizes[dim]]
+    asked = {row.name for row in layout.rows}
+    for part in stored.parts:
+        left = [quantity for quantity in part.quantities if quantity not in asked]
+        if left and not set(grown).isdisjoint(part.dims):
+            raise StoreError(
+                f"store: {name} has fewer values of {', '.join(grown)} than the call, which does "
+                f"not name {', '.join(left)}; what makes an axis longer names all quantities of "
+                "the map in of="
+            )
+    parts = []
+    for part in stored.parts:
+        if not set(grown).isdisjoint(part.dims):
+            boxes = (b for b in layout.boxes() if any(r.name in part.quantities for r in b.rows))
+            names = {input for box in boxes for input in box.names}
+            part = replace(part, complete=False)
+            part = cut_again(part, names, stored.sizes, sizes, chunks)
+        parts.append(part)
+    return replace(
+        stored,
+        scalars={**stored.scalars, **wanted.scalars},
+        arrays={**stored.arrays, **wanted.arrays},
+        sizes=sizes,
+        parts=tuple(parts),
+        ready=True,
+        earlier=stored.earlier if not grown else (*stored.earlier, stored.sizes),
+        before={},
+    )
+
+
+def _differences(stored: Plan, wanted: Plan, layout: Layout) -> Iterable[str]:
+    """Name what keeps a call from continuing a map."""
+    if stored.model != wanted.model:
+        yield f"the model is {stored.model}, the call's {wanted.model}"
+        return
+    required = {p.name for p in layout.system.declared if not p.optional} | set(stored.sizes)
+    for name in dict.fromkeys([*stored.scalars, *stored.arrays, *wanted.scalars, *wanted.arrays]):
+        old, new = _shown(stored, name), _shown(wanted, name)
+        if old is None or new is None:
+            # States and optional parameters come with the quantities that need them.
+            if name in required if old is None else name not in STATES:
+                yield f"{name} is {old or 'not given'}, in the call {new or 'not given'}"
+        elif name in stored.scalars and name in wanted.scalars:
+            if stored.scalars[name] != wanted.scalars[name]:
+                yield f"{name} is {old}, in the call {new}"
+        elif name in stored.scalars or name in wanted.scalars:
+            yield f"{name} is {old}, in the call {new}"
+        else:
+            yield from _array_differences(stored, wanted, layout, name)
+    common = [dim for dim in stored.sizes if dim in wanted.sizes]
+    order = [dim for dim in wanted.sizes if dim in stored.sizes]
+    if common != order:
+        yield f"the order of its axes is {', '.join(common)}, in the call {', '.join(order)}"
+
+
+def _array_differences(stored: Plan, wanted: Plan, layout: Layout, name: str) -> Iterable[str]:
+    dims = stored.arrays[name]["dims"]
+    if dims != wanted.arrays[name]["dims"]:
+        yield f"{name} lies on {dims}, in the call on {wanted.arrays[name]['dims']}"
+        return
+    shorter = [dim for dim in dims if wanted.sizes[dim] < stored.sizes[dim]]
+    if shorter:
+        yield f"{name} is {_shown(stored, name)}, in the call {_shown(wanted, name)}"
+        return
+    values = {**layout.grid.coords, **layout.grid.inputs}[name]
+    if (
+        fingerprint(values.isel({dim: slice(stored.sizes[dim]) for dim in dims}))
+        != stored.arrays[name]["sha256"]
+    ):
+        grown = any(wanted.sizes[dim] > stored.sizes[dim] for dim in dims)
+        hint = ", which may only be longer at its end" if grown else ""
+        yield f"the values of {name} are others in the call{hint}"
+
+
+def _shown(plan: Plan, name: str) -> str | None:
+    if name in plan.scalars:
+        return repr(plan.scalars[name])
+    if name not in plan.arrays:
+        return None
+    sizes = (f"{plan.sizes[dim]} along {dim}" for dim in plan.arrays[name]["dims"])
+    return f"an axis of {' and '.join(sizes)}"
+
+
+def with_parts(
+    plan: Plan, layout: Layout, chunks: Mapping[str, int], dtypes: Mapping[str, str], name: str
+) -> Plan:
+    """Add parts for what a layout computes and the plan does not hold.
+
+    Parameters
+    ----------
+    chunks : mapping of str to int
+        Sizes of tiles that the call asks for; -1: the whole dim.
+    dtypes : mapping of str to str
+        Dtypes of quantities that the call asks for.
+
+    Raises
+    ------
+    StoreError
+        If the map holds a quantity with another dtype or in other chunks.
+    """
+    held = plan.quantities
+    for row in layout.rows:
+        part = held.get(row.name)
+        if part is None:
+            continue
+        if row.name in dtypes and dtypes[row.name] != part.quantities[row.name]:
+            raise StoreError(
+                f"store: {name} holds {row.name} as {part.quantities[row.name]}, the call asks "
+                f"for {dtypes[row.name]}; choose another name, or pass overwrite=True"
+            )
+        for dim, n in zip(part.dims, part.chunks, strict=True):
+            if chunks.get(dim, n) not in (n, -1):
+                raise StoreError(
+                    f"store: {name} holds {row.name} in chunks of {n} along {dim}, the call asks "
+                    f"for {chunks[dim]}; leave out chunks=, choose another name, or pass "
+                    "overwrite=True"
+                )
+    parts = list(plan.parts)
+    for box in layout.boxes():
+        rows = tuple(
+            replace(row, dtype=dtypes.get(row.name, row.dtype))
+            for row in box.rows
+            if row.name not in held
+        )
+        if rows:
+            taken = {part.name for part in parts}
+            free = next(n for n in map("part{}".format, itertools.count()) if n not in taken)
+            parts.append(new_part(free, replace(box, rows=rows), plan.sizes, chunks))
+    return replace(plan, parts=tuple(parts))

@@ -1,0 +1,258 @@
+"""Maps: quantities over a grid of parameters as one labelled Dataset, in memory or stored."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.dispatch import inputs_of, is_offered, passes_of
+from phasekit.cells.evaluate import Layout, evaluate, lay_out, leaves
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
+from phasekit.labels.coordinates import STATES
+from phasekit.labels.memory import refuse_too_large
+from phasekit.maps.job import Job, plan_job
+from phasekit.maps.options import (
+    check_chunks,
+    check_dtypes,
+    check_workers,
+    refuse_without_store,
+)
+from phasekit.maps.whole import WholeTarget, open_map, target_of
+from phasekit.systems.as_system import as_system
+from phasekit.systems.system import Model
+from phasekit.table.quantities import Pass, Quantity, select
+
+#: What is computed where nothing is said, as far as the system's law offers it.
+OFFERED = ("equilibria", "separatrices")
+
+
+def sweep(
+    system: Any,
+    axes: Mapping[str, Any] | None = None,
+    *,
+    of: str | Iterable[str] = OFFERED,
+    store: str | PathLike[str] | Any | None = None,
+    chunks: int | Mapping[str, int] | None = None,
+    workers: int | None = None,
+    client: Any = None,
+    progress: bool | None = None,
+    overwrite: bool = False,
+    force: bool = False,
+    dtype: str | Mapping[str, str] | None = None,
+    **axes_by_name: Any,
+) -> xr.Dataset:
+    """Map quantities over one or more parameters of a system.
+
+    Parameters
+    ----------
+    system : system
+        A `GyroRotorDisk`, `Reduced`, `Coefficients` or any other system.
+    axes : mapping of str to array_like, optional
+        Values of the swept parameters: 1-D lists, arrays or ranges, each a dim of the map, in
+        the order given; or DataArrays, which broadcast by the names of their dims. Likewise the
+        states that the quantities need (``state_phi``, ``state_dphi``, ``time``, ...), which may
+        be single numbers as well.
+    of : str or iterable of str, default ("equilibria", "separatrices")
+        Quantities, or groups of them; `quantities` lists them.
+    store : path, URL or zarr store, optional
+        Put the map there: a name that ends in ``.zarr``, a URL that fsspec knows, or a store of
+        zarr (Zarr v3), tile by tile, so that it need not fit into memory; or a name that ends in
+        ``.nc`` (netCDF), in one go. A Zarr store that the same call began is continued, and one
+        that has fewer quantities or shorter axes is extended; what it holds is not computed anew.
+    chunks : int or mapping of str to int, optional
+        Cells of a tile along each dim of the map, or along those named; -1: all. The tiles are
+        the chunks of the store. Default: about a million cells, or 128 MB.
+    workers : int, optional
+        Number of processes; 1: this one. Default: as many as there are cores, this one for maps
+        that take seconds.
+    client : dask.distributed.Client or str, optional
+        Compute on the workers of a dask cluster, given by its client or its scheduler's address;
+        all of them must reach the store by the same name.
+    progress : bool, optional
+        Show a progress bar. Default: if it takes longer than a second, in a terminal.
+    overwrite : bool, default False
+        Replace a map that is already at `store`.
+    force : bool, default False
+        Begin also if the map will not fit on the disk.
+    dtype : str or mapping of str to str, optional
+        ``"float32"`` to store numbers in single precision, or the dtypes of quantities by name.
+        They are computed in double precision.
+    **axes_by_name
+        Axes by keyword in place of `axes`.
+
+    Returns
+    -------
+    xarray.Dataset
+        The quantities with units, equations and sources. Swept parameters are dimension
+        coordinates, fixed ones scalar coordinates; ``ds.phasekit.system()`` rebuilds the system
+        of any selection. Cells whose parameters are not valid hold NaN, and -1 in n_equilibria.
+        With a Zarr store it is opened from there, as `open_map` does.
+
+    Raises
+    ------
+    ParameterError
+        If an axis or a quantity is unknown or unusable, or the map would not fit into memory.
+    StoreError
+        If `store` holds something else and overwrite is not set, it cannot be written, the disk
+        is too small, or a tile fails. Tiles that are done are kept: the same call goes on.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import phasekit as pk
+    >>> disk = pk.GyroRotorDisk(beta=0.3, e=0.001153, a=0.002, r=0.2, omega1=2.518)
+    >>> ds = pk.sweep(disk, beta=np.linspace(0.01, 1.5, 4), a=[0.0, 0.01, 0.02])
+    >>> dict(ds.n_equilibria.sizes)
+    {'beta': 4, 'a': 3}
+    >>> ds.sel(beta=0.5, a=0.01, method="nearest").phasekit.system().a
+    0.01
+    """
+    flag("overwrite", overwrite)
+    flag("force", force)
+    if progress is not None:
+        flag("progress", progress)
+    place = None if store is None else target_of(store)
+    system = as_system(system)
+    if place is not None and not place.is_netcdf and system.rung.labels_fixed:
+        from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
+
+        layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
+        sweep_into(
+            place,
+            layout,
+            chunks=check_chunks(chunks, layout.grid.sizes),
+            dtypes=dtypes,
+            workers=check_workers(workers, client),
+            client=client,
+            progress=progress,
+            overwrite=overwrite,
+            force=force,
+        )
+        return open_map(store)
+    refuse_without_store(chunks=chunks, workers=workers, client=client, force=force)
+    swept, rows, passes, states, order = _read(system, axes, of, axes_by_name)
+    dtypes = check_dtypes(dtype, rows)
+    rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
+    target = None if place is None else WholeTarget(place, overwrite=overwrite)
+    more = inputs_of(swept, rows)
+    ds = evaluate(swept, (*rows, *more), passes, states=states, order=order, progress=progress)
+    if more:
+        own = {dim for row in rows for dim in row.dims}
+        unasked = {row.name for row in more} | {dim for row in more for dim in row.dims} - own
+        ds = ds.drop_vars(sorted(unasked))
+    if target is not None:
+        target.write(ds)
+    return ds
+
+
+def plan_sweep(
+    system: Any,
+    axes: Mapping[str, Any] | None,
+    *,
+    of: Any,
+    store: Any,
+    chunks: Any = None,
+    dtype: Any = None,
+    overwrite: bool = False,
+) -> Job:
+    """Return what `sweep` with a Zarr store would have to do; nothing is computed or written."""
+    layout, dtypes = _lay_out(system, axes, of, dtype, {})
+    tiles = check_chunks(chunks, layout.grid.sizes)
+    return plan_job(target_of(store), layout, chunks=tiles, dtypes=dtypes, overwrite=overwrite)
+
+
+def _lay_out(
+    system: Any,
+    axes: Mapping[str, Any] | None,
+    of: Any,
+    dtype: Any,
+    by_name: Mapping[str, Any],
+) -> tuple[Layout, dict[str, str]]:
+    swept, rows, passes, states, order = _read(system, axes, of, by_name)
+    dtypes = check_dtypes(dtype, rows)
+    # A stored map needs its axes whole, however it is cut.
+    swept = swept.replace(**_loaded(swept.parameters))
+    return lay_out(swept, rows, passes, states=_loaded(states), order=order), dtypes
+
+
+def _read(
+    system: Any, axes: Mapping[str, Any] | None, of: Any, by_name: Mapping[str, Any]
+) -> tuple[Model, tuple[Quantity, ...], tuple[Pass, ...], dict[str, Value], list[str]]:
+    """Return the system with its axes, what to compute and how, the states, the order of dims."""
+    system = as_system(system)
+    rows = select(of)
+    if of is OFFERED:
+        rows = tuple(row for row in rows if is_offered(system, row.group))
+    along = (*rows, *inputs_of(system, rows))
+    passes = passes_of(system, along)
+    needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
+    kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
+    states = {name: value for name, value in kept.items() if name in STATES}
+    order = list(dict.fromkeys(dim for name, value in kept.items() for dim in _dims(name, value)))
+    swept = system.replace(**{name: x for name, x in kept.items() if name not in STATES})
+    return swept, rows, passes_of(swept, along), states, order  # with what only the axes give
+
+
+def _axes(
+    system: Model, axes: Mapping[str, Any] | None, by_name: Mapping[str, Any], states: list[str]
+) -> dict[str, Value]:
+    if axes is not None and not isinstance(axes, Mapping):
+        raise bad("axes", axes, "a mapping of parameter names to values, {'beta': [...], ...}")
+    given = dict(axes or {})
+    for name in by_name:
+        if name in given:
+            raise ParameterError(f"{name}: got it in axes and as a keyword, wants it once")
+    given.update(by_name)
+    valid = [parameter.name for parameter in system.declared] + states
+    kept: dict[str, Value] = {}
+    for name, value in given.items():
+        if name not in valid:
+            raise _unknown_axis(system, name, valid)
+        kept[name] = numeric(name, value, system.unit_of(name))
+        if isinstance(kept[name], float) and name not in states:
+            raise bad(
+                name,
+                value,
+                "a 1-D list, array or range of values to sweep over",
+                f"to change a fixed parameter use system.replace({name}=...)",
+            )
+    if not kept and all(isinstance(v, float) for v in system.parameters.values()):
+        raise ParameterError(
+            f"axes: got none, wants at least one of {', '.join(valid)}, "
+            f"as in pk.sweep(system, {valid[0]}=[...])"
+        )
+    return kept
+
+
+def _unknown_axis(system: Model, name: Any, valid: list[str]) -> ParameterError:
+    if name in ("lam", "psi", "A", "B", "C"):
+        other = "system.reduced()" if name in ("lam", "psi") else "system.coefficients()"
+        return ParameterError(
+            f"axis {name!r} is not a parameter of {type(system).__name__}; sweep {other}, "
+            f"or one of {', '.join(valid)}"
+        )
+    return unknown(f"axis of {type(system).__name__}:", name, valid)
+
+
+def _dims(name: str, value: Value) -> tuple[str, ...]:
+    if isinstance(value, xr.DataArray):
+        return tuple(map(str, value.dims))
+    return (name,) if isinstance(value, np.ndarray) else ()
+
+
+def _loaded(values: Mapping[str, Value]) -> dict[str, Value]:
+    """Read chunked axes into memory: a stored map needs them whole, however it is cut."""
+    lazy = {
+        name: value
+        for name, value in values.items()
+        if isinstance(value, xr.DataArray) and value.chunks is not None
+    }
+    for name, value in lazy.items():
+        refuse_too_large({name: value.nbytes}, {str(dim): n for dim, n in value.sizes.items()})
+    return {**values, **{name: numeric(name, value.load()) for name, value in lazy.items()}}

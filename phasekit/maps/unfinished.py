@@ -1,0 +1,156 @@
+"""Stored maps as Datasets: what is read is checked, and of unfinished ones what is computed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from xarray.backends import BackendArray
+from xarray.core import indexing
+
+from phasekit.errors import StoreError
+from phasekit.maps.damage import Damage, at_a_glance, in_full, lost_tiles, refuse
+from phasekit.maps.marks import Marks, marks_of, read_marks
+from phasekit.maps.parts import Part
+from phasekit.maps.plan import Plan
+from phasekit.maps.stored_arrays import refuse_damaged, zarr_group
+from phasekit.systems.identity import MODEL
+
+COMPUTED = "computed"
+_ATTRS = {"long_name": "whether all quantities of the cell are computed", "units": "1"}
+
+
+@contextlib.contextmanager
+def opened(source: Any, plan: Plan, name: str) -> Iterator[tuple[xr.Dataset, Any]]:
+    """Give the Dataset and the group of a map, for its metadata and coordinates."""
+    ds, store = _open(source, plan, name, None)
+    with ds:
+        yield ds, zarr_group(store)
+
+
+def _open(source: Any, plan: Plan, name: str, chunks: Any) -> tuple[xr.Dataset, Any]:
+    from phasekit.maps.checked import Checked  # here: it loads zarr
+
+    store: Any = Checked(source, plan, name)
+    ds = xr.open_zarr(store, consolidated=False, chunks=chunks, zarr_format=3)
+    inputs = [input for input in (*plan.arrays, *plan.scalars) if input in ds.data_vars]
+    return ds.set_coords(inputs), store
+
+
+def open_stored(
+    source: Any, plan: Plan, name: str, chunks: Any = None, *, verify: bool = False
+) -> xr.Dataset:
+    """Open a map that was made tile by tile; one that is not finished has the variable `computed`.
+
+    Raises
+    ------
+    StoreError
+        If its arrays were being made when that was interrupted, or it is damaged.
+    """
+    if not plan.parts or not (plan.ready or plan.before):
+        raise StoreError(
+            f"store: {name} cannot be opened: its arrays are being made, or that was interrupted; "
+            "wait, or make the sweep's call again"
+        )
+    ds, store = _open(source, plan, name, chunks)
+    refuse_damaged(ds, zarr_group(store), plan, name)
+    if ds.attrs.get(MODEL) != plan.model:
+        raise StoreError(
+            f"store: {name} is damaged: zarr.json names the model {ds.attrs.get(MODEL)!r}, its "
+            f"plan {plan.model!r}"
+        )
+    ds = ds.drop_vars([other for other in ds.data_vars if other not in plan.quantities])
+    values = {coord: ds[coord].variable for coord in (*plan.arrays, *plan.scalars)}
+    marks = {part.name: marks_of(source, plan, part, values) for part in plan.parts}
+    damaged: list[Damage] = []
+    for part in plan.parts:
+        known = marks[part.name].known()
+        found = (in_full if verify else at_a_glance)(source, part, known)
+        if found:  # or written anew since its mark was read
+            now = read_marks(source, part)
+            found = [one for one in found if now.get(one.index) == known[one.index]]
+        damaged += [*lost_tiles(part, marks[part.name], plan.sizes), *found]
+    refuse(name, damaged, plan.sizes)
+    store.marks = {part: one.known() for part, one in marks.items()}
+    if all(part.complete for part in plan.parts):
+        return ds
+    dims = tuple(dim for dim in plan.sizes if any(dim in part.dims for part in plan.parts))
+    done = [_done(part, marks[part.name], plan.sizes) for part in plan.parts if not part.complete]
+    data = indexing.LazilyIndexedArray(_Computed(dims, plan.sizes, done))
+    computed = xr.Variable(dims, data, _ATTRS)
+    if chunks is not None:
+        if isinstance(chunks, Mapping):  # what it does not name is cut as it is stored
+            tiles = {
+                d: n for part in plan.parts for d, n in zip(part.dims, part.chunks, strict=True)
+            }
+            chunks = {dim: chunks.get(dim, tiles[dim]) for dim in dims}
+        computed = computed.chunk(chunks)
+    return ds.assign({COMPUTED: computed})
+
+
+class _Tiles(NamedTuple):
+    """Tiles of a part that are done, as far as a map of some sizes went."""
+
+    marks: Any  # True for each
+    sizes: Mapping[str, int]
+
+
+def _done(part: Part, marks: Marks, sizes: Mapping[str, int]) -> tuple[Part, list[_Tiles]]:
+    found = [_Tiles(np.zeros(part.grid(sizes), bool), sizes)]
+    for index in marks.done:
+        found[0].marks[index] = True
+    for index, (_, shorter) in marks.shorter.items():
+        tiles = next((one for one in found if one.sizes == shorter), None)
+        if tiles is None:
+            tiles = _Tiles(np.zeros(part.grid(sizes), bool), shorter)
+            found.append(tiles)
+        tiles.marks[index] = True
+    return part, found
+
+
+class _Computed(BackendArray):
+    """The cells whose tiles are done in every part, made when they are asked for."""
+
+    def __init__(
+        self,
+        dims: tuple[str, ...],
+        sizes: Mapping[str, int],
+        done: list[tuple[Part, list[_Tiles]]],
+    ) -> None:
+        self.dims = dims
+        self.shape = tuple(sizes[dim] for dim in dims)
+        self.dtype = np.dtype(bool)
+        self.done = done
+
+    def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        return indexing.explicit_indexing_adapter(
+            key, self.shape, indexing.IndexingSupport.OUTER, self._cells
+        )
+
+    def _cells(self, key: tuple[Any, ...]) -> Any:
+        cells = dict(
+            zip(
+                self.dims,
+                (np.arange(n)[k] for n, k in zip(self.shape, key, strict=True)),
+                strict=True,
+            )
+        )
+        asked = [dim for dim in self.dims if np.ndim(cells[dim])]
+        result = np.ones([len(cells[dim]) for dim in asked], bool)
+        for part, several in self.done:
+            # The part's dims come in the map's order, as those of the map do.
+            shape = [len(cells[dim]) if dim in part.dims else 1 for dim in asked]
+            there = False
+            for marks, sizes in several:
+                places = [np.atleast_1d(cells[dim]) for dim in part.dims]
+                tiles = [at // n for at, n in zip(places, part.chunks, strict=True)]
+                found = marks[np.ix_(*tiles)] if part.dims else marks
+                for axis, (at, dim) in enumerate(zip(places, part.dims, strict=True)):
+                    beyond = (slice(None),) * axis + (at >= sizes[dim],)
+                    found[beyond] = False
+                there = there | found
+            result &= np.reshape(there, shape)
+        return result

@@ -1,0 +1,222 @@
+"""What is stored in one go, netCDF maps and branches; and maps read back as they were."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.schema import restore
+from phasekit.cells.tiling import tiles
+from phasekit.errors import ParameterError, StoreError
+from phasekit.labels.arguments import bad, flag
+from phasekit.maps.place import NETCDF, ZARR, Place, place_of
+from phasekit.maps.stored_arrays import read_plan, reason, refuse_strange, zarr_group
+from phasekit.maps.unfinished import open_stored
+from phasekit.systems.identity import MODEL, model_name
+
+
+class WholeTarget:
+    """A local name for a Dataset; everything that can be refused is refused before it is made."""
+
+    def __init__(self, place: Place, *, overwrite: bool = False) -> None:
+        if place.path is None:
+            raise StoreError(f"store: {place.name} is no local path, which this is written to")
+        self.path = place.path
+        self.overwrite = overwrite
+        if not self.path.parent.is_dir():
+            raise StoreError(f"store: the folder {self.path.parent} does not exist; make it first")
+        if not os.access(self.path.parent, os.W_OK):
+            raise StoreError(f"store: the folder {self.path.parent} cannot be written to")
+        if place.is_netcdf:
+            _need_h5netcdf()
+        self._refuse_existing()
+
+    def _refuse_existing(self) -> None:
+        if not os.path.lexists(self.path):
+            return
+        if not self.overwrite:
+            raise StoreError(
+                f"store: {self.path} exists; choose another name, or pass overwrite=True"
+            )
+        if not _is_map_file(self.path):
+            raise StoreError(
+                f"store: {self.path} exists and is not a map, so it is not overwritten; "
+                "choose another name"
+            )
+        if self.path.is_dir():
+            refuse_strange(
+                Place(str(self.path), path=self.path).open(read_only=True), str(self.path)
+            )
+
+    def write(self, ds: xr.Dataset) -> None:
+        """Write a Dataset in one go; the name appears only when it is complete."""
+        folder = self.path.parent
+        try:
+            with tempfile.TemporaryDirectory(prefix=f".{self.path.name}.", dir=folder) as scratch:
+                fresh = Path(scratch) / self.path.name
+                if self.path.suffix == ZARR:
+                    ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
+                else:
+                    checked = _with_checksums(ds)
+                    checked.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
+                self._refuse_existing()  # it may have appeared while the map was computed
+                if self.path.is_dir():
+                    self.path.rename(Path(scratch) / "replaced")
+                fresh.replace(self.path)
+        except OSError as error:
+            if isinstance(error, StoreError):
+                raise
+            raise StoreError(f"store: {self.path} was not written: {error}") from error
+
+
+def _with_checksums(ds: xr.Dataset) -> xr.Dataset:
+    """Ask for checksums of arrays in HDF5, which has none for scalars and strings."""
+    ds = ds.copy()
+    for variable in ds.variables.values():
+        if variable.size and variable.ndim and variable.dtype.kind in "biuf":
+            variable.encoding = {**variable.encoding, "fletcher32": True}
+    return ds
+
+
+def target_of(store: Any) -> Place:
+    """Return the place for a map, which is a name that ends in .zarr or .nc, a URL or a store."""
+    place = place_of(store)
+    if place.path is not None and place.path.suffix not in (ZARR, NETCDF):
+        raise bad("store", os.fspath(store), "a path that ends in .zarr or .nc")
+    return place
+
+
+def open_map(
+    store: str | PathLike[str] | Any, *, chunks: Any = None, verify: bool = False
+) -> xr.Dataset:
+    """Open a stored map as it was when it was written, dtypes and attributes included.
+
+    Of a Zarr store, coordinates and metadata are compared with what was written, and of each
+    finished tile the presence and size of its files; values when they are read, by checksums.
+
+    Parameters
+    ----------
+    store : path, URL or zarr store
+        A Zarr store (a folder, or what fsspec or zarr know) or a netCDF file (``.nc``) that
+        phasekit wrote, or that holds a Dataset of phasekit.
+    chunks : optional
+        Chunks of dask arrays, as in `xarray.open_dataset`. Default: no dask; values are read
+        when they are used.
+    verify : bool, default False
+        Read all files at once and compare their checksums, which in netCDF files only arrays of
+        numbers have. Files of phasekit before checksums are only read through.
+
+    Returns
+    -------
+    xarray.Dataset
+        The map; `xarray.Dataset.load` reads it whole, `xarray.Dataset.close` closes the file.
+        A map that `sweep` has not finished, or is writing now, has a variable ``computed`` on its
+        dims: whether all quantities of a cell are there. Where they are not, floats are NaN and
+        codes not_computed; it is the map as it was when it was opened.
+
+    Raises
+    ------
+    StoreError
+        If there is nothing, what is there is not a map of phasekit, or it is damaged: with what
+        and where. Values of a Dataset that is open raise it as well, when they are read.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import phasekit as pk
+    >>> disk = pk.GyroRotorDisk(beta=0.3, e=0.001153, a=0.002, r=0.2, omega1=2.518)
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     ds = pk.sweep(disk, beta=[0.1, 0.2], store=f"{folder}/map.zarr")
+    ...     pk.open_map(f"{folder}/map.zarr").identical(ds)
+    True
+    """
+    flag("verify", verify)
+    place = place_of(store)
+    if place.path is not None and not place.path.exists():
+        raise StoreError(f"store: {place.name} does not exist")
+    with _as_store_error(place.name):
+        if place.path is not None and not place.path.is_dir():
+            _need_h5netcdf()
+            ds = xr.open_dataset(place.path, engine="h5netcdf", chunks=chunks)
+            plan = None
+        else:
+            source = place.open(read_only=True)
+            plan = read_plan(source)
+            if plan is None:
+                ds = _whole(source, place.name, chunks)
+            else:
+                ds = open_stored(source, plan, place.name, chunks, verify=verify)
+        model_name(ds)
+        if verify and plan is None:
+            for variable in ds.variables.values():
+                for tile in tiles(variable.shape, 1 << 24):
+                    np.asarray(variable[tile])
+        return restore(ds)
+
+
+def _whole(source: Any, name: str, chunks: Any) -> xr.Dataset:
+    """Open a store that was written in one go."""
+    ds: xr.Dataset = xr.open_zarr(source, consolidated=False, chunks=chunks, zarr_format=3)
+    group = zarr_group(source)
+    encodings = (group[name].metadata.chunk_key_encoding for name in ds.data_vars)
+    if any(getattr(encoding, "separator", "/") == "." for encoding in encodings):
+        raise StoreError(
+            f"store: {name} is damaged: its group sweep is gone, which says what is computed; put "
+            "it back, or pass overwrite=True to sweep"
+        )
+    if not ds.variables:
+        raise StoreError(
+            f"store: {name} cannot be opened: its arrays are being made, or that was interrupted; "
+            "wait, or make the sweep's call again"
+        )
+    return ds
+
+
+@contextlib.contextmanager
+def _as_store_error(name: str) -> Iterator[None]:
+    try:
+        yield
+    except ParameterError as error:
+        raise StoreError(f"store: {name} is not a map of phasekit: {error}") from error
+    except StoreError:
+        raise
+    except FileNotFoundError as error:
+        raise StoreError(
+            f"store: {name} cannot be read: there is no map, or not yet; Zarr is read in format 3"
+        ) from error
+    except Exception as error:  # whatever is made of files that are not what they were
+        raise StoreError(f"store: {name} cannot be read: {reason(error)}") from error
+
+
+def _is_map_file(path: Path) -> bool:
+    """Whether overwriting may remove it: a store that says which model of phasekit made it."""
+    if path.is_symlink():
+        return False
+    try:
+        if path.suffix == ZARR:
+            return MODEL in json.loads((path / "zarr.json").read_bytes())["attributes"]
+        import h5netcdf
+
+        with h5netcdf.File(path, "r") as file:
+            return MODEL in file.attrs
+    except (OSError, ValueError, KeyError, TypeError):
+        return False
+
+
+def _need_h5netcdf() -> None:
+    try:
+        import h5netcdf  # noqa: F401
+    except ImportError:
+        raise StoreError(
+            "store: netCDF needs h5netcdf and h5py: pip install 'phasekit[netcdf]'; "
+            "or use a name that ends in .zarr"
+        ) from None

@@ -1,0 +1,186 @@
+"""Derivatives of a right-hand side that is given alone, by differences, and its values.
+
+A step that suits the size of an unknown may be far too wide for f: each derivative is taken over
+one and over two steps, and again over shorter ones until what they leave out is rounding.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.native import call, twin
+
+# How the right-hand side comes: with its derivatives, or alone, to be differenced.
+DERIVED, PLAIN, SHARP = range(3)
+
+COARSE = 2.0**-20  # of central differences, while stepping
+STEP = 2.0**-10  # of fourth-order differences: their error is STEP^4 and rounding/STEP
+FINE = 2.0**-22  # of those that show whether STEP is too wide to see what f does
+SHORTER = 0.125
+TRIES = 8
+EPSILON = 2.0**-52
+KNOWN = 1e-10  # relative error that rounding alone does not exceed
+MIXED = 2.0**-12  # of mixed second differences
+
+
+def spare_size(n: int, m: int) -> int:
+    """Length of what `jet` and `bend` need for themselves."""
+    return m + 7 * n
+
+
+@routine
+def plain(function: Any, n: int, w: Array, x: int, par: Array, active: Any, out: int) -> None:
+    """Call a right-hand side that takes the state and all parameters."""
+    for i in range(n):
+        w[out + i] = np.nan
+    for j in range(active.size):
+        par[active[j]] = w[x + n + j]
+    call(function, w, x, par, x, out)
+
+
+@routine
+def across(
+    function: Any, n: int, w: Array, x: int, j: int, step: float, par: Array, active: Any,
+    value: int, slope: int, bend_: int,
+) -> None:  # fmt: skip
+    """The central difference over a step along an unknown; the sum of both sides is added on."""
+    middle = w[x + j]
+    for side in range(2):
+        k = 1.0 - 2.0 * side
+        w[x + j] = middle + k * step
+        plain(function, n, w, x, par, active, value)
+        for i in range(n):
+            w[slope + i] = k * w[value + i] + (w[slope + i] if side == 1 else 0.0)
+            w[bend_ + i] += w[value + i]
+    for i in range(n):
+        w[slope + i] /= 2.0 * step
+    w[x + j] = middle
+
+
+def _jet(
+    first: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any, scale: int, out: int,
+    spare: int,
+) -> None:  # fmt: skip
+    if mode == DERIVED:
+        call(first, w, u, par, u, out)
+        return
+    m = n + active.size
+    x, value = spare, spare + m
+    near, far, fine, wide = value + n, value + 2 * n, value + 3 * n, value + 4 * n
+    bend_, least = value + 5 * n, value + 6 * n
+    for i in range(m):
+        w[x + i] = w[u + i]
+    plain(first, n, w, x, par, active, out)
+    for j in range(m):
+        # Powers of two, so that what is added to a number of its size is exact.
+        size = 2.0 ** np.floor(np.log2(max(abs(w[u + j]), w[scale + j])))
+        place = out + n + j
+        if mode == PLAIN:
+            across(first, n, w, x, j, COARSE * size, par, active, value, near, bend_)
+            for i in range(n):
+                w[place + i * m] = w[near + i]
+            continue
+        across(first, n, w, x, j, FINE * size, par, active, value, fine, bend_)
+        across(first, n, w, x, j, 2.0 * FINE * size, par, active, value, wide, bend_)
+        for i in range(n):
+            w[least + i] = np.inf
+            w[place + i * m] = w[fine + i]
+        step = STEP * size
+        for _ in range(TRIES):
+            across(first, n, w, x, j, 2.0 * step, par, active, value, far, bend_)
+            for i in range(n):
+                w[bend_ + i] = -2.0 * w[out + i]
+            across(first, n, w, x, j, step, par, active, value, near, bend_)
+            done = True
+            for i in range(n):
+                gap = abs(w[near + i] - w[far + i])
+                best = w[near + i] + (w[near + i] - w[far + i]) / 3.0
+                slope, curved = abs(w[near + i]), abs(w[bend_ + i]) / step
+                # The square of the step over the width of f, by its first or second derivative.
+                width = (gap / curved) ** 2 if curved > 0.0 else np.inf
+                width = min(width, gap / slope) if slope > 0.0 else width
+                left = gap * width if gap > 0.0 else 0.0
+                # What rounding does to the shortest differences, here in proportion.
+                rounding = FINE * size / step * abs(w[fine + i] - w[wide + i])
+                rounding = min(rounding, KNOWN * (slope + 100.0 * curved))
+                rounding += EPSILON * size / step * slope
+                off = max(0.0, abs(best - w[fine + i]) - 4.0 * abs(w[fine + i] - w[wide + i]))
+                off = 0.0 if off <= 1e-9 * (slope + curved) else off
+                if left + off + rounding < w[least + i]:
+                    w[place + i * m] = best
+                    w[least + i] = left + off + rounding
+                done = done and left <= rounding and off == 0.0
+            if done:
+                break
+            step *= SHORTER
+
+
+@twin(_jet)
+def jet(
+    first: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any, scale: int, out: int,
+    spare: int,
+) -> None:  # fmt: skip
+    """F and its derivatives by state and free parameters, row by row."""
+    call(first, w, u, par, u, out)
+
+
+def _bend(
+    first: Any, second: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any,
+    scale: int, z: int, out: int, spare: int,
+) -> None:  # fmt: skip
+    if mode == DERIVED:
+        call(second, w, u, par, z, out)
+        return
+    m = n + active.size
+    out += n + n * m
+    x = spare
+    value = spare + m
+    length = 0.0
+    for i in range(m):
+        length = max(length, abs(w[z + i]) / max(abs(w[u + i]), w[scale + i]))
+    for i in range(n * m):
+        w[out + i] = 0.0
+    if length == 0.0:
+        return
+    along = MIXED / length
+    for j in range(m):
+        step = MIXED * max(abs(w[u + j]), w[scale + j])
+        for side in range(4):
+            k = (1.0, 1.0, -1.0, -1.0)[side]
+            l = (1.0, -1.0, 1.0, -1.0)[side]  # noqa: E741
+            for i in range(m):
+                w[x + i] = w[u + i] + l * along * w[z + i]
+            w[x + j] += k * step
+            plain(first, n, w, x, par, active, value)
+            weight = k * l / (4.0 * step * along)
+            for i in range(n):
+                w[out + i * m + j] += weight * w[value + i]
+
+
+@twin(_bend)
+def bend(
+    first: Any, second: Any, mode: int, n: int, w: Array, u: int, par: Array, active: Any,
+    scale: int, z: int, out: int, spare: int,
+) -> None:  # fmt: skip
+    """The derivatives of f_u z by state and free parameters, row by row.
+
+    They come after f and its derivatives, which begin at out and are filled as well where the mode
+    is DERIVED: what they share is computed once.
+    """
+    call(second, w, u, par, z, out)
+
+
+@kernel
+def values(first: Any, n: int, par: Array, active: Any, points: Array, out: Array) -> None:
+    """A right-hand side that is given alone, at many points."""
+    m = n + active.size
+    w = np.zeros(m + n)
+    for k in range(points.shape[0]):
+        for j in range(m):
+            w[j] = points[k, j]
+        plain(first, n, w, 0, par, active, m)
+        for i in range(n):
+            out[k, i] = w[m + i]

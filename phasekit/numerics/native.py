@@ -1,0 +1,179 @@
+"""Calls of native functions by their address, and linear algebra on pieces of a flat work array.
+
+A kernel that takes the right-hand side of a system as the address of its machine code is compiled
+once, for all systems. The same kernel interpreted (`py_func`) takes a Python function instead.
+`twin` gives a helper two bodies: NumPy for the interpreter, loops for the compiler. Vectors and
+matrices are pieces of one flat array ``w``, named by the place where they begin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic, overload
+
+from phasekit.numerics.compile import Array, Function
+
+OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
+
+
+def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
+    """Give a function that is interpreted as it stands another body for the compiler."""
+
+    def decorate(function: Function) -> Function:
+        overload(function, jit_options={"error_model": "numpy"}, strict=False)(
+            lambda *args: compiled
+        )
+        return function
+
+    return decorate
+
+
+@intrinsic
+def _invoke(
+    typing_context: Any, address: Any, w: Any, x: Any, p: Any, z: Any, out: Any
+) -> tuple[Any, Any]:
+    """Call ``void (*)(double *x, double *p, double *z, double *out)``."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        pointer = ir.DoubleType().as_pointer()
+        function = ir.FunctionType(ir.VoidType(), [pointer] * 4)
+        address, w, x, p, z, out = args
+        data = context.make_array(signature.args[1])(context, builder, w).data
+        parameters = context.make_array(signature.args[3])(context, builder, p).data
+        x, z, out = (builder.gep(data, [place]) for place in (x, z, out))
+        where = builder.inttoptr(address, function.as_pointer())
+        builder.call(where, [x, parameters, z, out])
+        return context.get_dummy_value()
+
+    return types.void(address, w, types.intp, p, types.intp, types.intp), generate
+
+
+def _call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
+    _invoke(function, w, x, p, z, out)  # type: ignore[call-arg]
+
+
+@twin(_call)
+def call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
+    """Call ``function(x, p, z, out)``, a Python function or the address of a native one."""
+    function(w[x:], p, w[z:], w[out:])
+
+
+def _solve(w: Array, a: int, b: int, n: int) -> float:
+    if n > OWN:
+        matrix, right = w[a : a + n * n].reshape(n, n), w[b : b + 2 * n].reshape(n, 2)
+        for i in range(n * n):
+            if not np.isfinite(w[a + i]):
+                return 0.0
+        try:
+            right[:] = np.linalg.solve(matrix, right)
+        except Exception:  # noqa: BLE001 (all that numba knows)
+            return 0.0
+        return 1.0
+    sign = 1.0
+    for j in range(n):
+        pivot = j
+        size = abs(w[a + j * n + j])
+        for i in range(j + 1, n):
+            if abs(w[a + i * n + j]) > size:
+                size = abs(w[a + i * n + j])
+                pivot = i
+        if not size > 0.0:
+            return 0.0
+        if pivot != j:
+            sign = -sign
+            for k in range(j, n):
+                value = w[a + j * n + k]
+                w[a + j * n + k] = w[a + pivot * n + k]
+                w[a + pivot * n + k] = value
+            for k in range(b, b + 2):
+                value = w[k + 2 * j]
+                w[k + 2 * j] = w[k + 2 * pivot]
+                w[k + 2 * pivot] = value
+        if w[a + j * n + j] < 0.0:
+            sign = -sign
+        inverse = 1.0 / w[a + j * n + j]
+        for i in range(j + 1, n):
+            factor = w[a + i * n + j] * inverse
+            if factor != 0.0:
+                for k in range(j + 1, n):
+                    w[a + i * n + k] -= factor * w[a + j * n + k]
+                w[b + 2 * i] -= factor * w[b + 2 * j]
+                w[b + 2 * i + 1] -= factor * w[b + 2 * j + 1]
+    for i in range(n - 1, -1, -1):
+        first = w[b + 2 * i]
+        second = w[b + 2 * i + 1]
+        for j in range(i + 1, n):
+            first -= w[a + i * n + j] * w[b + 2 * j]
+            second -= w[a + i * n + j] * w[b + 2 * j + 1]
+        inverse = 1.0 / w[a + i * n + i]
+        w[b + 2 * i] = first * inverse
+        w[b + 2 * i + 1] = second * inverse
+    return sign
+
+
+@twin(_solve)
+def solve(w: Array, a: int, b: int, n: int) -> float:
+    """Solve for two right sides, in their place; the determinant's sign, 0 if it is singular.
+
+    The interpreter leaves the sign to `orientation`.
+    """
+    right = w[b : b + 2 * n].reshape(n, 2)
+    try:
+        right[:] = np.linalg.solve(w[a : a + n * n].reshape(n, n), right)
+    except np.linalg.LinAlgError:
+        return 0.0
+    return 1.0
+
+
+def _orientation(w: Array, a: int, n: int, sign: float) -> float:
+    if n > OWN:
+        return float(np.linalg.slogdet(w[a : a + n * n].reshape(n, n))[0])
+    return sign
+
+
+@twin(_orientation)
+def orientation(w: Array, a: int, n: int, sign: float) -> float:
+    """Sign of the determinant of the matrix that was solved last."""
+    return float(np.linalg.slogdet(w[a : a + n * n].reshape(n, n))[0])
+
+
+def _inner(w: Array, weight: int, x: int, y: int, n: int) -> float:
+    total = 0.0
+    for i in range(n):
+        total += w[weight + i] * w[x + i] * w[y + i]
+    return total
+
+
+@twin(_inner)
+def inner(w: Array, weight: int, x: int, y: int, n: int) -> float:
+    """Sum of weight * x * y over n entries."""
+    return float(np.dot(w[weight : weight + n] * w[x : x + n], w[y : y + n]))
+
+
+def _copy(w: Array, source: int, target: int, n: int) -> None:
+    for i in range(n):
+        w[target + i] = w[source + i]
+
+
+@twin(_copy)
+def copy(w: Array, source: int, target: int, n: int) -> None:
+    """Copy n entries."""
+    w[target : target + n] = w[source : source + n]
+
+
+def _dot(w: Array, x: int, y: int, n: int) -> float:
+    total = 0.0
+    for i in range(n):
+        total += w[x + i] * w[y + i]
+    return total
+
+
+@twin(_dot)
+def dot(w: Array, x: int, y: int, n: int) -> float:
+    """Sum of x * y over n entries."""
+    return float(np.dot(w[x : x + n], w[y : y + n]))

@@ -1,0 +1,1 @@
+"""Phase space of the trigonometric law in closed form, arrays only."""

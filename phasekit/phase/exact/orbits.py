@@ -1,0 +1,234 @@
+"""Period, action and turning points of orbits, in closed form. Arrays in, arrays out."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import EquilibriumKind, ParameterError
+from phasekit.numerics.launch import Arrays, launch
+from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.kernels import portrait as kernels
+from phasekit.phase.exact.states import flat, systems
+
+Array = npt.NDArray[np.float64]
+
+
+class Orbits(NamedTuple):
+    """Orbits, one for each state."""
+
+    orbit_kind: npt.NDArray[np.int8]
+    """`OrbitKind`."""
+    orbit_energy: Array
+    """Energy h = dphi^2/2 + V(phi), 1/s^2."""
+    period: Array
+    """Time of one round, s; inf on a separatrix and at a saddle, that of small oscillations at a
+    center."""
+    frequency: Array
+    """2 pi/period, rad/s."""
+    action: Array
+    """Area inside the orbit over 2 pi, rad^2/s; of a rotation, that under one turn. NaN on a
+    separatrix."""
+    phi_min: Array
+    """Least angle, rad, unwrapped round the state; NaN for a rotation."""
+    phi_max: Array
+    """Greatest angle, rad."""
+
+
+def orbits(
+    A: npt.ArrayLike,
+    B: npt.ArrayLike,
+    C: npt.ArrayLike,
+    phi0: npt.ArrayLike,
+    dphi0: npt.ArrayLike,
+    *,
+    threads: int | None = None,
+) -> Orbits:
+    """Orbits through states: kind, energy, period, frequency, action, turning points.
+
+    The frequency is an arithmetic-geometric mean of distances between the Weierstrass roots of
+    the motion; the action is the mean of phi'^2 over the phase, where the trapezoidal rule
+    converges exponentially. Both keep their relative accuracy for small oscillations, and next to
+    a separatrix, where the energy above the saddle is computed in double-double arithmetic.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2, of any sign and size.
+    phi0, dphi0 : array_like
+        States: angles in rad, angular velocities in 1/s. All five broadcast. Cells that are not
+        finite come back as NaN, with the kind not_computed.
+    threads : int, optional
+        Number of threads for large arrays; all cores by default.
+
+    Returns
+    -------
+    Orbits
+        An orbit is an equilibrium if dphi0 = 0 and V'(phi0) = 0 in floating point, and asymptotic
+        if its energy is that of a saddle within the rounding of the state.
+
+    Notes
+    -----
+    The motion is that of [Veljovic2015] (12), with the energy integral (14).
+
+    Examples
+    --------
+    A pendulum, raised by half a radian:
+
+    >>> orbit = orbits(0.0, 1.0, 0.0, 0.5, 0.0)
+    >>> round(float(orbit.period), 9)
+    6.382789698
+    """
+    cells = systems(A, B, C, threads)
+    shape = np.broadcast_shapes(cells.shape, np.shape(phi0), np.shape(dphi0))
+    arrays = (*cells.arrays, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
+    out = allocate(shape)
+    launch(kernels.orbits, arrays, out[0].size, (out,), threads)
+    return Orbits(*(array.reshape(shape) for array in out))
+
+
+def orbits_at_energy(
+    A: npt.ArrayLike,
+    B: npt.ArrayLike,
+    C: npt.ArrayLike,
+    energy: npt.ArrayLike,
+    center: npt.ArrayLike | None = None,
+    *,
+    threads: int | None = None,
+) -> Orbits:
+    """Orbits of given energy round a center.
+
+    Below the energy of the lower saddle the orbit stays in the center's well; above, it is the
+    one that goes round both wells, or the rotation.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2.
+    energy : array_like
+        Energies h in 1/s^2. Where they are below that of the center, or the center is absent, the
+        kind is not_computed and the rest NaN.
+    center : array_like of int
+        0 for the lower center, 1 for the upper one; the lower one by default. All five broadcast.
+    threads : int, optional
+        Number of threads for large arrays; all cores by default.
+
+    Returns
+    -------
+    Orbits
+
+    Examples
+    --------
+    Both wells have the same period at the same energy:
+
+    >>> orbit = orbits_at_energy(1.3, 0.2, 0.15, 0.2, [0, 1])
+    >>> orbit.period.round(9).tolist()
+    [6.216582005, 6.216582005]
+    """
+    return _at_levels(A, B, C, energy, 0 if center is None else center, 0, False, threads)
+
+
+def orbits_at_gap(
+    A: npt.ArrayLike,
+    B: npt.ArrayLike,
+    C: npt.ArrayLike,
+    gap: npt.ArrayLike,
+    saddle: npt.ArrayLike | None = None,
+    side: npt.ArrayLike = 1,
+    *,
+    threads: int | None = None,
+) -> Orbits:
+    """Orbits by their energy above a saddle, where the energy itself has lost the digits.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2.
+    gap : array_like
+        Energy minus that of the saddle, in 1/s^2: negative inside.
+    saddle : array_like of int
+        0 for the lower saddle, 1 for the upper one; the lower one by default where there are two,
+        else the only one.
+    side : array_like of int
+        0 for the well on the left of the saddle, 1 for that on its right; it matters where the
+        orbit stays in one of them. All six broadcast.
+    threads : int, optional
+        Number of threads for large arrays; all cores by default.
+
+    Returns
+    -------
+    Orbits
+
+    Examples
+    --------
+    >>> gaps = [-1e-20, -1e-40, -1e-80]
+    >>> orbits_at_gap(2.0, 1.0, 0.0, gaps, 0, 1).period.round(3).tolist()
+    [49.517, 95.569, 187.673]
+    """
+    if saddle is None:
+        lower = equilibria(A, B, C, threads=threads).kind[..., 1] == EquilibriumKind.SADDLE
+        saddle = np.where(lower, 0, 1)
+    return _at_levels(A, B, C, gap, saddle, side, True, threads)
+
+
+def energy_rises(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
+    """Heights of the wells, each with its own digits, where their energies have lost them.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2; they broadcast.
+
+    Returns
+    -------
+    ndarray
+        Energies in 1/s^2 on a last axis of length 4: from the lower center, and from the upper
+        one, to the saddle where its well ends; from the lower saddle to the upper one, 0 between
+        equal saddles; from the lower center to the upper saddle. NaN where one is absent.
+
+    Examples
+    --------
+    >>> energy_rises(2.0, 1.0, 0.0).round(12).tolist()
+    [0.25, 0.25, 2.0, 2.25]
+    """
+    cells = systems(A, B, C, None)
+    out = (np.empty((cells.A.size, 4)),)
+    launch(kernels.rises, cells.arrays, cells.A.size, (out,), None)
+    return out[0].reshape(*cells.shape, 4)
+
+
+def _at_levels(
+    A: npt.ArrayLike,
+    B: npt.ArrayLike,
+    C: npt.ArrayLike,
+    level: npt.ArrayLike,
+    point: npt.ArrayLike,
+    side: npt.ArrayLike,
+    gap: bool,
+    threads: int | None,
+) -> Orbits:
+    for name, value in (("saddle" if gap else "center", point), ("side", side)):
+        if not np.isin(value, (0, 1)).all():
+            raise ParameterError(f"{name}: got {value!r}, wants 0 or 1")
+    cells = systems(A, B, C, threads)
+    shape = np.broadcast_shapes(cells.shape, np.shape(level), np.shape(point), np.shape(side))
+    arrays = (
+        *cells.arrays,
+        cells.points.energy,
+        cells.numbers(shape),
+        flat(level, shape),
+        flat(point, shape),
+        flat(side, shape),
+        gap,
+    )
+    out = allocate(shape)
+    launch(kernels.levels, arrays, out[0].size, (out,), threads)
+    return Orbits(*(array.reshape(shape) for array in out))
+
+
+def allocate(shape: tuple[int, ...]) -> Arrays:
+    """Room for the orbits of all cells of a shape."""
+    size = int(np.prod(shape, dtype=int))
+    return (np.empty(size, np.int8), *(np.empty(size) for _ in range(6)))

@@ -1,0 +1,264 @@
+"""Branches of a continuation: equilibria against a parameter, or curves in two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+
+from phasekit.errors import EquilibriumKind
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labels.arguments import bad, flag, named, unknown
+from phasekit.plot.parts import labels as words
+from phasekit.plot.parts import style
+
+_STABLE: style.Look = {
+    "color": style.BLUE,
+    "linestyle": "-",
+    "linewidth": 1.8,
+    "label": "stable",
+}
+_UNSTABLE: style.Look = {
+    "color": style.VERMILLION,
+    "linestyle": (0, (5, 2)),
+    "linewidth": 1.8,
+    "label": "unstable",
+}
+_CURVES: dict[str, style.Look] = {
+    "fold": {"color": style.BLACK, "linestyle": "-", "linewidth": 2.0, "label": "fold"},
+    "hopf": {"color": style.GREEN, "linestyle": "-", "linewidth": 2.0, "label": "Hopf"},
+    "neutral_saddle": {
+        "color": style.GRAY,
+        "linestyle": (0, (1.5, 1.5)),
+        "linewidth": 1.4,
+        "label": "neutral saddle",
+    },
+    "branch_point": {
+        "color": style.PURPLE,
+        "linestyle": (0, (7, 2, 1.5, 2)),
+        "linewidth": 2.0,
+        "label": "branch points",
+    },
+}
+#: Distance in pixels within which the labels of special points would cover each other.
+_TOUCHING = 8.0
+
+_MARKS = {
+    "LP": ("s", style.YELLOW),
+    "BP": ("^", style.PURPLE),
+    "H": ("o", style.GREEN),
+    "NS": ("D", "white"),
+    "CP": ("v", style.ORANGE),
+    "BT": ("P", style.SKY),
+    "GH": ("h", style.SKY),
+    "ZH": ("X", style.SKY),
+}
+
+
+def branch(
+    branches: Any,
+    x: str | None = None,
+    y: str | None = None,
+    *,
+    sel: Mapping[str, Any] | None = None,
+    angles: style.Angles = "rad",
+    labels: bool = True,
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw one branch or several, with their special points labelled.
+
+    Stable equilibria (centers of a conservative problem) are solid, unstable ones (saddles)
+    dashed. Curves in two parameters are drawn in the plane of both.
+
+    Parameters
+    ----------
+    branches : Branch or sequence of Branch
+        What `continuation`, `diagram`, `.switch` or `.curve` return.
+    x, y : str, optional
+        Variables of ``branch.points``; default: the parameter and the first state, or the two
+        parameters.
+    sel : mapping of str to label, optional
+        Of a recorded quantity with more dims which one: ``sel={"bearing": "A2"}``.
+    angles : {"rad", "deg"}
+        Unit in which angles are shown.
+    labels : bool
+        Whether to write LP, BP, H, ... beside special points.
+    legend : bool
+        Whether to explain the lines under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> cubic = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    >>> ax = pk.plot.branch(pk.continuation(cubic, "mu", x0=[-1.3], span=(-1, 1)))
+    >>> [text.get_text() for text in ax.texts]
+    ['LP', 'LP']
+    """
+    flag("labels", labels)
+    flag("legend", legend)
+    several = _several(branches)
+    first = several[0]
+    if sel is not None and not isinstance(sel, Mapping):
+        raise bad("sel", sel, "a mapping from dims to labels, such as {'unknown': 'x'}")
+    x = first.free[0] if x is None else x
+    if y is None:
+        y = first.free[1] if len(first.free) > 1 else first.problem_state[0]
+    style.angle_factor(angles)
+    columns = [(_column(one, "x", x, sel), _column(one, "y", y, sel)) for one in several]
+    axes = style.axes_for(ax, legend=legend)
+    handles: dict[str, Artist] = {}
+    for one, pair in zip(several, columns, strict=True):
+        for look, across, up in _pieces(one, pair, angles):
+            (line,) = axes.plot(across, up, **look)
+            handles.setdefault(str(look["label"]), line)
+    marks: dict[str, list[tuple[float, float]]] = {}
+    for one, pair in zip(several, columns, strict=True):
+        across, up = (words.shown(column, angles)[0] for column in pair)
+        for special in one.special_points:
+            if special.kind == "end":
+                continue
+            place = (float(across[special.index]), float(up[special.index]))
+            marks.setdefault(special.label, []).append(place)
+    for label, places in marks.items():
+        marker, color = _MARKS[label]
+        across, up = np.array(places).T
+        axes.plot(
+            across, up, linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
+            markeredgecolor=style.BLACK, zorder=3 if label == "NS" else 4,
+        )  # fmt: skip
+        handles[label] = Line2D(
+            [], [], linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
+            markeredgecolor=style.BLACK, label=label,
+        )  # fmt: skip
+    if columns[0][1].name == "phi" and columns[0][1].attrs.get("units") == "rad":
+        style.circle_axis(axes, "y", angles)
+    for text, spot in _texts(axes, marks) if labels else []:
+        axes.annotate(
+            text, spot, xytext=(6, 6), textcoords="offset points", fontsize="small", zorder=5
+        )
+    axes.set_xlabel(words.label(columns[0][0], angles, style.letters(axes, "x")))
+    axes.set_ylabel(words.label(columns[0][1], angles, style.letters(axes, "y")))
+    if legend:
+        style.legend_below(axes, list(handles.values()))
+    return axes
+
+
+def holds_branches(what: Any) -> bool:
+    """Whether something is a Branch or a sequence of them."""
+    first = what[0] if isinstance(what, Sequence) and what else what
+    return isinstance(first, Branch)
+
+
+def _several(branches: Any) -> list[Branch]:
+    several = list(branches) if isinstance(branches, Sequence) else [branches]
+    for one in several:
+        if not isinstance(one, Branch):
+            raise bad("branches", one, "a Branch, or several")
+    if not several:
+        raise bad("branches", branches, "at least one Branch")
+    return several
+
+
+def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None) -> xr.DataArray:
+    """A quantity of a branch along its points."""
+    points = one.points
+    offered = [
+        str(n)
+        for n, v in points.data_vars.items()
+        if v.dims[:1] == ("point",) and v.dtype.kind in "if" and n != "tangent"
+    ]
+    column: xr.DataArray = points[named(argument, name, offered)]
+    for dim in column.dims[1:]:
+        values = column[dim].values.tolist()
+        if dim not in (sel or {}):
+            raise bad("sel", sel, f"one of {dim} = {values} for {argument} = {name}")
+        label = (sel or {})[str(dim)]
+        if isinstance(label, bool) or not isinstance(label, (str, int)) or label not in values:
+            raise unknown(f"sel: {dim}", label, map(str, values))
+        column = column.sel({dim: label})
+    return column
+
+
+def _pieces(
+    one: Branch, pair: tuple[xr.DataArray, xr.DataArray], angles: style.Angles
+) -> list[tuple[style.Look, Any, Any]]:
+    """Runs of points of one look; each begins where the one before ends, and angles may wrap."""
+    cuts = _cuts(one, pair)
+    across, up = (words.shown(column, angles)[0].astype(float) for column in pair)
+    looks = _looks(one)
+    pieces = []
+    begin = 0
+    for i in range(1, len(across) + 1):
+        if i < len(across) and looks[i] is looks[begin]:
+            continue
+        stop = min(i + 1, len(across))
+        places = cuts[(cuts > begin) & (cuts < stop)] - begin
+        xs, ys = (np.insert(values[begin:stop], places, np.nan) for values in (across, up))
+        pieces.append((looks[begin], xs, ys))
+        begin = i
+    return pieces
+
+
+def _looks(one: Branch) -> list[style.Look]:
+    points = one.points
+    if one.kind == "hopf":
+        pair = [str(name) or "hopf" for name in points.kind_of_pair.values]
+        return [_CURVES[name] for name in pair]
+    if one.kind != "equilibrium":
+        return [_CURVES[one.kind]] * points.sizes["point"]
+    if "kind" in points:
+        kinds = points.kind.values.copy()
+        # A degenerate point has the look of what comes after it.
+        for i in range(len(kinds) - 2, -1, -1):
+            if kinds[i] == EquilibriumKind.DEGENERATE:
+                kinds[i] = kinds[i + 1]
+        if len(kinds) > 1 and kinds[-1] == EquilibriumKind.DEGENERATE:
+            kinds[-1] = kinds[-2]
+        return [
+            style.BRANCHES.get(EquilibriumKind(int(k)), style.BRANCHES[EquilibriumKind.SADDLE])
+            for k in kinds
+        ]
+    return [_STABLE if k == 0 else _UNSTABLE for k in points.n_unstable.values]
+
+
+def _cuts(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> Any:
+    """The points before which a line has a gap: an angle jumps by about its period."""
+    periods = dict(one.problem.periods) if one.problem is not None else {}
+    jump = np.zeros(max(pair[0].size - 1, 0), dtype=bool)
+    for column in pair:
+        if column.name in periods:
+            jump |= np.abs(np.diff(column.values)) > 0.5 * periods[column.name]
+    return np.flatnonzero(jump) + 1
+
+
+def _texts(
+    axes: Axes, marks: Mapping[str, list[tuple[float, float]]]
+) -> list[tuple[str, tuple[float, float]]]:
+    """Labels and their places; those of points that touch on the page are one text."""
+    kept: list[tuple[list[str], tuple[float, float], Any]] = []
+    for label, places in marks.items():
+        for place in places:
+            at = axes.transData.transform(place)
+            near = [one for one in kept if np.hypot(*(at - one[2])) < _TOUCHING]
+            if not near:
+                kept.append(([label], place, at))
+            elif label not in near[0][0]:
+                near[0][0].append(label)
+    return [(", ".join(names), place) for names, place, _ in kept]

@@ -1,0 +1,184 @@
+"""The surface of equilibria over a plane of two parameters, with its folds."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.colors import LightSource, to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d import Axes3D
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
+
+from phasekit.bifurcation.exact.surface import equilibrium_surface
+from phasekit.errors import EquilibriumKind
+from phasekit.labelled.atlas import single
+from phasekit.labelled.bifurcation_set import bifurcation_set
+from phasekit.labels.arguments import bad, flag, pair, whole
+from phasekit.plot.parts import labels, style
+
+FloatArray = NDArray[np.float64]
+
+LEAST, MOST = 4, 200
+LIGHT = LightSource(azdeg=225.0, altdeg=50.0).direction
+FACES = {
+    EquilibriumKind.CENTER: style.SKY,
+    EquilibriumKind.SADDLE: style.ORANGE,
+}
+
+
+def branch_surface(
+    system: Any,
+    x: str,
+    y: str,
+    *,
+    xlim: tuple[float, float],
+    ylim: tuple[float, float],
+    cells: int = 36,
+    angles: style.Angles = "rad",
+    legend: bool = True,
+    view: tuple[float, float] = (28.0, -58.0),
+    ax: Axes3D | None = None,
+) -> Axes3D:
+    r"""Draw the equilibria over a plane of two parameters, as a surface with its folds.
+
+    Parameters
+    ----------
+    system : system
+        A single system; its own values of the two parameters are not used.
+    x, y : str
+        Two different parameters on which the equilibria depend.
+    xlim, ylim : (float, float)
+        The part of the plane, in the parameters' units.
+    cells : int
+        Number of cells of the surface along each parameter, 4 to 200.
+    angles : {"rad", "deg"}
+        Unit in which angles are shown.
+    legend : bool
+        Whether to explain colors, lines and markers.
+    view : (float, float)
+        Elevation and azimuth of the eye, in degrees.
+    ax : mpl_toolkits.mplot3d.axes3d.Axes3D, optional
+        Where to draw; a new figure if left out.
+
+    Returns
+    -------
+    mpl_toolkits.mplot3d.axes3d.Axes3D
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    The surface is V'(phi) = 0, of [Veljovic2015] (12), on a grid; the folds and cusps on it are
+    those of `bifurcation_set`, exact. phi lives on a circle: the surface goes on from the top to
+    the bottom.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> reduced = pk.Reduced(lam=0.0, psi=0.0)
+    >>> ax = pk.plot.branch_surface(
+    ...     reduced, "lam", "psi", xlim=(0.0, 1.5), ylim=(-0.6, 0.6), cells=8
+    ... )
+    >>> ax.get_zlabel()
+    '$\\varphi$ (rad)'
+    """
+    factor = style.angle_factor(angles)
+    flag("legend", legend)
+    wants = f"a whole number from {LEAST} to {MOST}"
+    cells = whole("cells", cells, wants, LEAST)
+    if cells > MOST:
+        raise bad("cells", cells, wants)
+    elevation, azimuth = pair("view", view, "two angles in degrees: elevation and azimuth")
+    if ax is not None and not isinstance(ax, Axes3D):
+        hint = 'plt.figure().add_subplot(projection="3d") makes one'
+        raise bad("ax", ax, "a matplotlib 3-D Axes", hint)
+    folds = bifurcation_set(system, x, y, xlim=xlim, ylim=ylim)
+    kind, values = single(system)
+
+    def coefficients(at_x: FloatArray, at_y: FloatArray) -> Any:
+        full = {name: np.full(at_x.shape, value) for name, value in values.items()}
+        return type(kind).valid_coefficients({**full, x: at_x, y: at_y})
+
+    box = [folds.attrs[ends] for ends in ("xlim", "ylim")]
+    grids = [np.linspace(low, high, cells + 1) for low, high in box]
+    phi = np.linspace(-np.pi, np.pi, 2 * cells + 1)
+    surface = equilibrium_surface(coefficients, grids[0], grids[1], phi)
+
+    axes: Any = ax
+    if axes is None:
+        axes = style.new_figure(7.2, 5.8).add_subplot(projection="3d")
+    scales = [factor if folds[name].attrs.get("units") == "rad" else 1.0 for name in (x, y)]
+    stretch = np.array([*scales, factor])
+    ends = np.array([[*grids[0][[0, -1]]], [*grids[1][[0, -1]]], [-np.pi, np.pi]])
+    handles: list[Artist] = []
+    for code, triangles in zip(FACES, surface, strict=True):
+        if triangles.size:
+            _add_faces(axes, triangles, stretch, FACES[code])
+            name = style.BRANCHES[code]["label"]
+            handles.append(Patch(facecolor=FACES[code], edgecolor=style.GRAY, label=name))
+    handles += _draw_folds(axes, folds, (x, y), stretch)
+    for which, limits, scale in zip("xyz", ends, stretch, strict=True):
+        getattr(axes, f"set_{which}lim")(*(limits * scale))
+    axes.set_xlabel(_short(folds[x], angles))
+    axes.set_ylabel(_short(folds[y], angles))
+    axes.set_zlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
+    quarters = np.arange(-2, 3) * (np.pi / 2)
+    axes.set_zticks(quarters * factor)
+    if angles == "rad":
+        axes.set_zticklabels([style.multiple_of_pi(q) for q in quarters])
+    axes.view_init(elevation, azimuth)
+    axes.computed_zorder = False  # folds stay in sight
+    if legend and handles:
+        axes.legend(handles=handles, loc="upper left", frameon=False, fontsize="small")
+    return axes
+
+
+def _short(values: Any, angles: style.Angles) -> str:
+    """Return symbol and unit: there is no room for more along a slanted axis."""
+    symbol = labels.SYMBOLS.get(str(values.name), str(values.name).replace("_", " "))
+    unit = labels.shown(values, angles)[1]
+    return f"{symbol} ({unit})" if unit else symbol
+
+
+def _add_faces(ax: Any, triangles: FloatArray, stretch: FloatArray, color: str) -> None:
+    """Add triangles, shaded by the way the surface faces in the box."""
+    normal = triangles[..., 3:].mean(axis=1)
+    length = np.linalg.norm(normal, axis=1)
+    glance = np.abs(normal @ LIGHT) / np.where(length > 0.0, length, 1.0)
+    colors = np.array(to_rgb(color)) * (0.55 + 0.45 * glance)[:, None]
+    corners = triangles[..., :3] * stretch
+    faces = Poly3DCollection(
+        corners, facecolors=colors, edgecolors=colors, linewidths=0.2, zorder=1
+    )
+    ax.add_collection3d(faces)
+
+
+def _draw_folds(ax: Any, ds: Any, names: tuple[str, str], stretch: FloatArray) -> list[Artist]:
+    """Draw the fold curves on the surface, and the cusps."""
+    handles: dict[str, Artist] = {}
+    for row in range(ds.sizes["curve"]):
+        kind = str(ds["curve_kind"].values[row])
+        if kind not in ("fold", "pitchfork"):
+            continue
+        x, y, phi = (ds[name].values[row] for name in (*names, "phi"))
+        phi = np.where(phi == np.pi, np.pi, (phi + np.pi) % (2.0 * np.pi) - np.pi)
+        seam = np.flatnonzero(np.abs(np.diff(phi)) > np.pi) + 1
+        points = np.insert(np.stack([x, y, phi]) * stretch[:, None], seam, np.nan, axis=1)
+        look = style.FOLD_CURVE if kind == "fold" else style.PITCHFORK_CURVE
+        (line,) = ax.plot(*points, zorder=10, **look)
+        handles.setdefault(kind, line)
+    if ds.sizes["cusp"]:
+        points = np.stack([ds[f"cusp_{name}"].values for name in (*names, "phi")])
+        look = {**style.MERGERS["cusp"], "markerfacecolor": "white"}
+        ax.plot(*(points * stretch[:, None]), linestyle="none", zorder=11, **look)
+        for point in (points * stretch[:, None]).T:
+            ax.text(*point, "  CP", fontsize="small", zorder=12)
+        handles["cusp"] = Line2D([], [], linestyle="none", **look)
+    return list(handles.values())

@@ -1,0 +1,272 @@
+"""Hodographs of rotators: the curves that their tips draw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from numpy.typing import ArrayLike, NDArray
+
+from phasekit.errors import Loop, ParameterError
+from phasekit.labelled.energy import gradient
+from phasekit.labelled.loads import is_disk, rotators
+from phasekit.labels.arguments import bad, flag, unknown
+from phasekit.laws.trigonometric import Trigonometric
+from phasekit.mechanics.rotators import ROTATORS
+from phasekit.phase.exact.potential import gradient as slope
+from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.phase_portrait import curves_of, levels_of, starts_of
+from phasekit.plot.time_history import TIME, motions_of
+from phasekit.systems.as_system import as_system
+
+FloatArray = NDArray[np.float64]
+Plane = tuple[str, str]
+
+CARRIER_AXES = ("u01", "v01", "n1")
+AXIS_SYMBOLS = {"u01": "$u_{01}$", "v01": "$v_{01}$", "n1": "$n_1$"}
+# The plane in which a rotator turns; that of R022 turns with the disk, and is named by None.
+PLANES: dict[str, Plane | None] = {
+    **dict.fromkeys(ROTATORS, ("u01", "v01")),
+    "R022": None,
+    "R2": ("v01", "n1"),
+    "R12c": ("v01", "n1"),
+}
+
+
+def hodograph(
+    system: Any,
+    rotator: str = "R022",
+    *,
+    energies: ArrayLike | None = None,
+    orbits: ArrayLike | None = None,
+    plane: Sequence[str] | None = None,
+    angles: style.Angles = "rad",
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    r"""Draw the hodograph of a rotator: what its tip runs through along orbits or motions.
+
+    The rotator R022 of the self-rotation is drawn in axes that turn with the disk: tangential
+    :math:`u = \ddot\varphi`, radial :math:`v = \dot\varphi^2`. Its hodograph is the same for both
+    directions of :math:`\dot\varphi`, equilibria are at the origin, and those of two energies are
+    the same curve at different heights, cut off at :math:`v = 0`. Both axes have one scale, so
+    that lengths and angles are those of the vectors.
+
+    Parameters
+    ----------
+    system
+        A system whose parameters are scalars; for other rotators than R022 a disk. Or a Dataset:
+        motions over time, as `flow` and `separatrix_motion` return, or their rotators, as
+        `rotators` returns.
+    rotator : str
+        Name of the rotator: R01, R011, R022, R012, R1, R2, R12, R12c.
+    energies : float or sequence of float, optional
+        Energies (s^-2) of the orbits. If neither energies nor orbits are given, those of a phase
+        portrait are drawn, with the separatrices.
+    orbits : array_like, optional
+        Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs.
+    plane : pair of {"u01", "v01", "n1"}, optional
+        Axes of the carrier on which the rotator is projected; left out, the plane in which it
+        turns.
+    angles : {"rad", "deg"}
+        Unit in which angles are shown in the legend.
+    legend : bool
+        Whether to explain the curves under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out. A given figure without layout engine gets the
+        constrained one, unless `legend` is False.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or there are more motions than can be told apart.
+
+    Notes
+    -----
+    [HedrihVeljovic2011] Figures 6, 7 and 9, eq. (6.11), corrected: :math:`v` has no factor
+    :math:`\Omega^2`.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ax = pk.plot.hodograph(pk.Reduced(lam=0.4, psi=0.1), orbits=(0.3, 0.0))
+    >>> ax.get_ylabel()
+    '$\\dot\\varphi^2$, radial (s$^{-2}$)'
+    """
+    if not isinstance(rotator, str) or rotator not in ROTATORS:
+        raise unknown("rotator", rotator, ROTATORS)
+    flag("legend", legend)
+    factor = style.angle_factor(angles)
+    pair = _plane_of(rotator, plane)
+    if isinstance(system, xr.Dataset):
+        if energies is not None or orbits is not None:
+            name = "energies" if energies is not None else "orbits"
+            raise ParameterError(f"{name}: got one beside motions, wants None: motions are orbits")
+        curves = _along_motions(system, rotator, pair, angles)
+        axes = style.axes_for(ax, legend=legend and len(curves) > 1)
+        handles = _draw_motions(axes, curves)
+    else:
+        tip = _Tip(system, rotator, pair)
+        axes = style.axes_for(ax, legend=legend)
+        handles = _draw_levels(axes, tip, energies, orbits, factor)
+    axes.set_aspect("equal", adjustable="datalim")
+    across, up = _words(rotator, pair)
+    axes.set_xlabel(across)
+    axes.set_ylabel(up)
+    if legend:
+        style.legend_below(axes, handles)
+    return axes
+
+
+def _stroke(ax: Axes, u: FloatArray, v: FloatArray, **look: Any) -> list[Any]:
+    """Draw a curve; one that is a point, as of R01, as a dot on axes that reach to the origin."""
+    if u.size == 0 or np.ptp(u) != 0.0 or np.ptp(v) != 0.0:
+        return ax.plot(u, v, **look)
+    ax.update_datalim([(0.0, 0.0)])
+    return ax.plot(u, v, marker="o", **look)
+
+
+def _plane_of(rotator: str, plane: Sequence[str] | None) -> Plane | None:
+    if plane is None:
+        return PLANES[rotator]
+    names = list(plane) if isinstance(plane, Sequence) and not isinstance(plane, str) else []
+    known = all(isinstance(name, str) and name in CARRIER_AXES for name in names)
+    if len(names) != 2 or not known or names[0] == names[1]:
+        raise bad("plane", plane, f"a pair of {', '.join(CARRIER_AXES)}")
+    return names[0], names[1]
+
+
+def _words(rotator: str, plane: Plane | None) -> tuple[str, str]:
+    if plane is None:
+        return r"$\ddot\varphi$, tangential (s$^{-2}$)", r"$\dot\varphi^2$, radial (s$^{-2}$)"
+    first, second = (f"{rotator} along {AXIS_SYMBOLS[name]} (s$^{{-2}}$)" for name in plane)
+    return first, second
+
+
+class _Tip:
+    """Where the tip of a rotator of one system lies at given states."""
+
+    def __init__(self, system: Any, rotator: str, plane: Plane | None) -> None:
+        self.system = as_system(system, rung=Trigonometric, what="a hodograph")
+        self.land = curves_of(self.system)
+        self.rotator, self.plane = rotator, plane
+        self.disk = None if plane is None else _disk(system)
+
+    def __call__(self, phi: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
+        if self.plane is None or self.disk is None:
+            return -slope(*self.system.coefficients(), phi), speed**2
+        tips = rotators(self.disk, phi, speed).rotator.sel(rotator_name=self.rotator)
+        first, second = (tips.sel(carrier_axis=name).values for name in self.plane)
+        return first, second
+
+    def branches(self, phi: FloatArray, speed: FloatArray, turning: bool) -> list[Any]:
+        """Return the curves over an arc, of which the upper half is given."""
+        if self.plane is None:
+            return [self(phi, speed)]
+        if turning:
+            return [self(phi, speed), self(phi, -speed)]
+        return [self(*strokes.closed(phi, speed))]
+
+
+def _draw_levels(
+    ax: Axes, tip: _Tip, energies: ArrayLike | None, orbits: ArrayLike | None, factor: float
+) -> list[Artist]:
+    """Draw the hodographs of levels, of separatrices where nothing is asked for, of orbits."""
+    land = tip.land
+    starts = starts_of(land, orbits)
+    chosen = [] if energies is None and orbits is not None else levels_of(land, energies)
+    for level in chosen:
+        for arc in land.arcs_of(level):
+            look = strokes.level_look(land, arc)
+            for u, v in tip.branches(*land.curve(arc, level[0]), land.turns(arc)):
+                _stroke(ax, u, v, zorder=1, **look)
+    handles = _draw_separatrices(ax, tip) if energies is None and orbits is None else []
+    for number, start in enumerate(starts):
+        handles += _draw_orbit(ax, tip, start, number, factor)
+    if tip.plane is None and land.answers.phi.size:
+        handles += ax.plot(0.0, 0.0, zorder=5, **style.ORIGIN)
+    return handles
+
+
+def _draw_separatrices(ax: Axes, tip: _Tip) -> list[Artist]:
+    handles: dict[Loop, Artist] = {}
+    for energy, arc, loop in tip.land.separatrices:
+        for u, v in tip.branches(*tip.land.curve(arc, energy), loop == Loop.WINDING):
+            (handles[loop],) = _stroke(ax, u, v, zorder=3, **strokes.LOOPS[loop])
+    return list(handles.values())
+
+
+def _draw_orbit(
+    ax: Axes, tip: _Tip, start: tuple[float, float], number: int, factor: float
+) -> list[Artist]:
+    land, look = tip.land, strokes.orbit_look(number)
+    energy = land.energy(*start)
+    for arc in strokes.orbit_arcs(land, start):
+        phi, speed = land.curve(arc, energy)
+        if arc == land.window:
+            curves = [tip(phi, speed if start[1] >= 0.0 else -speed)]
+        else:
+            curves = tip.branches(phi, speed, False)
+        for u, v in curves:
+            _stroke(ax, u, v, zorder=4, **look)
+    u, v = tip(np.array([start[0]]), np.array([start[1]]))
+    name = strokes.start_name(land, start, factor)
+    (handle,) = ax.plot(u, v, zorder=6, label=name, **strokes.START, **look)
+    return [handle]
+
+
+def _along_motions(
+    dataset: xr.Dataset, rotator: str, plane: Plane | None, angles: style.Angles
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return the curves of one motion or several, under what tells each from the others."""
+    telling = "motion_phi" if "motion_phi" in dataset else "hodograph_u"
+    if telling not in dataset or TIME not in dataset[telling].dims:
+        raise ParameterError(
+            "system: got a Dataset without motions along the dim 'time', wants a system, motions "
+            "over time, such as pk.flow returns, or their rotators (pk.rotators)"
+        )
+    names = motions_of(dataset[telling], TIME, angles)
+    pair = _components(dataset, rotator, plane)
+    others = [dim for dim in dataset[telling].dims if dim != TIME]
+    flat = [array.transpose(*others, TIME).values.reshape(len(names), -1) for array in pair]
+    return dict(zip(names, zip(*flat, strict=True), strict=True))
+
+
+def _components(
+    dataset: xr.Dataset, rotator: str, plane: Plane | None
+) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return both components of the rotator along motions, or out of rotators."""
+    if plane is None and "hodograph_u" in dataset:
+        return dataset["hodograph_u"], dataset["hodograph_v"]
+    if "rotator" not in dataset:
+        system = labels.system_of(dataset, "system", "pk.rotators")
+        if plane is None:
+            pull = gradient(system, dataset["motion_phi"]).potential_gradient
+            return -pull, dataset["motion_dphi"] ** 2
+        dataset = rotators(_disk(system), dataset)
+    tips = dataset["rotator"].sel(rotator_name=rotator)
+    first, second = (tips.sel(carrier_axis=name) for name in plane or CARRIER_AXES[1:])
+    return first, second
+
+
+def _disk(system: Any) -> Any:
+    disk = as_system(system)
+    if not is_disk(disk):
+        raise bad("system", system, "a GyroRotorDisk, for a rotator along the carrier's axes")
+    return disk
+
+
+def _draw_motions(ax: Axes, curves: dict[str, tuple[FloatArray, FloatArray]]) -> list[Artist]:
+    handles: list[Artist] = []
+    for number, (name, (u, v)) in enumerate(curves.items()):
+        look = strokes.orbit_look(number) if len(curves) > 1 else style.MOTION
+        handles += _stroke(ax, u, v, label=name, **look)
+    return handles if len(curves) > 1 else []

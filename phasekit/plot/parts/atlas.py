@@ -1,0 +1,135 @@
+"""The exact atlas of branches, drawn: curves by kind, special points by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from phasekit.errors import EquilibriumKind
+from phasekit.labels.arguments import bad, named
+from phasekit.plot.parts import labels, strokes, style
+
+FloatArray = NDArray[np.float64]
+
+DIMS = ("branch", "point")
+
+
+def draw(
+    ds: xr.Dataset,
+    x: str | None,
+    y: str,
+    *,
+    angles: style.Angles,
+    legend: bool,
+    ax: Axes | None,
+) -> Axes:
+    """Draw an atlas; `bifurcation_diagram` says what the arguments are."""
+    factor = style.angle_factor(angles)
+    parameter = str(ds.attrs.get("parameter", ""))
+    if parameter not in ds.coords or ds[parameter].dims != DIMS:
+        raise bad("dataset", ds, "what branches returns, with its attribute 'parameter'")
+    if x is not None:
+        named("x", x, [parameter])
+    offered = [
+        str(name) for name, v in ds.data_vars.items() if v.dims == DIMS and v.dtype.kind == "f"
+    ]
+    named("y", y, offered)
+    axes = style.axes_for(ax, legend=legend)
+    along, up = ds[parameter], ds[y]
+    stretch = (
+        factor if along.attrs.get("units") == "rad" else 1.0,
+        factor if up.attrs.get("units") == "rad" else 1.0,
+    )
+    handles: dict[str, Artist] = {}
+    for row in range(ds.sizes["branch"]):
+        cells = {"branch": row}
+        kinds = ds["kind"].isel(cells).values
+        values = (along.isel(cells).values, up.isel(cells).values)
+        for kind, part in _runs(kinds):
+            look = style.BRANCHES.get(kind, style.MERGED)
+            across, height = (v[part] for v in values)
+            if y == "phi":
+                height, across = strokes.round_the_cylinder(height, across)
+            (line,) = axes.plot(across * stretch[0], height * stretch[1], **look)
+            handles.setdefault(str(look["label"]), line)
+    if y == "phi":
+        style.circle_axis(axes, "y", angles)
+    low, high = float(along.min()) * stretch[0], float(along.max()) * stretch[0]
+    axes.set_xlim(low, high)
+    handles |= _mark(axes, ds, y, stretch)
+    axes.set_xlabel(labels.label(along, angles, style.letters(axes, "x")))
+    axes.set_ylabel(labels.label(up, angles, style.letters(axes, "y")))
+    if legend:
+        style.legend_below(axes, list(handles.values()))
+    return axes
+
+
+def _runs(kinds: NDArray[np.int8]) -> Iterator[tuple[EquilibriumKind, slice]]:
+    """Stretches of one kind; the degenerate point between two belongs to both."""
+    n = int((kinds != EquilibriumKind.ABSENT).sum())
+    degenerate = EquilibriumKind.DEGENERATE
+    # The kind of each chord is that of its end which is not degenerate.
+    chords = np.where(kinds[: n - 1] == degenerate, kinds[1:n], kinds[: n - 1])
+    edges = np.flatnonzero(np.diff(chords)) + 1
+    for start, stop in zip([0, *edges], [*edges, chords.size], strict=True):
+        if stop > start:
+            yield EquilibriumKind(int(chords[start])), slice(int(start), int(stop) + 1)
+
+
+def _mark(ax: Axes, ds: xr.Dataset, y: str, stretch: tuple[float, float]) -> dict[str, Artist]:
+    """Mark and label the special points, but for the ends of branches."""
+    handles: dict[str, Artist] = {}
+    kinds = ds["special_kind"].values
+    texts = ds["special_label"].values
+    x = ds["special_value"].values
+    heights = ds["special_phi"].values if y == "phi" else _heights(ds, y)
+    placed: list[tuple[float, float]] = []
+    for name, look in style.MERGERS.items():
+        chosen = np.flatnonzero(kinds == name)
+        if not chosen.size:
+            continue
+        across, up = x[chosen] * stretch[0], heights[chosen] * stretch[1]
+        ax.plot(across, up, linestyle="none", zorder=4, clip_on=False, **look)
+        handles[name] = Line2D([], [], linestyle="none", **look)
+        for i, point in zip(chosen, zip(across, up, strict=True), strict=True):
+            if point not in placed:
+                placed.append(point)
+                label_point(ax, point, str(texts[i]))
+    return handles
+
+
+def _heights(ds: xr.Dataset, y: str) -> FloatArray:
+    """Return the quantity at each special point, from the vertex that stands there."""
+    parameter = str(ds.attrs["parameter"])
+    along, phi, up = (ds[name].values for name in (parameter, "phi", y))
+    found = np.full(ds.sizes["special"], np.nan)
+    places = zip(ds["special_value"].values, ds["special_phi"].values, strict=True)
+    for i, (at, angle) in enumerate(places):
+        near = np.flatnonzero(along == at)
+        if near.size:
+            off = np.abs(np.sin(0.5 * (phi.flat[near] - angle)))
+            found[i] = up.flat[near[int(np.nanargmin(off))]]
+    return found
+
+
+def label_point(ax: Axes, point: tuple[float, float], text: str) -> None:
+    """Write the name of a point next to it, on the side where there is room."""
+    u, v = ax.transAxes.inverted().transform(ax.transData.transform(point))
+    right, above = u < 0.9, v < 0.9
+    ax.annotate(
+        text,
+        point,
+        xytext=(6 if right else -6, 6 if above else -6),
+        textcoords="offset points",
+        ha="left" if right else "right",
+        va="bottom" if above else "top",
+        fontsize="small",
+        zorder=6,
+        annotation_clip=False,
+    )

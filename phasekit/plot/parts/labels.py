@@ -1,0 +1,148 @@
+"""Words on axes and color bars, made from the attributes that Datasets carry."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Hashable, Iterable
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import bad, unknown
+from phasekit.plot.parts.style import Angles, angle_factor, angle_unit
+from phasekit.systems.identity import model_name
+from phasekit.systems.system import MODELS, Model
+
+SYMBOLS = {
+    "beta": r"$\beta$",
+    "lam": r"$\lambda$",
+    "psi": r"$\psi$",
+    "phi": r"$\varphi$",
+    "omega1": r"$\omega_1$",
+    "state_phi": r"$\varphi_0$",
+    "state_dphi": r"$\dot\varphi_0$",
+    "Omega_sq": r"$\Omega^2$",
+    **{name: f"${name}$" for name in ("A", "B", "C", "a", "e", "g", "m", "r")},
+}
+
+GLUE = "\N{NO-BREAK SPACE}"
+
+
+def unit_text(units: str) -> str:
+    """Return CF units for print: ``m s-2`` becomes m s with a raised -2.
+
+    >>> unit_text("m s-2")
+    'm s$^{-2}$'
+    """
+    return re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", units)
+
+
+def shown(values: xr.DataArray, angles: Angles) -> tuple[np.ndarray[Any, Any], str]:
+    """Return the values in the unit in which they are shown, and that unit for print."""
+    units = str(values.attrs.get("units", ""))
+    if units == "rad":
+        return values.values * angle_factor(angles), angle_unit(angles)
+    return values.values, "" if units in ("", "1") else unit_text(units)
+
+
+def label(values: xr.DataArray, angles: Angles, width: int, extra: str = "") -> str:
+    """Return what a quantity or parameter is called on an axis: symbol, meaning, unit."""
+    name = str(values.name)
+    meaning = str(values.attrs.get("long_name", ""))
+    symbol = SYMBOLS.get(name, "" if meaning else name)
+    text = ", ".join(part for part in (symbol, meaning, extra) if part)
+    unit = shown(values, angles)[1]
+    # The unit stays with the last word.
+    return wrap(f"{text}{GLUE}({unit.replace(' ', GLUE)})" if unit else text, width)
+
+
+def wrap(text: str, width: int) -> str:
+    r"""Break a label into lines, counting what is seen of its formulas.
+
+    >>> wrap(r"$\omega_1$, angular velocity (s$^{-1}$)", 24)
+    '$\\omega_1$, angular velocity\n(s$^{-1}$)'
+    """
+    lines: list[str] = []
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}" if lines else word
+        seen = re.sub(r"[${}^_]", "", re.sub(r"\\[A-Za-z]+", "x", longer))
+        if lines and len(seen) <= width:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    return "\n".join(lines).replace(GLUE, " ")
+
+
+def value(number: xr.DataArray, angles: Angles) -> str:
+    r"""Return one value of a coordinate for print.
+
+    >>> value(xr.DataArray(0.5, name="beta", attrs={"units": "rad"}), "rad")
+    '$\\beta$ = 0.5\xa0rad'
+    """
+    name = str(number.name)
+    symbol = SYMBOLS.get(name, name.replace("_", " "))
+    if number.dtype.kind not in "iuf":
+        return f"{symbol} {number.item()}".replace("_", " ")
+    shown_value, unit = shown(number, angles)
+    if name == "state_dphi":
+        shown_value, unit = number.values * angle_factor(angles), f"{angle_unit(angles)}/s"
+    text = f"{float(shown_value):.4g}".replace("-", "\N{MINUS SIGN}")
+    between = "" if unit.startswith("°") or not unit else GLUE
+    return f"{symbol} = {text}{between}{unit}"
+
+
+def dataset(
+    value: object, argument: str, needs: Iterable[str], source: str = "pk.equilibria or pk.sweep"
+) -> xr.Dataset:
+    """Return `value` if it is a Dataset with the variables that a picture needs."""
+    wants = f"a Dataset, such as {source} returns"
+    if not isinstance(value, xr.Dataset):
+        raise bad(argument, value, wants)
+    for name in needs:
+        if name not in value.variables:
+            raise ParameterError(f"{argument}: got a Dataset without {name!r}, wants {wants}")
+    return value
+
+
+def system_of(motion: xr.Dataset, argument: str, instead: str) -> Model:
+    """Return the system whose motion a Dataset holds."""
+    try:
+        name = model_name(motion)
+        if name not in MODELS:
+            raise ParameterError(f"ds: got a motion of {name}")
+        return MODELS[name].from_dataset(motion)
+    except ParameterError as error:
+        raise ParameterError(
+            f"{argument}: got a motion that does not tell its system ({error}); "
+            f"give {instead}(disk, motion)"
+        ) from None
+
+
+def swept(values: xr.DataArray, labels: Iterable[Hashable] = ()) -> list[str]:
+    """Return the dims of an array that are axes of a map."""
+    return [str(dim) for dim in values.dims if dim not in set(labels)]
+
+
+def choose_axis(values: xr.DataArray, name: object, argument: str, offered: list[str]) -> str:
+    """Return the dim that `name` asks for: the dim itself, or a coordinate along it."""
+    if not isinstance(name, str) or (name not in offered and name not in values.coords):
+        raise unknown(argument, name, offered)
+    if name in offered:
+        return name
+    dims = [str(dim) for dim in values.coords[name].dims]
+    if len(dims) != 1 or dims[0] not in offered:
+        raise unknown(argument, name, offered)
+    return name
+
+
+def monotone(values: xr.DataArray, argument: str) -> None:
+    """Refuse an axis that cannot be drawn: not numbers, not finite, or not in order."""
+    numbers = np.asarray(values.values)
+    wants = "at least two finite values in rising or falling order"
+    if numbers.dtype.kind not in "iuf" or numbers.size < 2 or not np.isfinite(numbers).all():
+        raise bad(argument, numbers, wants)
+    steps = np.diff(numbers)
+    if not ((steps > 0).all() or (steps < 0).all()):
+        raise bad(argument, numbers, wants, f"sort it: ds.sortby({str(values.name)!r})")

@@ -1,0 +1,247 @@
+"""Phase portrait of one system on the cylinder or the plane."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
+from numpy.typing import ArrayLike, NDArray
+
+from phasekit.labels.arguments import bad, one_of, reals
+from phasekit.phase.answers import answers
+from phasekit.phase.level_curves import Arc, Level, LevelCurves
+from phasekit.plot.parts import labels, strokes, style
+from phasekit.systems.as_system import single
+
+FloatArray = NDArray[np.float64]
+
+# What level curves can be colored by, and the words at the color bar, by the unit of V.
+COLORED = {
+    "period": dict.fromkeys(("s-2", "J", ""), "period (s)"),
+    "frequency": dict.fromkeys(("s-2", "J", ""), "frequency (rad/s)"),
+    "action": {"s-2": "action (rad$^2$/s)", "J": "action (J s)", "": "action"},
+}
+
+
+def phase_portrait(
+    system: Any,
+    *,
+    energies: ArrayLike | None = None,
+    orbits: ArrayLike | None = None,
+    color_by: str | None = None,
+    angles: style.Angles = "rad",
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    r"""Draw the phase portrait of one system on the cylinder.
+
+    Level curves of the energy integral :math:`h = \dot\varphi^2/2 + V(\varphi)` lie below, solid
+    where they close and dotted where they run round the cylinder; separatrices lie on top; centers
+    and saddles are marked, and the lobes of a figure-eight are filled. The left and right edges are
+    the same line of the cylinder. Of a machine on a free support the levels are those of
+    :math:`M\dot\varphi^2/2 + V_p(\varphi)`, in J, at one angular momentum :math:`p`.
+
+    Parameters
+    ----------
+    system
+        A system whose parameters are scalars; a `Potential` on a line or a circle as well; a
+        `FreeGyroRotor` at a momentum, ``rotor.amended(p)``, or by itself at the momentum that it
+        has when the disk hangs at rest and the support turns at the disk's omega1.
+    energies : float or sequence of float, optional
+        Energies (s^-2, or J) of the level curves. Left out, they are chosen evenly in speed between
+        the centers and saddles and above them. An empty list draws none; an energy below the least
+        potential has no curve.
+    orbits : array_like, optional
+        Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs; the level
+        curve through each is drawn over the others and its start is marked.
+    color_by : {"period", "frequency", "action"}, optional
+        Color the level curves by what their orbits have, on a logarithmic scale with a color bar;
+        gray if left out. The period of a rotation is the time of one turn. Levels that are not
+        given lie twice as close.
+    angles : {"rad", "deg"}
+        Unit of the angle on both axes.
+    legend : bool
+        Whether to explain lines and markers under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out. A given figure without layout engine gets the
+        constrained one, unless `legend` is False.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    The level curves are [Veljovic2015] eq. (14); the figure-eight is the homoclinic orbit of its
+    Section 4 and encloses the trigger of coupled singularities (center, saddle, center).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ax = pk.plot.phase_portrait(pk.Reduced(lam=0.4, psi=0.1))
+    >>> ax.get_xlabel()
+    '$\\varphi$ (rad)'
+    """
+    if color_by is not None:
+        one_of("color_by", color_by, tuple(COLORED))
+    picture = Picture.of(system, energies, orbits, angles, 2.0 if color_by is not None else 1.0)
+    axes = style.axes_for(ax, legend=legend, width=6.4 if color_by is None else 6.8)
+    land, factor = picture.land, picture.factor
+    curves = [(level[0], arc) for level in picture.levels for arc in land.arcs_of(level)]
+    for (energy, arc), color in zip(curves, _colors(axes, land, curves, color_by), strict=True):
+        look = strokes.level_look(land, arc, color)
+        strokes.draw_level(axes, land, energy, arc, factor, zorder=1, **look)
+    handles = strokes.draw_separatrices(axes, land, factor)
+    handles += strokes.draw_points(axes, land, factor, on_potential=False)
+    handles += [
+        strokes.draw_orbit(axes, land, start, number, factor)
+        for number, start in enumerate(picture.starts)
+    ]
+    reach = factor * picture.reach(given=energies is not None)
+    axes.set_ylim(-reach, reach)
+    picture.coordinate_axis(axes)
+    unit = f" ({style.angle_unit(angles)}/s)" if land.answers.is_angle else ""
+    name = picture.symbol
+    name = name if name[1:].isalpha() else f"{{{name}}}"  # \varphi needs no braces
+    axes.set_ylabel(rf"$\dot{name}$" + unit)
+    if legend:
+        style.legend_below(axes, handles)
+    return axes
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What portrait and well show of a system: its level curves, levels, orbits, axis."""
+
+    land: LevelCurves
+    levels: list[Level]
+    starts: list[strokes.State]
+    angles: style.Angles
+
+    @classmethod
+    def of(
+        cls,
+        system: Any,
+        energies: ArrayLike | None,
+        orbits: ArrayLike | None,
+        angles: style.Angles,
+        density: float = 1.0,
+    ) -> Picture:
+        """Check the arguments of a picture."""
+        land = curves_of(system)
+        if style.angle_factor(angles) != 1.0 and not land.answers.is_angle:
+            wants = "'rad' for a coordinate that is not an angle of period 2 pi"
+            raise bad("angles", angles, wants)
+        return cls(land, levels_of(land, energies, density), starts_of(land, orbits), angles)
+
+    @property
+    def factor(self) -> float:
+        """What the coordinate is multiplied by to be shown."""
+        return style.angle_factor(self.angles)
+
+    @property
+    def symbol(self) -> str:
+        """The coordinate for print."""
+        name = self.land.answers.coordinate
+        if name in labels.SYMBOLS:
+            return labels.SYMBOLS[name].strip("$")
+        import sympy as sp
+
+        return str(sp.latex(sp.Symbol(name)))
+
+    def reach(self, *, given: bool) -> float:
+        """Return the greatest speed to show: past the separatrices, and past what was asked for."""
+        land = self.land
+        levels = [energy for energy, _ in self.levels]
+        asked = [*(levels if given else []), *(land.energy(*start) for start in self.starts)]
+        own = 1.42 * land.fastest(land.summit)
+        if not land.answers.phi.size:
+            own = 1.17 * land.fastest(max(levels, default=land.floor))
+        return max(own, 1.08 * land.fastest(max(asked, default=land.floor))) or 1.0
+
+    def coordinate_axis(self, ax: Axes) -> None:
+        """Show the coordinate on the x axis, under its name, and the momentum that is constant."""
+        known = self.land.answers
+        text = f"${self.symbol}$"
+        if known.is_angle:
+            style.circle_axis(ax, "x", self.angles)
+            text += f" ({style.angle_unit(self.angles)})"
+        else:
+            ax.set_xlim(*self.land.window)
+        if known.momentum is not None:
+            name, value, unit = known.momentum
+            number = f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
+            text += f", at ${name}$ = {number} {labels.unit_text(unit)}"
+        ax.set_xlabel(text)
+
+
+def curves_of(system: Any) -> LevelCurves:
+    """Return the level curves of one system."""
+    return LevelCurves(answers(*single(system)))
+
+
+def _colors(
+    ax: Axes, land: LevelCurves, curves: list[tuple[float, Arc]], color_by: str | None
+) -> list[str | None]:
+    """Return the color of each level curve, and draw the color bar."""
+    values = np.array([land.orbit(arc, energy, color_by) for energy, arc in curves if color_by])
+    limits = style.log_limits(values)
+    if color_by is None or limits is None:
+        return [None] * len(curves)
+    mappable = style.log_bar(ax, limits, COLORED[color_by][land.answers.units])
+    shown = mappable.to_rgba(np.minimum(values, limits[1]))
+    return [None if np.isnan(v) else to_hex(c) for v, c in zip(values, shown, strict=True)]
+
+
+def levels_of(land: LevelCurves, energies: ArrayLike | None, density: float = 1.0) -> list[Level]:
+    """Return the levels to draw: those asked for, or a choice."""
+    if energies is None:
+        return land.levels(1.0 / (6.0 * density))
+    unit = {"s-2": "s^-2"}.get(land.answers.units, land.answers.units or "the unit of V")
+    array = _finite(energies, "energies", unit)
+    if array.ndim > 1:
+        raise bad("energies", energies, f"a number or a 1-D list of numbers, in {unit}")
+    levels: list[Level] = [(float(energy), None) for energy in array.ravel()]
+    for energy, _ in levels:
+        if not _has_speed(land, energy):
+            raise bad("energies", energy, "energies whose speeds are finite")
+    return levels
+
+
+def starts_of(land: LevelCurves, orbits: ArrayLike | None) -> list[strokes.State]:
+    """Return initial conditions as pairs of floats."""
+    if orbits is None:
+        return []
+    pairs = _finite(orbits, "orbits", "rad and rad/s")
+    if not pairs.size:
+        return []
+    if pairs.ndim == 1:
+        pairs = pairs[np.newaxis]
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise bad("orbits", orbits, "pairs (phi0, dphi0), of shape (2,) or (n, 2)")
+    starts = [(float(phi), float(speed)) for phi, speed in pairs]
+    for start in starts:
+        if not _has_speed(land, land.energy(*start)):
+            raise bad("orbits", start, "pairs (phi0, dphi0) whose energies are finite")
+    return starts
+
+
+def _has_speed(land: LevelCurves, energy: float) -> bool:
+    """Return whether the greatest speed on a level is a number."""
+    return bool(np.isfinite(2.0 * (energy - land.floor)))
+
+
+def _finite(values: ArrayLike, argument: str, unit: str) -> FloatArray:
+    wants = f"finite numbers in {unit}"
+    array = reals(argument, getattr(values, "values", values), wants)
+    if not np.isfinite(array).all():
+        raise bad(argument, values, wants)
+    return array

@@ -1,0 +1,1 @@
+"""Systems: values on a law, one file each."""

@@ -1,0 +1,186 @@
+"""The same equation in other guises: the papers' reduced form, particle, pendulum, magnet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from phasekit.constants import STANDARD_GRAVITY
+from phasekit.labels.arguments import NumberLike
+from phasekit.laws.trigonometric import Values
+from phasekit.systems.parameter import Parameter
+from phasekit.systems.system import Model, model
+
+
+@model
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class ParticleOnCircle(Model):
+    """Heavy particle on a circle that is carried round a vertical axis.
+
+    The circle lies in a plane tilted from the vertical; phi is measured from its lowest point.
+
+    Parameters
+    ----------
+    radius : float, 1-D array_like or xarray.DataArray
+        Radius of the circle in m, > 0.
+    omega : float or array_like
+        Angular velocity about the vertical axis in s^-1, of either sign.
+    tilt : float or array_like, default 0.0
+        Angle of the circle's plane from the vertical in rad, -pi/2 to pi/2.
+    offset : float or array_like, default 0.0
+        Distance of the circle's center from the axis in m, along the plane's horizontal.
+    normal_offset : float or array_like, default 0.0
+        Distance of the circle's center from the axis in m, along the horizontal square to that.
+    g : float or array_like, default 9.80665
+        Acceleration of gravity in m s^-2.
+
+    Raises
+    ------
+    ParameterError
+        If a scalar is unusable; inside arrays such cells give NaN.
+
+    Notes
+    -----
+    ``A = omega^2 cos^2 tilt``, ``B = (g/radius) cos tilt + omega^2 normal_offset sin tilt/radius``,
+    ``C = omega^2 offset/radius``. With tilt 0 it is the disk at ``beta = pi/2`` with ``r = 0``,
+    ``e = radius`` and ``a = offset``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.ParticleOnCircle(radius=0.5, omega=2.0, g=10.0, offset=0.25).coefficients()
+    Coefficients(A=4.0, B=20.0, C=2.0)
+    """
+
+    radius: NumberLike
+    omega: NumberLike
+    tilt: NumberLike = 0.0
+    offset: NumberLike = 0.0
+    normal_offset: NumberLike = 0.0
+    g: NumberLike = STANDARD_GRAVITY
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="radius", units="m", long_name="radius of the circle", positive=True),
+        Parameter(name="omega", units="s-1", long_name="angular velocity about the vertical axis"),
+        Parameter(
+            name="tilt",
+            units="rad",
+            long_name="angle of the circle's plane from the vertical",
+            low=-np.pi / 2,
+            high=np.pi / 2,
+        ),
+        Parameter(
+            name="offset",
+            units="m",
+            long_name="distance of the circle's center from the axis, in the plane",
+        ),
+        Parameter(
+            name="normal_offset",
+            units="m",
+            long_name="distance of the circle's center from the axis, square to the plane",
+        ),
+        Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
+    )
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """The particle's law, as polynomials of its parameters."""
+        sine, cosine, unit = v["tilt"]
+        omega_sq = v["omega"] * v["omega"]
+        return (
+            v["radius"] * (omega_sq * (cosine * cosine)),
+            (v["g"] * cosine + omega_sq * v["normal_offset"] * sine) * unit,
+            omega_sq * v["offset"] * (unit * unit),
+            v["radius"] * (unit * unit),
+        )
+
+
+@model
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Pendulum(Model):
+    """Plane pendulum, ``phi'' + (g/length) sin phi = 0``.
+
+    Parameters
+    ----------
+    length : float, 1-D array_like or xarray.DataArray
+        Length in m, > 0; of a compound pendulum the reduced length.
+    g : float or array_like, default 9.80665
+        Acceleration of gravity in m s^-2, of either sign.
+
+    Raises
+    ------
+    ParameterError
+        If a scalar is unusable; inside arrays such cells give NaN.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.Pendulum(length=0.5, g=10.0).coefficients()
+    Coefficients(A=0.0, B=20.0, C=0.0)
+    """
+
+    length: NumberLike
+    g: NumberLike = STANDARD_GRAVITY
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="length", units="m", long_name="length of the pendulum", positive=True),
+        Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
+    )
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """Gravity alone."""
+        return 0 * v["g"], v["g"], 0 * v["g"], v["length"]
+
+
+@model
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class StonerWohlfarth(Model):
+    """Single-domain magnetic particle, ``V = K sin^2 phi - h_x cos phi - h_y sin phi``.
+
+    phi is the angle of the magnetisation from the easy axis. Its switching astroid is the fold
+    curve: four equilibria inside, two outside.
+
+    Parameters
+    ----------
+    K : float, 1-D array_like or xarray.DataArray
+        Constant of the uniaxial anisotropy, of either sign.
+    h_x, h_y : float or array_like
+        Applied field along the easy axis and across it, times the magnetisation
+        (``mu_0 M_s H``), of any sign.
+
+    Raises
+    ------
+    ParameterError
+        If a scalar is unusable; inside arrays such cells give NaN.
+
+    Notes
+    -----
+    ``A = -2 K``, ``B = h_x``, ``C = h_y``; V differs from phasekit's potential by the constant K.
+    Like every potential here, K, h_x and h_y are per unit of inertia, in s^-2. Equilibria and
+    topology depend on their ratios only: given as energy densities in J m^-3 they make the
+    energies come out in J m^-3.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.StonerWohlfarth(K=2.0, h_x=1.0, h_y=0.5).coefficients()
+    Coefficients(A=-4.0, B=1.0, C=0.5)
+    """
+
+    K: NumberLike
+    h_x: NumberLike
+    h_y: NumberLike
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="K", units="s-2", long_name="constant of the uniaxial anisotropy"),
+        Parameter(name="h_x", units="s-2", long_name="field along the easy axis"),
+        Parameter(name="h_y", units="s-2", long_name="field across the easy axis"),
+    )
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """Anisotropy and field."""
+        return -2 * v["K"], v["h_x"], v["h_y"], 1

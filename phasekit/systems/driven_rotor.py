@@ -1,0 +1,158 @@
+"""The disk on a free support under torques: its law in time, and what is known along a motion."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import FloatArray, bad, describe, number
+from phasekit.labels.units import UNITS_OF
+from phasekit.mechanics import two_degrees as mechanics
+from phasekit.mechanics.two_degrees import TwoDegrees
+from phasekit.motion.events import Event
+
+#: A function of (t, phi1, phi, omega1, dphi): a torque in N m, or what vanishes at an event.
+StateFunction: TypeAlias = Callable[[float, float, float, float, float], float]
+Torque: TypeAlias = float | StateFunction | None
+
+LAGRANGE = "Lagrange's equations, [Veljovic2015] (11) with omega1 free, corrected"
+MOMENTUM = "d/dt [M11 omega1 + M12 phi'] = Q1"
+
+#: name -> (units, long_name, equation)
+STATE = {
+    "phi1": ("rad", "angle of the support", "d phi1/dt = omega1"),
+    "phi": ("rad", "angle of the disk", "d phi/dt = phi'"),
+    "omega1": ("s-1", "angular velocity of the support", MOMENTUM),
+    "dphi": ("s-1", "angular velocity of the disk", "d/dt [M12 omega1 + M22 phi'] = dL/dphi + Q2"),
+}
+DERIVED = {
+    "domega1": ("s-2", "angular acceleration of the support", "M q'' = Q - bias"),
+    "ddphi": ("s-2", "angular acceleration of the disk", "M q'' = Q - bias"),
+    "torque1": ("N m", "torque on the support", "Q1"),
+    "torque2": ("N m", "torque on the disk by its shaft", "Q2"),
+    "torque_power": ("W", "power of the torques", "Q1 omega1 + Q2 phi'"),
+    "mechanical_energy": ("J", "kinetic and potential energy", "T - m g e sin(beta) cos(phi)"),
+    "angular_momentum": (
+        "kg m2 s-1",
+        "angular momentum about the vertical axis",
+        "p = M11 omega1 + M12 phi'",
+    ),
+}
+
+
+#: What messages suppose where the integrator cannot go on.
+CAUSES = (
+    "A torque without bound, or a particle over the vertical axis on a support without inertia,"
+)
+
+
+@dataclass(frozen=True)
+class DrivenRotor:
+    """The machine and what drives it."""
+
+    machine: TwoDegrees
+    torque1: float | StateFunction
+    torque2: float | StateFunction
+
+    def torques(self, t: float, state: Any) -> tuple[float, float]:
+        """Q1 and Q2 in a state."""
+        q1, q2 = self.torque1, self.torque2
+        return q1(t, *state) if callable(q1) else q1, q2(t, *state) if callable(q2) else q2
+
+    def rates(self, t: float, state: Any) -> tuple[Any, ...]:
+        """Time derivative of the state."""
+        _, phi, omega1, dphi = state
+        return (
+            omega1,
+            dphi,
+            *mechanics.accelerations(self.machine, phi, dphi, omega1, *self.torques(t, state)),
+        )
+
+    def check(self, start: float, state: tuple[float, ...]) -> None:
+        """Raise a `ParameterError` if it cannot start in a state."""
+        with np.errstate(all="ignore"):
+            rates = self.rates(start, np.array(state))[2:]  # Python's floats raise on overflow
+        if not np.isfinite(rates).all():
+            _, phi, omega1, dphi = state
+            raise ParameterError(
+                f"phi0, dphi0, omega1: got {phi!r}, {dphi!r}, {omega1!r}, where the accelerations "
+                f"are {tuple(map(float, rates))}; wants a state in which they are finite: not a "
+                "particle over the vertical axis on a support without inertia"
+            )
+
+    def derived(self, times: FloatArray, states: FloatArray) -> tuple[Any, ...]:
+        """All that `DERIVED` names, along a motion."""
+        pairs = zip(times.ravel(), states.reshape(4, -1).T, strict=True)
+        torques = np.array([self.torques(t, tuple(state)) for t, state in pairs], dtype=float)
+        torque1, torque2 = torques.T.reshape(2, *times.shape)
+        _, phi, omega1, dphi = states
+        now = (self.machine, phi, dphi, omega1)
+        with np.errstate(all="ignore"):
+            accelerations = mechanics.accelerations(*now, torque1, torque2)
+        power = torque1 * omega1 + torque2 * dphi
+        rest = (mechanics.energy(*now), mechanics.angular_momentum(*now))
+        return (*accelerations, torque1, torque2, power, *rest)
+
+
+def checked_torque(
+    argument: str, value: Any, t: float, state: tuple[float, ...]
+) -> float | StateFunction:
+    """Return a torque as a number or a function that gives one at the initial state."""
+    if value is None:
+        return 0.0
+    wants = "a torque in N m: a number, or a function of (t, phi1, phi, omega1, dphi)"
+    if not callable(value):
+        return checked_number(argument, value, wants)
+    check_call(argument, value, wants)
+    with np.errstate(all="ignore"):
+        number = value(t, *np.array(state))
+    if not isinstance(number, (int, float, np.floating, np.integer)) or not np.isfinite(number):
+        raise bad(f"{argument} at t = {t!r}", number, "a function that returns a finite number")
+    function: StateFunction = value
+    return function
+
+
+def event_of(name: Any, event: Any) -> Event:
+    """Return an event of a function of (t, phi1, phi, omega1, dphi), which may bear attributes.
+
+    These are SciPy's: `terminal`, and `direction`.
+    """
+    if not isinstance(name, str):
+        raise bad("events", name, "names that are strings")
+    wants = "a function of (t, phi1, phi, omega1, dphi), or a mapping of names to such"
+    if not callable(event):
+        raise bad("events", event, wants)
+    check_call("events", event, wants)
+    terminal, direction = getattr(event, "terminal", None), getattr(event, "direction", 0)
+    try:
+        count = 0 if terminal is None else int(terminal)
+        if count < 0 or (terminal is not None and count != terminal):
+            raise ValueError
+        return Event(lambda t, state: event(t, *state), count, float(direction))
+    except (TypeError, ValueError):
+        got = f"terminal = {describe(terminal)}, direction = {describe(direction)}"
+        wants = "terminal of True, False or a count, and direction of 1, -1 or 0"
+        raise ParameterError(f"events: got a function with {got}, wants {wants}") from None
+
+
+def checked_number(argument: str, value: Any, wants: str, *, low: float = -np.inf) -> float:
+    """Return one finite number, at least `low`."""
+    kept = number(argument, value, wants, UNITS_OF.get(argument, ""))
+    if kept < low:
+        raise bad(argument, value, wants)
+    return kept
+
+
+def check_call(argument: str, function: Callable[..., Any], wants: str) -> None:
+    """Raise a `ParameterError` unless a function takes (t, phi1, phi, omega1, dphi)."""
+    try:
+        inspect.signature(function).bind(*range(5))
+    except TypeError:
+        raise bad(argument, function, wants, "its arguments do not fit") from None
+    except ValueError:  # a builtin without signature
+        return

@@ -1,0 +1,327 @@
+"""The disk on a support that is not driven evenly, but turns freely or under torques."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar, NamedTuple, Self
+
+import numpy as np
+import xarray as xr
+
+from phasekit.labels.arguments import NumberLike, Value, bad, named_arguments, same, unknown
+from phasekit.laws.ladder import Law, Routhian
+from phasekit.mechanics import two_degrees as mechanics
+from phasekit.systems.amended import Amended, States, on_states
+from phasekit.systems.disk import GyroRotorDisk
+from phasekit.systems.driven_rotor import checked_number
+from phasekit.systems.identity import parameter_values, refuse_another
+from phasekit.systems.parameter import Parameter
+from phasekit.systems.rotor_motions import RotorMotions
+from phasekit.systems.system import MODELS
+
+
+class Accelerations(NamedTuple):
+    """Angular accelerations of support and disk, s^-2."""
+
+    domega1: Any
+    ddphi: Any
+
+
+@dataclass(frozen=True, eq=False)
+class FreeGyroRotor(RotorMotions):
+    """Heavy disk on a support that turns freely about the vertical, or under torques.
+
+    The machine of `GyroRotorDisk` with two degrees of freedom: the support's angular velocity
+    omega1 is not prescribed but follows from the motion. As the support's inertia grows, it turns
+    ever more evenly, and the disk moves as that of `GyroRotorDisk`.
+
+    Parameters
+    ----------
+    disk : GyroRotorDisk
+        Disk of scalar parameters, its mass among them. Its omega1 is the support's angular velocity
+        at the start, unless told otherwise.
+    carrier_inertia : float
+        The support's own moment of inertia about the vertical axis, kg m^2, >= 0.
+    momentum : float, optional
+        Angular momentum about the vertical axis in kg m^2/s, at which the machine is a system of
+        one degree of freedom, with equilibria (the steady rotations), maps and diagrams; left out,
+        that of the support's omega1 with the disk at rest at phi = 0.
+
+    Raises
+    ------
+    ParameterError
+        If the disk has no mass or array parameters, or the inertia is not a number >= 0.
+
+    Notes
+    -----
+    With ``s = sin phi``, ``c = cos phi`` and moments of inertia at O2,
+    ``M11 = Jc + m a^2 + 2 m a e sin beta s + Ju s^2 + Jv c^2``, ``M12 = Jvn c``, ``M22 = Jn``,
+    ``V = -m g e sin beta c``. Torques are Q1 on the support and Q2 on the disk by its shaft,
+    which reacts on the support.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> disk = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.05, r=0.1, omega1=6.0, m=2.0)
+    >>> machine = pk.FreeGyroRotor(disk, carrier_inertia=0.02)
+    >>> machine.accelerations(phi=0.5, dphi=0.0)
+    Accelerations(domega1=..., ddphi=...)
+    >>> motion = machine.simulate(0.5, 0.0, [0.0, 1.0])
+    >>> end = motion.isel(time=-1)
+    >>> state = (end.motion_phi, end.motion_dphi, end.motion_omega1)
+    >>> abs(float(machine.energy(*state)) - machine.energy(0.5, 0.0)) < 1e-9
+    True
+    >>> machine.mass_matrix(0.5).shape
+    (2, 2)
+
+    At the momentum that it keeps it is a system of one degree of freedom, with equilibria and maps:
+
+    >>> p = machine.angular_momentum(0.5, 0.0)
+    >>> float(machine.amended(p).p) == p
+    True
+    >>> ds = pk.sweep(machine, momentum=[0.0, p])
+    >>> ds.n_equilibria.dims
+    ('momentum',)
+    >>> ds.isel(momentum=1).phasekit.system() == machine.replace(momentum=p)
+    True
+    """
+
+    disk: GyroRotorDisk
+    carrier_inertia: NumberLike
+    momentum: NumberLike | None = None
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        *(replace(p, optional=p.name == "half_span") for p in GyroRotorDisk.declared),
+        Parameter(
+            name="carrier_inertia",
+            units="kg m2",
+            long_name="moment of inertia of the support",
+            low=0.0,
+        ),
+        Parameter(
+            name="momentum",
+            units="kg m2 s-1",
+            long_name="angular momentum about the vertical axis",
+            optional=True,
+        ),
+    )
+    rung: ClassVar[type[Law]] = Routhian
+
+    def __post_init__(self) -> None:
+        """Check that it is one machine, with all of its masses."""
+        if not isinstance(self.disk, GyroRotorDisk):
+            raise bad("disk", self.disk, "a GyroRotorDisk")
+        for name, value in self.disk.parameters.items():
+            if not isinstance(value, float) and name != "half_span":
+                hint = "make one FreeGyroRotor for each disk.replace(...)"
+                raise bad(f"disk.{name}", value, "one number", hint)
+        if self.disk.m is None:
+            raise bad("disk.m", None, "a mass in kg", "use disk.replace(m=...)")
+        wants = "a number >= 0 in kg m2"
+        inertia = checked_number("carrier_inertia", self.carrier_inertia, wants, low=0.0)
+        object.__setattr__(self, "carrier_inertia", inertia)
+        if self.momentum is not None:
+            wants = "an angular momentum in kg m2 s-1 whose square is finite"
+            momentum = checked_number("momentum", self.momentum, wants)
+            if not np.isfinite(momentum * momentum):
+                raise bad("momentum", momentum, wants)
+            object.__setattr__(self, "momentum", momentum)
+
+    @property
+    def law(self) -> Law:
+        """The law of the disk's angle at the momentum that is kept."""
+        if not all(isinstance(value, float) for value in self.parameters.values()):
+            return Routhian()  # many machines
+        kept: Any = self.momentum
+        return self.amended(self.angular_momentum(0.0, 0.0) if kept is None else kept).law
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters of disk and support by name, those that are None left out."""
+        own = {"carrier_inertia": self.carrier_inertia, "momentum": self.momentum}
+        given: dict[str, Any] = {k: v for k, v in own.items() if v is not None}
+        return {**self.disk.parameters, **given}
+
+    @classmethod
+    def formula_inputs(cls) -> tuple[str, ...]:
+        """Names of the parameters on which the equilibria depend."""
+        return ("beta", "e", "a", "r", "omega1", "m", "g", "carrier_inertia", "momentum")
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some parameters changed, of the disk or of the support.
+
+        Arrays make axes of maps; a machine with arrays has equilibria, and no single motion.
+
+        Raises
+        ------
+        ParameterError
+            If a name is not one of the parameters, or a value is unusable.
+        """
+        names = ["disk", *(parameter.name for parameter in self.declared)]
+        for name in changes:
+            if name not in names:
+                raise unknown(f"parameter of {type(self).__name__}", name, names)
+        disk = changes.pop("disk", self.disk)
+        own = {n: changes.pop(n, getattr(self, n)) for n in ("carrier_inertia", "momentum")}
+        return type(self)._of(disk.replace(**changes) if changes else disk, own)
+
+    @classmethod
+    def from_dataset(cls, ds: xr.Dataset) -> Self:
+        """Rebuild the machine from a map, or from any selection of it.
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, or a parameter's coordinate is gone.
+        """
+        refuse_another(ds, cls.__name__)
+        values = parameter_values(ds, cls.declared)
+        own = {n: values.pop(n, None) for n in ("carrier_inertia", "momentum")}
+        return cls._of(GyroRotorDisk(**values), own)
+
+    @classmethod
+    def _of(cls, disk: GyroRotorDisk, own: dict[str, Any]) -> Self:
+        """A machine of parameters some of which may be arrays, cells of a map."""
+        declared = {parameter.name: parameter for parameter in cls.declared}
+        kept = {k: None if v is None else declared[k].check(v) for k, v in own.items()}
+        own_values = (x for x in kept.values() if x is not None)
+        if all(isinstance(x, float) for x in (*disk.parameters.values(), *own_values)):
+            return cls(disk, **own)
+        made = object.__new__(cls)
+        for name, value in {"disk": disk, **kept}.items():
+            object.__setattr__(made, name, value)
+        return made
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same machine; NaN equals NaN."""
+        if not isinstance(other, FreeGyroRotor):
+            return NotImplemented
+        mine, theirs = self.parameters, other.parameters
+        return list(mine) == list(theirs) and all(same(mine[n], theirs[n]) for n in mine)
+
+    def __hash__(self) -> int:
+        """Hash of the parameters; a machine that holds DataArrays has none."""
+        return hash((type(self).__name__, self.disk, self.carrier_inertia, self.momentum))
+
+    def accelerations(
+        self,
+        phi: States,
+        dphi: States,
+        omega1: States | None = None,
+        *,
+        torque1: States = 0.0,
+        torque2: States = 0.0,
+    ) -> Accelerations:
+        """Accelerations of support and disk in states.
+
+        Parameters
+        ----------
+        phi, dphi : float, array_like or xarray.DataArray
+            Angle of the disk in rad and its angular velocity in s^-1. Arrays broadcast, DataArrays
+            by the names of their dims.
+        omega1 : float, array_like or xarray.DataArray, optional
+            Angular velocity of the support in s^-1; that of the disk's parameters by default.
+        torque1, torque2 : float, array_like or xarray.DataArray
+            Torques on the support and on the disk by its shaft, N m.
+
+        Returns
+        -------
+        Accelerations
+            domega1 and ddphi in s^-2; numbers, arrays or DataArrays as the states.
+
+        Raises
+        ------
+        ParameterError
+            If an argument is unusable, or shapes do not fit.
+
+        Notes
+        -----
+        Lagrange's equations; for a prescribed omega1 the second one is [Veljovic2015] (11),
+        corrected, with the term of omega1' that is missing there.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> pendulum = pk.GyroRotorDisk(beta=90 * pk.deg, e=0.5, a=0, r=0, omega1=0, m=1, g=9.81)
+        >>> round(pk.FreeGyroRotor(pendulum, 1.0).accelerations(30 * pk.deg, 0.0).ddphi, 12)
+        -9.81
+        """
+        rows = {
+            "domega1": ("s-2", "angular acceleration of the support"),
+            "ddphi": ("s-2", "angular acceleration of the disk"),
+        }
+        states = {"phi": phi, "dphi": dphi, "omega1": self._omega1(omega1)}
+        return Accelerations(
+            *on_states(
+                functools.partial(mechanics.accelerations, self._machine),
+                rows,
+                **states,
+                torque1=torque1,
+                torque2=torque2,
+            )
+        )
+
+    def mass_matrix(self, phi: States) -> States:
+        """Matrix [[M11, M12], [M12, M22]] of the kinetic energy, kg m^2.
+
+        It multiplies (omega1', phi''). The last two axes, for a DataArray the dims ``row`` and
+        ``column``, are those of the matrix.
+        """
+        rows = {"mass_matrix": ("kg m2", "mass matrix of support and disk")}
+        return on_states(
+            lambda x: (mechanics.mass_matrix(self._machine, x),),
+            rows,
+            dims=("row", "column"),
+            phi=phi,
+        )[0]
+
+    def energy(self, phi: States, dphi: States, omega1: States | None = None) -> States:
+        """Kinetic and potential energy, J; constant without torques.
+
+        The potential energy of the weight is 0 at ``phi = pi/2``.
+        """
+        rows = {"mechanical_energy": ("J", "kinetic and potential energy")}
+        return on_states(
+            lambda *state: (mechanics.energy(self._machine, *state),),
+            rows,
+            phi=phi,
+            dphi=dphi,
+            omega1=self._omega1(omega1),
+        )[0]
+
+    def angular_momentum(self, phi: States, dphi: States, omega1: States | None = None) -> States:
+        """Angular momentum ``M11 omega1 + M12 phi'`` about the vertical axis, kg m^2/s.
+
+        Its rate is the torque on the support: it is constant without one.
+        """
+        rows = {"angular_momentum": ("kg m2 s-1", "angular momentum about the vertical axis")}
+        return on_states(
+            lambda *state: (mechanics.angular_momentum(self._machine, *state),),
+            rows,
+            phi=phi,
+            dphi=dphi,
+            omega1=self._omega1(omega1),
+        )[0]
+
+    def amended(self, p: float) -> Amended:
+        """Reduction to phi alone at an angular momentum that no torque changes.
+
+        Parameters
+        ----------
+        p : float
+            Angular momentum about the vertical axis, kg m^2/s: `angular_momentum` of any state.
+
+        Raises
+        ------
+        ParameterError
+            If it is not a number, or too large for its square.
+        """
+        p = checked_number("p", p, "an angular momentum in kg m2 s-1: one finite number")
+        if not np.isfinite(p * p):
+            raise bad("p", p, "an angular momentum in kg m2 s-1 whose square is finite")
+        return Amended(p, self._machine, self._attrs(), self._coords())
+
+
+FreeGyroRotor.__init__ = named_arguments("FreeGyroRotor", FreeGyroRotor.__init__)  # type: ignore[method-assign]
+MODELS["FreeGyroRotor"] = FreeGyroRotor

@@ -1,0 +1,426 @@
+"""Any potential of one coordinate as a system: a formula, its parameters, a line or a circle."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import (
+    FloatArray,
+    NumberLike,
+    Value,
+    bad,
+    brief,
+    named_arguments,
+    number,
+    numeric,
+    pair,
+    same,
+    unknown,
+)
+from phasekit.labels.coordinates import LABELS, STATES
+from phasekit.laws.formulas import NAME, is_name, read_formula
+from phasekit.laws.ladder import Conservative
+from phasekit.phase.numerical.formula import Formula, check_period, make_formula
+from phasekit.systems.parameter import Parameter
+from phasekit.systems.system import MODELS, Model
+from phasekit.table.quantities import NUMERICAL_ROWS, ROWS
+
+if TYPE_CHECKING:
+    from phasekit.systems.problem import Problem
+
+#: Names that parameters cannot have, because results have them.
+_TAKEN = {*ROWS, *LABELS, *STATES, "point"}
+_TAKEN |= {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
+
+
+class Potential(Model):
+    """Any system of one degree of freedom, ``x'' = -V'(x)``, by its potential.
+
+    Goes wherever a `GyroRotorDisk` goes but for what is in closed form: potential and energy,
+    equilibria, separatrices, orbits, flow, portraits and sweeps, by numerical methods. Where
+    results call the coordinate phi, it is the coordinate of this system.
+
+    Parameters
+    ----------
+    expression : str or sympy expression
+        The potential V per unit of inertia. In a string ``^`` and ``**`` both raise to a power,
+        and functions have sympy's names; special functions are those of SciPy. Strings are read
+        as formulas and nothing else, so that one from another's file can do no harm.
+    coordinate : str or sympy symbol
+        The coordinate in it.
+    parameters : mapping of str to float, 1-D array_like or xarray.DataArray, optional
+        Values of the other symbols. An array is an axis of its own name, as in other systems.
+    period : float or str, optional
+        Length of the circle on which the coordinate lies, 2 pi for an angle (``"2*pi"`` as well);
+        None for a line.
+    interval : (float, float), optional
+        The part of a line that is looked at. Needed for equilibria and all that follows from them
+        if V is not a polynomial; orbits that leave it count as unbounded.
+
+    Raises
+    ------
+    ParameterError
+        If the expression cannot be read, a symbol has no value, or V does not repeat over the
+        period.
+
+    Notes
+    -----
+    Equilibria are proved, not sampled: those of polynomials and of finite Fourier sums over the
+    period by disjoint discs about the roots of companion matrices ([Boyd2013], [Smith1970]) or by
+    exact isolation of roots, those of any other function in the interval, or on the circle, by
+    interval arithmetic [MooreKearfottCloud2009]. The interval is closed: an equilibrium at one of
+    its ends, or within rounding of it, counts. They are numbered from left to right, from 0; on a
+    circle from -period/2. Equilibria that have merged within rounding are one, degenerate. The
+    variable ``complete`` of results is False where it is not proved that there are no others: where
+    some have merged, where rounding hides V', and for functions of which no bounds are known; what
+    was not excluded, and stands for no equilibrium, is named in a RuntimeWarning.
+
+    Periods, actions, areas and motions come with estimates of their errors (``period_error`` and so
+    on). A period, an action or an area whose error may exceed 1e-8 of it is NaN, and a
+    RuntimeWarning says how many and why.
+
+    Examples
+    --------
+    The figure-eight of the double well:
+
+    >>> import phasekit as pk
+    >>> well = Potential("x^4/4 - mu*x^2/2", "x", {"mu": 1.0})
+    >>> pk.equilibria(well).phi.values
+    array([-1.,  0.,  1.])
+    >>> pk.separatrices(well).lobe_area.values
+    array([[1.33333333, 1.33333333]])
+    >>> well.potential([1.0]), well.gradient([2.0]), well.curvature([1.0])
+    (array([-0.25]), array([6.]), array([2.]))
+    >>> well.problem()
+    Problem(x' = dx, dx' = mu*x - x**3; mu=1.0, conservative)
+
+    A pendulum with a second harmonic, for two of its strengths:
+
+    >>> V = Potential("-cos(q) + b*cos(2*q)", "q", {"b": [0.1, 0.5]}, period=6.283185307179586)
+    >>> pk.equilibria(V).n_equilibria.values
+    array([2, 4], dtype=int16)
+    """
+
+    declared: ClassVar[tuple[Parameter, ...]] = ()
+    rung: ClassVar[type[Conservative]] = Conservative
+
+    formula: Formula
+    _values: dict[str, Value]
+
+    def __init__(
+        self,
+        expression: Any,
+        coordinate: Any,
+        parameters: Mapping[str, NumberLike] | None = None,
+        period: float | str | None = None,
+        *,
+        interval: Sequence[float] | None = None,
+    ) -> None:
+        name = _name("coordinate", coordinate)
+        if parameters is not None and not isinstance(parameters, Mapping):
+            raise bad("parameters", parameters, "a mapping of names to values, {'mu': 1.0}")
+        given = {_name("parameters", key): value for key, value in (parameters or {}).items()}
+        for key in given:
+            if key == name:
+                raise bad("parameters", key, "names other than the coordinate's")
+            if key in _TAKEN:
+                raise bad("parameters", key, f"another name, because results have {key!r}")
+        declared = tuple(
+            Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")
+            for key in given
+        )
+        values = {p.name: p.check(numeric(p.name, given[p.name], None)) for p in declared}
+        formula = make_formula(
+            _expression(expression),
+            name,
+            tuple(given),
+            _period(period),
+            _interval(interval, period),
+        )
+        check_period(formula, tuple(values.values()))
+        for key, value in (("declared", declared), ("_values", values), ("formula", formula)):
+            object.__setattr__(self, key, value)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        """Refuse: a system does not change."""
+        raise AttributeError(f"a Potential does not change; use .replace({name}=...)")
+
+    def __getattr__(self, name: str) -> Any:
+        """Return the value of a parameter."""
+        values = self.__dict__.get("_values", {})
+        if name not in values:
+            raise AttributeError(f"'Potential' object has no attribute {name!r}")
+        return values[name]
+
+    @property
+    def expression(self) -> Any:
+        """The potential as a sympy expression."""
+        return self.formula.expression
+
+    @property
+    def coordinate(self) -> str:
+        """Name of the coordinate."""
+        return self.formula.coordinate
+
+    @property
+    def period(self) -> float | None:
+        """Length of the circle, None on a line."""
+        return self.formula.period
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The part of the line that is looked at."""
+        return self.formula.interval
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters by name."""
+        return dict(self._values)
+
+    @property
+    def law(self) -> Conservative:
+        """The formula."""
+        return self.formula
+
+    def potential(self, x: ArrayLike) -> FloatArray:
+        """V at x, an array of the shape of x; `phasekit.potential` labels it.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is an array.
+        """
+        return self.formula.values(x, *self._scalars())
+
+    def gradient(self, x: ArrayLike) -> FloatArray:
+        """V' at x, an array of the shape of x."""
+        return self.formula.slopes(x, *self._scalars())
+
+    def curvature(self, x: ArrayLike) -> FloatArray:
+        """V'' at x, an array of the shape of x."""
+        return self.formula.bends(x, *self._scalars())
+
+    def problem(self) -> Problem:
+        """The planar system of (x, x') for `continuation`: its equilibria, orbits and loops.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is an array.
+        """
+        from phasekit.systems.problem import Problem
+
+        values = dict(zip(self._values, self._scalars(), strict=True))
+        return Problem.from_potential(self.expression, self.coordinate, values, period=self.period)
+
+    def _scalars(self) -> list[float]:
+        values = []
+        for name, value in self._values.items():
+            if not isinstance(value, float):
+                raise bad(name, value, "a scalar", "for arrays use pk.potential, pk.gradient, ...")
+            values.append(value)
+        return values
+
+    def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the parameters: all of them."""
+        return tuple(self._values)
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some parameters changed, or expression, period or interval.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown, or a value is unusable.
+        """
+        own = {
+            "expression": self.expression,
+            "coordinate": self.coordinate,
+            "period": self.period,
+            "interval": self.interval,
+        }
+        values = {**self._values, **{k: v for k, v in changes.items() if k not in own}}
+        own.update({key: value for key, value in changes.items() if key in own})
+        if own["expression"] is self.expression:
+            for name in values:
+                if name not in self._values:
+                    raise unknown("parameter of Potential", name, [*self._values, *own])
+        return type(self)(parameters=values, **own)
+
+    def unit_of(self, name: str) -> str | None:
+        """Only times have a known unit; V may be one of anything."""
+        return STATES[name][0] if name == "time" else None
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What makes it again, by keyword."""
+        return {
+            "expression": self.formula.text,
+            "coordinate": self.coordinate,
+            "parameters": self.parameters,
+            "period": self.period,
+            "interval": self.interval,
+        }
+
+    @property
+    def definition(self) -> dict[str, str]:
+        """What maps store beside the parameters' values."""
+        return {
+            "phasekit_expression": self.formula.text,
+            "phasekit_coordinate": self.coordinate,
+            "phasekit_parameters": " ".join(self.formula.names),
+            "phasekit_period": repr(self.period),
+            "phasekit_interval": " ".join(map(repr, self.interval or ())),
+        }
+
+    @classmethod
+    def from_dataset(cls, ds: Any) -> Self:
+        """Rebuild the potential from a map, or from any selection of it.
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, a parameter's coordinate is gone, or the
+            attributes that hold the formula are damaged.
+        """
+        from phasekit.systems.identity import model_name, parameter_values
+
+        if model_name(ds) != cls.__name__:
+            raise ParameterError(
+                f"ds: got a map of {model_name(ds)}, wants one of {cls.__name__}; "
+                "use ds.phasekit.system()"
+            )
+        expression, coordinate, names, period, ends = (
+            _attribute(ds, name)
+            for name in ("expression", "coordinate", "parameters", "period", "interval")
+        )
+        declared = [Parameter(name=name, units="1", long_name=name) for name in names.split()]
+        try:
+            return cls(
+                expression,
+                coordinate,
+                parameter_values(ds, declared),
+                None if period == "None" else period,
+                interval=[float(end) for end in ends.split()] or None,
+            )
+        except ValueError as error:  # as ParameterError is
+            raise ParameterError(
+                f"ds: got a map whose potential cannot be made again: {error}; its attributes "
+                "phasekit_* or its coordinates were changed: make the map again"
+            ) from error
+
+    def __reduce__(self) -> Any:
+        """Pickle what it was made from; the functions are made anew."""
+        own = (str(self.formula.text), self.coordinate, self._values, self.period, self.interval)
+        return _rebuild, own
+
+    def __repr__(self) -> str:
+        """Write the potential and its parameters, long arrays by their ends."""
+        parts = [repr(self.formula.text), repr(self.coordinate)]
+        if self._values:
+            shown = ", ".join(f"{name!r}: {brief(value)}" for name, value in self._values.items())
+            parts.append(f"{{{shown}}}")
+        if self.period is not None:
+            parts.append(f"period={self.period!r}")
+        if self.interval is not None:
+            parts.append(f"interval={self.interval!r}")
+        return f"Potential({', '.join(parts)})"
+
+    def _key(self) -> tuple[Any, ...]:
+        formula = self.formula
+        return formula.text, formula.coordinate, formula.names, formula.period, formula.interval
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same formula with equal parameters; NaN equals NaN."""
+        if not isinstance(other, Potential):
+            return NotImplemented
+        return self._key() == other._key() and all(
+            same(value, other._values[name]) for name, value in self._values.items()
+        )
+
+    def __hash__(self) -> int:
+        """Hash of formula and parameters; one that holds DataArrays has none."""
+        values = self._values.values()
+        return hash(
+            (
+                *self._key(),
+                *((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values),
+            )
+        )
+
+
+Potential.__init__ = named_arguments("Potential", Potential.__init__)  # type: ignore[method-assign]
+MODELS["Potential"] = Potential
+
+
+def _rebuild(
+    text: str, coordinate: str, values: dict[str, Value], period: Any, interval: Any
+) -> Potential:
+    return Potential(text, coordinate, values, period, interval=interval)
+
+
+def _attribute(ds: Any, name: str) -> str:
+    value = ds.attrs.get(f"phasekit_{name}")
+    if not isinstance(value, str):
+        raise bad(
+            f"ds: attribute phasekit_{name}", value, "the string that phasekit stored there",
+            "the Dataset is damaged: make the map again",
+        )  # fmt: skip
+    return value
+
+
+def _expression(expression: Any) -> Any:
+    if isinstance(expression, str):
+        return expression
+    import sympy as sp
+
+    if isinstance(expression, sp.Expr):
+        return expression
+    # Numbers as text, for the formula of 1.0 is not that of 1.
+    if isinstance(expression, (float, np.floating)):
+        return repr(float(expression))
+    whole = isinstance(expression, (int, np.integer)) and not isinstance(expression, bool)
+    if whole and abs(expression) < 1e308:
+        return repr(int(expression))
+    raise bad("expression", expression, "a string or a sympy expression")
+
+
+def _name(argument: str, name: Any) -> str:
+    text = str(name) if type(name).__module__.startswith("sympy") else name
+    if isinstance(text, str) and keyword.iskeyword(text):
+        raise bad(argument, name, "a name that Python does not use itself", f"such as {text[:3]!r}")
+    if not isinstance(text, str) or not is_name(text):
+        raise bad(argument, name, f"a name, such as 'x', of at most {NAME} letters and digits")
+    return text
+
+
+def _period(period: Any) -> float | None:
+    if period is None:
+        return None
+    wants = "a number > 0, the length of the circle, or None for a line"
+    if isinstance(period, str):
+        period = read_formula(period, {}, "period")
+    if getattr(period, "is_number", False) and period.is_real:  # a sympy number
+        period = float(period)
+    value = number("period", period, wants)
+    if not value > 0.0:
+        raise bad("period", period, wants)
+    return value
+
+
+def _interval(interval: Any, period: Any) -> tuple[float, float] | None:
+    if interval is None:
+        return None
+    if period is not None:
+        raise bad("interval", interval, "None on a circle, which is looked at as a whole")
+    wants = "two finite numbers (low, high), low < high"
+    low, high = pair("interval", interval, wants)
+    if not low < high:
+        raise bad("interval", interval, wants)
+    return low, high

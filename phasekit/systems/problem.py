@@ -1,0 +1,338 @@
+"""`Problem`: any smooth system x' = f(x, parameters) that equilibria can be continued of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.code_fields import CompiledField
+from phasekit.bifurcation.continuation.fields import Field, SymbolicField
+from phasekit.labels.arguments import bad, flag, reals, unknown
+from phasekit.laws.formulas import symbols_of, take_formula, write_formula
+from phasekit.laws.ladder import Conservative
+from phasekit.systems.as_system import as_system, stands_on
+from phasekit.systems.problem_parts import (
+    make_field,
+    names_of,
+    values_of,
+)
+from phasekit.systems.system import MODELS, Model
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Problem:
+    """A smooth system ``x' = f(x, **parameters)`` with states and parameters by name.
+
+    Parameters
+    ----------
+    f : callable, str, sympy.Expr, or sequence or mapping of formulas
+        The right-hand side. A callable is called as ``f(x, **parameters)`` with a 1-D array x and
+        returns as many numbers (a single number for one state); it may raise an ArithmeticError
+        or ValueError, or return NaN, where it is not defined. A function compiled by
+        ``numba.njit`` is stepped in compiled code. Formulas (strings in Python's syntax, or sympy
+        expressions), one a state or by its name, are turned into machine code, with exact
+        derivatives.
+    state : str or sequence of str
+        Names of the states; of one state the name alone.
+    parameters : mapping of str to float
+        The parameters and their values.
+    jac : callable, optional
+        ``jac(x, **parameters)``, the matrix of derivatives of f by x, for a Python function.
+        Without it derivatives are central differences.
+    periods : mapping of str to float, optional
+        States that are angles, with their periods: points that differ by a period are the same.
+    conservative : bool, default False
+        Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
+        force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> from phasekit.systems.problem import Problem
+    >>> cusp = Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 1.0})
+    >>> cusp
+    Problem(x' = l*x + mu - x**3; mu=-1.0, l=1.0)
+    >>> float(cusp([2.0])[0])
+    -7.0
+    >>> value, slope = cusp.replace(l=2.0).derivatives([2.0])
+    >>> value.item(), slope.item()
+    (-5.0, -10.0)
+    >>> Problem.from_specification(cusp.specification())
+    Problem(x' = l*x + mu - x**3; mu=-1.0, l=1.0)
+    >>> Problem.from_system(pk.Pendulum(length=0.5))
+    Problem(phi' = -V'(phi) of Pendulum(length=0.5, g=9.80665))
+    """
+
+    __slots__ = (
+        "_field",
+        "conservative",
+        "f",
+        "jac",
+        "parameters",
+        "periods",
+        "state",
+        "system",
+    )
+
+    f: Any
+    jac: Callable[..., Any] | None
+    state: tuple[str, ...]
+    parameters: Mapping[str, float]
+    periods: Mapping[str, float]
+    conservative: bool
+    system: Model | None
+    _field: Field
+
+    def __init__(
+        self,
+        f: Any,
+        state: str | Sequence[str],
+        parameters: Mapping[str, float],
+        jac: Callable[..., Any] | None = None,
+        *,
+        periods: Mapping[str, float] | None = None,
+        conservative: bool = False,
+    ) -> None:
+        states = names_of("state", (state,) if isinstance(state, str) else state)
+        values = values_of("parameters", parameters)
+        for name in values:
+            if name in states:
+                raise bad("parameters", list(values), f"names that are no states; {name!r} is one")
+        angles = values_of("periods", {} if periods is None else periods)
+        for name, value in angles.items():
+            if name not in states:
+                raise unknown("periods: state", name, states)
+            if not value > 0.0:
+                raise bad(f"periods[{name!r}]", value, "a number > 0")
+        flag("conservative", conservative)
+        if jac is not None and not callable(jac):
+            raise bad("jac", jac, "a function jac(x, **parameters), or None")
+        if conservative and len(states) > 1 and len(states) % 2:
+            raise bad("conservative", True, "one state (the force) or pairs of states")
+        self._set("state", states)
+        self._set("parameters", MappingProxyType(values))
+        self._set("periods", MappingProxyType(angles))
+        self._set("conservative", bool(conservative))
+        self._set("jac", jac)
+        self._set("system", None)
+        field, kept = make_field(f, jac, states, tuple(values))
+        self._set("f", kept)
+        self._set("_field", field)
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse: a problem is frozen."""
+        raise AttributeError(f"a Problem is frozen; use .replace({name}=...) for a parameter")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
+        arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
+        return _made, (type(self), *arguments, self.conservative, self.system)
+
+    @property
+    def field(self) -> Field:
+        """What the stepping code takes."""
+        return self._field
+
+    @property
+    def kind(self) -> str:
+        """How f was given: "symbolic", "compiled" or "python"."""
+        if isinstance(self._field, SymbolicField):
+            return "symbolic"
+        return "compiled" if isinstance(self._field, CompiledField) else "python"
+
+    @classmethod
+    def from_potential(
+        cls,
+        potential: Any,
+        coordinate: str = "x",
+        parameters: Mapping[str, float] | None = None,
+        *,
+        period: float | None = None,
+    ) -> Problem:
+        """The planar conservative system ``x'' = -V'(x)`` with the states (x, dx).
+
+        Parameters
+        ----------
+        potential : str or sympy.Expr
+            V, a formula of the coordinate and the parameters.
+        coordinate : str
+            Its name; the velocity's is the same with a d before it.
+        parameters : mapping of str to float, optional
+            The parameters and their values.
+        period : float, optional
+            The period of the coordinate, where it is an angle.
+
+        Examples
+        --------
+        >>> Problem.from_potential("x**4/4 - x**2/2")
+        Problem(x' = dx, dx' = -x**3 + x; conservative)
+        """
+        states = names_of("coordinate", (coordinate,))
+        states += (f"d{coordinate}",)
+        values = values_of("parameters", {} if parameters is None else parameters)
+        symbols = symbols_of([*states, *values])
+        V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
+        force = -V.diff(symbols[coordinate])
+        periods = {} if period is None else {coordinate: period}
+        return cls([symbols[states[1]], force], states, values, periods=periods, conservative=True)
+
+    @classmethod
+    def from_system(cls, system: Model) -> Problem:
+        """The problem phi' = -V'(phi) whose equilibria are those of a system with scalars.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is an array.
+        """
+        system = stands_on(as_system(system), Conservative, "continuation")
+        law: Any = system.law
+        names = system.formula_inputs()
+        values: dict[str, float] = {}
+        for key in names:
+            value = system.parameters[key]
+            if not isinstance(value, float):
+                raise bad(key, value, "a single number, to continue a single system")
+            values[key] = value
+        x = law.coordinate
+        force = -law.gradient_formula(symbols_of([x, *names]))
+        periods = {} if law.period is None else {x: law.period}
+        problem = cls([force], x, values, periods=periods, conservative=True)
+        problem._set("system", system)
+        return problem
+
+    def replace(self, **changes: float) -> Self:
+        """Return a copy with some parameters changed.
+
+        Raises
+        ------
+        ParameterError
+            If a name is not one of the parameters, or a value is no number.
+        """
+        values = dict(self.parameters)
+        for name, value in changes.items():
+            if name not in values:
+                raise unknown("parameter of the problem", name, values)
+            values[name] = values_of("parameters", {name: value})[name]
+        copy = object.__new__(type(self))
+        for slot in self.__slots__:
+            copy._set(slot, getattr(self, slot))
+        copy._set("parameters", MappingProxyType(values))
+        if self.system is not None:
+            copy._set("system", self.system.replace(**changes))
+        return copy
+
+    def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:
+        """Value of f at a state, with some parameters changed."""
+        problem = self.replace(**changes) if changes else self
+        return problem.derivatives(x)[0]
+
+    def derivatives(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Value of f and its matrix of derivatives by the states."""
+        from phasekit.bifurcation.continuation.curve import Curve
+        from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+        from phasekit.bifurcation.continuation.options import ContinuationOptions
+
+        n = len(self.state)
+        wants = f"{n} numbers: {', '.join(self.state)}"
+        x = np.atleast_1d(reals("x", x, wants))
+        if x.shape != (n,):
+            raise bad("x", x, wants)
+        infinite = np.full(n, np.inf)
+        par = np.array(list(self.parameters.values()))
+        curve = Curve(
+            self.field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite,
+            infinite, ContinuationOptions(),
+        )  # fmt: skip
+        return curve.at(x)
+
+    def specification(self) -> dict[str, Any]:
+        """What is needed to make the problem again, as plain values; f is None if it is code."""
+        formulas = [write_formula(e) for e in self.f] if self.kind == "symbolic" else None
+        spec: dict[str, Any] = {
+            "f": formulas,
+            "state": list(self.state),
+            "parameters": dict(self.parameters),
+            "periods": dict(self.periods),
+            "conservative": self.conservative,
+        }
+        if self.system is not None:
+            spec["system"] = type(self.system).__name__
+            spec["system_parameters"] = self.system.arguments
+        return spec
+
+    @classmethod
+    def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
+        """Make a problem of what `specification` gave of no system; None where f was code."""
+        keys = ("f", "state", "parameters", "periods", "conservative")
+        if not isinstance(spec, Mapping) or not spec.keys() >= set(keys):
+            raise bad("spec", spec, "what Problem.specification returns")
+        if spec["f"] is None:
+            return None
+        return cls(
+            spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
+            conservative=spec["conservative"],
+        )  # fmt: skip
+
+    def __repr__(self) -> str:
+        """Write the equations, if they are formulas, and the parameters."""
+        if self.system is not None:
+            x = self.state[0]
+            return f"Problem({x}' = -V'({x}) of {self.system!r})"
+        if self.kind == "symbolic":
+            equations = ", ".join(
+                f"{name}' = {formula}" for name, formula in zip(self.state, self.f, strict=True)
+            )
+            if len(equations) > 200:
+                equations = equations[:200] + " ..."
+        else:
+            name = getattr(self.f, "__name__", "f")
+            equations = f"({', '.join(self.state)})' = {name}(x, **parameters), {self.kind}"
+        notes = [f"{name}={value!r}" for name, value in self.parameters.items()]
+        notes += [f"{name} modulo {value:.6g}" for name, value in self.periods.items()]
+        notes += ["conservative"] * self.conservative
+        return f"Problem({equations}{'; ' if notes else ''}{', '.join(notes)})"
+
+
+def _made(
+    kind: type[Problem], f: Any, state: Any, parameters: Any, jac: Any, periods: Any,
+    conservative: bool, system: Any,
+) -> Problem:  # fmt: skip
+    """The problem of its arguments, for copies and pickles."""
+    problem = kind(f, state, parameters, jac, periods=periods, conservative=conservative)
+    problem._set("system", system)
+    return problem
+
+
+def as_problem(problem: Any) -> Problem:
+    """Return the problem that an argument is: a Problem, or a system.
+
+    Raises
+    ------
+    ParameterError
+        If it is neither.
+    """
+    if isinstance(problem, Problem):
+        return problem
+    if isinstance(problem, Model):
+        return Problem.from_system(problem)
+    convert = getattr(problem, "as_problem", None)
+    if callable(convert):
+        made = convert()
+        if isinstance(made, Problem):
+            return made
+    hint = "pk.Problem(f, state=..., parameters=...) makes one" if callable(problem) else ""
+    raise bad("problem", problem, f"a Problem or a system ({', '.join(MODELS)})", hint)

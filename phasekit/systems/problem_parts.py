@@ -1,0 +1,118 @@
+"""What a `Problem` is made of: its names, values and formulas, checked, and its right-hand side."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
+from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import bad, number, unknown
+from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula
+
+
+def names_of(argument: str, given: Any) -> tuple[str, ...]:
+    """Names that can be states or parameters."""
+    try:
+        names = tuple(given)
+    except TypeError:
+        raise bad(argument, given, "names") from None
+    for name in names:
+        if not is_name(name):
+            raise bad(
+                argument, name,
+                f"names that are Python identifiers and no keywords, of at most {NAME} letters",
+            )  # fmt: skip
+    if not names:
+        raise bad(argument, given, "at least one name")
+    if len(set(names)) < len(names):
+        raise bad(argument, given, "names that differ")
+    return names
+
+
+def values_of(argument: str, given: Any) -> dict[str, float]:
+    """Names with finite numbers."""
+    if not isinstance(given, Mapping):
+        raise bad(argument, given, "a mapping from names to numbers")
+    if given:
+        names_of(argument, given)
+    values = {}
+    for name, value in given.items():
+        values[name] = number(f"{argument}[{name!r}]", value, "a number, finite", None)
+    return values
+
+
+def expressions_of(
+    given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str]
+) -> list[Any]:
+    """Formulas as sympy expressions of real symbols, that there is machine code for.
+
+    Raises
+    ------
+    ParameterError
+        If one cannot be read, or needs a function, or a derivative by the states, that has none.
+    """
+    symbols = symbols_of(names)
+    declare = "declare it in state or parameters"
+    found = [take_formula(one, symbols, argument, declare) for one in given]
+    moving = {symbols[name] for name in states}
+    for expression in found:
+        refuse_uncompiled(expression, moving, argument)
+    return found
+
+
+def make_field(
+    f: Any, jac: Callable[..., Any] | None, states: tuple[str, ...], names: tuple[str, ...]
+) -> tuple[Field, Any]:
+    """The right-hand side in the form that the stepping code takes, and f as it is kept."""
+    if isinstance(f, Mapping):
+        for name in f:
+            if name not in states:
+                raise unknown("f: state", name, states)
+        missing = [name for name in states if name not in f]
+        if missing:
+            raise bad("f", list(f), f"a formula for {', '.join(missing)} as well")
+        f = [f[name] for name in states]
+    is_one = isinstance(f, str) or hasattr(f, "free_symbols")
+    if is_one or (isinstance(f, (list, tuple)) or (hasattr(f, "tolist") and np.ndim(f) > 0)):
+        if jac is not None:
+            raise bad("jac", jac, "None with formulas, whose derivatives are exact")
+        given = [f] if is_one and not hasattr(f, "tolist") else list(f)
+        if len(given) != len(states):
+            raise bad("f", given, f"{len(states)} formulas, one for each of {', '.join(states)}")
+        expressions = tuple(expressions_of(given, [*states, *names], "f", states))
+        return SymbolicField(expressions, states, names), expressions
+    if not callable(f):
+        raise bad(
+            "f", f, "a function f(x, **parameters), formulas as strings, or sympy expressions"
+        )
+    inner = getattr(f, "py_func", None)
+    if inner is not None and hasattr(f, "signatures"):
+        arguments = list(inspect.signature(inner).parameters)[1:]
+        if sorted(arguments) != sorted(names):
+            raise bad("parameters", list(names), f"the arguments of f after the state: {arguments}")
+        if jac is not None:
+            raise bad("jac", jac, "None with a compiled f, whose derivatives are compiled as well")
+        return CompiledField(f, arguments, states, names), f
+    _check_call("f", f, names)
+    if jac is not None:
+        _check_call("jac", jac, names)
+    return PythonField(f, jac, states, names), f
+
+
+def _check_call(argument: str, function: Any, names: Sequence[str]) -> None:
+    try:
+        signature = inspect.signature(function)
+    except (TypeError, ValueError):
+        return
+    try:
+        signature.bind(np.zeros(1), **dict.fromkeys(names, 0.0))
+    except TypeError as error:
+        raise ParameterError(
+            f"{argument}: got a function with the arguments {signature}, wants one to be called "
+            f"as {argument}(x, {', '.join(f'{n}=...' for n in names)}): {error}"
+        ) from None

@@ -1,0 +1,423 @@
+"""What every system shares: declared parameters, validation, copies, equality, rebuilding.
+
+A system is a set of parameters and a formula that turns them into the coefficients (A, B, C) of
+``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``. A model declares its parameters once, as
+a tuple of `Parameter`; validation, sweeps, coordinates of maps and rebuilding from a map all
+follow from that declaration.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+
+import numpy as np
+
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import (
+    FloatArray,
+    NumberLike,
+    Value,
+    bad,
+    brief,
+    describe,
+    named_arguments,
+    same,
+    unknown,
+)
+from phasekit.labels.coordinates import STATES
+from phasekit.labels.grid import combine
+from phasekit.laws.ladder import Law, Lawful
+from phasekit.laws.trigonometric import Trigonometric, Values
+from phasekit.laws.trigonometric import law as make_law
+from phasekit.systems.identity import parameter_values, refuse_another
+from phasekit.systems.parameter import Parameter, attrs_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+#: Every model by its name, as maps store it.
+MODELS: dict[str, type[Model]] = {}
+
+ModelType = TypeVar("ModelType", bound="Model")
+
+
+class Model(Lawful):
+    """Base of the systems: frozen, compared by value, rebuilt from any map that they made.
+
+    Examples
+    --------
+    >>> import xarray as xr
+    >>> import phasekit as pk
+    >>> magnet = pk.StonerWohlfarth(K=-2.0, h_x=1.0, h_y=0.5)
+    >>> magnet.coefficients(), magnet.reduced()
+    (Coefficients(A=4.0, B=1.0, C=0.5), Reduced(lam=0.25, psi=0.125, Omega_sq=4.0))
+    >>> made_by = {"phasekit_model": "StonerWohlfarth", "phasekit_schema": "1"}
+    >>> ds = xr.Dataset(coords=magnet.replace(h_x=3.0).parameters, attrs=made_by)
+    >>> magnet.from_dataset(ds)
+    StonerWohlfarth(K=-2.0, h_x=3.0, h_y=0.5)
+    >>> magnet.formula_inputs(), magnet.unit_of("K"), magnet.products(magnet.parameters)
+    (('K', 'h_x', 'h_y'), 's-2', (4.0, 1.0, 0.5, 1))
+    >>> law, K = magnet.trigonometric(), magnet.in_domain("K", 1.0)
+    >>> A, B, C = magnet.valid_coefficients({"K": K, "h_x": 1.0, "h_y": 2.0})
+    """
+
+    __slots__ = ()
+
+    declared: ClassVar[tuple[Parameter, ...]]
+    #: Parameters for which folds are known in closed form, with the function that solves for each.
+    critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
+    #: The rung of its law, which says what can be computed of it.
+    rung: ClassVar[type[Law]] = Trigonometric
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
+        """Let a law that is asked for no parameters say so."""
+        super().__init_subclass__(**keywords)
+        own = cls.__dict__.get("products")
+        if own is not None:
+            cls.products = staticmethod(_of_parameters(own.__func__))  # type: ignore[assignment, method-assign]
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each."""
+        raise ParameterError(
+            f"v: got {describe(v)}, wants the parameters of a system with coefficients "
+            "(A, B, C), which this one has not"
+        )
+
+    @property
+    def law(self) -> Law:
+        """The law, and what follows from it."""
+        return self.trigonometric()
+
+    @classmethod
+    def trigonometric(cls) -> Trigonometric:
+        """The law of all systems of this kind, for those whose law is that of (A, B, C)."""
+        declared = ((p.name, p.units, p.least, p.high) for p in cls.declared)
+        return make_law(cls.products, tuple(declared))
+
+    def __post_init__(self) -> None:
+        """Check the parameters and keep them."""
+        for parameter in self.declared:
+            value = getattr(self, parameter.name)
+            if value is not None or not parameter.optional:
+                object.__setattr__(self, parameter.name, parameter.check(value))
+
+    @classmethod
+    def formula_inputs(cls) -> tuple[str, ...]:
+        """Names of the parameters on which the coefficients depend."""
+        return cls.trigonometric().parameters
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a parameter or state; None where it may be any."""
+        units = {parameter.name: parameter.units for parameter in self.declared}
+        return units.get(name) or STATES.get(name, (None,))[0]
+
+    @property
+    def definition(self) -> dict[str, str]:
+        """What maps store of the system beside its name and parameters."""
+        return {}
+
+    @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters by name, those that are None left out."""
+        values = {p.name: getattr(self, p.name) for p in self.declared}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What makes it again, by keyword."""
+        return dict(self.parameters)
+
+    @classmethod
+    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
+        """Values of a parameter, NaN where they leave its domain."""
+        for parameter in cls.declared:
+            if parameter.name == name and not (valid := parameter.valid(value)).all():
+                return np.where(valid, value, np.nan)
+        return value
+
+    @classmethod
+    def valid_coefficients(
+        cls, parameters: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Coefficients from arrays that broadcast, NaN where a parameter leaves its domain."""
+        used = {name: parameters[name] for name in cls.formula_inputs()}
+        with np.errstate(all="ignore"):
+            valid = functools.reduce(
+                np.logical_and, [p.valid(used[p.name]) for p in cls.declared if p.name in used]
+            )
+            A, B, C = cls.trigonometric().coefficients(used)
+            if not valid.all():
+                A, B, C = (np.where(valid, x, np.nan) for x in (A, B, C))
+        return A, B, C
+
+    def coefficients(self) -> Coefficients:
+        """Coefficients (A, B, C) of the equation of motion, all in s^-2.
+
+        Returns
+        -------
+        Coefficients
+            Floats, or DataArrays on the parameters' dims where a parameter is an array.
+        """
+        if not issubclass(self.rung, Trigonometric):
+            raise bad("system", self, f"{Trigonometric.called}; this needs the closed form")
+        names = self.formula_inputs()
+        used = {name: self.parameters[name] for name in names}
+
+        def abc(*arrays: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+            return self.valid_coefficients(dict(zip(names, arrays, strict=True)))
+
+        attrs = attrs_of(*self.declared, *Coefficients.declared)
+        results = combine(abc, used, ("A", "B", "C"), attrs)
+        if not all(np.isfinite(x) for x in results if isinstance(x, float)):
+            got = ", ".join(f"{name}={brief(value)}" for name, value in used.items())
+            raise ParameterError(
+                f"{type(self).__name__}: got {got}, whose coefficients are {results}; wants "
+                "parameters of a size for which A, B and C are finite"
+            )
+        return Coefficients(*results)
+
+    def reduced(self) -> Reduced:
+        """Return the papers' form (lambda, psi, Omega^2); cells with ``A = 0`` become NaN.
+
+        Raises
+        ------
+        ParameterError
+            If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
+        """
+        A, B, C = self.coefficients()
+        if isinstance(A, float) and A == 0.0:
+            raise ParameterError(
+                "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "
+                "use .coefficients(), which has no such limit"
+            )
+
+        def divide(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
+            with np.errstate(all="ignore"):
+                lam, psi = (np.where(A == 0, np.nan, x / A) for x in (B, C))
+                return lam, psi, A + 0 * (B + C)
+
+        attrs = attrs_of(*self.declared, *Reduced.declared)
+        values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
+        if not all(np.isfinite(value) for value in values if isinstance(value, float)):
+            raise ParameterError(
+                f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which "
+                "lambda = B/A and psi = C/A are finite; use .coefficients(), which has no such "
+                "limit"
+            )
+        return Reduced(*values)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore a pickled model; its arrays are read-only again."""
+        for name, value in state.items():
+            if isinstance(value, np.ndarray):
+                value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+    def replace(self, **changes: Any) -> Self:
+        """Return a copy with some parameters changed.
+
+        Raises
+        ------
+        ParameterError
+            If a name is not one of the model's parameters, or a value is unusable.
+        """
+        names = [parameter.name for parameter in self.declared]
+        for name in changes:
+            if name not in names:
+                raise unknown(f"parameter of {type(self).__name__}", name, names)
+        return type(self)(**{**{n: getattr(self, n) for n in names}, **changes})
+
+    @classmethod
+    def from_dataset(cls, ds: xr.Dataset) -> Self:
+        """Rebuild the model from a map, or from any selection of it.
+
+        Parameters
+        ----------
+        ds : xarray.Dataset
+            A Dataset that phasekit made. Parameters that are scalar coordinates become scalars;
+            swept ones that were not selected stay arrays.
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, or a parameter's coordinate is gone.
+        """
+        refuse_another(ds, cls.__name__)
+        return cls(**parameter_values(ds, cls.declared))
+
+    def __repr__(self) -> str:
+        """Write the parameters, long arrays by their ends."""
+        shown = ", ".join(f"{name}={brief(value)}" for name, value in self.parameters.items())
+        return f"{type(self).__name__}({shown})"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same model with equal parameters; NaN equals NaN."""
+        if type(self) is not type(other) or not isinstance(other, Model):
+            return NotImplemented
+        return all(same(getattr(self, p.name), getattr(other, p.name)) for p in self.declared)
+
+    def __hash__(self) -> int:
+        """Hash of the parameters; a model that holds DataArrays has none."""
+        values = (getattr(self, p.name) for p in self.declared)
+        # 0.0 is added because -0.0 equals it
+        keys = ((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values)
+        return hash((type(self).__name__, *keys))
+
+
+def _of_parameters(products: Callable[[Values], Any]) -> Callable[[Values], Any]:
+    @functools.wraps(products)
+    def checked(v: Values) -> Any:
+        try:
+            return products(v)
+        except Exception as error:
+            raise ParameterError(
+                f"v: got {describe(v)}, wants the parameters by name, angles as (sine, cosine, "
+                f"radius): {type(error).__name__}: {error}"
+            ) from error
+
+    return checked
+
+
+def model(cls: type[ModelType]) -> type[ModelType]:
+    """Class decorator of a model: register its name, refuse wrong argument names readably."""
+    cls.__init__ = named_arguments(cls.__name__, cls.__init__)  # type: ignore[method-assign]
+    MODELS[cls.__name__] = cls
+    return cls
+
+
+class _ABC(NamedTuple):
+    A: Any
+    B: Any
+    C: Any
+
+
+class Coefficients(Model, _ABC):
+    """Coefficients of ``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``, in s^-2.
+
+    A system by themselves; every other system reduces to them. Of any sign, zero included.
+
+    Parameters
+    ----------
+    A, B, C : float, 1-D array_like or xarray.DataArray
+        Coefficients of the potential ``V = -B cos phi + (A/2) cos^2 phi - C sin phi``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a real, finite number or an array of numbers.
+
+    Notes
+    -----
+    In the papers' notation ``A = Omega^2``, ``B = lambda Omega^2``, ``C = psi Omega^2``
+    ([Veljovic2015] (12)).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> c = pk.Coefficients(4.0, 1.0, 0.5)
+    >>> c
+    Coefficients(A=4.0, B=1.0, C=0.5)
+    >>> A, B, C = c
+    >>> c.replace(B=[1.0, 2.0])
+    Coefficients(A=4.0, B=[1.0, 2.0], C=0.5)
+    """
+
+    __slots__ = ()
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="A", units="s-2", long_name="coefficient of -sin(phi) cos(phi), Omega^2"),
+        Parameter(name="B", units="s-2", long_name="coefficient of sin(phi), lambda Omega^2"),
+        Parameter(name="C", units="s-2", long_name="coefficient of -cos(phi), psi Omega^2"),
+    )
+
+    def __new__(cls, A: NumberLike, B: NumberLike, C: NumberLike) -> Coefficients:
+        """Check the values and keep them."""
+        kept = [p.check(x) for p, x in zip(cls.declared, (A, B, C), strict=True)]
+        return super().__new__(cls, *kept)
+
+    @classmethod
+    def _make(cls, iterable: Iterable[Any]) -> Coefficients:  # type: ignore[override]
+        """Make coefficients from three values, checked; ``_replace`` comes here as well."""
+        return cls(*iterable)
+
+    def coefficients(self) -> Coefficients:
+        """Return itself: coefficients are a system."""
+        return self
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """The coefficients themselves."""
+        return v["A"], v["B"], v["C"], 1
+
+    def __eq__(self, other: object) -> bool:
+        """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
+        if isinstance(other, Model):
+            return Model.__eq__(self, other)
+        if not isinstance(other, tuple) or len(other) != 3:
+            return NotImplemented
+        return all(same(x, y) for x, y in zip(self, other, strict=True))
+
+    def __ne__(self, other: object) -> bool:
+        """Return the opposite of ``==``, in place of the tuple's."""
+        return not self == other
+
+    def __hash__(self) -> int:
+        """Hash as the tuple that it equals, or by the arrays that it holds."""
+        return (
+            tuple.__hash__(self) if all(isinstance(x, float) for x in self) else super().__hash__()
+        )
+
+
+Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
+MODELS["Coefficients"] = Coefficients
+
+
+@model
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduced(Model):
+    """The papers' reduced form, in lambda and psi.
+
+    ``phi'' + Omega^2 (lam - cos phi) sin phi - Omega^2 psi cos phi = 0``.
+
+    Parameters
+    ----------
+    lam, psi : float, 1-D array_like or xarray.DataArray
+        Gravity and eccentric centrifugal force against the coupling term, of any sign.
+    Omega_sq : float or array_like, default 1.0
+        Omega^2 in s^-2; negative for a disk that is nearly in line with its shaft.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a real, finite number or an array of numbers.
+
+    Notes
+    -----
+    [Veljovic2015] (12): ``A = Omega^2``, ``B = lam Omega^2``, ``C = psi Omega^2``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.Reduced(0.25, 0.125, 4.0).coefficients()
+    Coefficients(A=4.0, B=1.0, C=0.5)
+    """
+
+    lam: NumberLike
+    psi: NumberLike
+    Omega_sq: NumberLike = 1.0
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="lam", units="1", long_name="lambda = B/A"),
+        Parameter(name="psi", units="1", long_name="psi = C/A"),
+        Parameter(name="Omega_sq", units="s-2", long_name="Omega^2 = A"),
+    )
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """[Veljovic2015] (12)."""
+        return v["Omega_sq"], v["lam"] * v["Omega_sq"], v["psi"] * v["Omega_sq"], 1

@@ -1,0 +1,108 @@
+"""What two rungs of the ladder of laws both compute, compared: each is the witness of the other."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+import xarray as xr
+
+import phasekit as pk
+from phasekit.cells.dispatch import pass_from, passes_of
+from phasekit.cells.states import at_states
+from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.trigonometric import Trigonometric
+from phasekit.systems.system import MODELS
+from phasekit.table.quantities import PASSES, ROWS
+
+SYSTEMS = (
+    pk.Coefficients(1.0, 0.35, 0.12),
+    pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4),
+    pk.StonerWohlfarth(K=1.0, h_x=0.3, h_y=0.2),
+    pk.Pendulum(length=0.5, g=10.0),
+)
+STATES = {
+    "state_phi": [0.3, -1.2, 2.5], "state_dphi": [0.1, 0.0, -4.0], "state_energy": [1.0, 2.0, 3.0],
+    "state_gap": [-0.01, 0.02, 0.3], "time": [0.0, 0.7, 5.0],
+}  # fmt: skip
+CHOICES = {"center": None, "saddle": None, "side": "right"}
+#: Each way on which two rungs compute the same: groups, what they start from, what a call says.
+SHARED = sorted(
+    {
+        (one.groups, tuple(x for x in one.inputs if x in STATES), one.options)
+        for one in PASSES
+        if one.of is Conservative
+    }
+    & {
+        (one.groups, tuple(x for x in one.inputs if x in STATES), one.options)
+        for one in PASSES
+        if one.of is Trigonometric
+    }
+)
+
+
+def as_potential(system):
+    """The same law one rung lower: any potential."""
+    law = system.trigonometric()
+    symbols = {name: sympy.Symbol(name, real=True) for name in law.domains}
+    A, B, C = law.formulas(symbols)
+    phi = sympy.Symbol("phi", real=True)
+    V = -B * sympy.cos(phi) + A / 2 * sympy.cos(phi) ** 2 - C * sympy.sin(phi)
+    values = {name: system.parameters[name] for name in law.parameters}
+    V = V.subs({symbols[name]: sympy.Float(value, 17) for name, value in values.items()})
+    return pk.Potential(V, "phi", {}, period=2 * np.pi)
+
+
+def test_every_rung_below_is_reached():
+    assert len(SHARED) >= 12
+    groups = {group for groups, _, _ in SHARED for group in groups}
+    assert {"equilibria", "separatrices", "orbits", "motion", "potential"} <= groups
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize("way", SHARED, ids=lambda w: "-".join((*w[0], *w[1])))
+def test_the_rungs_agree(system, way):
+    groups, needed, options = way
+    rows = [row for row in ROWS.values() if row.group in groups]
+    states = {name: (name, STATES[name]) for name in needed}
+    results = []
+    for one in (system, as_potential(system)):
+        if options:
+            chosen = {name: CHOICES[name] for name in options}
+            passes = (pass_from(one, groups[0], needed[-1], **chosen)[0],)
+        else:
+            passes = passes_of(one, rows)
+        results.append(in_order(at_states(one, rows, states, passes)))
+    exact, numerical = results
+    names = [row.name for row in rows if row.of is Law]
+    assert names
+    for name in names:
+        a, b = (ds[name].values.astype(float) for ds in results)
+        assert a.shape == b.shape, name
+        if ROWS[name].units == "rad":
+            a, b = (np.exp(1j * x) for x in (a, b))
+        np.testing.assert_allclose(b, a, rtol=2e-11, atol=2e-11, err_msg=name)
+    assert exact.sizes == numerical.sizes
+
+
+def in_order(ds):
+    """Label dims without names, in the order of the angle; absent labels left out."""
+    for dim, name in (("equilibrium", "phi"), ("saddle", "saddle_phi")):
+        if dim in ds.dims and name in ds:
+            order = np.argsort(ds[name].values)
+            order = order[np.isfinite(ds[name].values[order])]
+            ds = ds.isel({dim: order}).drop_vars(dim)
+    return ds
+
+
+def test_a_quantity_of_a_higher_rung_is_refused_below():
+    potential = as_potential(SYSTEMS[0])
+    with pytest.raises(pk.ParameterError, match=r"wants a system with coefficients \(A, B, C\)"):
+        pk.action_angle(potential, 0.1, 0.2)
+    assert "fold_margin" not in pk.equilibria(potential)
+
+
+def test_rungs_are_the_only_thing_that_systems_are_asked_for():
+    rungs = {model.rung for model in MODELS.values()}
+    assert rungs <= {Trigonometric, Conservative, Routhian}
+    assert isinstance(pk.equilibria(SYSTEMS[1]), xr.Dataset)

@@ -1,0 +1,84 @@
+"""A system of the trigonometric law is one class: every function answers for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.labels.arguments import NumberLike
+from phasekit.systems.parameter import Parameter
+from phasekit.systems.system import MODELS, Model, model
+
+
+@pytest.fixture(scope="module")
+def Governor():
+    """A bead on a hoop in a wind: A = w^2, B = g/R, C = a/R."""
+
+    @model
+    @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+    class Governor(Model):
+        R: NumberLike
+        w: NumberLike
+        wind: NumberLike = 0.0
+        g: NumberLike = 9.81
+
+        declared: ClassVar[tuple[Parameter, ...]] = (
+            Parameter(name="R", units="m", long_name="radius of the hoop", positive=True),
+            Parameter(name="w", units="s-1", long_name="angular velocity of the hoop"),
+            Parameter(name="wind", units="m s-2", long_name="acceleration by the wind"),
+            Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
+        )
+
+        @staticmethod
+        def products(v):
+            return v["R"] * v["w"] * v["w"], v["g"], v["wind"], v["R"]
+
+    yield Governor
+    del MODELS["Governor"]
+
+
+def test_every_function_takes_it(Governor, tmp_path):
+    hoop = Governor(R=0.5, w=7.0, wind=1.0)
+    A, B, C = hoop.coefficients()
+    assert (A, B, C) == pytest.approx((49.0, 19.62, 2.0), rel=1e-15)
+    same = pk.Coefficients(A, B, C)
+    for function, arguments in (
+        (pk.equilibria, ()), (pk.separatrices, ()), (pk.orbits, (0.3, 0.5)),
+        (pk.flow, (0.3, 0.5, [0.0, 9.0])), (pk.potential, (0.3,)), (pk.orbit_families, (5,)),
+    ):  # fmt: skip
+        got, want = function(hoop, *arguments), function(same, *arguments)
+        assert len(want.data_vars)
+        for name in want.data_vars:
+            np.testing.assert_array_equal(got[name].values, want[name].values)
+    fold = pk.critical(hoop, "w").critical_fold.sel(fold="plus").item()
+    assert abs(pk.equilibria(hoop.replace(w=fold)).fold_margin.item()) < 1e-13
+    atlas = pk.branches(hoop, "w", (0.0, 20.0))
+    (special,) = np.flatnonzero(atlas.special_kind.values == "fold")
+    assert atlas.special_value.values[special] == pytest.approx(fold, rel=1e-14)
+    plane = pk.bifurcation_set(hoop, "w", "wind", xlim=(1, 20), ylim=(-5, 5))
+    assert "fold" in plane.curve_kind.values
+    eights = pk.figure_eights(hoop, {"w": (1.0, 12.0)})
+    at = eights.event_w.values[eights.event_kind.values == "fold"]
+    np.testing.assert_allclose(at, [fold], rtol=1e-12)
+    branch = pk.continuation(hoop, "w", x0="lower_center", span=(4.0, 12.0))
+    phi = pk.equilibria(hoop.replace(w=12.0)).phi.sel(equilibrium="lower_center").item()
+    assert branch.points.phi.values[-1] == pytest.approx(phi, abs=1e-12)
+    assert len(pk.diagram(hoop, "w", span=(1.0, 12.0))) >= 1
+    store = pk.sweep(hoop, w=np.linspace(1, 12, 7), store=tmp_path / "map.zarr", workers=1)
+    memory = pk.sweep(hoop, w=np.linspace(1, 12, 7))
+    np.testing.assert_array_equal(store.phi.values, memory.phi.values)
+    assert memory.isel(w=3).phasekit.system() == hoop.replace(w=memory.w.values[3].item())
+    assert pk.open_map(tmp_path / "map.zarr").isel(w=2).phasekit.system().R == 0.5
+
+
+def test_every_picture_takes_it(Governor):
+    hoop = Governor(R=0.5, w=7.0, wind=1.0)
+    pk.plot.phase_portrait(hoop)
+    pk.plot.potential_well(hoop)
+    pk.plot.bifurcation_diagram(pk.branches(hoop, "w", (0.0, 20.0)))
+    ds = pk.sweep(hoop, w=np.linspace(1, 12, 5), wind=np.linspace(-1, 1, 4))
+    pk.plot.parameter_map(ds, "topology")
