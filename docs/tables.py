@@ -20,7 +20,8 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import MODELS, Model
-from phasekit.table.quantities import LAW, PASSES, QUANTITIES, Pass, Quantity
+from phasekit.table.quantities import PASSES, QUANTITIES
+from phasekit.table.row import LAW, Pass, Quantity
 
 
 class Point(NamedTuple):

@@ -12,7 +12,7 @@ import phasekit as pk
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.system import MODELS
 from phasekit.table import quantities
-from phasekit.table.quantities import Pass, Quantity
+from phasekit.table.row import Pass, Quantity
 
 matplotlib.use("Agg")
 GUIDE = Path(__file__).parents[1] / "docs" / "contributing.md"

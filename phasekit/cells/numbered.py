@@ -17,7 +17,9 @@ from phasekit.labels.coordinates import LABELS, Labels
 from phasekit.labels.grid import make_grid
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.system import Model
-from phasekit.table.quantities import NUMERICAL_ROWS, Pass, Quantity
+from phasekit.table.numerical import NUMERICAL_ROWS
+from phasekit.table.quantities import variant
+from phasekit.table.row import Pass, Quantity
 
 _POINTWISE = (
     "potential",
@@ -93,7 +95,7 @@ def _most(system: Model, count: Pass) -> tuple[int, int]:
 
 
 def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity:
-    words: dict[str, Any] = {"labels": labels, **row.variant(system.rung)}
+    words: dict[str, Any] = {"labels": labels, **variant(row, system.rung)}
     words |= system.law.words(row.name, row.units, row.long_name)
     if row.name == "n_equilibria":
         words["dtype"] = "int16"

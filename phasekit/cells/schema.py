@@ -16,7 +16,7 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.system import Model
-from phasekit.table.quantities import ROWS, Quantity
+from phasekit.table.row import ROWS, Quantity
 
 
 def dataset_attrs(system: Model) -> dict[str, str]:

@@ -18,7 +18,7 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, numeric
 from phasekit.labels.coordinates import AXES
 from phasekit.systems.as_system import as_system
-from phasekit.table.quantities import Pass, Quantity
+from phasekit.table.row import Pass, Quantity
 
 
 def at_states(

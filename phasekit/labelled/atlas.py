@@ -19,7 +19,7 @@ from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
-from phasekit.table.quantities import FROM_MOTION, ROWS
+from phasekit.table.row import FROM_MOTION, ROWS
 
 #: What special points are called in pictures.
 SPECIAL = {

@@ -16,7 +16,7 @@ from phasekit.labelled.atlas import limits, single
 from phasekit.labels.arguments import unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.systems.system import Model
-from phasekit.table.quantities import FROM_MOTION
+from phasekit.table.row import FROM_MOTION
 
 #: What each kind of curve is.
 CURVES = {

@@ -20,7 +20,9 @@ from phasekit.labels.arguments import NumberLike, bad, numeric, one_of
 from phasekit.systems.as_system import as_system
 from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.system import Model
-from phasekit.table.quantities import DISK, Quantity, select
+from phasekit.table.loads import DISK
+from phasekit.table.quantities import select
+from phasekit.table.row import Quantity
 
 FRAMES = ("disk", "carrier")
 CURVES = ("equilibria", "separatrix", "orbit")

@@ -14,7 +14,7 @@ from phasekit.labels.memory import human
 from phasekit.maps.place import Place
 from phasekit.maps.stored_arrays import codecs
 from phasekit.maps.tile import Tile, compute_cells, release_buffers
-from phasekit.table.quantities import Quantity
+from phasekit.table.row import Quantity
 
 #: Cells of the first sample, more than are ever computed without compiling the kernels. Those that
 #: are timed follow, evenly over the tiles that are left, as large as takes `SAMPLE_SECONDS`.

@@ -9,7 +9,7 @@ import numpy as np
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown, whole
-from phasekit.table.quantities import Quantity
+from phasekit.table.row import Quantity
 
 #: What numbers can be stored as.
 FLOATS = ("float32", "float64")

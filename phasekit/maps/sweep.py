@@ -26,7 +26,8 @@ from phasekit.maps.options import (
 from phasekit.maps.whole import WholeTarget, open_map, target_of
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
-from phasekit.table.quantities import Pass, Quantity, select
+from phasekit.table.quantities import select
+from phasekit.table.row import Pass, Quantity
 
 #: What is computed where nothing is said, as far as the system's law offers it.
 OFFERED = ("equilibria", "separatrices")

@@ -25,7 +25,7 @@ from phasekit.maps.marks import Mark, key_of
 from phasekit.maps.place import Place
 from phasekit.maps.plan_file import GROUP, PLAN_KEY, plan_from
 from phasekit.systems.system import Model
-from phasekit.table.quantities import Pass, Quantity
+from phasekit.table.row import Pass, Quantity
 
 #: Cells that are computed at a time: their results stay in the processor's cache, and memory for
 #: them is used again.

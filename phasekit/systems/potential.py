@@ -29,7 +29,8 @@ from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import MODELS, Model
-from phasekit.table.quantities import NUMERICAL_ROWS, ROWS
+from phasekit.table.numerical import NUMERICAL_ROWS
+from phasekit.table.row import ROWS
 
 if TYPE_CHECKING:
     from phasekit.systems.problem import Problem

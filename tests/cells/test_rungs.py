@@ -13,7 +13,8 @@ from phasekit.cells.states import at_states
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import MODELS
-from phasekit.table.quantities import PASSES, ROWS
+from phasekit.table.quantities import PASSES
+from phasekit.table.row import ROWS
 
 SYSTEMS = (
     pk.Coefficients(1.0, 0.35, 0.12),

@@ -1,0 +1,61 @@
+"""What is computed of any potential, numerically: passes, and rows that say how sure they are."""
+
+from __future__ import annotations
+
+from phasekit.laws.ladder import Conservative
+from phasekit.table.row import FROM_ENERGY, FROM_MOTION, LAW, STATE, Pass, Quantity
+
+_NUMERICAL = "phasekit.phase.numerical.functions:"
+
+#: What results in any potential say besides, by group: how sure they are.
+NUMERICAL_ROWS: dict[str, tuple[Quantity, ...]] = {
+    "equilibria": (
+        Quantity("complete", "equilibria", (), "bool", "1",
+                 "whether it is proved that there are these equilibria and no others",
+                 "bounds of V' and V'' over all pieces; disjoint discs; exact isolation of roots",
+                 "[MooreKearfottCloud2009]; [Smith1970]"),
+    ),
+    "separatrices": (
+        Quantity("winding_area_error", "separatrices", ("saddle",), "float64", "s-1",
+                 "estimated error of the area under one branch", "of its quadrature", FROM_ENERGY),
+        Quantity("lobe_area_error", "separatrices", ("saddle", "side"), "float64", "s-1",
+                 "estimated error of the area inside the separatrix", "of its quadrature",
+                 FROM_ENERGY),
+    ),
+    "orbits": (
+        Quantity("period_error", "orbits", (), "float64", "s",
+                 "estimated error of the period", "of its quadrature", FROM_ENERGY),
+        Quantity("action_error", "orbits", (), "float64", "s-1",
+                 "estimated error of the action", "of its quadrature", FROM_ENERGY),
+    ),
+    "motion": (
+        Quantity("motion_phi_error", "motion", (), "float64", "rad",
+                 "estimated error of the angle", "change of the energy, error of the period",
+                 FROM_MOTION),
+        Quantity("motion_dphi_error", "motion", (), "float64", "s-1",
+                 "estimated error of the angular velocity",
+                 "change of the energy, error of the period", FROM_MOTION),
+    ),
+}  # fmt: skip
+
+PASSES: tuple[Pass, ...] = (
+    *(
+        Pass(_NUMERICAL + name, (LAW, *states), groups, Conservative, options)
+        for name, states, groups, options in (
+            ("most", (), ("labels",), ()),
+            ("phase_space", (), ("equilibria", "separatrices"), ()),
+            ("equilibria", (), ("equilibria",), ()),
+            ("separatrices", (), ("separatrices",), ()),
+            ("potential", ("state_phi",), ("potential",), ()),
+            ("gradient", ("state_phi",), ("potential_gradient",), ()),
+            ("curvature", ("state_phi",), ("potential_curvature",), ()),
+            ("energy", STATE, ("energy_integral",), ()),
+            ("phase_velocity", ("state_phi", "state_energy"), ("phase_velocity",), ()),
+            ("orbits", STATE, ("orbits",), ()),
+            ("flow_with_errors", (*STATE, "time"), ("motion",), ()),
+            ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
+            ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
+            ("separatrix_motion_with_errors", ("time",), ("motion",), ("saddle", "side")),
+        )
+    ),
+)

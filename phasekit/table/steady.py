@@ -1,0 +1,46 @@
+"""Rows of the freely carried disk: steady rotations, at the momentum that it keeps."""
+
+from __future__ import annotations
+
+from phasekit.laws.ladder import Routhian
+from phasekit.table.row import BRANCHES, Pass, Quantity
+
+ROUTH_OF = "Routh's reduction; [Veljovic2015] (11) with omega1 free, corrected"
+
+_FREE = ("beta", "e", "a", "r", "m", "g", "carrier_inertia", "omega1")
+_KEPT = (("momentum", "momentum"),)
+
+# fmt: off
+QUANTITIES: tuple[Quantity, ...] = (
+    Quantity("support_speed", "steady_rotations", BRANCHES, "float64", "s-1",
+             "angular velocity of the support in the steady rotation", "p/M11(phi)", ROUTH_OF,
+             of=Routhian),
+)
+# fmt: on
+
+#: Equilibria of the amended potential, which are steady rotations.
+ROUTH: dict[str, dict[str, str]] = {
+    "phi": {"long_name": "angle of the disk in a steady rotation",
+            "equation": "V' = p^2 M11'/(2 M11^2)"},
+    "kind": {"equation": "sign of V_p''"},
+    "energy": {"units": "J", "long_name": "amended potential at the equilibrium",
+               "equation": "V_p = V + p^2/(2 M11)"},
+    "curvature": {"units": "J", "long_name": "curvature of the amended potential",
+                  "equation": "V_p''"},
+    "natural_frequency": {"equation": "sqrt(V_p''/(M22 - M12^2/M11))"},
+    "exponent": {"equation": "sqrt(-V_p''/(M22 - M12^2/M11))"},
+    "n_equilibria": {"equation": "zeros of M11^2 V' - p^2 M11'/2"},
+}  # fmt: skip
+for _words in ROUTH.values():
+    _words["source"] = ROUTH_OF
+
+PASSES: tuple[Pass, ...] = (
+    *(
+        Pass(f"phasekit.mechanics.steady:{name}", (*_FREE, *more), groups, Routhian, (), _KEPT)
+        for name, more, groups in (
+            ("steady", (), ("equilibria",)),
+            ("support_speed", ("phi",), ("steady_rotations",)),
+            ("most", (), ("labels",)),
+        )
+    ),
+)
