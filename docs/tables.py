@@ -4,56 +4,23 @@ from __future__ import annotations
 
 import inspect
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from enum import IntEnum
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import sympy
 
 import phasekit as pk
 from phasekit import errors
-from phasekit.labelled.atlas import SPECIAL
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.bifurcation_set import CURVES
-from phasekit.labelled.continuation.branch_points import LABELS as TRACED
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import MODELS, Model
 from phasekit.table.quantities import PASSES, QUANTITIES, variant
 from phasekit.table.row import LAW, Pass, Quantity
-
-
-class Point(NamedTuple):
-    """A kind of special point: its label in pictures, what it is, and which functions find it."""
-
-    label: str
-    meaning: str
-    found_by: tuple[str, ...]
-
-
-_MEANING = {
-    "fold": "two equilibria merge and vanish: the branch turns back in the parameter",
-    "branch_point": "two branches cross; their kind of crossing is not decided",
-    "pitchfork": "three equilibria merge into one, on two branches that cross",
-    "transcritical": "two branches cross and exchange their types",
-    "hopf": "a pair of eigenvalues crosses the imaginary axis; periodic orbits begin",
-    "neutral_saddle": "two real eigenvalues sum to zero: no bifurcation, only next to one",
-    "cusp": "two folds meet: three equilibria merge into one",
-    "bogdanov_takens": "a double eigenvalue zero: a fold and a Hopf curve meet",
-    "generalized_hopf": "the first Lyapunov coefficient of a Hopf point is zero",
-    "zero_hopf": "an eigenvalue zero beside a pair on the imaginary axis",
-    "no_force": "A = B = C = 0: every angle is an equilibrium",
-    "end": "the end of the branch; its message says why",
-}
-
-_FINDERS = {"continuation": TRACED, "branches": SPECIAL}
-
-#: Every kind of special point.
-SPECIAL_POINTS: dict[str, Point] = {
-    kind: Point(label, _MEANING[kind], tuple(by for by, has in _FINDERS.items() if kind in has))
-    for kind, label in (TRACED | SPECIAL).items()
-}
 
 
 def pages() -> dict[str, str]:
@@ -63,7 +30,7 @@ def pages() -> dict[str, str]:
     return {
         "quantities": _quantities(),
         "systems": _systems(),
-        "special_points": _special_points(SPECIAL_POINTS),
+        "special_points": _special_points(),
         "codes": _codes(),
     }
 
@@ -252,15 +219,21 @@ def _symbol(name: str) -> str:
 # ------------------------------------------------------------------------------ points, codes
 
 
-def _special_points(points: Mapping[str, Point]) -> str:
+def _special_points() -> str:
+    kinds = KINDS.values()
     rows = [
-        (code(k), code(p.label), plain(p.meaning), codes(p.found_by)) for k, p in points.items()
+        (code(k.name), code(k.label), plain(k.meaning), codes(k.normal_form), codes(k.found_by))
+        for k in kinds
     ]
+    found = [(code(k.name), plain(k.test), plain(k.system)) for k in kinds if k.test]
     return page(
         "# Special points",
         "Kinds of special points, and the labels that they bear in pictures and in "
         "`branch.special(...)`. A point of a continuation is a {py:obj}`phasekit.SpecialPoint`.",
-        table(("kind", "label", "meaning", "found by"), rows),
+        table(("kind", "label", "meaning", "normal form", "found by"), rows),
+        "## How they are found",
+        "A change of the test function brackets a point; the equations are then solved.",
+        table(("kind", "test function", "equations"), found),
         "## Curves in a plane of two parameters",
         "Kinds of the curves that {py:obj}`phasekit.bifurcation_set` finds.",
         table(("kind", "meaning"), [(code(kind), plain(text)) for kind, text in CURVES.items()]),

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import phasekit as pk
-from phasekit.labelled.continuation.branch_points import LABELS
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import MODELS
 from phasekit.table.quantities import PASSES, QUANTITIES
@@ -161,9 +161,11 @@ def test_each_system_has_its_parameters_and_its_law(pages, tables):
 
 
 def test_every_kind_of_special_point_has_a_line(pages):
-    for kind, label in LABELS.items():
-        assert f"| `{kind}` | `{label}` |" in pages["special_points"]
-    assert "| `no_force` | `NF` |" in pages["special_points"]
+    assert {"fold": "LP", "hopf": "H", "no_force": "NF"}.items() <= {
+        kind.name: kind.label for kind in KINDS.values()
+    }.items()
+    for kind in KINDS.values():
+        assert f"| `{kind.name}` | `{kind.label}` |" in pages["special_points"]
 
 
 def test_every_code_has_a_line(pages):

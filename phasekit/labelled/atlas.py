@@ -11,6 +11,7 @@ import xarray as xr
 from phasekit.bifurcation.exact.atlas import Curve, atlas
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.meetings import Meeting
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import EquilibriumKind
 from phasekit.labels.arguments import FloatArray, bad, pair, unknown
@@ -20,17 +21,6 @@ from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
 from phasekit.table.row import FROM_MOTION, ROWS
-
-#: What special points are called in pictures.
-SPECIAL = {
-    "fold": "LP",
-    "pitchfork": "BP",
-    "transcritical": "BP",
-    "branch_point": "BP",
-    "cusp": "CP",
-    "no_force": "NF",
-    "end": "EP",
-}
 
 COMPLETE = (
     "complete: every equilibrium for every value of the parameter in the span lies on one of the "
@@ -234,7 +224,7 @@ def _special(
         ),
         "special_label": variable(
             dims,
-            np.array([SPECIAL[kind] for kind in kinds], LABEL_DTYPE),
+            np.array([KINDS[kind].label for kind in kinds], LABEL_DTYPE),
             {"long_name": "label of the special point"},
         ),
     }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,11 +11,13 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labels.arguments import bad, flag, named, unknown
 from phasekit.plot.parts import labels as words
 from phasekit.plot.parts import style
+from phasekit.plot.parts.style import POINTS_OF
 
 _STABLE: style.Look = {
     "color": style.BLUE,
@@ -47,17 +49,6 @@ _CURVES: dict[str, style.Look] = {
 }
 #: Distance in pixels within which the labels of special points would cover each other.
 _TOUCHING = 8.0
-
-_MARKS = {
-    "LP": ("s", style.YELLOW),
-    "BP": ("^", style.PURPLE),
-    "H": ("o", style.GREEN),
-    "NS": ("D", "white"),
-    "CP": ("v", style.ORANGE),
-    "BT": ("P", style.SKY),
-    "GH": ("h", style.SKY),
-    "ZH": ("X", style.SKY),
-}
 
 
 def branch(
@@ -135,18 +126,12 @@ def branch(
             if special.kind == "end":
                 continue
             place = (float(across[special.index]), float(up[special.index]))
-            marks.setdefault(special.label, []).append(place)
-    for label, places in marks.items():
-        marker, color = _MARKS[label]
+            marks.setdefault(special.kind, []).append(place)
+    for kind, places in marks.items():
+        look = {**POINTS_OF[kind], "label": _key(kind, marks)}
         across, up = np.array(places).T
-        axes.plot(
-            across, up, linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
-            markeredgecolor=style.BLACK, zorder=3 if label == "NS" else 4,
-        )  # fmt: skip
-        handles[label] = Line2D(
-            [], [], linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
-            markeredgecolor=style.BLACK, label=label,
-        )  # fmt: skip
+        axes.plot(across, up, linestyle="none", zorder=3 if kind == "neutral_saddle" else 4, **look)
+        handles[kind] = Line2D([], [], linestyle="none", **look)
     if columns[0][1].name == "phi" and columns[0][1].attrs.get("units") == "rad":
         style.circle_axis(axes, "y", angles)
     for text, spot in _texts(axes, marks) if labels else []:
@@ -248,12 +233,20 @@ def _cuts(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> Any:
     return np.flatnonzero(jump) + 1
 
 
+def _key(kind: str, drawn: Collection[str]) -> str:
+    """What the legend calls a kind: its label, and its name where another has that label too."""
+    label = KINDS[kind].label
+    alone = [KINDS[other].label for other in drawn].count(label) == 1
+    return label if alone else f"{label} {POINTS_OF[kind]['label']}"
+
+
 def _texts(
     axes: Axes, marks: Mapping[str, list[tuple[float, float]]]
 ) -> list[tuple[str, tuple[float, float]]]:
     """Labels and their places; those of points that touch on the page are one text."""
     kept: list[tuple[list[str], tuple[float, float], Any]] = []
-    for label, places in marks.items():
+    for kind, places in marks.items():
+        label = KINDS[kind].label
         for place in places:
             at = axes.transData.transform(place)
             near = [one for one in kept if np.hypot(*(at - one[2])) < _TOUCHING]

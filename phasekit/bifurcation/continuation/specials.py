@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.two_parameters import find_on
+from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
 
@@ -53,8 +54,7 @@ def _find(
 
 def wanted(special: Special, detect: tuple[str, ...]) -> bool:
     """Whether a kind was asked for."""
-    group = {"fold": "fold"} | dict.fromkeys(("hopf", "neutral_saddle", "bogdanov_takens"), "hopf")
-    return group.get(special.kind, "branch_point") in detect
+    return KINDS[special.kind].detected in (None, *detect)
 
 
 def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:

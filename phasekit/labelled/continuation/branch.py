@@ -20,8 +20,9 @@ from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.specials import find
 from phasekit.bifurcation.continuation.start import go_on
+from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.branch_points import LABELS, points_of
+from phasekit.labelled.continuation.branch_points import points_of
 from phasekit.labelled.continuation.special_point import SpecialPoint, special_point
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, whole
@@ -151,8 +152,9 @@ class Branch:
 
     def special(self, label: str) -> tuple[SpecialPoint, ...]:
         """The special points of one label (LP, BP, H, ...) or kind (fold, pitchfork, ...)."""
-        if not isinstance(label, str) or label not in {*LABELS, *LABELS.values()}:
-            raise bad("label", label, f"one of {', '.join(dict.fromkeys(LABELS.values()))}")
+        labels = dict.fromkeys(kind.label for kind in SPECIAL.values())
+        if not isinstance(label, str) or label not in {*SPECIAL, *labels}:
+            raise bad("label", label, f"one of {', '.join(labels)}")
         return tuple(s for s in self.special_points if label in (s.label, s.kind))
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:

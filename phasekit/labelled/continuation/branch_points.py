@@ -15,26 +15,12 @@ from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
-
-#: What special points are called, by their kind.
-LABELS = {
-    "fold": "LP",
-    "branch_point": "BP",
-    "pitchfork": "BP",
-    "transcritical": "BP",
-    "hopf": "H",
-    "neutral_saddle": "NS",
-    "cusp": "CP",
-    "bogdanov_takens": "BT",
-    "generalized_hopf": "GH",
-    "zero_hopf": "ZH",
-    "end": "EP",
-}
 
 
 def wrap(value: FloatArray, period: float) -> FloatArray:
@@ -83,7 +69,7 @@ def points_of(
         gap = np.zeros(curve.size)
         gap[:m] = u[i] - before[:m]
         info[i, trace.ARCLENGTH] = path.info[one.index, trace.ARCLENGTH] + curve.length(gap)
-        label[i] = LABELS[s.kind]
+        label[i] = KINDS[s.kind].label
     places = []
     seen = 0
     for one in specials:
@@ -93,7 +79,7 @@ def points_of(
             places.append(int(mine[seen]))
             seen += 1
     for one, place in zip(specials, places, strict=True):
-        label[place] = LABELS[one.special.kind]
+        label[place] = KINDS[one.special.kind].label
     kappa = np.full(total, np.nan)
     if curve.kind == HOPF:
         kappa[own] = path.u[:, -1]

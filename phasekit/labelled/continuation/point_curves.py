@@ -11,21 +11,15 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run
 from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, make_branch
-from phasekit.labelled.continuation.branch_points import LABELS
 from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
 
-_CURVES = {
-    "fold": FOLD,
-    "hopf": HOPF,
-    "neutral_saddle": HOPF,
-    "branch_point": BRANCH,
-    "pitchfork": BRANCH,
-    "transcritical": BRANCH,
-}
+#: Defining systems of curves, by what special points say of theirs.
+_CURVES = {"fold": FOLD, "hopf": HOPF, "branch_point": BRANCH}
 
 
 def point_curve(
@@ -63,8 +57,11 @@ def point_curve(
     ConvergenceError
         If there is no curve through the point: a branch point that another parameter destroys.
     """
-    if point.kind not in _CURVES:
-        raise bad("point", point.kind, f"one of {', '.join(_CURVES)}")
+    along = KINDS[point.kind].curve
+    if along is None:
+        raise bad(
+            "point", point.kind, f"one of {', '.join(k.name for k in KINDS.values() if k.curve)}"
+        )
     if point.branch.kind != "equilibrium":
         raise bad("point", point.branch.kind, "a point of a branch of equilibria")
     curve, problem = point.branch.known()
@@ -95,7 +92,7 @@ def point_curve(
         high=np.concatenate([curve.high[:n], [bounds[1], high]]),
         options=options,
     )
-    begun = two_parameter_curve(made, point.special, _CURVES[point.kind])
+    begun = two_parameter_curve(made, point.special, _CURVES[along])
     if begun is None:
         raise ConvergenceError(
             f"curve: no curve of {point.kind} points leads on from {point!r} when {parameter} "
@@ -125,7 +122,7 @@ def switch(
     ParameterError
         If it is no branch point, or the direction of the other branch is not known.
     """
-    if LABELS.get(point.kind) != "BP":
+    if KINDS[point.kind].label != "BP":
         raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
     curve, problem = point.branch.known()
     others = point.special.others

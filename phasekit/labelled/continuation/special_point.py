@@ -13,7 +13,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.labelled.continuation.branch_points import LABELS, eigenvalues_at, wrap
+from phasekit.bifurcation.special_points import KINDS
+from phasekit.labelled.continuation.branch_points import eigenvalues_at, wrap
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ class SpecialPoint:
     @property
     def label(self) -> str:
         """LP, BP, H, NS, CP, BT, GH, ZH or EP."""
-        return LABELS[self.kind]
+        return KINDS[self.kind].label
 
     def __getitem__(self, name: str) -> float:
         """A state or parameter by name."""

@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, MultipleLocator, NullLocator
 from matplotlib.transforms import ScaledTranslation
 
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind, Topology
 from phasekit.labels.arguments import bad, flag
 
@@ -30,6 +31,11 @@ Look = dict[str, Any]
 BLACK, GRAY = "#000000", "#6E6E6E"
 BLUE, SKY, GREEN = "#0072B2", "#56B4E9", "#009E73"
 ORANGE, VERMILLION, PURPLE, YELLOW = "#E69F00", "#D55E00", "#CC79A7", "#F0E442"
+
+#: Colors by the names that the registry of special points has for them.
+PALETTE = {
+    "SKY": SKY, "GREEN": GREEN, "ORANGE": ORANGE, "PURPLE": PURPLE, "YELLOW": YELLOW,
+}  # fmt: skip
 
 # Markers of equilibria, by kind.
 POINTS: Mapping[EquilibriumKind, Look] = {
@@ -73,50 +79,22 @@ BRANCHES: Mapping[EquilibriumKind, Look] = {
     },
 }
 
+#: Special points, by kind: as the registry has them.
+POINTS_OF: Mapping[str, Look] = {
+    kind.name: {
+        "marker": kind.marker,
+        "markersize": kind.size,
+        "markerfacecolor": PALETTE.get(kind.face, kind.face),
+        "markeredgecolor": BLACK,
+        "label": kind.name.replace("_", " "),
+    }
+    for kind in KINDS.values()
+    if kind.marker
+}
+
 # Points where equilibria meet.
 MERGERS: Mapping[str, Look] = {
-    "fold": {
-        "marker": "s",
-        "markersize": 7,
-        "markerfacecolor": YELLOW,
-        "markeredgecolor": BLACK,
-        "label": "fold",
-    },
-    "pitchfork": {
-        "marker": "^",
-        "markersize": 8,
-        "markerfacecolor": PURPLE,
-        "markeredgecolor": BLACK,
-        "label": "pitchfork",
-    },
-    "transcritical": {
-        "marker": "X",
-        "markersize": 8,
-        "markerfacecolor": GREEN,
-        "markeredgecolor": BLACK,
-        "label": "transcritical point",
-    },
-    "branch_point": {
-        "marker": "X",
-        "markersize": 8,
-        "markerfacecolor": PURPLE,
-        "markeredgecolor": BLACK,
-        "label": "branch point",
-    },
-    "cusp": {
-        "marker": "*",
-        "markersize": 12,
-        "markerfacecolor": ORANGE,
-        "markeredgecolor": BLACK,
-        "label": "cusp",
-    },
-    "no_force": {
-        "marker": "o",
-        "markersize": 6,
-        "markerfacecolor": "white",
-        "markeredgecolor": BLACK,
-        "label": "no force",
-    },
+    name: POINTS_OF[name] for name in POINTS_OF if "branches" in KINDS[name].found_by
 }
 
 # Equilibria that stay degenerate along a branch.

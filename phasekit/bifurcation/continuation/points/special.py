@@ -11,6 +11,7 @@ from phasekit.bifurcation.continuation.curve import TIGHT, Curve, nullspace
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
 from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
 
@@ -32,6 +33,11 @@ class Special:
     others: tuple[Array, ...] = ()  # tangents of the other branches, at a branch point
     extra: Array | None = None  # the unknowns that its defining system adds
     corank: int = 0  # of f_x
+
+    def __post_init__(self) -> None:
+        """Refuse a kind that nobody knows."""
+        if self.kind not in KINDS:
+            raise ValueError(f"no special point is a {self.kind!r}")
 
 
 def interval_of(curve: Curve, bracket: Bracket) -> tuple[float, float]:

@@ -1,0 +1,126 @@
+"""The registry of special points: one entry a kind, read by the engines, files, pictures, docs.
+
+A kind that has no entry cannot be: a special point of it is refused where it is made. Labels are
+the field's ([Kuznetsov2004]; the names that AUTO and MatCont use).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+#: What `detect=` asks for.
+Group = Literal["fold", "branch_point", "hopf"]
+
+
+@dataclass(frozen=True)
+class PointKind:
+    """A kind of special point: what it is called, what it means, how it is found and drawn."""
+
+    name: str
+    label: str
+    meaning: str
+    #: The function whose sign changes along a branch, and the equations that are solved then.
+    test: str
+    system: str
+    #: Coefficients of its normal form.
+    normal_form: tuple[str, ...] = ()
+    #: matplotlib's marker, its size, and the color inside, by its name in the palette.
+    marker: str = ""
+    size: float = 7.0
+    face: str = "white"
+    #: What has to be detected for it to be looked for; None: whatever is.
+    detected: Group | None = "branch_point"
+    #: The curve of its kind in two parameters.
+    curve: Group | None = None
+    found_by: tuple[str, ...] = ("continuation",)
+
+
+KINDS: dict[str, PointKind] = {}
+
+
+def register(kind: PointKind) -> PointKind:
+    """Add a kind.
+
+    Raises
+    ------
+    ValueError
+        If its name is taken.
+
+    Examples
+    --------
+    >>> register(KINDS["fold"])
+    Traceback (most recent call last):
+    ValueError: the special point 'fold' is registered already
+    """
+    if kind.name in KINDS:
+        raise ValueError(f"the special point {kind.name!r} is registered already")
+    KINDS[kind.name] = kind
+    return kind
+
+
+BOTH = ("continuation", "branches")
+EXACT = ("branches",)
+
+for _kind in (
+    PointKind(
+        "fold", "LP", "two equilibria merge and vanish: the branch turns back in the parameter",
+        "part of the tangent along the parameter", "f = 0, f_x v = 0, |v| = 1",
+        ("a", "b"), "s", 7, "YELLOW", "fold", "fold", BOTH,
+    ),
+    PointKind(
+        "branch_point", "BP", "branches cross; their kind of crossing is not decided",
+        "determinant of f_u, bordered by the tangent", "f + b w = 0, w f_u = 0, |w| = 1",
+        (), "X", 8, "PURPLE", "branch_point", "branch_point", BOTH,
+    ),
+    PointKind(
+        "pitchfork", "BP", "three equilibria merge into one, on two branches that cross",
+        "as of a branch point", "as of a branch point",
+        ("c", "d"), "^", 8, "PURPLE", "branch_point", "branch_point", BOTH,
+    ),
+    PointKind(
+        "transcritical", "BP", "two branches cross and exchange their types",
+        "as of a branch point", "as of a branch point",
+        ("a", "d"), "X", 8, "GREEN", "branch_point", "branch_point", BOTH,
+    ),
+    PointKind(
+        "hopf", "H", "a pair of eigenvalues crosses the imaginary axis; periodic orbits begin",
+        "real part of the complex pair next to the axis", "f = 0, (f_x^2 + k) v = 0, |v| = 1",
+        ("l1", "omega", "d"), "o", 7, "GREEN", "hopf", "hopf",
+    ),
+    PointKind(
+        "neutral_saddle", "NS",
+        "two real eigenvalues sum to zero: no bifurcation, only next to one",
+        "sum of two real eigenvalues", "as of a Hopf point, with k < 0",
+        (), "D", 6, "white", "hopf", "hopf",
+    ),
+    PointKind(
+        "cusp", "CP", "two folds meet: three equilibria merge into one",
+        "quadratic coefficient of the fold", "fold, and the coefficient is zero",
+        (), "*", 12, "ORANGE", None, None, BOTH,
+    ),
+    PointKind(
+        "bogdanov_takens", "BT", "a double eigenvalue zero: a fold and a Hopf curve meet",
+        "w v of the fold; k of the Hopf point", "fold, and w v = 0; Hopf point, and k = 0",
+        (), "P", 9, "SKY", "hopf",
+    ),
+    PointKind(
+        "generalized_hopf", "GH", "the first Lyapunov coefficient of a Hopf point is zero",
+        "first Lyapunov coefficient", "Hopf point, and l1 = 0",
+        (), "h", 9, "SKY", None,
+    ),
+    PointKind(
+        "zero_hopf", "ZH", "an eigenvalue zero beside a pair on the imaginary axis",
+        "determinant of f_x along a Hopf curve, real part of a pair along folds",
+        "Hopf point and fold", (), "X", 9, "SKY", None,
+    ),
+    PointKind(
+        "no_force", "NF", "A = B = C = 0: every angle is an equilibrium",
+        "exact zeros of A, B and C", "A = B = C = 0", (), "o", 6, "white", None, None, EXACT,
+    ),
+    PointKind(
+        "end", "EP", "the end of the branch; its message says why", "", "",
+        detected=None, found_by=BOTH,
+    ),
+):  # fmt: skip
+    register(_kind)
