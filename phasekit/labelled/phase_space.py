@@ -11,17 +11,22 @@ import xarray as xr
 
 from phasekit.cells.dispatch import passes_of
 from phasekit.cells.evaluate import evaluate
+from phasekit.labelled.in_box import equilibria_in_box
+from phasekit.labels.arguments import bad
 from phasekit.systems.as_system import as_system
+from phasekit.systems.problem import Problem
 from phasekit.table.quantities import select
 
 
-def equilibria(system: Any) -> xr.Dataset:
+def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     """All equilibria, their kinds, energies and frequencies, as branches.
 
     Parameters
     ----------
-    system : system
-        Any system.
+    system : system or Problem
+        Any system; or equations ``x' = f(x)``.
+    box : mapping of str to (float, float), optional
+        Of a `Problem`: where to look, by state. States that are angles may be left out: one turn.
 
     Returns
     -------
@@ -47,15 +52,30 @@ def equilibria(system: Any) -> xr.Dataset:
     that a cell has; there is no ``fold_margin``, which belongs to the coefficients (A, B, C), but
     ``complete``: whether it is proved that there are no others.
 
+    Those of a `Problem` in a box are ``x`` on (``equilibrium``, ``state``), with ``eigenvalue``,
+    ``n_unstable`` and ``complete``: interval arithmetic on the formulas proves that there are no
+    others [MooreKearfottCloud2009]. Where it does not, ``complete`` is False and a warning says
+    what is open; so it is where f is code, of which nothing can be proved.
+
     Examples
     --------
     >>> import phasekit as pk
+    >>> lorenz = pk.Problem(
+    ...     ["10*(y - x)", "x*(rho - z) - y", "x*y - 8*z/3"], ["x", "y", "z"], {"rho": 28.0}
+    ... )
+    >>> three = pk.equilibria(lorenz, box={"x": (-50, 50), "y": (-50, 50), "z": (-50, 50)})
+    >>> three.x.sel(state="z").values.round(9).tolist(), three.complete.item()
+    ([27.0, 0.0, 27.0], True)
     >>> eq = pk.equilibria(pk.Coefficients(4.0, 1.0, 0.5))
     >>> eq.n_equilibria.item()
     4
     >>> pk.EquilibriumKind(eq.kind.sel(equilibrium="lower_saddle").item()).name
     'SADDLE'
     """
+    if isinstance(system, Problem):
+        return equilibria_in_box(system, box)
+    if box is not None:
+        raise bad("box", box, "None: all equilibria of a system are found, wherever they are")
     return _of_system("equilibria", system)
 
 
