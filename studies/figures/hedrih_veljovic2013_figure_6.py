@@ -7,8 +7,8 @@ with it the force, greater by tens to hundreds, and puts the curves of the famil
 order: note the scales.
 
 Above the intensity ``|R2| = |R022|``: (17) as printed has Omega^2 before phi'^2. Below the
-force ``|F_B24| |R022|``; F_B24 is printed right. That this is what the figure shows is a reading. Left
-and right have different scales.
+force ``|F_B24| |R022|``; F_B24 is printed right. That this is what the figure shows is a reading.
+Left and right have different scales.
 Parameters: ``hedrih_veljovic.py``, e = 20 mm, a = 50 mm; beta is the family. None is the paper's.
 
 Run: ``python studies/figures/hedrih_veljovic2013_figure_6.py [PICTURE]``
