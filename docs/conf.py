@@ -34,7 +34,7 @@ exclude_patterns = [
 # The list of references stands even where no docstring cites an entry.
 suppress_warnings = ["ref.citation"]
 
-myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
