@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
@@ -21,12 +20,21 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.mathjax",
     "sphinx.ext.viewcode",
+    "sphinx_design",
+    "sphinx_gallery.gen_gallery",
+    "sphinx-mathjax-offline",  # formulas are set without any other host
 ]
-exclude_patterns = ["_build", "jupyter_execute"]
+exclude_patterns = [
+    "_build",
+    "jupyter_execute",
+    "**/sg_execution_times.rst",
+    "sg_execution_times.rst",
+    "gallery/**/*.ipynb",
+]
 # The list of references stands even where no docstring cites an entry.
 suppress_warnings = ["ref.citation"]
 
-myst_enable_extensions = ["amsmath", "dollarmath"]
+myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
@@ -38,15 +46,23 @@ autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_xref_param_type = False
 
-# The pictures of the studies are made here, so that none can be out of date.
 _here = Path(__file__).parent
-(_here / "auto_studies").mkdir(exist_ok=True)
-for _study in sorted(_here.parent.glob("studies/*.py")):
-    if "__main__" not in _study.read_text(encoding="utf-8"):
-        continue  # what the studies have in common
-    _picture = _here / "auto_studies" / f"{_study.stem}.png"
-    _command = [sys.executable, str(_study), str(_picture)]
-    subprocess.run(_command, check=True, stdout=subprocess.DEVNULL)
+
+sphinx_gallery_conf = {
+    "examples_dirs": "../studies",
+    "gallery_dirs": "gallery",
+    "filename_pattern": r"\.py$",
+    "ignore_pattern": r"^(picture|veljovic2015|hedrih_veljovic|hedrih_veljovic_hodographs)\.py$",
+    "subsection_order": ["../studies/questions", "../studies/figures"],
+    "within_subsection_order": "FileNameSortKey",
+    "reset_argv": "study_run.argv",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "remove_config_comments": True,
+    "show_memory": False,
+    "show_signature": False,
+    "plot_gallery": True,
+}
 
 html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"

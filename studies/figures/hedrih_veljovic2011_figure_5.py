@@ -1,21 +1,37 @@
-"""Figure 5 of [HedrihVeljovic2011]: intensity of R022, which is that of R2, over the angle.
+r"""
+HedrihVeljovic2011, figure 5: intensity of R022, which is that of R2, over the angle
+====================================================================================
+
+(6.8) as printed is greater by about :math:`\Omega^2`, which depends on :math:`e` and
+:math:`\beta`.
 
 Left (6.8) as printed, with Omega^2 before phi'^2; right phasekit's; the scales differ.
 Families over e, beta, a, psi.
-Parameters: hedrih_veljovic.py, e = 20 mm, beta = 45 deg, a = 50 mm where they are not the family.
+Parameters: ``hedrih_veljovic.py``, e = 20 mm,
+beta = 45 deg, a = 50 mm where they are not the family.
 No parameter of the disk changes psi alone: there Omega^2 = 4 1/s^2, lambda = 0.4 and the start
 phi20 = 0, phi20' = 5 1/s. None of these numbers is the paper's.
-Run: python studies/hedrih_veljovic2011_figure_5.py [PICTURE]
+
+Run: ``python studies/figures/hedrih_veljovic2011_figure_5.py [PICTURE]``
 """
 
 from __future__ import annotations
 
 import matplotlib.pyplot as plt
 import numpy as np
-from hedrih_veljovic import DISK, Array, acceleration, draw, explain, over_e, panels, save
+from hedrih_veljovic import (
+    DISK,
+    Array,
+    acceleration,
+    circle_axis,
+    draw,
+    explain,
+    over_e,
+    panels,
+    save,
+)
 
 import phasekit as pk
-from phasekit.plot.parts.style import circle_axis
 
 FAMILIES = {
     "e": over_e(),
@@ -48,7 +64,7 @@ def main() -> None:
         u = -pk.gradient(system, phi).potential_gradient.values
         for ax, factor in zip(axes[3], (OMEGA_SQ, 1.0), strict=True):
             ax.plot(phi, np.hypot(u, factor * v), color=color, label=rf"$\psi$ = {psi}")
-            circle_axis(ax, "x", "rad")
+            circle_axis(ax)
     for row in axes:
         row[0].set_ylabel(r"$|R_{022}|$ (s$^{-2}$)")
         explain(row[1], two_ways=False)

@@ -1,8 +1,13 @@
-"""Figure 6 of [Veljovic2015]: several starts at four skew angles, and the speeds that turn over.
+"""
+Veljovic2015, figure 6: several starts at four skew angles, and the speeds that turn over
+=========================================================================================
+
+The rotor was chosen so that these two agree with the paper; the other two follow.
 
 The paper names the initial speeds 1.54 1/s (beta = pi/3) and 2.53 1/s (beta = 0.01 pi) as giving
 progressive motion; with the rotor below they are the thresholds of a start at phi = 0.
-Run: python studies/veljovic2015_figure_6.py [PICTURE]
+
+Run: ``python studies/figures/veljovic2015_figure_6.py [PICTURE]``
 """
 
 from __future__ import annotations

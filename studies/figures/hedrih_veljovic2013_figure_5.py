@@ -1,8 +1,13 @@
-"""Figure 5 of [HedrihVeljovic2013]: kinetic force of A2 across the shaft, for several e.
+"""
+HedrihVeljovic2013, figure 5: kinetic force of A2 across the shaft, for several e
+=================================================================================
+
+(27) as printed has its peak at another angle: five of its eight terms are wrong.
 
 Left the size of (27) as printed, right phasekit's.
-Parameters: hedrih_veljovic.py, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
-Run: python studies/hedrih_veljovic2013_figure_5.py [PICTURE]
+Parameters: ``hedrih_veljovic.py``, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
+
+Run: ``python studies/figures/hedrih_veljovic2013_figure_5.py [PICTURE]``
 """
 
 from __future__ import annotations

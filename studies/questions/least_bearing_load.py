@@ -1,4 +1,9 @@
-"""The least peak load of the bearings over beta and e, and what crossing the fold does to it.
+r"""
+Which skew angle spares the bearings, and what does the fold do to them?
+========================================================================
+
+The least peak load of the bearings over :math:`\beta` and :math:`e`, and what crossing the fold
+does to it.
 
 A disk of 2 kg on a carrier at 300 rpm. "Peak load" is the greatest force in either bearing over the
 winding separatrix, both ways round: the worst that any swing below turning over can reach. That no
@@ -13,19 +18,23 @@ Crossing the fold does nothing to the worst swing: the upper saddle has no part 
 the peak load is continuous there. It is the rotor at rest that it hits. Its upper center is gone; a
 rotor that rested there swings down, and its bearings get a peak load of up to several times what
 they bore. All numbers are printed.
-Run: python studies/least_bearing_load.py [PICTURE]
+
+Run: ``python studies/questions/least_bearing_load.py [PICTURE]``
 """
 
 from __future__ import annotations
 
+import sys
+
 import matplotlib.pyplot as plt
 import numpy as np
-import picture
 import xarray as xr
 
 import phasekit as pk
 from phasekit.plot import bearing_load_map
-from phasekit.plot.parts.style import BLACK, BLUE, GREEN, ORANGE, VERMILLION
+
+# Okabe and Ito's colors, which the color-blind can tell apart.
+BLACK, BLUE, GREEN, ORANGE, VERMILLION = "#000000", "#0072B2", "#009E73", "#E69F00", "#D55E00"
 
 ROTOR = pk.GyroRotorDisk(
     beta=70 * pk.deg, e=0.06, a=0.024, r=0.2, omega1=300 * pk.rpm, m=2.0, half_span=0.2
@@ -147,7 +156,9 @@ def main() -> None:
         "swings below turning over, larger of both bearings",
         fontsize="small",
     )
-    picture.save(figure)
+    path = sys.argv[1] if len(sys.argv) > 1 else "least_bearing_load.png"
+    figure.savefig(path, dpi=150)
+    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
 from matplotlib.figure import Figure
 
 
@@ -13,5 +12,4 @@ def save(figure: Figure) -> None:
     """Save a picture under the name given on the command line, else in the working folder."""
     path = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(Path(sys.argv[0]).stem + ".png")
     figure.savefig(path, dpi=150)
-    plt.close(figure)
     print(f"wrote {path}")

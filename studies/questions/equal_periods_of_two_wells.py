@@ -1,24 +1,34 @@
-"""Two different wells whose orbits have the same period at the same energy.
+r"""
+Can two different wells have the same period?
+=============================================
+
+They can, and always do at equal energy: to all digits, in every system with two wells.
 
 One well is deeper and wider than the other, so their orbits of one energy enclose different areas;
 still both take the same time. The period is 2 pi times the derivative of the action with respect
-to the energy, so the actions differ by a constant: 2 |C|/sqrt(A) where A > 0.
-Run: python studies/equal_periods_of_two_wells.py [PICTURE]
+to the energy, so the actions differ by a constant: :math:`2|C|/\sqrt{A}` where A > 0.
+
+Run: ``python studies/questions/equal_periods_of_two_wells.py [PICTURE]``
 """
 
 from __future__ import annotations
 
+import sys
+
 import matplotlib.pyplot as plt
 import numpy as np
-import picture
 
 import phasekit as pk
 from phasekit.plot import period_energy, potential_well
-from phasekit.plot.parts.style import FAMILIES, WALLS
 
 SYSTEM = pk.Coefficients(A=1.3, B=0.2, C=0.15)
 ENERGY = 0.25
 WELLS = {"lower_well": "lower_center", "upper_well": "upper_center"}
+
+FAMILIES = {
+    "lower_well": {"color": "#0072B2", "linestyle": "-", "linewidth": 2.4, "label": "lower well"},
+    "upper_well": {"color": "#E69F00", "linestyle": (0, (4, 3)), "label": "upper well"},
+}
 
 
 def main() -> None:
@@ -53,13 +63,15 @@ def main() -> None:
         panels[name].axvline(ENERGY, color="gray", linewidth=0.8, zorder=0)
     panels["period"].set(ylim=(4.0, 14.0), xlabel="", title="one period for both wells")
     panels["period"].tick_params(labelbottom=False)
-    panels["action"].axvline(rim, zorder=1, **WALLS["lower"])
+    panels["action"].axvline(rim, zorder=1, color="#D55E00", ls=(0, (5, 2)), lw=1.2)
     panels["action"].set_ylim(bottom=0.0)
     panels["action"].set(xlabel="energy $h$ (s$^{-2}$)", ylabel="action $J$ (rad$^2$/s)")
     panels["action"].set_title(r"two actions, $2C/\sqrt{A}$ apart")
     panels["well"].set_title(f"orbits of energy {ENERGY} s$^{{-2}}$ in either well")
     panels["well"].legend(handles=keys, loc="upper center", ncols=2, frameon=False)
-    picture.save(figure)
+    path = sys.argv[1] if len(sys.argv) > 1 else "equal_periods_of_two_wells.png"
+    figure.savefig(path, dpi=150)
+    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,21 @@
-"""Map of the period over the phase plane.
+"""
+How long does every orbit take?
+===============================
+
+Map of the period over the phase plane.
 
 Every point of the plane is a state; its color is the period of the orbit through it. The period
 grows without bound towards the separatrices, but only like a logarithm.
-Run: python studies/period_map.py [PICTURE]
+
+Run: ``python studies/questions/period_map.py [PICTURE]``
 """
 
 from __future__ import annotations
 
+import sys
+
 import matplotlib.pyplot as plt
 import numpy as np
-import picture
 import xarray as xr
 from matplotlib.colors import LogNorm
 
@@ -49,7 +55,9 @@ def main() -> None:
         print(f"small oscillations about the {center}: {2 * np.pi / float(natural):.6f} s")
     outer = pk.orbit_families(SYSTEM).period.sel(family="outer")
     print(f"round both centers: at least {float(outer.min()):.6f} s")
-    picture.save(figure)
+    path = sys.argv[1] if len(sys.argv) > 1 else "period_map.png"
+    figure.savefig(path, dpi=150)
+    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

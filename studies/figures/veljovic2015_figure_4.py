@@ -1,6 +1,13 @@
-"""Figure 4 of [Veljovic2015]: potential well and phase portrait at beta = 0.01 pi.
+r"""
+Veljovic2015, figure 4: potential well and phase portrait at beta = 0.01 pi
+===========================================================================
 
-Run: python studies/veljovic2015_figure_4.py [PICTURE]
+The two saddles differ in energy by :math:`9\cdot 10^{-5}` s\ :sup:`-2`: the separatrix of the
+lower one is a figure-eight, and that of the upper one winds round it so closely that the two lie
+on one line.
+
+
+Run: ``python studies/figures/veljovic2015_figure_4.py [PICTURE]``
 """
 
 from __future__ import annotations

@@ -1,8 +1,11 @@
-"""Figure 6 of [HedrihVeljovic2011]: hodograph of the rotator R022 for several psi.
+"""
+HedrihVeljovic2011, figure 6: hodograph of the rotator R022 for several psi
+===========================================================================
 
 Left (6.11) as printed, v = Omega^2 phi'^2; right v = phi'^2. Omega^2 = 4 1/s^2, lambda = 0.4,
 start at phi20 = 0 with phi20' = 2.5 1/s: none of these numbers is the paper's.
-Run: python studies/hedrih_veljovic2011_figure_6.py [PICTURE]
+
+Run: ``python studies/figures/hedrih_veljovic2011_figure_6.py [PICTURE]``
 """
 
 from __future__ import annotations

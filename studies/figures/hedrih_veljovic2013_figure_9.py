@@ -1,8 +1,11 @@
-"""Figure 9 of [HedrihVeljovic2013]: couple of the kinetic forces of both bearings.
+"""
+HedrihVeljovic2013, figure 9: couple of the kinetic forces of both bearings
+===========================================================================
 
 Left the size of l [n2, F_A - F_B] of (26) and (27) as printed, right phasekit's, for several e.
-Parameters: hedrih_veljovic.py, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
-Run: python studies/hedrih_veljovic2013_figure_9.py [PICTURE]
+Parameters: ``hedrih_veljovic.py``, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
+
+Run: ``python studies/figures/hedrih_veljovic2013_figure_9.py [PICTURE]``
 """
 
 from __future__ import annotations

@@ -1,8 +1,13 @@
-"""Figure 3 of [Veljovic2015]: the potential for several skew angles beta.
+r"""
+Veljovic2015, figure 3: the potential for several skew angles beta
+==================================================================
+
+With growing :math:`\beta` the well at the top becomes shallow and vanishes.
 
 The curves are E_p of equation (15), which is V - A/2. The start is at rest at phi = pi as the
 caption says (the text has pi/2); the level of that start is drawn for each beta.
-Run: python studies/veljovic2015_figure_3.py [PICTURE]
+
+Run: ``python studies/figures/veljovic2015_figure_3.py [PICTURE]``
 """
 
 from __future__ import annotations

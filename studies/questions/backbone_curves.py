@@ -1,19 +1,28 @@
-"""Backbone curves of the disk: frequency against amplitude, as beta passes its critical value.
+r"""
+How does the frequency of the disk change with its amplitude?
+=============================================================
+
+Backbone curves: frequency against amplitude, for skew angles on either side of the fold at
+:math:`\beta = 0.3664\pi`.
 
 Below the fold the disk can swing about two centers, and both swings end at the saddle between them.
 On the fold the upper center and the lower saddle are gone; the swing about the lower center then
 goes on to the top.
-Run: python studies/backbone_curves.py [PICTURE]
+
+Run: ``python studies/questions/backbone_curves.py [PICTURE]``
 """
 
 from __future__ import annotations
 
+import sys
+
 import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
-from veljovic2015 import DISK, save
 
 import phasekit as pk
+
+DISK = pk.GyroRotorDisk(beta=0.01 * np.pi, e=1.153e-3, a=2e-3, r=0.2, omega1=2.518, g=9.81)
 
 BETAS = {
     "0.01": 0.01,
@@ -73,7 +82,9 @@ def main() -> None:
         alignment="left",
         loc="upper right",
     )
-    save(figure, r"$\beta$, but for 0.36 $\pi$ and 0.38 $\pi$, which are chosen here")
+    path = sys.argv[1] if len(sys.argv) > 1 else "backbone_curves.png"
+    figure.savefig(path, dpi=150)
+    print(f"wrote {path}")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,14 @@
-"""Figure 4 of [HedrihVeljovic2013]: axial kinetic force of the bearing A2, for several e.
+r"""
+HedrihVeljovic2013, figure 4: axial kinetic force of the bearing A2, for several e
+==================================================================================
+
+(19) names the rotators of other moments: its curves jump where :math:`\cos\varphi_2` changes
+sign. The correct force falls and rises with :math:`\cos\varphi_2` on the two ways round.
 
 Left (19) as printed, with the rotators of the deviation moments and without r0; right phasekit's.
-Parameters: hedrih_veljovic.py, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
-Run: python studies/hedrih_veljovic2013_figure_4.py [PICTURE]
+Parameters: ``hedrih_veljovic.py``, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
+
+Run: ``python studies/figures/hedrih_veljovic2013_figure_4.py [PICTURE]``
 """
 
 from __future__ import annotations

@@ -1,7 +1,12 @@
-"""Figure 5 of [Veljovic2015]: one start, several skew angles beta.
+"""
+Veljovic2015, figure 5: one start, several skew angles beta
+===========================================================
+
+The study prints where each motion turns.
 
 Each curve is the level through phi0 = pi/4, dphi0 = pi/12 1/s.
-Run: python studies/veljovic2015_figure_5.py [PICTURE]
+
+Run: ``python studies/figures/veljovic2015_figure_5.py [PICTURE]``
 """
 
 from __future__ import annotations

@@ -1,10 +1,17 @@
-"""Figure 6 of [HedrihVeljovic2013]: kinetic force of B2 "in the direction of R2", for several beta.
+r"""
+HedrihVeljovic2013, figure 6: kinetic force of B2 "in the direction of R2", for several beta
+============================================================================================
 
-Above the intensity |R2| = |R022|: (17) as printed has Omega^2 before phi'^2. Below the
-force |F_B24| |R022|; F_B24 is printed right. That this is what the figure shows is a reading. Left
-and right have different scales.
-Parameters: hedrih_veljovic.py, e = 20 mm, a = 50 mm; beta is the family. None is the paper's.
-Run: python studies/hedrih_veljovic2013_figure_6.py [PICTURE]
+The factor :math:`\Omega^2` that (17) has before :math:`\dot\varphi_2^2` makes the intensity, and
+with it the force, greater by tens to hundreds, and puts the curves of the family in another
+order: note the scales.
+
+Above the intensity ``|R2| = |R022|``: (17) as printed has Omega^2 before phi'^2. Below the
+force ``|F_B24| |R022|``; F_B24 is printed right. That this is what the figure shows is a reading.
+Left and right have different scales.
+Parameters: ``hedrih_veljovic.py``, e = 20 mm, a = 50 mm; beta is the family. None is the paper's.
+
+Run: ``python studies/figures/hedrih_veljovic2013_figure_6.py [PICTURE]``
 """
 
 from __future__ import annotations

@@ -1,10 +1,17 @@
-"""Figure 8 of [HedrihVeljovic2011]: angular velocity of the rotator R022 for several a.
+r"""
+HedrihVeljovic2011, figure 8: angular velocity of the rotator R022 for several a
+================================================================================
+
+(6.12), as far as it is printed, lacks :math:`\psi`: the curves of all distances :math:`a` all but
+coincide.
 
 The velocity is relative to the disk. Left (6.12) as far as it is printed: without psi, which is
 right for a = 0 only; right phasekit's.
-Parameters: hedrih_veljovic.py, e = 20 mm, beta = 45 deg; a is the family. None of these numbers is
+Parameters: ``hedrih_veljovic.py``, e = 20 mm,
+beta = 45 deg; a is the family. None of these numbers is
 the paper's.
-Run: python studies/hedrih_veljovic2011_figure_8.py [PICTURE]
+
+Run: ``python studies/figures/hedrih_veljovic2011_figure_8.py [PICTURE]``
 """
 
 from __future__ import annotations

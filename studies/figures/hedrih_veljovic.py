@@ -22,7 +22,6 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 import phasekit as pk
-from phasekit.plot.parts.style import circle_axis
 
 Array = NDArray[np.float64]
 Formula = Callable[[pk.GyroRotorDisk, Array, Array], Array]
@@ -106,7 +105,14 @@ def draw(
         plain = name.replace("$", "").replace("\\", "").replace("^circ", " deg")
         print(f"{what}, {plain}: at most {greatest[1]:.4g}, as printed {greatest[0]:.4g}")
     for ax in axes:
-        circle_axis(ax, "x", "rad")
+        circle_axis(ax)
+
+
+def circle_axis(ax: Axes) -> None:
+    """Show the whole circle, with ticks at quarter turns."""
+    ticks = [r"$-\pi$", r"$-\pi/2$", "0", r"$\pi/2$", r"$\pi$"]
+    ax.set_xticks(np.linspace(-np.pi, np.pi, 5), ticks)
+    ax.set_xlim(-np.pi, np.pi)
 
 
 def explain(ax: Axes, *, two_ways: bool = True, title: str | None = None) -> None:

@@ -1,10 +1,13 @@
-"""Figure 8 of [HedrihVeljovic2013]: kinetic force of B2 across the shaft, for several e.
+"""
+HedrihVeljovic2013, figure 8: kinetic force of B2 across the shaft, for several e
+=================================================================================
 
 Left the size of (26) as printed, right phasekit's. The captions of Figures 7 and 8 are alike, but
 for "without intersection" in that of 8; so here the axes meet in 7, and do not in 8.
-Parameters: hedrih_veljovic.py, beta = 45 deg, a = 50 mm: the axes do not meet; e is the
+Parameters: ``hedrih_veljovic.py``, beta = 45 deg, a = 50 mm: the axes do not meet; e is the
 family. None is the paper's.
-Run: python studies/hedrih_veljovic2013_figure_8.py [PICTURE]
+
+Run: ``python studies/figures/hedrih_veljovic2013_figure_8.py [PICTURE]``
 """
 
 from __future__ import annotations

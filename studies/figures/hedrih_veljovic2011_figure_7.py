@@ -1,9 +1,12 @@
-"""Figure 7 of [HedrihVeljovic2011]: hodograph of the rotator R022 for several a.
+"""
+HedrihVeljovic2011, figure 7: hodograph of the rotator R022 for several a
+=========================================================================
 
 Left (6.11) as printed, v = Omega^2 phi'^2; right v = phi'^2. The disk: beta = 80 deg, e = 50 mm,
 r = 100 mm, omega1 = 5 1/s, g = 9.81 m/s^2, start at rest at phi20 = 75 deg: none of these
 numbers is the paper's.
-Run: python studies/hedrih_veljovic2011_figure_7.py [PICTURE]
+
+Run: ``python studies/figures/hedrih_veljovic2011_figure_7.py [PICTURE]``
 """
 
 from __future__ import annotations
