@@ -1,0 +1,38 @@
+"""The examples on the pages run as they stand, one after the other, as a reader types them.
+
+Notebooks run when the site is built, those of the contributing guide in tests/test_contributing.py.
+"""
+
+import re
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import pytest
+
+matplotlib.use("Agg")
+DOCS = Path(__file__).parents[2] / "docs"
+BLOCK = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
+PAGES = [
+    path.name
+    for path in sorted(DOCS.glob("*.md"))
+    if path.name != "contributing.md" and BLOCK.search(path.read_text(encoding="utf-8"))
+]
+#: Sizes that take long, and what they are here.
+SMALLER = {"10_001": "101"}
+
+
+def test_there_are_pages_with_examples():
+    assert {"index.md", "continuation.md", "large_maps.md"} <= set(PAGES)
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("name", PAGES)
+def test_the_examples_of_a_page_run(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = {"__name__": "example"}
+    for number, block in enumerate(BLOCK.findall((DOCS / name).read_text(encoding="utf-8"))):
+        for size, less in SMALLER.items():
+            block = block.replace(size, less)
+        exec(compile(block, f"{name}, example {number + 1}", "exec"), names)
+    plt.close("all")
