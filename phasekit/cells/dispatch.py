@@ -18,8 +18,8 @@ from phasekit.laws.ladder import Law
 from phasekit.systems.as_system import stands_on
 from phasekit.systems.system import Model
 from phasekit.table import quantities
-from phasekit.table.quantities import plan_passes
-from phasekit.table.row import LAW, ROWS, Pass, Quantity
+from phasekit.table.quantities import ROWS, plan_passes
+from phasekit.table.row import LAW, Pass, Quantity
 
 CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
 SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]

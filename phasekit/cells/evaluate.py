@@ -26,8 +26,8 @@ from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import Grid, make_grid, variable
 from phasekit.labels.memory import refuse_too_large
 from phasekit.systems.system import Model
-from phasekit.table.quantities import pass_of
-from phasekit.table.row import ROWS, Pass, Quantity
+from phasekit.table.quantities import ROWS, pass_of
+from phasekit.table.row import Pass, Quantity
 
 
 @dataclass

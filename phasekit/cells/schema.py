@@ -16,7 +16,8 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.system import Model
-from phasekit.table.row import ROWS, Quantity
+from phasekit.table.quantities import ROWS
+from phasekit.table.row import Quantity
 
 
 def dataset_attrs(system: Model) -> dict[str, str]:

@@ -20,7 +20,8 @@ from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
-from phasekit.table.row import FROM_MOTION, ROWS
+from phasekit.table.quantities import ROWS
+from phasekit.table.row import FROM_MOTION
 
 COMPLETE = (
     "complete: every equilibrium for every value of the parameter in the span lies on one of the "

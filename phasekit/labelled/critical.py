@@ -17,7 +17,8 @@ from phasekit.labels.arguments import FloatArray, unknown
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
-from phasekit.table.row import ROWS, Pass
+from phasekit.table.quantities import ROWS
+from phasekit.table.row import Pass
 
 _CRITICAL = ("critical_fold", "critical_sign_change")
 

@@ -16,7 +16,8 @@ from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
 from phasekit.phase.exact.separatrices import phase_space
 from phasekit.systems.as_system import as_system
-from phasekit.table.row import ROWS, Pass
+from phasekit.table.quantities import ROWS
+from phasekit.table.row import Pass
 
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
 CLUSTER = 4

@@ -9,8 +9,8 @@ from math import prod
 from phasekit.cells.evaluate import Box
 from phasekit.errors import ParameterError
 from phasekit.labels.memory import SHARE, available_memory, human
-from phasekit.table.quantities import plan_passes
-from phasekit.table.row import ROWS, Pass, Quantity
+from phasekit.table.quantities import ROWS, plan_passes
+from phasekit.table.row import Pass, Quantity
 
 #: Cells of a tile, where its results stay below `MOST_BYTES`. Small maps are cut as well, so that
 #: there is work for several processes, but not into tiles below `FEWEST_CELLS`.

@@ -14,7 +14,7 @@ from typing import Any
 from phasekit.errors import ParameterError
 from phasekit.maps.parts import Part
 from phasekit.maps.plan import LAYOUT, Plan
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import ROWS
 
 #: The group that holds the plan, and the marks of tiles that are done; its file and attribute.
 GROUP = "sweep"

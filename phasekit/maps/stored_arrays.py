@@ -28,7 +28,8 @@ from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan, fingerprint
 from phasekit.maps.plan_file import GROUP, PLAN_KEY, plan_bytes, plan_from
 from phasekit.systems.system import MODELS
-from phasekit.table.row import ROWS, Quantity
+from phasekit.table.quantities import ROWS
+from phasekit.table.row import Quantity
 
 #: Names of files in a Zarr v3 store: metadata, chunks, and what a killed process left.
 _OWN = re.compile(r"zarr\.json|c?(\.?\d+)*|part\d+|.*\.[0-9a-f]{32}\.partial")

@@ -30,7 +30,7 @@ from phasekit.phase.numerical.formula import Formula, check_period, make_formula
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import MODELS, Model
 from phasekit.table.numerical import NUMERICAL_ROWS
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import ROWS
 
 if TYPE_CHECKING:
     from phasekit.systems.problem import Problem

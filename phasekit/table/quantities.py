@@ -15,7 +15,7 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.table import loads, numerical, orbits, phase_space, steady
-from phasekit.table.row import ROWS, Pass, Quantity
+from phasekit.table.row import REGISTERED, Pass, Quantity
 
 QUANTITIES: tuple[Quantity, ...] = (
     *phase_space.QUANTITIES,
@@ -23,6 +23,8 @@ QUANTITIES: tuple[Quantity, ...] = (
     *loads.QUANTITIES,
     *steady.QUANTITIES,
 )
+#: Every row by its name.
+ROWS = REGISTERED
 ROWS.update({row.name: row for row in QUANTITIES})
 
 #: Passes over the cells; `phasekit.cells.dispatch` finds the one for a system.

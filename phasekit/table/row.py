@@ -35,7 +35,7 @@ FROM_ENERGY = "[Veljovic2015] (14), corrected coefficients"
 FROM_MOTION = "[Veljovic2015] (12), corrected coefficients"
 
 #: Every row by its name; filled where the table is put together.
-ROWS: dict[str, Quantity] = {}
+REGISTERED: dict[str, Quantity] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ class Pass:
         results = result if len(self.groups) > 1 else (result,)
         named: dict[str, Any] = {}
         for group, part in zip(self.groups, results, strict=True):
-            names = [row.name for row in ROWS.values() if row.group == group]
+            names = [row.name for row in REGISTERED.values() if row.group == group]
             if names[0] in getattr(part, "_fields", ()):
                 named.update(part._asdict())
             else:

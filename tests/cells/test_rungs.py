@@ -13,8 +13,7 @@ from phasekit.cells.states import at_states
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import MODELS
-from phasekit.table.quantities import PASSES
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import PASSES, ROWS
 
 SYSTEMS = (
     pk.Coefficients(1.0, 0.35, 0.12),

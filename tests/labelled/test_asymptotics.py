@@ -6,8 +6,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.phase.exact import asymptotics as floor
-from phasekit.table.quantities import select
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import ROWS, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)
 SINGLE = pk.Coefficients(0.4, 1.2, 0.7)

@@ -57,7 +57,7 @@ def test_the_axis_of_the_parameter_itself_does_not_count():
 
 def test_attributes_of_the_table_are_left_alone():
     pk.critical(DISK, "beta")
-    from phasekit.table.row import ROWS
+    from phasekit.table.quantities import ROWS
 
     assert ROWS["critical_fold"].units == "1"
     assert "parameter" not in ROWS["critical_fold"].attrs

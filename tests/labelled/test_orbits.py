@@ -9,8 +9,7 @@ import phasekit as pk
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.phase.exact import action_angle as angle_floor
 from phasekit.phase.exact import orbits as floor
-from phasekit.table.quantities import plan_passes, select
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import ROWS, plan_passes, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)  # figure-eight
 SINGLE = pk.Coefficients(0.4, 1.2, 0.7)  # one saddle

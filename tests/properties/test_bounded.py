@@ -16,7 +16,7 @@ import phasekit as pk
 from phasekit.cells.dispatch import is_offered, passes_of
 from phasekit.labels.coordinates import STATES
 from phasekit.loads import functions
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import ROWS
 
 CELLS = int(os.environ.get("PHASEKIT_EXTREME", "6"))
 SPECIAL = [0.0, -0.0, 1e16, 1e300, -1e300, 1.7e308, 5e-324, np.inf, -np.inf, np.nan]

@@ -8,8 +8,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.phase.exact.equilibria import Equilibria
 from phasekit.phase.exact.separatrices import Separatrices
 from phasekit.table import quantities as table
-from phasekit.table.quantities import PASSES, QUANTITIES, plan_passes, select
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import PASSES, QUANTITIES, ROWS, plan_passes, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
