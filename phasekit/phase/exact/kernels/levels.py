@@ -61,8 +61,8 @@ SOME, ALL = 1e-3, math.inf
 LEVEL_TO = 1e-15
 # What the rounding of an angle changes in the energy above a saddle, in units of -V''.
 NOISE = 2e-31
-# Smaller energies above an equilibrium, degenerate or not, are raised to these, lest they
-# underflow.
+# Motion in full with less energy above an equilibrium, degenerate or not, is not computed, as
+# products of it underflow.
 LEAST, TINIEST = 1e-290, 1e-307
 
 
@@ -72,15 +72,15 @@ def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
     w[REFERENCE] = j
     if j == LOWER_CENTER or j == UPPER_CENTER:
         gap = max(gap, 0.0)
-    least = LEAST if w[CURVATURE + j] == 0.0 else TINIEST
-    if gap != 0.0 and abs(gap) < least:
-        gap = least if gap > 0.0 else -least
     w[GAP] = gap
     w[PLACE] = place
     slope = w[CURVATURE + j]
     mode = TURN if kind == ROTATION else SWING
     if gap == 0.0 or (slope > 0.0 and gap < HARMONIC_TO * min(slope, slope * slope * slope)):
         mode = HARMONIC if slope > 0.0 else REST
+    least = LEAST if slope == 0.0 else TINIEST
+    if abs(gap) < least and (mode == SWING or mode == TURN):
+        mode = INVALID
     w[MODE] = ASYMPTOTE if kind == ASYMPTOTIC else mode
 
 

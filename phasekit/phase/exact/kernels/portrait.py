@@ -18,6 +18,7 @@ from phasekit.phase.exact.kernels import levels as lv
 from phasekit.phase.exact.kernels import motion as mo
 from phasekit.phase.exact.kernels import orbits as ob
 from phasekit.phase.exact.kernels import system as sy
+from phasekit.phase.exact.kernels.magnify import enter
 
 Index = npt.NDArray[np.int64]
 
@@ -70,10 +71,11 @@ def orbits(
         if i != last:
             valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
-        code = lv.classify(phi0[k], dphi0[k], valid, w)
+        code = enter(phi0[k], dphi0[k], valid, w)
+        last = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, w[lv.ENERGY] / w[sy.UNIT] / w[sy.UNIT], w, out)
+        write_orbit(k, code, w[lv.ENERGY], w, out)
 
 
 @kernel
@@ -119,6 +121,7 @@ def levels(
         code = lv.classify_level(j, gap, center, slack, present, w)
         ob.shape(w)
         ob.finish(w)
+        code = code if w[lv.MODE] != lv.INVALID else lv.NOT_COMPUTED
         value = gap + energy[i, j] if code != lv.NOT_COMPUTED else math.nan
         write_orbit(k, code, value, w, out)
 
@@ -174,11 +177,14 @@ def flow(
             if i != system:
                 valid = load_system(i, a, b, c, phi, curvature, w)
                 system = i
-            lv.classify(phi0[j], dphi0[j], valid, w)
+            enter(phi0[j], dphi0[j], valid, w)
+            system = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
             ob.shape(w)
             mo.begin(w)
             last = j
-        motion_phi[k], motion_dphi[k] = mo.after(t[k], w)
+        local, rate = mo.after(t[k], w)
+        motion_phi[k] = local * w[sy.ZOOM]
+        motion_dphi[k] = rate * w[sy.ZOOM]
 
 
 @kernel
@@ -207,13 +213,16 @@ def action_angle(
         if i != last:
             valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
-        code = lv.classify(phi0[k], dphi0[k], valid, w)
+        code = enter(phi0[k], dphi0[k], valid, w)
+        last = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, w[lv.ENERGY] / w[sy.UNIT] / w[sy.UNIT], w, out)
+        write_orbit(k, code, w[lv.ENERGY], w, out)
         family[k] = aa.family(w)
         angle[k] = aa.angle(w)
         twist[k] = aa.twist(w)
+        if w[lv.MODE] == lv.SWING:
+            twist[k] = twist[k] / w[sy.ZOOM] / w[sy.ZOOM]
 
 
 @kernel
