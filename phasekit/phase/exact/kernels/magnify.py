@@ -14,7 +14,7 @@ import numpy as np
 
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.elementary import cbrt, power_of_two_scale
-from phasekit.phase.exact.kernels.levels import ENERGY, INVALID, MODE, NOT_COMPUTED, classify
+from phasekit.phase.exact.kernels.levels import ENERGY, classify
 from phasekit.phase.exact.kernels.system import (
     CURVATURE,
     LARGEST,
@@ -29,7 +29,7 @@ from phasekit.phase.exact.kernels.system import (
 )
 
 # Angles below this are magnified to about that.
-SMALL, SIZE = 2.0**-200, 2.0**-100
+SMALL, SIZE = 2.0**-110, 2.0**-100
 
 
 @inline
@@ -41,9 +41,6 @@ def enter(phi: float, dphi: float, valid: bool, w: Array) -> int:
         scale = magnify(phi, dphi, w)
     code = classify(phi * scale, dphi * scale, valid, w)
     w[ENERGY] = w[ENERGY] / unit / unit
-    if w[MODE] == INVALID:
-        w[ENERGY] = math.nan
-        return NOT_COMPUTED
     return code
 
 

@@ -38,10 +38,14 @@ def load_system(
 def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> None:
     """Results of cell k."""
     kind, orbit_energy, period, frequency, action, phi_min, phi_max = out
-    kind[k] = code
-    orbit_energy[k] = energy
-    period[k] = TWO_PI / w[ob.OMEGA]
-    frequency[k] = w[ob.OMEGA]
+    known = w[lv.MODE] != lv.INVALID
+    kind[k] = code if known else lv.NOT_COMPUTED
+    orbit_energy[k] = energy if known else math.nan
+    omega = w[ob.OMEGA]
+    period[k] = TWO_PI / omega
+    if omega > 0.0 and not period[k] < math.inf:
+        period[k] = math.nan  # no double holds it
+    frequency[k] = omega
     action[k] = w[ob.ACTION]
     phi_min[k] = w[ob.PHI_MIN]
     phi_max[k] = w[ob.PHI_MAX]
@@ -121,9 +125,7 @@ def levels(
         code = lv.classify_level(j, gap, center, slack, present, w)
         ob.shape(w)
         ob.finish(w)
-        code = code if w[lv.MODE] != lv.INVALID else lv.NOT_COMPUTED
-        value = gap + energy[i, j] if code != lv.NOT_COMPUTED else math.nan
-        write_orbit(k, code, value, w, out)
+        write_orbit(k, code, gap + energy[i, j], w, out)
 
 
 @kernel
