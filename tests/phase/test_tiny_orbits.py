@@ -67,7 +67,7 @@ def test_motion_and_angle_next_to_a_cusp(a):
 
 
 def test_the_unfolding_of_a_cusp_has_one_shape():
-    """phi = C^(1/3) x and t = C^(-1/3) u make one motion of all: x'' = 1 - x^3/2."""
+    """All have one motion in phi = C^(1/3) x and t = C^(-1/3) u: x'' = 1 - x^3/2."""
     c = np.array([1e-21, 1e-60, 1e-120, 1e-210, 1e-300])
     size = np.array([float(mp.cbrt(mp.mpf(x))) for x in c])
     got = orbits(1.0, 1.0, c, 0.0, 0.0)

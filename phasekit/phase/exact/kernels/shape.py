@@ -64,8 +64,8 @@ from phasekit.phase.exact.kernels.system import (
 # distance, its ratio (libration: sqrt(V'(high)/V'(low)), rotation: sqrt(v(fast)/v(slow))), and
 # 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the factors of a libration: sum
 # of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of its own, and its zeros at
-# both turning points; of a rotation, cosines (Z) and sines (TAU, REST_R) of half the angles from the
-# reference to the slow and to the fast point. The number of Gauss steps. What `orbits` makes of all
+# both turning points; of a rotation, cosines (Z) and sines (TAU, REST_R) of half the angles from
+# reference to slow and fast point. The number of Gauss steps. What `orbits` makes of all
 # that. What the reference's angle misses, Z_HIGH - Z_LOW,
 # and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
