@@ -18,6 +18,7 @@ from phasekit.cells.schema import restore
 from phasekit.cells.tiling import tiles
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import bad, flag
+from phasekit.maps import netcdf
 from phasekit.maps.place import NETCDF, ZARR, Place, place_of
 from phasekit.maps.stored_arrays import read_plan, reason, refuse_strange, zarr_group
 from phasekit.maps.unfinished import open_stored
@@ -37,7 +38,7 @@ class WholeTarget:
         if not os.access(self.path.parent, os.W_OK):
             raise StoreError(f"store: the folder {self.path.parent} cannot be written to")
         if place.is_netcdf:
-            _need_h5netcdf()
+            netcdf.need_h5netcdf()
         self._refuse_existing()
 
     def _refuse_existing(self) -> None:
@@ -66,8 +67,7 @@ class WholeTarget:
                 if self.path.suffix == ZARR:
                     ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
                 else:
-                    checked = _with_checksums(ds)
-                    checked.to_netcdf(fresh, mode="w", format="NETCDF4", engine="h5netcdf")
+                    netcdf.write(ds, fresh)
                 self._refuse_existing()  # it may have appeared while the map was computed
                 if self.path.is_dir():
                     self.path.rename(Path(scratch) / "replaced")
@@ -76,15 +76,6 @@ class WholeTarget:
             if isinstance(error, StoreError):
                 raise
             raise StoreError(f"store: {self.path} was not written: {error}") from error
-
-
-def _with_checksums(ds: xr.Dataset) -> xr.Dataset:
-    """Ask for checksums of arrays in HDF5, which has none for scalars and strings."""
-    ds = ds.copy()
-    for variable in ds.variables.values():
-        if variable.size and variable.ndim and variable.dtype.kind in "biuf":
-            variable.encoding = {**variable.encoding, "fletcher32": True}
-    return ds
 
 
 def target_of(store: Any) -> Place:
@@ -100,8 +91,9 @@ def open_map(
 ) -> xr.Dataset:
     """Open a stored map as it was when it was written, dtypes and attributes included.
 
-    Of a Zarr store, coordinates and metadata are compared with what was written, and of each
-    finished tile the presence and size of its files; values when they are read, by checksums.
+    Coordinates and metadata are compared with what was written, of netCDF files all but arrays of
+    numbers, and of each finished tile of a Zarr store the presence and size of its files; values
+    when they are read, by checksums.
 
     Parameters
     ----------
@@ -112,8 +104,8 @@ def open_map(
         Chunks of dask arrays, as in `xarray.open_dataset`. Default: no dask; values are read
         when they are used.
     verify : bool, default False
-        Read all files at once and compare their checksums, which in netCDF files only arrays of
-        numbers have. Files of phasekit before checksums are only read through.
+        Read all files at once and compare their checksums. Files of phasekit before checksums are
+        only read through.
 
     Returns
     -------
@@ -145,8 +137,7 @@ def open_map(
         raise StoreError(f"store: {place.name} does not exist")
     with _as_store_error(place.name):
         if place.path is not None and not place.path.is_dir():
-            _need_h5netcdf()
-            ds = xr.open_dataset(place.path, engine="h5netcdf", chunks=chunks)
+            ds = netcdf.open_netcdf(place.path, chunks)
             plan = None
         else:
             source = place.open(read_only=True)
@@ -210,13 +201,3 @@ def _is_map_file(path: Path) -> bool:
             return MODEL in file.attrs
     except (OSError, ValueError, KeyError, TypeError):
         return False
-
-
-def _need_h5netcdf() -> None:
-    try:
-        import h5netcdf  # noqa: F401
-    except ImportError:
-        raise StoreError(
-            "store: netCDF needs h5netcdf and h5py: pip install 'phasekit[netcdf]'; "
-            "or use a name that ends in .zarr"
-        ) from None

@@ -691,6 +691,54 @@ def test_bits_that_flip_in_arrays_of_netcdf_files_are_noticed(tmp_path, capsys):
         assert main(["info", str(path), "--verify"]) == 2
 
 
+def test_bits_that_flip_beside_the_arrays_of_netcdf_files_are_noticed(tmp_path):
+    """Scalars, texts and attributes, for which HDF5 has no checksums."""
+    path = tmp_path / "map.nc"
+    ds = pk.sweep(DISK, beta=np.linspace(0.1, 0.9, 9), store=path).load()
+    ds.close()
+    with pk.open_map(path) as opened:
+        xr.testing.assert_identical(opened.load(), ds)
+    intact = path.read_bytes()
+    for text in (b"phasekit_model", b"GyroRotorDisk", b"lower_saddle", b"rad", b"flag_meanings",
+                 ds.e.values.tobytes(), ds.omega1.values.tobytes()):  # fmt: skip
+        place = intact.index(text)
+        for bit in (1, 64):
+            data = bytearray(intact)
+            data[place + len(text) // 2] ^= bit
+            other = tmp_path / f"{place}-{bit}.nc"
+            other.write_bytes(data)
+            with pytest.raises(pk.StoreError, match=other.name):
+                pk.open_map(other)
+    xr.testing.assert_identical(pk.open_map(path, verify=True).load(), ds)
+
+
+@pytest.mark.parametrize("chunks", [None, {}])
+def test_damage_of_netcdf_files_that_are_open_is_a_store_error(tmp_path, chunks):
+    path = tmp_path / "map.nc"
+    ds = pk.sweep(DISK, beta=np.linspace(0.1, 0.9, 9), store=path).load()
+    ds.close()
+    data = bytearray(path.read_bytes())
+    data[data.index(ds.phi.values.tobytes()) + 8] ^= 1
+    path.write_bytes(data)
+    with pk.open_map(path, chunks=chunks) as opened:
+        assert np.array_equal(opened.energy, ds.energy, equal_nan=True)
+        with pytest.raises(pk.StoreError, match=r"map\.nc is damaged: phi cannot be read"):
+            opened.phi.load()
+
+
+def test_netcdf_files_without_a_digest_open_as_before(tmp_path):
+    ds = pk.sweep(DISK, beta=np.linspace(0.1, 0.9, 9))
+    ds.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
+    with pk.open_map(tmp_path / "map.nc") as opened:
+        xr.testing.assert_identical(opened.load(), ds)
+    # What is saved again by others keeps no digest of what it was.
+    pk.sweep(DISK, beta=[0.1, 0.2], store=tmp_path / "own.nc").close()
+    with xr.open_dataset(tmp_path / "own.nc", engine="h5netcdf") as own:
+        own.assign_attrs(note="mine").to_netcdf(tmp_path / "copy.nc", engine="h5netcdf")
+    with pk.open_map(tmp_path / "copy.nc") as copy:
+        assert copy.attrs["note"] == "mine"
+
+
 @pytest.mark.parametrize(
     "call", [pk.open_map, lambda p: pk.sweep(pk.Reduced(1, 1), {"lam": [1]}, store=p)]
 )

@@ -148,7 +148,7 @@ SHAPES = {
 @given(
     st.lists(
         st.tuples(
-            st.sampled_from(["gaussian", "lorentzian"]),
+            st.sampled_from(["gaussian", "lorentzian", "step"]),
             st.floats(-4.0, 0.0),
             st.floats(0.2, 3.0),
             st.booleans(),
@@ -179,7 +179,10 @@ def test_narrow_features_are_all_found(features):
         assert np.any((got.phi >= a) & (got.phi <= b))
     assert np.all(np.diff(got.kind) != 0)
     with mpmath.workdps(40):
-        exact = sp.lambdify(X, sp.diff(formula.expression, X), "mpmath")
+        # In fractions: 1 - tanh^2 times a rounded number has no digits left.
+        floats = formula.expression.atoms(sp.Float)
+        fractions = {f: sp.Rational(*float(f).as_integer_ratio()) for f in floats}
+        exact = sp.lambdify(X, sp.diff(formula.expression.xreplace(fractions), X), "mpmath")
         for phi in got.phi:
             step = 1e-13 * (1.0 + abs(phi))
             assert exact(mpmath.mpf(phi - step)) * exact(mpmath.mpf(phi + step)) < 0
@@ -248,6 +251,7 @@ FORMULAS = [
     sp.tan(X / 3), sp.asinh(X), sp.asin(X / 9), sp.acos(X / 9), sp.atan(X / 9), sp.atanh(X / 9),
     sp.log(5 + X), sp.sqrt(4 + X), X**-3, X**5 - X**2 / 3, sp.erf(X), sp.erfc(X), sp.acosh(X + 9),
     (5 + X) ** sp.Rational(7, 3), 2**X, (5 + X) ** X, sp.sech(X) + sp.cot(X + 6) / 3,
+    sp.tanh(X) / sp.cosh(X) ** 2,
 ]  # fmt: skip
 
 
@@ -346,3 +350,24 @@ def test_errors_bound_what_is_wrong_of_lennard_jones():
             want = 2 * mpmath.quad(slowness, [-mpmath.pi / 2, *marks])
             assert abs(period - float(want)) <= error + 1e-15 * period
             assert error < 1e-12 * period / min(1.0, -energy)
+
+
+# --------------------------------------------------------------------- steps
+
+
+def test_the_slope_of_a_step_keeps_its_digits_far_from_it():
+    formula = make_formula("tanh(x) - c*x", "x", ("c",), None, (0.0, 900.0))
+    x = np.array([1.0, 5.0, 15.0, 20.0, 300.0, 900.0])
+    with mpmath.workdps(900):
+        sech = [1 / mpmath.cosh(mpmath.mpf(u)) for u in x]
+        slopes = [float(s**2) for s in sech]
+        bends = [
+            float(-2 * s**2 * mpmath.tanh(mpmath.mpf(u))) for s, u in zip(sech, x, strict=True)
+        ]
+    np.testing.assert_allclose(formula.slopes(x, 0.0), slopes, rtol=1e-14)
+    np.testing.assert_allclose(formula.bends(x, 0.0), bends, rtol=1e-14)
+    for c in (1e-3, 1e-12, 1e-30, 1e-250):
+        got = functions.equilibria(formula, c)
+        np.testing.assert_allclose(got.phi, [np.arccosh(c**-0.5)], rtol=1e-15)
+        assert got.kind.tolist() == [SADDLE]
+        assert got.complete

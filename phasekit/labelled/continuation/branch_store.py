@@ -15,6 +15,7 @@ from phasekit.errors import StoreError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.branch_stored import ARRAYS, Stored, damaged
 from phasekit.labels.arguments import bad, flag
+from phasekit.maps.netcdf import open_netcdf
 from phasekit.maps.stored_arrays import reason
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
@@ -120,7 +121,7 @@ def _open(place: Path) -> xr.Dataset:
             # Format 2 has codecs that unpickle what they read; branches are of format 3.
             ds = xr.open_zarr(place, consolidated=False, chunks=None, zarr_format=3)
         else:
-            ds = xr.open_dataset(place, engine="h5netcdf")
+            ds = open_netcdf(place)
     except Exception as error:  # whatever is made of files that are not what they were
         raise StoreError(f"path: {place} cannot be read: {reason(error)}") from error
     if str(ds.attrs.get(MODEL)) != _NAME or "branch" not in ds.attrs:

@@ -176,13 +176,13 @@ def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[An
     """V' and V'', if they are functions that can be computed."""
     import sympy as sp
 
+    from phasekit.laws.derivatives import derivative
     from phasekit.laws.nodes import foreign
 
     try:
         if derived_nodes(potential, x) > _NODES:
             raise FormulaError
-        slope = sp.diff(potential, x)
-        bend = sp.diff(slope, x)
+        slope, bend = derivative(potential, x), derivative(potential, x, 2)
         strange = foreign(slope, symbols.values()) or foreign(bend, symbols.values())
     except (RecursionError, FormulaError):
         raise ParameterError(

@@ -56,10 +56,12 @@ def slope_bounds(formula: Formula) -> Bounds | None:
     """Bounds of V' and V'' over boxes of (x, parameters); None where a function has no rule."""
     import sympy as sp
 
+    from phasekit.laws.derivatives import derivative
+
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
-    slope = sp.diff(formula.expression, x)
+    slope, bend = (derivative(formula.expression, x, order) for order in (1, 2))
     try:
-        return Bounds((slope, sp.diff(slope, x)), (x, *parameters))
+        return Bounds((slope, bend), (x, *parameters))
     except NoRule:
         return None
 

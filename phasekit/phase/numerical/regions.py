@@ -128,8 +128,8 @@ def _wave(first: tuple[str, str], second: tuple[str, str], sign: float) -> Calla
     return rule
 
 
-def _odd(rule: Callable[..., Box]) -> Callable[..., Box]:
-    """Rule for an odd function from that on the right half of the plane."""
+def _mirrored(rule: Callable[..., Box], odd: bool) -> Callable[..., Box]:
+    """Rule for an odd or even function from that on the right half of the plane."""
 
     def whole(undefined: Flags, a: Box) -> Box:
         left = np.asarray(a[0][0]) + np.asarray(a[0][1]) < 0.0
@@ -139,15 +139,33 @@ def _odd(rule: Callable[..., Box]) -> Callable[..., Box]:
             return np.where(left, -high, low), np.where(left, -low, high)
 
         re, im = rule(undefined, (flip(a[0]), flip(a[1])))
-        return flip(re), flip(im)
+        return (flip(re), flip(im)) if odd else (re, im)
 
     return whole
+
+
+_odd = functools.partial(_mirrored, odd=True)
 
 
 def _tanh(undefined: Flags, a: Box) -> Box:
     q = _exp(undefined, _product(undefined, ((-2.0, -2.0), NOTHING), a))
     over = _sum(undefined, _ONE, (_negative(q[0]), _negative(q[1])))
     return _product(undefined, over, _reciprocal(undefined, _sum(undefined, _ONE, q)))
+
+
+def _sech(undefined: Flags, a: Box) -> Box:
+    near_pole, far_pole = np.zeros((2, *undefined.shape), dtype=bool)
+    near = _reciprocal(near_pole, _RULES["cosh"](near_pole, a))
+    root = _exp(far_pole, (_negative(a[0]), _negative(a[1])))
+    below = _reciprocal(far_pole, _sum(far_pole, _ONE, _square(far_pole, root)))
+    far = _product(far_pole, ((2.0, 2.0), NOTHING), _product(far_pole, root, below))
+    steep = np.asarray(a[0][1]) > 20.0  # where cosh is about to overflow
+    undefined |= np.where(steep, far_pole, near_pole)
+    re, im = (
+        (np.where(steep, f[0], n[0]), np.where(steep, f[1], n[1]))
+        for f, n in zip(far, near, strict=True)
+    )
+    return re, im
 
 
 def _asinh(undefined: Flags, a: Box) -> Box:
@@ -205,6 +223,7 @@ _RULES: dict[str, Callable[..., Box]] = {
     "sinh": _wave(("sinh", "cos"), ("cosh", "sin"), 1.0),
     "cosh": _wave(("cosh", "cos"), ("sinh", "sin"), 1.0),
     "tanh": _odd(_tanh),
+    "sech": _mirrored(_sech, odd=False),
     "tan": _back(_odd(_tanh)),
     "asinh": _odd(_asinh),
     "asin": _back(_odd(_asinh)),
@@ -227,6 +246,16 @@ class Regions(Bounds):
     _real_power = staticmethod(_real_power)
     _rules = _RULES
 
+    def _lay_out(self, expression: Any) -> int:
+        import sympy as sp
+
+        base, exponent = expression.as_base_exp()
+        if isinstance(base, sp.cosh) and exponent.is_Integer and exponent < 0:
+            # cosh overflows where its reciprocal is nearly 0
+            place = self._compile(sp.sech(base.args[0], evaluate=False))
+            return self._add(self._whole_power(-int(exponent)), place) if exponent < -1 else place
+        return super()._lay_out(expression)
+
     def largest(self, *boxes: Box) -> Array:
         """Largest absolute value of the first expression; infinite where it is not analytic."""
         shape = np.broadcast_shapes(*(np.shape(box[0][0]) for box in boxes))
@@ -247,11 +276,13 @@ def slope_regions(formula: Formula) -> Regions | None:
     """
     import sympy as sp
 
+    from phasekit.laws.derivatives import derivative
+
     if formula.expression is None:
         return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
     try:
-        return Regions((sp.diff(formula.expression, x),), (x, *parameters))
+        return Regions((derivative(formula.expression, x),), (x, *parameters))
     except NoRule:
         return None
 

@@ -19,6 +19,7 @@ from phasekit.phase.exact.kernels.levels import (
     GAP,
     MODE,
     SWING,
+    TURN,
 )
 from phasekit.phase.exact.kernels.shape import (
     HIGH,
@@ -39,6 +40,8 @@ from phasekit.phase.exact.kernels.system import (
 
 # Nodes of the trapezoidal rule: the fewest, the most, and how many are done at a time.
 FEWEST, MOST, CHUNK = 32, 1024, 32
+# Below this frequency rounding puts all nodes next to the saddle.
+LINGERS = 1e-9
 SINE = NODES
 COSINE = SINE + CHUNK
 DELTA = COSINE + CHUNK
@@ -138,6 +141,9 @@ def action(w: Array) -> float:
 
     A libration passes each speed twice and is at rest at the ends, so half of the nodes do.
     """
+    wide = w[MODE] == TURN or w[HIGH] - w[LOW] > 1.0
+    if wide and w[MEANS + int(w[LEVELS])] < LINGERS:
+        return area(w) / TWO_PI
     both = 2 if w[MODE] == SWING else 1
     total, even, fourth = square_speeds(0, FEWEST // both, w)
     mean = total

@@ -65,6 +65,8 @@ from phasekit.phase.exact.kernels.system import (
     multiplier,
 )
 
+# What the action of an orbit may miss of the one that was asked for.
+FOUND_TO = 1e-9
 NOT_COMPUTED = int(OrbitFamily.NOT_COMPUTED)
 NONE = int(OrbitFamily.NONE)
 LOWER_WELL = int(OrbitFamily.LOWER_WELL)
@@ -224,8 +226,11 @@ def find_action(code: int, action: float, w: Array) -> None:
         if last or lower == upper:
             break
         last = close
-    if orbit_at(base, gap, center, w) != action and w[MODE] == ASYMPTOTE:
-        orbit_at(base, lower, center, w)
+    found = orbit_at(base, gap, center, w)
+    if found != action and w[MODE] == ASYMPTOTE:
+        found = orbit_at(base, lower, center, w)
+    if not abs(found - action) <= FOUND_TO * action:
+        w[MODE] = INVALID
     if code == BACKWARD:
         w[DIRECTION] = -1.0
 

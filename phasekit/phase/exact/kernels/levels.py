@@ -59,10 +59,10 @@ HARMONIC_TO = 1e-30
 SOME, ALL = 1e-3, math.inf
 # Saddles with energies closer than this are level.
 LEVEL_TO = 1e-15
-# What the rounding of an angle changes in the energy above a saddle, in units of -V''.
+# What the rounding of an angle of 1 changes in the energy above a saddle, in units of -V''.
 NOISE = 2e-31
-# Smaller energies above an equilibrium, degenerate or not, are raised to these, lest they
-# underflow.
+# Motion in full with less energy above an equilibrium, degenerate or not, is not computed, as
+# products of it underflow.
 LEAST, TINIEST = 1e-290, 1e-307
 
 
@@ -72,15 +72,15 @@ def settle(j: int, gap: float, place: int, kind: int, w: Array) -> None:
     w[REFERENCE] = j
     if j == LOWER_CENTER or j == UPPER_CENTER:
         gap = max(gap, 0.0)
-    least = LEAST if w[CURVATURE + j] == 0.0 else TINIEST
-    if gap != 0.0 and abs(gap) < least:
-        gap = least if gap > 0.0 else -least
     w[GAP] = gap
     w[PLACE] = place
     slope = w[CURVATURE + j]
     mode = TURN if kind == ROTATION else SWING
     if gap == 0.0 or (slope > 0.0 and gap < HARMONIC_TO * min(slope, slope * slope * slope)):
         mode = HARMONIC if slope > 0.0 else REST
+    least = LEAST if slope == 0.0 else TINIEST
+    if abs(gap) < least and (mode == SWING or mode == TURN):
+        mode = INVALID
     w[MODE] = ASYMPTOTE if kind == ASYMPTOTIC else mode
 
 
@@ -127,17 +127,17 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     within = math.nan
     # What the rounding of the state changes in its energy, and that of angles at a saddle. But
     # saddles that are almost level are told apart as far as the state does.
-    blur = NOISE
-    unit = max(1.0, abs(phi))
+    blur = NOISE * min(1.0, phi * phi)
     if level and energy_between(LOWER_SADDLE, UPPER_SADDLE, w) > 0.0:
         blur = 0.0
-        unit = abs(phi)
-    slack = 8.0 * ROUNDING * (v * v + abs(slope) * unit)
+    slack = 8.0 * ROUNDING * (v * v + abs(slope * phi))
     if level:
         within, above = above_level_saddles(phi, v, w)
     else:
         above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if abs(above) <= slack - blur * w[CURVATURE + UPPER_SADDLE]:
+        if slack - blur * w[CURVATURE + UPPER_SADDLE] < LEAST:
+            return NOT_COMPUTED  # all of it underflows
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if above > 0.0:
@@ -153,6 +153,8 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     if not level:
         within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if abs(within) <= slack - blur * w[CURVATURE + LOWER_SADDLE]:
+        if slack - blur * w[CURVATURE + LOWER_SADDLE] < LEAST:
+            return NOT_COMPUTED
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:

@@ -170,9 +170,17 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         near = w[U] * x - y
         reach = skew * (w[U] * x + y)
         far = w[U] * x + y + reach
+        less = 2.0 * y + reach
+        half = 0.5 * ((angle - w[PHI_S]) - w[PHI_S_LOW])
+        c = np.float64(math.cos(half))
+        s = np.float64(math.sin(half))
+        if abs(s) < 0.05:  # next to the saddle, where the offset from it has more digits
+            near = w[REST_R] * c - w[Z_HIGH] * s
+            far = w[RATIO] * (w[Z_LOW] * s - w[TAU] * c)
+            less = far - near
         square = near * near + far * far
         sine = 2.0 * near * far / square
-        cosine = -(2.0 * y + reach) * (2.0 * w[U] * x + reach) / square
+        cosine = -less * (near + far) / square
         return phase(sine, cosine, MEANS, int(w[LEVELS]), w)
     if x < 0.0:
         x = -x

@@ -46,6 +46,7 @@ from phasekit.phase.exact.kernels.system import (
     CURVATURE,
     PHI,
     UNIT,
+    ZOOM,
     A,
     B,
     C,
@@ -135,10 +136,10 @@ def finish(w: Array) -> None:
         high = w[ANGLE]
     turns = w[TURNS] + np.rint((w[ANGLE] - sigma) / TWO_PI)
     w[OMEGA] = omega / unit
-    w[ACTION] = area_ / unit
+    w[ACTION] = area_ / unit * w[ZOOM] * w[ZOOM]
     # The state is on its orbit.
-    w[PHI_MIN] = min(low + turns * TWO_PI, w[START])
-    w[PHI_MAX] = max(high + turns * TWO_PI, w[START])
+    w[PHI_MIN] = min(low + turns * TWO_PI, w[START]) * w[ZOOM]
+    w[PHI_MAX] = max(high + turns * TWO_PI, w[START]) * w[ZOOM]
     if low != low:
         w[PHI_MIN] = math.nan
         w[PHI_MAX] = math.nan

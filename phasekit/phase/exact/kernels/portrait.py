@@ -18,6 +18,7 @@ from phasekit.phase.exact.kernels import levels as lv
 from phasekit.phase.exact.kernels import motion as mo
 from phasekit.phase.exact.kernels import orbits as ob
 from phasekit.phase.exact.kernels import system as sy
+from phasekit.phase.exact.kernels.magnify import enter
 
 Index = npt.NDArray[np.int64]
 
@@ -37,10 +38,14 @@ def load_system(
 def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> None:
     """Results of cell k."""
     kind, orbit_energy, period, frequency, action, phi_min, phi_max = out
-    kind[k] = code
-    orbit_energy[k] = energy
-    period[k] = TWO_PI / w[ob.OMEGA]
-    frequency[k] = w[ob.OMEGA]
+    known = w[lv.MODE] != lv.INVALID
+    kind[k] = code if known else lv.NOT_COMPUTED
+    orbit_energy[k] = energy if known else math.nan
+    omega = w[ob.OMEGA]
+    period[k] = TWO_PI / omega
+    if omega > 0.0 and not period[k] < math.inf:
+        period[k] = math.nan  # no double holds it
+    frequency[k] = omega
     action[k] = w[ob.ACTION]
     phi_min[k] = w[ob.PHI_MIN]
     phi_max[k] = w[ob.PHI_MAX]
@@ -70,10 +75,11 @@ def orbits(
         if i != last:
             valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
-        code = lv.classify(phi0[k], dphi0[k], valid, w)
+        code = enter(phi0[k], dphi0[k], valid, w)
+        last = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, w[lv.ENERGY] / w[sy.UNIT] / w[sy.UNIT], w, out)
+        write_orbit(k, code, w[lv.ENERGY], w, out)
 
 
 @kernel
@@ -119,8 +125,7 @@ def levels(
         code = lv.classify_level(j, gap, center, slack, present, w)
         ob.shape(w)
         ob.finish(w)
-        value = gap + energy[i, j] if code != lv.NOT_COMPUTED else math.nan
-        write_orbit(k, code, value, w, out)
+        write_orbit(k, code, gap + energy[i, j], w, out)
 
 
 @kernel
@@ -174,11 +179,14 @@ def flow(
             if i != system:
                 valid = load_system(i, a, b, c, phi, curvature, w)
                 system = i
-            lv.classify(phi0[j], dphi0[j], valid, w)
+            enter(phi0[j], dphi0[j], valid, w)
+            system = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
             ob.shape(w)
             mo.begin(w)
             last = j
-        motion_phi[k], motion_dphi[k] = mo.after(t[k], w)
+        local, rate = mo.after(t[k], w)
+        motion_phi[k] = local * w[sy.ZOOM]
+        motion_dphi[k] = rate * w[sy.ZOOM]
 
 
 @kernel
@@ -207,13 +215,16 @@ def action_angle(
         if i != last:
             valid = load_system(i, a, b, c, phi, curvature, w)
             last = i
-        code = lv.classify(phi0[k], dphi0[k], valid, w)
+        code = enter(phi0[k], dphi0[k], valid, w)
+        last = i if w[sy.ZOOM] == 1.0 else np.int64(-1)
         ob.shape(w)
         ob.finish(w)
-        write_orbit(k, code, w[lv.ENERGY] / w[sy.UNIT] / w[sy.UNIT], w, out)
+        write_orbit(k, code, w[lv.ENERGY], w, out)
         family[k] = aa.family(w)
         angle[k] = aa.angle(w)
         twist[k] = aa.twist(w)
+        if w[lv.MODE] == lv.SWING:
+            twist[k] = twist[k] / w[sy.ZOOM] / w[sy.ZOOM]
 
 
 @kernel

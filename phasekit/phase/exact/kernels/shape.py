@@ -38,6 +38,7 @@ from phasekit.phase.exact.kernels.levels import (
     AROUND,
     ASYMPTOTE,
     GAP,
+    INVALID,
     LEFT,
     MODE,
     ORBIT,
@@ -63,7 +64,8 @@ from phasekit.phase.exact.kernels.system import (
 # distance, its ratio (libration: sqrt(V'(high)/V'(low)), rotation: sqrt(v(fast)/v(slow))), and
 # 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the factors of a libration: sum
 # of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of its own, and its zeros at
-# both turning points. The number of Gauss steps. What `orbits` makes of all
+# both turning points; of a rotation, cosines (Z) and sines (TAU, REST_R) of half the angles from
+# reference to slow and fast point. The number of Gauss steps. What `orbits` makes of all
 # that. What the reference's angle misses, Z_HIGH - Z_LOW,
 # and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
@@ -72,6 +74,8 @@ TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 18, ORBIT + 24)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 24, ORBIT + 28)
 PHI_S_LOW, Z_APART, SIGMA_LOW = range(ORBIT + 28, ORBIT + 31)
 MEANS = ORBIT + 31
+# Below this the last term of the cubic has lost digits.
+UNDERFLOWS = 1e-305
 NODES = MEANS + 2 * STEPS
 
 
@@ -105,6 +109,13 @@ def length(y: float, x: float) -> float:
     """sqrt(x^2 + y^2) without overflow; y and x are not both 0."""
     most = max(abs(x), abs(y))
     return most * np.sqrt(x / most * (x / most) + y / most * (y / most))
+
+
+@inline
+def unit_vector(z: float) -> tuple[float, float]:
+    """Cosine and sine >= 0 of the angle whose cotangent is z."""
+    size = np.sqrt(1.0 + z * z) if abs(z) < 1e150 else abs(z)
+    return (z / size if abs(z) < math.inf else math.copysign(1.0, z)), 1.0 / size
 
 
 @routine
@@ -183,8 +194,12 @@ def turn(w: Array) -> None:
             fast = first
     o_slow = 2.0 * angle_half(1.0, slow)
     o_fast = 2.0 * angle_half(1.0, fast)
+    w[Z_LOW], w[TAU] = unit_vector(slow)
+    w[Z_HIGH], w[REST_R] = unit_vector(fast)
     if o_fast < o_slow:
         o_fast += TWO_PI
+        w[Z_HIGH] = -w[Z_HIGH]
+        w[REST_R] = -w[REST_R]
     w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
     if abs(slow) < math.inf:
         w[U] = tan_half(abs(slow - fast), (1.0 + slow * fast) * (1.0 if slow > fast else -1.0))
@@ -380,6 +395,11 @@ def shape(w: Array) -> None:
     mode = w[MODE]
     if mode == SWING or mode == TURN or mode == ASYMPTOTE:
         refer(w)
+    if mode == SWING or mode == TURN:
+        cubic = w[GAP] * w[M] * w[N]
+        if abs(cubic) < UNDERFLOWS and w[M] != 0.0 and w[N] != 0.0:
+            mode = INVALID
+            w[MODE] = INVALID
     if mode == TURN:
         turn(w)
     if mode == SWING:

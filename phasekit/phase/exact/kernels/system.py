@@ -32,9 +32,9 @@ from phasekit.numerics.double_double import (
 
 # One orbit is a flat work array. First the system: coefficients in a unit of time that brings
 # the sum of their sizes into [1, 4), that unit; of the equilibria angles, V'', multipliers; what
-# the angles miss, and V'' as a double-double.
+# the angles miss, and V'' as a double-double; what angles are multiplied by at last, see `magnify`.
 A, B, C, UNIT, PHI, CURVATURE, MULTIPLIER = 0, 1, 2, 3, 4, 8, 12
-PHI_LOW, BEND, BEND_LOW, STATE = 28, 32, 36, 40
+PHI_LOW, BEND, BEND_LOW, ZOOM, STATE = 28, 32, 36, 40, 41
 
 LARGEST = 1.7976931348623157e308
 ROUNDING = 2.0**-53
@@ -47,6 +47,7 @@ STEPS = 100
 @inline
 def load(a: float, b: float, c: float, w: Array) -> bool:
     """Scale a system by a power of four; whether it is valid and has a force."""
+    w[ZOOM] = 1.0
     size = abs(a) + abs(b) + abs(c)  # NaN if any is
     if size > LARGEST:
         size = max(abs(a), abs(b), abs(c))
