@@ -5,10 +5,13 @@ from __future__ import annotations
 import copy
 import pickle
 
+import mpmath
 import numpy as np
 import pytest
+import sympy
 
 import phasekit as pk
+from phasekit.numerics import differences
 
 FOLD = 2.0 / (3.0 * np.sqrt(3.0))
 
@@ -203,3 +206,66 @@ def test_branches_and_special_points_travel(f):
         assert point is point.branch.special_points[number]
         assert repr(point) == repr(special)
         np.testing.assert_array_equal(point.directions, special.directions)
+
+
+LORENZ = ["sigma*(y - x)", "r*x - y - x*z", "x*y - b*z"]
+PREY = ["b*u*(1-u) - u*v - p*(1-exp(-5*u))", "-v + d*u*v"]
+
+
+@pytest.mark.parametrize(
+    ("f", "state", "parameters", "parameter", "x0", "span"),
+    [
+        (LORENZ, "xyz", {"r": 0.5, "sigma": 10.0, "b": 2.0}, "r", [0, 0, 0], (0.5, 3.0)),
+        (PREY, "uv", {"p": 0.5, "b": 3.0, "d": 3.0}, "p", [0.8, 0.0], (0.0, 2.0)),
+        (["p*x - x**2"], "x", {"p": 1.0}, "p", [1.0], (-1.0, 1.0)),
+        (["exp(30*(1 - 1/x)) - p"], "x", {"p": 1.0}, "p", [1.1], (0.5, 20.0)),
+        (lambda x, p: [p * x[0] - x[0] ** 2], "x", {"p": 1.0}, "p", [1.0], (-1.0, 1.0)),
+    ],
+)  # fmt: skip
+def test_f_is_rounding_of_its_terms_at_every_point(f, state, parameters, parameter, x0, span):
+    """Also where branches cross at zero, and on the branches that leave from there."""
+    branch = follow(f, tuple(state), parameters, parameter, x0, span)
+    branches = [branch, *(point.switch() for point in branch.special("BP"))]
+    assert len(branches) == 1 + len(branch.special("BP"))
+    for one in branches:
+        assert one.points.sizes["point"] > 3
+        assert one.points.residual.max() < 1e-13
+        assert one.messages == ()
+
+
+def test_sizes_of_terms_bound_the_rounding_of_a_formula():
+    """|computed - exact| of each formula against what its terms allow, exact in 60 digits."""
+    texts = ["1 - exp(-5*x)", "exp(40*(x - y)) - p", "(x - y)**3/(p - y)", "sqrt(x - y*p) + x**p"]
+    rng = np.random.default_rng(3)
+    problem = pk.Problem(texts, tuple("xyzw"), {"p": 1.0})
+    field = problem.field
+    exact = sympy.lambdify(sympy.symbols("x y p"), [sympy.sympify(t) for t in texts], "mpmath")
+    u = rng.uniform(0.9, 1.1, (40, 5))
+    u[:, 1] *= 0.3
+    out = np.empty((len(u), 8))
+    places = np.array([0], dtype=np.int64)
+    differences.values(field.terms((0,)), 8, np.array([1.0]), places, u, out)
+    with mpmath.workdps(60):
+        wanted = [exact(*map(mpmath.mpf, row[[0, 1, 4]].tolist())) for row in u]
+        off = [[abs(mpmath.mpf(a) - b) for a, b in zip(*two, strict=True)]
+               for two in zip(out[:, :4].tolist(), wanted, strict=True)]  # fmt: skip
+    ratio = np.array(off, dtype=float) / (2.0**-52 * out[:, 4:])
+    assert ratio.shape == (40, 4)
+    assert ratio.max() < 4.0
+    assert ratio.max(axis=0).min() > 1e-3  # and not by far too much
+
+
+def test_a_noisy_function_says_so():
+    """Where f is known to 1e-9 only, points are no better, and the branch says it."""
+
+    def f(x, p):
+        return [p - x[0] + 1e-9 * np.sin(1e13 * x[0] * x[0])]
+
+    noisy = pk.ContinuationOptions(tolerance=1e-7)
+    branch = pk.continuation(
+        pk.Problem(f, "x", {"p": 0.0}), "p", x0=[0.0], span=(-1.0, 1.0), options=noisy
+    )
+    assert branch.points.residual.max() > 1e-11
+    assert len(branch.messages) == 1
+    assert "points solve f = 0" in branch.messages[0]
+    assert branch.messages[0] in repr(branch)

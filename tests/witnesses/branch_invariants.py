@@ -9,16 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.fields import SymbolicField
-
 NOISE = 1e-8  # real parts that are smaller, relative to the largest eigenvalue, have no sign
+ROUNDING = 1e-13  # of the terms of f
 SAME = 1e-6  # distance on scaled axes
 
 
 def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bool) -> None:
     """Hold the special points of a path of equilibria against the eigenvalues at its points."""
     specials = [one.special for one in placed]
-    if isinstance(curve.field, SymbolicField) and curve.keeps:
+    if curve.keeps:
         _every_point_is_one(curve, path)
     for special in specials:
         assert special.status in ("converged", "guess")
@@ -36,12 +35,15 @@ def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bo
 
 
 def _every_point_is_one(curve: Any, path: Any) -> None:
-    """At every tenth point f is what unknowns within the tolerance of the curve leave of it."""
-    m, bound = curve.m, 10.0 * curve.options.tolerance
-    for u in path.u[::10, :m]:
+    """At every point f is rounding of its terms, and of unknowns in units of their scales."""
+    m = curve.m
+    assert len(path.residual) == path.count
+    for i in np.flatnonzero(~(path.residual <= ROUNDING)):
+        u = path.u[i, :m]
         value, slopes = curve.at(u)
         terms = np.abs(slopes) @ np.maximum(np.abs(u), curve.scale[:m])
-        assert np.all(np.abs(value) <= bound * terms), (u, value, terms)
+        known = np.all(np.abs(value) <= ROUNDING * terms)
+        assert known or path.messages, (u, value, terms, path.residual[i])
 
 
 def _no_twins(curve: Any, path: Any, placed: Any) -> None:

@@ -133,6 +133,10 @@ class Derivatives:
         total = total - self._along(a - b + c, 3) + self._along(a - b - c, 3)
         return (size / 24.0) * total
 
+    def noise(self) -> Array:
+        """Size of the rounding errors of f near the point, of whatever it does inside as well."""
+        return self._noise_of(self.reach, None)
+
     def _full(self, z: Array) -> Array:
         full = np.zeros(self.curve.m)
         full[: len(z)] = z

@@ -19,6 +19,8 @@ from phasekit.numerics.differences import DERIVED
 
 Array = npt.NDArray[np.float64]
 
+KINKED = {"Abs", "sign", "Heaviside", "Max", "Min", "Piecewise"}
+
 
 class Field:
     """A right-hand side with states and parameters by name."""
@@ -190,8 +192,13 @@ def _terms(
 
 
 def _magnitude(e: Any) -> Any:
-    """An expression with the sizes of all terms of its sums added up."""
+    """An expression with the sizes of all terms of its sums added up, those inside functions too.
+
+    Rounding of this, to first order, bounds the error with which the expression is computed.
+    """
     import sympy
+
+    from phasekit.bifurcation.continuation.machine_code import DIFFERENTIABLE
 
     if e.is_Add:
         return sympy.Add(*map(_magnitude, e.args))
@@ -199,7 +206,16 @@ def _magnitude(e: Any) -> Any:
         return sympy.Mul(*map(_magnitude, e.args))
     if e.is_Pow and e.exp.is_Integer and e.exp.is_positive:
         return _magnitude(e.base) ** e.exp
-    return abs(e)
+    smooth = e.is_Pow or type(e).__name__ in DIFFERENTIABLE - KINKED
+    if not smooth or not e.free_symbols:
+        return abs(e)
+    places = [sympy.Dummy(real=True) for _ in e.args]
+    terms = [abs(e)]
+    for place, argument in zip(places, e.args, strict=True):
+        if argument.is_Add or argument.is_Mul or not argument.is_Atom:
+            slope = e.func(*places).diff(place).subs(dict(zip(places, e.args, strict=True)))
+            terms.append(abs(slope) * _magnitude(argument))
+    return sympy.Add(*terms)
 
 
 @functools.lru_cache(maxsize=256)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.acceptance import accepted
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
@@ -32,7 +33,9 @@ class Path:
     info: Array
     start: int
     stops: tuple[Stop, Stop]
+    residual: Array  # |f| beside its terms
     eigenvalues: npt.NDArray[np.complex128] | None = None  # of f_x, where slopes are kept
+    messages: tuple[str, ...] = ()  # what is not certain about them
 
     @property
     def count(self) -> int:
@@ -73,20 +76,41 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     )
     if forward is not None and forward.stop.reason == "closed":
         stops = (forward.stop, forward.stop)
-    u = table[:, :size]
+    u, tangent = table[:, :size], table[:, size : 2 * size]
     slopes: Array | Slopes = Slopes(curve, u)
-    values = None
     if curve.keeps:
         kept = [start.slopes.reshape(1, -1)]
         if backward is not None:
             kept.insert(0, backward.slopes[::-1])
         if forward is not None:
             kept.append(forward.slopes)
-        slopes, values = _sharpened(curve, u, np.concatenate(kept).reshape(-1, n, m))
+        slopes = np.concatenate(kept).reshape(-1, n, m)
+    residual = curve.residuals(u, slopes)
+    fixed = _fixed(curve, u, len(behind), stops)
+    better, message = accepted(curve, u, tangent, residual, fixed)
+    for i, found in better.items():
+        u[i] = found
+        where = curve.at(found)[1]
+        residual[i] = curve.residuals(found[None], where[None])[0]
+        if isinstance(slopes, np.ndarray):
+            slopes[i] = where
+    values = None
+    if isinstance(slopes, np.ndarray):
+        slopes, values = _sharpened(curve, u, slopes)
     return Path(
-        u, table[:, size : 2 * size], slopes, table[:, -trace.RECORDED :], len(behind), stops,
-        values,
+        u, tangent, slopes, table[:, -trace.RECORDED :], len(behind), stops, residual, values,
+        (message,) if message else (),
     )  # fmt: skip
+
+
+def _fixed(curve: Curve, u: Array, start: int, stops: tuple[Stop, Stop]) -> dict[int, int]:
+    """Points that keep an unknown to the last bit: the start its parameter, ends their bound."""
+    fixed = {start: curve.n}
+    for i, stop in zip((0, len(u) - 1), stops, strict=True):
+        met = np.flatnonzero((u[i] == curve.low) | (u[i] == curve.high))
+        if stop.reason == "bound" and len(met):
+            fixed[i] = int(met[0])
+    return fixed
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.acceptance import residual_at, without_rounding
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
@@ -42,7 +45,7 @@ def _find(
         for special in locate(curve, bracket):
             if not wanted(special, detect):
                 continue
-            placed.append(place(curve, path, bracket, special))
+            placed.append(place(curve, path, bracket, _rounded(curve, special)))
     placed = unique(curve, path, placed)
     # The start of a closed curve is its end as well.
     if path.closed and len(placed) > 1:
@@ -50,6 +53,14 @@ def _find(
         if first.special.kind == last.special.kind and _distance(curve, first, last) < SAME:
             placed = placed[:-1]
     return placed, eigenvalues
+
+
+def _rounded(curve: Curve, special: Special) -> Special:
+    """A special point with zeros for unknowns that are but rounding, where f is no larger there."""
+    u = without_rounding(curve, special.u)
+    if np.array_equal(u, special.u) or residual_at(curve, u) > residual_at(curve, special.u):
+        return special
+    return replace(special, u=u)
 
 
 def wanted(special: Special, detect: tuple[str, ...]) -> bool:

@@ -55,6 +55,8 @@ class Branch:
     stops : tuple of Stop
         Why the curve ends, at its first and at its last point: ``reason`` (bound, closed,
         max_points, stuck, not_finite, start) and ``message``.
+    messages : tuple of str
+        What is not certain about the curve as a whole; empty where nothing is in doubt.
     kind : str
         equilibrium, fold, hopf or branch_point.
     parameter : str
@@ -100,6 +102,7 @@ class Branch:
     stops: tuple[Stop, Stop]
     kind: str
     record: Record
+    messages: tuple[str, ...] = ()
 
     @property
     def points(self) -> xr.Dataset:
@@ -245,6 +248,7 @@ class Branch:
                 f"  {name}: {stop.message}"
                 for name, stop in zip(("first", "last"), self.stops, strict=True)
             ]
+        lines += [f"  not certain: {message}" for message in self.messages]
         return "\n".join(lines) + ">"
 
 
@@ -265,7 +269,7 @@ def make_branch(
     points, places = points_of(problem, curve, path, specials, eigenvalues, record)
     branch = Branch(
         problem, names, curve.field.states, curve, start, (backward, forward), points, (),
-        path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
+        path.stops, KINDS[curve.kind], MappingProxyType(dict(record)), path.messages,
     )  # fmt: skip
     made = tuple(
         special_point(problem, curve, one.special, place, branch)

@@ -84,7 +84,7 @@ def points_of(
     if curve.kind == HOPF:
         kappa[own] = path.u[:, -1]
     residual = np.empty(total)
-    residual[own] = curve.residuals(path.u, path.slopes)
+    residual[own] = path.residual
     residual[mine] = curve.residuals(u[mine], [curve.at(point)[1] for point in u[mine]])
     return _dataset(problem, curve, u, t, info, values, label, record, kappa, residual), places
 

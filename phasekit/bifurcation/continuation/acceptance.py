@@ -1,0 +1,111 @@
+"""Acceptance of points: f at each is no more than rounding of its terms, or it is said.
+
+Newton's method judges a point by the steps that led to it, and unknowns that vanish by their
+scales; here f itself is held against its terms. What is larger is brought down, where it can be.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import TIGHT, Curve
+from phasekit.bifurcation.continuation.derivatives import Derivatives
+from phasekit.bifurcation.continuation.fields import SymbolicField
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.kernels.newton import RAISED, ROUNDING
+
+Array = npt.NDArray[np.float64]
+
+EPSILON = 2.0**-52
+INSIDE = 1e-12  # of a function, whose inner terms are not seen
+NEAR = 1e-8  # farthest, on scaled axes, that a point is moved
+VAIN = 3  # points in a row that cannot be brought nearer: f is no better known
+
+
+def accepted(
+    curve: Curve, u: Array, tangent: Array, residual: Array, fixed: dict[int, int]
+) -> tuple[dict[int, Array], str]:
+    """Points of a path that are better than those it has, by their places; and what is left.
+
+    Parameters
+    ----------
+    residual : ndarray
+        |f| beside its terms at each point.
+    fixed : dict of int to int
+        The unknown that keeps its value, of points where one does: at the start and at bounds.
+    """
+    bound = ROUNDING if isinstance(curve.field, SymbolicField) else INSIDE
+    better: dict[int, Array] = {}
+    left = np.array(residual)
+    vain = 0
+    poor = np.flatnonzero(~(residual <= bound))
+    if curve.options.tolerance < RAISED:
+        for i in poor.tolist():
+            found, value = nearer(curve, u[i], tangent[i], float(residual[i]), fixed.get(i))
+            if value < residual[i]:
+                better[i], left[i] = found, value
+            vain = 0 if value <= bound or value < 0.5 * residual[i] else vain + 1
+            if vain >= VAIN:
+                break
+    poor = np.flatnonzero(~(left <= bound))
+    return better, _said(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
+
+
+def nearer(
+    curve: Curve, u: Array, tangent: Array, residual: float, fixed: int | None = None
+) -> tuple[Array, float]:
+    """The best of a point, of what Newton's method makes of it, and of their rounded zeros."""
+    row = curve.weight * tangent
+    if fixed is not None:
+        row = np.zeros(curve.size)
+        row[fixed] = 1.0
+    point = curve.refine(u, row, tolerance=TIGHT)
+    tried = [u]
+    if point.converged and curve.length(point.u - u) <= NEAR:
+        again = np.array(point.u)
+        if fixed is not None:
+            again[fixed] = u[fixed]
+        tried.append(again)
+    best, least = u, residual
+    for one in [*tried, *(without_rounding(curve, one) for one in tried)]:
+        value = residual_at(curve, one)
+        if value < least:
+            best, least = one, value
+    return best, least
+
+
+def residual_at(curve: Curve, u: Array) -> float:
+    """|f| beside its terms at one point."""
+    return float(curve.residuals(u[None], curve.at(u)[1][None])[0])
+
+
+def without_rounding(curve: Curve, u: Array) -> Array:
+    """A point of a branch of equilibria whose unknowns are zero where they are but rounding."""
+    u = np.array(u)
+    if curve.kind == EQUILIBRIUM:
+        u[: curve.m][np.abs(u[: curve.m]) <= EPSILON * curve.scale[: curve.m]] = 0.0
+    return u
+
+
+def _said(curve: Curve, points: list[Array], bound: float) -> str:
+    """What is left of f, in words; nothing if unknowns of their scales would leave as much."""
+    sizes = []
+    for u in points:
+        value, slopes = curve.at(u)
+        terms = np.abs(slopes) @ np.maximum(np.abs(u[: curve.m]), curve.scale[: curve.m])
+        with np.errstate(all="ignore"):
+            sizes.append(np.max(np.where(value == 0.0, 0.0, np.abs(value) / terms)))
+    many = int(np.sum(~(np.array(sizes) <= bound)))
+    if not many:
+        return ""
+    u = points[int(np.argmax(np.nan_to_num(sizes, nan=np.inf)))]
+    names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
+    where = [f"{name} = {number:.6g}" for name, number in zip(names, u, strict=False)]
+    where = where if len(where) <= 4 else [*where[:3], "..."]
+    noise = np.all(np.abs(curve.at(u)[0]) <= 10.0 * Derivatives(curve, u).noise())
+    return (
+        f"{many} points solve f = 0 to {max(sizes):.1e} of its terms, which is more than rounding"
+        f"{' of numbers: f itself is not known better' if noise else ''}; the worst at "
+        f"{', '.join(where)}"
+    )
