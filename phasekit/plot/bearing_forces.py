@@ -148,8 +148,7 @@ def bearing_forces(
         style.circle_axis(axes, "x", shown, circle)
         axes.set_xlabel(rf"$\varphi$ ({shown.text('phi', 'rad')})")
     unit, room = shown.text(part, "N"), style.letters(axes, "y")
-    texts = [labels.with_unit(text, unit) for text in PARTS[part]]
-    axes.set_ylabel(labels.fitting(room, *texts))
+    axes.set_ylabel(labels.fitting(room, unit, *PARTS[part]))
     _reach(axes, lines)
     if legend:
         style.legend_below(axes, handles)

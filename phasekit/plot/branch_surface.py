@@ -144,6 +144,12 @@ def branch_surface(
     axes.set_zticks([tick * stretch[2] for tick in ticks])
     if stretch[2] == 1.0:
         axes.set_zticklabels([multiple_of_pi(tick) for tick in ticks])
+    axes.yaxis.labelpad = 8.0
+    if style.narrow(axes):
+        axes.locator_params(axis="x", nbins=4)
+        axes.locator_params(axis="y", nbins=4)
+    # The label along phi stands outside the box.
+    axes.set_box_aspect(None, zoom=0.85)
     axes.view_init(elevation, azimuth)
     axes.computed_zorder = False  # folds stay in sight
     if legend and handles:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -33,8 +34,8 @@ AXES: dict[Literal["x", "y"], tuple[str, str]] = {
     "x": ("along $u_2$, tangential", "$u_2$"),
     "y": ("along $v_2$, radial, inward", "$v_2$"),
 }
-# An arrow this short, in shares of the polygon, is named in the legend only.
-SHORT = 0.05
+# An arrow this short (inches) is named in the legend only.
+SHORT = 0.4
 
 
 def force_polygon(
@@ -127,9 +128,9 @@ def force_polygon(
     axes.margins(0.1)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
+    style.few_ticks(axes)
     for which, texts in AXES.items():
-        words = [labels.with_unit(text, unit) for text in texts]
-        axes.set(**{f"{which}label": labels.fitting(style.letters(axes, which), *words)})
+        axes.set(**{f"{which}label": labels.fitting(style.letters(axes, which), unit, *texts)})
     axes.set_title(f"bearing {bearing[0]}$_2$", fontsize="medium")
     if legend:
         names: dict[str, str] = {}
@@ -186,10 +187,20 @@ def _arrow(
     )
     ax.add_patch(arrow)
     symbol = f"$F_{{{name[1:]}}}$" if name[1:].isdigit() else {"F": "$F$"}.get(name, name)
-    if size > SHORT * span:
-        normal = np.array([start[1] - end[1], end[0] - start[0]]) / size
-        x, y = 0.5 * (start + end) + 0.04 * span * normal
-        ax.text(x, y, symbol, color=look["color"], ha="center", va="center", fontsize="small")
+    if size * min(style.inches(ax)) > SHORT * span:
+        across, up = (start[1] - end[1]) / size, (end[0] - start[0]) / size
+        x, y = 0.5 * (start + end)
+        ax.annotate(
+            symbol,
+            (x, y),
+            xytext=(4.0 * across, 4.0 * up),
+            textcoords="offset points",
+            color=look["color"],
+            ha="center" if abs(across) < 0.3 else "left" if across > 0.0 else "right",
+            va="center" if abs(up) < 0.3 else "bottom" if up > 0.0 else "top",
+            fontsize="small",
+            path_effects=style.halo(plt.rcParams["axes.facecolor"], 2.5),
+        )
     meaning = "" if name == "weight" else f", {along}"
     key = {name: look[name] for name in ("color", "linestyle", "linewidth")}
     return Line2D([], [], label=f"{symbol}{meaning}", **key)

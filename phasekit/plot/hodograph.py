@@ -123,9 +123,10 @@ def hodograph(
         axes = style.axes_for(ax, legend=legend)
         handles = _draw_levels(axes, tip, energies, orbits)
     axes.set_aspect("equal", adjustable="datalim")
+    style.few_ticks(axes)
     for which, texts in _words(rotator, pair).items():
-        words = [labels.with_unit(text, shown.text("rotator", "s-2")) for text in texts]
-        axes.set(**{f"{which}label": labels.fitting(style.letters(axes, which), *words)})
+        room, unit = style.letters(axes, which), shown.text("rotator", "s-2")
+        axes.set(**{f"{which}label": labels.fitting(room, unit, *texts)})
     if legend:
         style.legend_below(axes, handles)
     return axes

@@ -192,6 +192,8 @@ def _draw_field(
                 labels.label(field, units, style.letters(ax, "x"), selected), size="medium"
             )
         return _draw_codes(ax, grid, field, None if keys else text)
+    if selected not in text.replace("\n", " "):
+        ax.set_title(selected, size="medium")
     return _draw_values(ax, grid, labels.shown(field, units)[0], text, log)
 
 
@@ -212,15 +214,16 @@ def _draw_codes(ax: Axes, grid: Grid, field: xr.DataArray, text: str | None) -> 
         return [Patch(facecolor=palette(i), label=word, **edge) for i, word in enumerate(words)]
     bar = ax.figure.colorbar(mesh, ax=ax, ticks=range(len(present)))
     bar.set_label(text, labelpad=8.0)
-    upright = max(map(len, words)) <= 3 or _too_long(ax, words)
-    bar.ax.set_yticklabels(words, rotation=0 if upright else 90, va="center")
+    upright = max(map(len, words)) <= 3
+    bar.ax.set_yticklabels(words, rotation=0 if upright else 90, va="center", size=_size(ax, words))
     bar.ax.tick_params(which="both", length=0)
     return []
 
 
-def _too_long(ax: Axes, words: list[str]) -> bool:
-    """Whether words that are turned would run into each other along a color bar."""
-    return max(map(len, words)) > style.letters(ax, "y") / len(words)
+def _size(ax: Axes, words: list[str]) -> str:
+    """Return the size in which turned words do not run into each other along a color bar."""
+    room = style.letters(ax, "y") / (len(words) * max(map(len, words)))
+    return "medium" if room > 1.0 else "small" if room > 0.83 else "x-small"
 
 
 def _code_book(field: xr.DataArray) -> tuple[Mapping[int, str], Mapping[int, str]]:
@@ -255,14 +258,26 @@ def _draw_values(ax: Axes, grid: Grid, numbers: NDArray[Any], text: str, log: bo
     if log and low is not None and high is not None:
         norm = LogNorm(*(color_bar.log_limits([10.0**low, 10.0**high]) or (None, None)))
     ax.set_facecolor(style.NOTHING)
+    absent = [Patch(facecolor=style.NOTHING, edgecolor=style.GRAY, label="absent")]
+    if not finite.size:  # a bar would show numbers that nothing has
+        ax.set_title(text, size="medium")
+        ax.set(xlim=_edges(grid[0]), ylim=_edges(grid[1]))
+        return list(absent)
     mesh = ax.pcolormesh(
         *grid, values, cmap=style.SEQUENTIAL, norm=norm, shading="nearest", rasterized=True
     )
-    bar = ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend)
+    # Numbers at the ends of a bar stand over it, which the layout does not see.
+    slim: style.Look = {"shrink": 0.93, "fraction": 0.08, "pad": 0.03} if style.narrow(ax) else {}
+    bar = ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend, **slim)
     if isinstance(norm, LogNorm):
         color_bar.log_ticks(bar)
-    absent = np.ma.getmaskarray(values).any()
-    return [Patch(facecolor=style.NOTHING, edgecolor=style.GRAY, label="absent")] if absent else []
+    return list(absent) if np.ma.getmaskarray(values).any() else []
+
+
+def _edges(along: NDArray[Any]) -> tuple[float, float]:
+    """Return where the outer cells of a map end."""
+    ends = 1.5 * along[[0, -1]] - 0.5 * along[[1, -2]]
+    return float(ends.min()), float(ends.max())
 
 
 def _limits(values: NDArray[Any]) -> tuple[float | None, float | None, str]:

@@ -45,9 +45,8 @@ def drawn_texts(figure):
     return seen
 
 
-def faults(figure):
+def faults(figure, boxes):
     """Return what is wrong with the texts of a figure: outside of it, or over each other."""
-    boxes = drawn_texts(figure)
     width, height = figure.bbox.width, figure.bbox.height
     found = [
         f"{box.text!r} is outside: {box.x0:.0f} to {box.x1:.0f} of {width:.0f}, "

@@ -85,8 +85,11 @@ class Circle:
 
     def home(self, x: Any) -> Any:
         """Return where places are seen."""
-        high = self.ends[1]
-        return x if self.period is None else high - (high - x) % self.period
+        if self.period is None:
+            return x
+        low, high = self.ends
+        # What is there already is not rounded once more.
+        return np.where((x > low) & (x <= high), x, high - (high - x) % self.period)[()]
 
     def points(self, x: FloatArray, other: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return points where they are seen, those on the cut at both of its sides."""

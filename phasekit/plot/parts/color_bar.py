@@ -25,7 +25,7 @@ def log_limits(values: Any) -> tuple[float, float] | None:
 
 def log_bar(ax: Axes, limits: tuple[float, float], text: str) -> ScalarMappable:
     """Draw a color bar with round numbers, also where a logarithmic scale spans little."""
-    mappable = ScalarMappable(LogNorm(*limits), style.LINES)
+    mappable = ScalarMappable(LogNorm(*limits), style.lines())
     log_ticks(ax.figure.colorbar(mappable, ax=ax, label=text))
     return mappable
 

@@ -76,6 +76,17 @@ def inches(ax: Axes) -> tuple[float, float]:
     return float(box.width), float(box.height)
 
 
+def narrow(ax: Axes) -> bool:
+    """Whether Axes have room for short names only."""
+    return inches(ax)[0] < NARROW
+
+
+def few_ticks(ax: Axes) -> None:
+    """Put no more ticks with long numbers along a narrow axis than have room."""
+    if narrow(ax):
+        ax.locator_params(axis="x", nbins=4)
+
+
 def letters(ax: Axes, which: Literal["x", "y"]) -> int:
     """Return about how many letters of a label fit along one axis."""
     axis = ax.xaxis if which == "x" else ax.yaxis
@@ -114,7 +125,7 @@ def _legend(ax: Axes, handles: list[Artist], texts: list[str], columns: int) -> 
     lines = label.get_text().count("\n") + 1
     points = 22.0 + 1.35 * lines * float(label.get_fontsize())
     offset = ScaledTranslation(0.0, -points / 72.0, ax.figure.dpi_scale_trans)
-    narrow = inches(ax)[0] < NARROW
+    small = narrow(ax)
     return ax.legend(
         handles=handles,
         labels=texts,
@@ -125,10 +136,10 @@ def _legend(ax: Axes, handles: list[Artist], texts: list[str], columns: int) -> 
         frameon=False,
         borderaxespad=0.0,
         fontsize="small",
-        handlelength=2.2 if narrow else 2.6,
-        columnspacing=1.0 if narrow else 2.0,
-        handletextpad=0.5 if narrow else 0.8,
-        labelspacing=0.3 if narrow else 0.5,
+        handlelength=2.2 if small else 2.6,
+        columnspacing=1.0 if small else 2.0,
+        handletextpad=0.5 if small else 0.8,
+        labelspacing=0.3 if small else 0.5,
     )
 
 

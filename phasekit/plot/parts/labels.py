@@ -27,6 +27,9 @@ SYMBOLS = {
     **{name: f"${name}$" for name in ("A", "B", "C", "a", "e", "g", "m", "r")},
 }
 
+#: Names of quantities where there is no room for their meaning, if they are not plain words.
+BRIEF = {"n_equilibria": "number of equilibria"}
+
 GLUE = "\N{NO-BREAK SPACE}"
 #: From this number of letters on, labels may have two lines.
 ROOMY = 36
@@ -47,24 +50,24 @@ def label(values: xr.DataArray, units: Angles | Units, width: int, extra: str = 
     meaning = str(values.attrs.get("long_name", ""))
     symbol = SYMBOLS.get(name, "" if meaning else name)
     unit = as_units(units).text(name, str(values.attrs.get("units", "")))
-    brief = SYMBOLS.get(name, name.replace("_", " "))
-    return fitting(
-        width,
-        with_unit(", ".join(part for part in (symbol, meaning, extra) if part), unit),
-        with_unit(", ".join(part for part in (brief, extra) if part), unit),
-        with_unit(brief, unit),
+    brief = SYMBOLS.get(name) or BRIEF.get(name, name.replace("_", " "))
+    long, short = (
+        ", ".join(filter(None, one)) for one in ((symbol, meaning, extra), (brief, extra))
     )
+    return fitting(width, unit, long, short, brief)
 
 
 def with_unit(text: str, unit: str) -> str:
-    """Return a text with its unit, which stays with the last word."""
-    return f"{text}{GLUE}({unit.replace(' ', GLUE)})" if unit else text
+    """Return a text with its unit, if it has one."""
+    return f"{text} ({unit})" if unit else text
 
 
-def fitting(width: int, *texts: str) -> str:
-    """Return the first of the texts that fits, wrapped: in one line where few letters do."""
+def fitting(width: int, unit: str, *texts: str) -> str:
+    """Return the first of the texts that fits with its unit: in one line where few letters do."""
     lines = 2 if width >= ROOMY else 1
-    wrapped = [wrap(text, width) for text in texts]
+    # The unit stays with the last word.
+    end = f"{GLUE}({unit.replace(' ', GLUE)})" if unit else ""
+    wrapped = [wrap(text + end, width) for text in texts]
     return next((text for text in wrapped if text.count("\n") < lines), wrapped[-1])
 
 

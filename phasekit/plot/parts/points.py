@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
+
+from phasekit.plot.parts import style
 
 #: Distance in letters within which the names of two points would cover each other.
 TOUCHING = 1.6
@@ -62,4 +65,5 @@ def _label_point(
         fontsize="small",
         zorder=6,
         annotation_clip=False,
+        path_effects=style.halo(plt.rcParams["axes.facecolor"], 2.5),
     )

@@ -19,8 +19,11 @@ from phasekit.plot.parts.circle import circle_axis as circle_axis
 from phasekit.plot.parts.circle import unwrapped_axis as unwrapped_axis
 from phasekit.plot.parts.frame import axes_for as axes_for
 from phasekit.plot.parts.frame import check_axes as check_axes
+from phasekit.plot.parts.frame import few_ticks as few_ticks
+from phasekit.plot.parts.frame import inches as inches
 from phasekit.plot.parts.frame import legend_below as legend_below
 from phasekit.plot.parts.frame import letters as letters
+from phasekit.plot.parts.frame import narrow as narrow
 from phasekit.plot.parts.frame import new_figure as new_figure
 from phasekit.plot.parts.units import Angles as Angles
 from phasekit.plot.parts.units import angle_factor as angle_factor
@@ -285,13 +288,20 @@ KIND_COLORS: Mapping[int, str] = {
     EquilibriumKind.DEGENERATE: BLACK,
 }
 SEQUENTIAL = "cividis"
-# Colors of lines stay clear of the light end, which is lost on white.
+# Colors of lines stay clear of the light end, which is lost on white, or of the dark one on black.
 LINES = ListedColormap(plt.colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
+LINES_ON_DARK = ListedColormap(plt.colormaps["viridis"](np.linspace(0.25, 1.0, 256)))
 
 
 def inked(look: Look) -> Look:
     """Return a look whose black is the color of text, which is light in dark styles."""
     return {**look, "color": plt.rcParams["text.color"]} if look["color"] == BLACK else look
+
+
+def lines() -> ListedColormap:
+    """Return the colors of lines on the background that is set."""
+    dark = sum(to_rgba(plt.rcParams["axes.facecolor"])[:3]) < 1.5
+    return LINES_ON_DARK if dark else LINES
 
 
 def halo(color: str = "white", width: float = 1.6) -> list[AbstractPathEffect]:

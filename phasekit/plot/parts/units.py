@@ -113,7 +113,7 @@ def printed(unit: str) -> str:
     >>> printed("m s-2"), printed("deg/s"), printed("1")
     ('m s$^{-2}$', '°/s', '')
     """
-    return PRINTED.get(usual(unit), re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", unit))
+    return PRINTED.get(unit, re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", unit))
 
 
 def angle_factor(angles: object) -> float:
