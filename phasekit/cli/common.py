@@ -119,7 +119,9 @@ def save(drawn: Figure | Axes, path: Path, *, dpi: int = 150) -> None:
     # Without date and random names, the same picture is the same file.
     dated = {"svg": "Date", "pdf": "CreationDate"}.get(kind)
     metadata = {dated: None} if dated else None
-    with matplotlib.rc_context({"svg.hashsalt": "phasekit"}):
+    # Texts of vector files stay texts, which can be edited.
+    settings: Any = {"svg.hashsalt": "phasekit", "svg.fonttype": "none", "pdf.fonttype": 42}
+    with matplotlib.rc_context(settings):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
     # A link stays a link.
     target = path.resolve()
