@@ -99,18 +99,65 @@ def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:
     ParameterError
         If the unit is not known, or does not fit.
     """
-    name = usual(str(unit))
-    fits = UNITS.get(wanted, {}) if wanted is not None else {
-        key: value for units in UNITS.values() for key, value in units.items()
-    }  # fmt: skip
-    if name in fits:
-        return fits[name]
-    plain = wanted in (None, "1", "rad") and name in ("", "1")
-    if plain or name == wanted or (wanted == "1" and name == "rad"):
-        return Decimal(1)
-    known = list(dict.fromkeys([*([wanted] if wanted not in (None, "1") else []), *fits]))
+    found = _number(str(unit), wanted)
+    if found is not None:
+        return found
+    known = _fitting(wanted)
     wants = f"units {' or '.join(known)}" if known else "numbers without units"
     raise ParameterError(
         f"{argument}: got the attribute units={str(unit)!r}, wants {wants}; convert it, or drop "
         "the attribute with .drop_attrs() if the numbers are right"
     )
+
+
+def converted(argument: str, values: Any, held: str, unit: Any) -> Any:
+    """Return values that are held in the unit `held`, an SI unit or radians, in the unit `unit`.
+
+    Parameters
+    ----------
+    argument : str
+        What messages call the unit.
+    values : float, numpy.ndarray or xarray.DataArray
+        Values; attributes are left as xarray leaves them.
+    held : str
+        The unit of the values, one of `UNITS` or another, which nothing but itself fits.
+    unit : str
+        The unit that is wanted, as people write it.
+
+    Raises
+    ------
+    ParameterError
+        If the unit is not known, or is one of something else.
+
+    Examples
+    --------
+    >>> converted("units", 0.024, "m", "mm"), converted("units", 30.0 * rpm, "s-1", "rpm")
+    (24.0, 30.0)
+    """
+    times = _number(unit, held) if isinstance(unit, str) else None
+    if times is None:
+        wants = " or ".join(_fitting(held)) or "'1', for it has no unit"
+        raise ParameterError(f"{argument}: got {unit!r}, wants {wants}")
+    # 0.001153 m times 1000 is rounded once.
+    return values * float(1 / times) if 1 / times % 1 == 0 else values / float(times)
+
+
+def _number(unit: str, wanted: str | None) -> Decimal | None:
+    """Return the number that leads from `unit` to the unit `wanted`; None where there is none."""
+    name = usual(unit)
+    fits = UNITS.get(wanted, {}) if wanted is not None else {
+        key: value for units in UNITS.values() for key, value in units.items()
+    }  # fmt: skip
+    if name in fits:
+        return fits[name]
+    plain = wanted in (None, "", "1", "rad") and name in ("", "1")
+    same = name == wanted or (wanted == "1" and name == "rad")
+    return Decimal(1) if plain or same else None
+
+
+def _fitting(wanted: str | None) -> list[str]:
+    """Return the units that fit where `wanted` is, that one first."""
+    tables = UNITS.values() if wanted is None else [UNITS.get(wanted, {})]
+    names = [name for units in tables for name in units]
+    first = [wanted] if wanted not in (None, "", "1") else []
+    return [str(name) for name in dict.fromkeys([*first, *names])]
