@@ -17,6 +17,7 @@ from phasekit.cells.dispatch import passes_of
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import NumberLike, bad, numeric, one_of
+from phasekit.labels.conversion import in_si
 from phasekit.systems.as_system import as_system
 from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.system import Model
@@ -219,7 +220,7 @@ def _states(
     if not is_disk(system):
         raise bad("disk", disk, "a GyroRotorDisk")
     if isinstance(phi, xr.Dataset):
-        motion = phi
+        motion = in_si(phi)
         if dphi is not None:
             raise bad("dphi", dphi, "nothing beside a motion, which has its own")
         for name in ("motion_phi", "motion_dphi"):

@@ -19,10 +19,20 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
-from phasekit.labels.units import factor
+from phasekit.labels.units import factor, si_unit
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "describe", "flag", "numeric"]
-__all__ += ["named", "number", "one_of", "pair", "reals", "same", "unknown", "whole"]
+__all__ += [
+    "named",
+    "number",
+    "one_of",
+    "pair",
+    "reals",
+    "same",
+    "unknown",
+    "variable_in_si",
+    "whole",
+]
 
 #: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
 NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
@@ -123,10 +133,14 @@ def _data_array(argument: str, value: xr.DataArray, wants: str, units: str | Non
     # Only the coordinates of its own dims travel on: others (the fixed parameters of the map
     # that it was taken from, say) would contradict the system that it is put into.
     coords: dict[Any, Any] = {
-        dim: value.coords[dim] for dim in value.dims if _is_plain_axis(value, dim)
+        dim: value.coords[dim] if own is held else own
+        for dim in value.dims
+        if _is_plain_axis(value, dim)
+        for held in [value.coords[dim].variable]
+        for own in [variable_in_si(str(dim), held)]
     }
-    axis = coords.get(value.dims[0])
-    if value.ndim == 1 and kept.chunks is None and axis is not None:
+    axis = value.coords.get(value.dims[0])
+    if value.ndim == 1 and kept.chunks is None and value.dims[0] in coords and axis is not None:
         # An axis that is its own coordinate stays so in other units.
         if not kept.equals(value.variable) and value.variable.equals(axis.variable):  # type: ignore[no-untyped-call]
             coords = {value.dims[0]: kept}
@@ -143,6 +157,16 @@ def _converted(argument: str, value: xr.Variable, units: str | None) -> xr.Varia
     data = value.data / float(1 / times) if 1 / times % 1 == 0 else value.data * float(times)
     attrs = {key: item for key, item in value.attrs.items() if key != "units"}
     return xr.Variable(value.dims, data, attrs if units is None else {**attrs, "units": units})
+
+
+def variable_in_si(argument: str, value: xr.Variable) -> xr.Variable:
+    """Return numbers in SI units or radians; the variable itself where its unit is not known."""
+    given = value.attrs.get("units")
+    return (
+        value
+        if given is None or value.dtype.kind not in "iuf"
+        else _converted(argument, value, si_unit(given) or given)
+    )
 
 
 def _is_plain_axis(value: xr.DataArray, dim: Any) -> bool:
