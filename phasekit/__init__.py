@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
+    from phasekit.errors import InvalidCellsWarning as InvalidCellsWarning
     from phasekit.errors import Loop as Loop
     from phasekit.errors import OrbitFamily as OrbitFamily
     from phasekit.errors import OrbitKind as OrbitKind
@@ -79,6 +80,7 @@ _MODULES = {
     "phasekit.errors": (
         "ConvergenceError",
         "EquilibriumKind",
+        "InvalidCellsWarning",
         "Loop",
         "OrbitFamily",
         "OrbitKind",

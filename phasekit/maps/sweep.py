@@ -12,6 +12,7 @@ import xarray as xr
 
 from phasekit.cells.dispatch import inputs_of, is_offered, passes_of
 from phasekit.cells.evaluate import Layout, evaluate, lay_out, leaves
+from phasekit.cells.invalid import warn_of_invalid
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
@@ -93,7 +94,8 @@ def sweep(
         The quantities with units, equations and sources. Swept parameters are dimension
         coordinates, fixed ones scalar coordinates; ``ds.phasekit.system()`` rebuilds the system
         of any selection. Cells whose parameters are not valid hold NaN, and -1 in n_equilibria.
-        With a Zarr store it is opened from there, as `open_map` does.
+        With a Zarr store it is opened from there, as `open_map` does. An `InvalidCellsWarning` says
+        how many cells are empty because their parameters are not legal.
 
     Raises
     ------
@@ -124,6 +126,7 @@ def sweep(
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
         layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
+        warn_of_invalid(layout.system)
         sweep_into(
             place,
             layout,
@@ -141,6 +144,7 @@ def sweep(
     dtypes = check_dtypes(dtype, rows)
     rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     target = None if place is None else WholeTarget(place, overwrite=overwrite)
+    warn_of_invalid(swept)
     more = inputs_of(swept, rows)
     ds = evaluate(swept, (*rows, *more), passes, states=states, order=order, progress=progress)
     if more:
