@@ -13,7 +13,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.pictures import picture
-from phasekit.labels.arguments import NumberLike, bad
+from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
 from phasekit.systems.identity import model_name
 from phasekit.systems.registry import model_named
@@ -97,6 +97,7 @@ class PhasekitAccessor:
                 raise ParameterError(f"{name}: got it in units and as a keyword, wants it once")
         return in_units(self._ds, {**given, **units_by_name})
 
+    @state_arguments
     def rotators(
         self,
         on: str = "equilibria",
@@ -140,6 +141,7 @@ class PhasekitAccessor:
         """
         return self._on_map("rotators", on, phi0, dphi0, parameters)
 
+    @state_arguments
     def bearing_forces(
         self,
         on: str = "equilibria",

@@ -11,7 +11,7 @@ import difflib
 import functools
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -38,6 +38,8 @@ __all__ += [
 NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
 #: What is kept of it: a float, a read-only 1-D array, or a DataArray of float64.
 Value: TypeAlias = float | FloatArray | xr.DataArray
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
@@ -231,6 +233,37 @@ def brief(value: Value) -> str:
         return f"<{value.size} values, {value[0]:.6g} to {value[-1]:.6g}>"
     sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
     return f"<{'lazy ' if value.chunks is not None else ''}DataArray ({sizes})>"
+
+
+def state_arguments(function: Function) -> Function:
+    """Let a function take the parts of a state by any name that they have anywhere.
+
+    An angle is ``phi`` where it is a state, ``phi0`` where a motion starts there, ``state_phi`` as
+    the coordinate of results, and has the name of the coordinate in a system that names it; so are
+    its rates. The first argument is the system, or an accessor.
+    """
+    own = {name.rstrip("0"): name for name in inspect.signature(function).parameters}
+    own = {stem: name for stem, name in own.items() if stem in ("phi", "dphi", "ddphi")}
+    other = {
+        alias: name
+        for stem, name in own.items()
+        for alias in (stem, f"{stem}0", f"state_{stem}")
+        if alias != name
+    }
+
+    @functools.wraps(function)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        names = dict(other)
+        coordinate = getattr(args[0], "coordinate", None) if args else None
+        if isinstance(coordinate, str):
+            names |= {stem.replace("phi", coordinate): name for stem, name in own.items()}
+        for name in [name for name in kwargs if name in names and name not in own.values()]:
+            if names[name] in kwargs:
+                raise ParameterError(f"{name}: got it besides {names[name]}, wants it once")
+            kwargs[names[name]] = kwargs.pop(name)
+        return function(*args, **kwargs)
+
+    return cast(Function, called)
 
 
 def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., Any]:
