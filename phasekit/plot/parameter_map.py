@@ -19,7 +19,7 @@ from phasekit.labels.arguments import bad, flag, number, unknown
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.strands import relative_gap
 from phasekit.systems.identity import model_name
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import model_named
 
 # The values along x and along y, as shown.
 Grid = tuple[NDArray[Any], NDArray[Any]]
@@ -287,7 +287,7 @@ def _draw_curves(
 def _coefficient_A(ds: xr.Dataset) -> xr.DataArray | None:
     """Return A over the map, or None if the Dataset cannot rebuild its model."""
     try:
-        A = MODELS[model_name(ds)].from_dataset(ds).coefficients().A
-    except (KeyError, ParameterError):
+        A = model_named("ds", model_name(ds)).from_dataset(ds).coefficients().A
+    except ParameterError:
         return None
     return A if isinstance(A, xr.DataArray) else None

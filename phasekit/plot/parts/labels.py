@@ -13,7 +13,8 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.plot.parts.style import Angles, angle_factor, angle_unit
 from phasekit.systems.identity import model_name
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.registry import model_named
+from phasekit.systems.system import Model
 
 SYMBOLS = {
     "beta": r"$\beta$",
@@ -109,10 +110,7 @@ def dataset(
 def system_of(motion: xr.Dataset, argument: str, instead: str) -> Model:
     """Return the system whose motion a Dataset holds."""
     try:
-        name = model_name(motion)
-        if name not in MODELS:
-            raise ParameterError(f"ds: got a motion of {name}")
-        return MODELS[name].from_dataset(motion)
+        return model_named("ds", model_name(motion)).from_dataset(motion)
     except ParameterError as error:
         raise ParameterError(
             f"{argument}: got a motion that does not tell its system ({error}); "
