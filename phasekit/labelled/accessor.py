@@ -7,17 +7,21 @@ when it is made.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.pictures import picture
+from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
 from phasekit.systems.identity import model_name
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import Model
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
@@ -96,6 +100,41 @@ class PhasekitAccessor:
             if name in given:
                 raise ParameterError(f"{name}: got it in units and as a keyword, wants it once")
         return in_units(self._ds, {**given, **units_by_name})
+
+    def table(self, units: Mapping[str, str] | None = None, **units_by_name: str) -> pd.DataFrame:
+        """Return a table for reading and for spreadsheets: names for codes, units in the head.
+
+        Parameters
+        ----------
+        units : mapping of str to str, optional
+            Units of some columns, as in `to`.
+        **units_by_name
+            The same by keyword.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each cell of the dims that most variables have; variables with others are
+            left out, and rows of what is absent. ``.to_csv(path)`` writes it.
+
+        Raises
+        ------
+        ParameterError
+            As `to`.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> ds = pk.equilibria(pk.Coefficients(2.0, 1.0, 0.0))
+        >>> ds.phasekit.table(phi="deg")[["phi (deg)", "kind"]].round(3)
+                      phi (deg)    kind
+        equilibrium
+        lower_center       60.0  center
+        lower_saddle        0.0  saddle
+        upper_center      -60.0  center
+        upper_saddle      180.0  saddle
+        """
+        return table_of(self.to(units, **units_by_name))
 
     @state_arguments
     def rotators(
