@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
+    from phasekit.errors import InvalidCellsWarning as InvalidCellsWarning
     from phasekit.errors import Loop as Loop
     from phasekit.errors import OrbitFamily as OrbitFamily
     from phasekit.errors import OrbitKind as OrbitKind
@@ -79,6 +80,7 @@ _MODULES = {
     "phasekit.errors": (
         "ConvergenceError",
         "EquilibriumKind",
+        "InvalidCellsWarning",
         "Loop",
         "OrbitFamily",
         "OrbitKind",
@@ -129,7 +131,7 @@ def __getattr__(name: str) -> Any:
     if name == "plot":
         return importlib.import_module("phasekit.plot")
     if name not in _HOME:
-        raise AttributeError(f"module 'phasekit' has no attribute {name!r}")
+        raise AttributeError(_unknown(name), name=name)
     value = getattr(importlib.import_module(_HOME[name]), name)
     if "xarray" in sys.modules:
         importlib.import_module("phasekit.labelled.accessor")
@@ -137,8 +139,20 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+def _unknown(name: str) -> str:
+    text = f"module 'phasekit' has no attribute {name!r}"
+    if name.startswith("__"):  # asked for by machines
+        return text
+    import difflib
+
+    same = {known.lower().replace("_", ""): known for known in __all__}
+    plain = name.lower().replace("_", "")
+    near = difflib.get_close_matches(plain, same, n=1)
+    return f"{text}; did you mean {same[near[0]]!r}?" if near else text
+
+
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)
 
 
 if "xarray" in sys.modules:  # then the accessor costs nothing, and maps opened by xarray have it

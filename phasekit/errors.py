@@ -37,6 +37,20 @@ class ParameterError(PhasekitError, ValueError):
     """
 
 
+class InvalidCellsWarning(ParameterError, UserWarning):
+    """Cells of an array have parameters that are not legal: they are NaN, and -1 in counts.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import phasekit as pk
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("ignore", pk.InvalidCellsWarning)
+    ...     pk.equilibria(pk.Pendulum(length=[-1.0, 1.0])).n_equilibria.values.tolist()
+    [-1, 2]
+    """
+
+
 class ConvergenceError(PhasekitError, RuntimeError):
     """An iteration ended without reaching its tolerance.
 

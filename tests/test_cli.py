@@ -438,3 +438,11 @@ def test_ranges():
 def test_negative_values_are_not_options():
     assert glue_negative_values(["--a", "-2mm", "-h"]) == ["--a=-2mm", "-h"]
     assert glue_negative_values(["--a=1", "-2"]) == ["--a=1", "-2"]
+
+
+def test_a_fresh_process_knows_every_model():
+    code = "import sys; from phasekit.cli import main; sys.exit(main())"
+    command = ["portrait", "--model", "Pendulum", "--length", "50cm", "--out", "a.png"]
+    done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "wrote a.png" in done.stdout

@@ -72,6 +72,29 @@ def test_unknown_name():
         pk.equilibrio  # noqa: B018
 
 
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ("equilibrio", "equilibria"),
+        ("seperatrices", "separatrices"),
+        ("gyrorotordisk", "GyroRotorDisk"),
+        ("Stoner_Wohlfarth", "StonerWohlfarth"),
+        ("orbit", "orbits"),
+    ],
+)
+def test_misspelt_names_get_the_nearest(wrong, right):
+    with pytest.raises(AttributeError, match=f"{wrong!r}; did you mean {right!r}"):
+        getattr(pk, wrong)
+    with pytest.raises(AttributeError, match="no attribute 'wavelet'$"):
+        pk.wavelet  # noqa: B018
+
+
+def test_public_names_alone_are_listed():
+    code = "import phasekit as pk; pk.equilibria; print(sorted(set(dir(pk)) - set(pk.__all__)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
 def test_constants():
     assert 180 * pk.deg == 3.141592653589793
     assert 60 * pk.rpm == 2 * 3.141592653589793

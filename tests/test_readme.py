@@ -8,6 +8,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 import phasekit as pk
+from phasekit.cli import main
 
 matplotlib.use("Agg")
 ROOT = Path(__file__).parents[1]
@@ -30,6 +31,21 @@ def test_the_calls_run_and_give_what_the_comments_say(readme):
     assert [f"{fold:.1f}" for fold in folds] == list(said.groups())
     counts = pk.sweep(names["rotor"], momentum=[0.0, 4.0]).n_equilibria.values.tolist()
     assert counts == [int(x) for x in re.search(r"# (\d), later (\d) steady", block).groups()]
+
+
+def test_the_shell_commands_run(readme, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    (recipe,) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    (tmp_path / "map.toml").write_text(recipe)
+    lines = re.findall(r"^phasekit (?:portrait|diagram|sweep) .*$", readme, re.MULTILINE)
+    commands = [line.split()[1:] for joint in lines for line in joint.split(" && ")]
+    assert [words[0] for words in commands] == ["portrait", "diagram", "sweep", "info"]
+    for words in commands:
+        assert main(words) == 0
+    assert "empty" not in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "map.toml", "map.zarr", "portrait.png", "diagram.png",
+    }  # fmt: skip
 
 
 def test_each_of_the_two_commands_is_one_line_that_does_everything(readme):

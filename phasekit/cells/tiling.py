@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-import sys
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
@@ -78,15 +78,17 @@ class _NoBar:
 def progress_bar(cells: int, progress: bool | None, done: int = 0) -> Any:
     """Return a bar that counts cells, with their rate and the time left; quiet unless asked for.
 
-    None shows it in a terminal alone, and if it takes longer than a second.
+    None shows it in a terminal and in notebooks alone, and if it takes longer than a second.
     """
-    if progress is False or (progress is None and not sys.stderr.isatty()):
+    if progress is False:
         return _NoBar()
-    from tqdm import tqdm
+    from phasekit.numerics.waits import watched  # here, because it loads numba
 
-    # A log gets a line in a while; a notebook, which is no terminal either, is kept up to date.
-    quick = sys.stderr.isatty() or "ipykernel" in sys.modules
-    return tqdm(
+    # A log gets a line in a while.
+    quick = watched()
+    if progress is None and not quick:
+        return _NoBar()
+    return _tqdm()(
         total=cells,
         initial=done,
         unit="cell",
@@ -95,3 +97,11 @@ def progress_bar(cells: int, progress: bool | None, done: int = 0) -> Any:
         mininterval=0.1 if quick else LOG_SECONDS,
         desc="phasekit",
     )
+
+
+def _tqdm() -> Any:
+    """Return the bar of notebooks in a notebook that can show it, else that of terminals."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # that a notebook has no widgets
+        from tqdm.auto import tqdm
+    return tqdm

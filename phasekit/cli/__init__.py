@@ -10,10 +10,11 @@ import argparse
 import importlib
 import signal
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
-from phasekit.errors import PhasekitError
+from phasekit.errors import InvalidCellsWarning, PhasekitError
 from phasekit.version import __version__
 
 COMMANDS = {
@@ -78,7 +79,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         parser.error(f"unknown command {options.command!r}; wants one of {', '.join(COMMANDS)}")
     try:
         command = importlib.import_module(f"phasekit.cli.{options.command}")
-        command.run(options.rest)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", InvalidCellsWarning)  # commands say it in their words
+            command.run(options.rest)
     except (PhasekitError, OSError) as error:
         return _complain(str(error))
     except KeyboardInterrupt as interrupt:

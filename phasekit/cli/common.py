@@ -14,7 +14,8 @@ from phasekit.cli import Parser
 from phasekit.cli.values import glue_negative_values, is_range, number, span
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.registry import models
+from phasekit.systems.system import Model
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,9 +27,10 @@ PICTURES = (".pdf", ".png", ".svg")
 
 def model_called(name: Any) -> type[Model]:
     """Return the model of a name."""
-    if not isinstance(name, str) or name not in MODELS:
-        raise unknown("model", name, MODELS)
-    return MODELS[name]
+    known = models()
+    if not isinstance(name, str) or name not in known:
+        raise unknown("model", name, known)
+    return known[name]
 
 
 def read_model(
@@ -50,7 +52,7 @@ def read_model(
     model = model_called(first.parse_known_args(words)[0].model)
     parser = Parser(prog=f"phasekit {command}", description=description, allow_abbrev=False)
     parser.add_argument(
-        "--model", default="GyroRotorDisk", help=f"one of {', '.join(MODELS)} (%(default)s)"
+        "--model", default="GyroRotorDisk", help=f"one of {', '.join(models())} (%(default)s)"
     )
     group = parser.add_argument_group(
         f"parameters of {model.__name__}", "a number in SI units and radians, or with a unit"

@@ -6,16 +6,22 @@ when it is made.
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.pictures import picture
-from phasekit.labels.arguments import NumberLike
+from phasekit.labelled.tables import table_of
+from phasekit.labels.arguments import NumberLike, bad, state_arguments
+from phasekit.labels.conversion import in_si, in_units
 from phasekit.systems.identity import model_name
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import Model
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]
@@ -57,6 +63,80 @@ class PhasekitAccessor:
         """
         return model_named("ds", model_name(self._ds)).from_dataset(self._ds)
 
+    def to(self, units: Mapping[str, str] | None = None, **units_by_name: str) -> xr.Dataset:
+        """Return this Dataset with some variables and coordinates in other units.
+
+        Parameters
+        ----------
+        units : mapping of str to str, optional
+            Units by the names of variables or coordinates: ``"deg"``, ``"rpm"``, ``"mm"``, ...
+        **units_by_name
+            The same by keyword.
+
+        Returns
+        -------
+        xarray.Dataset
+            A copy in which their numbers, and their attributes ``units``, are in those units. What
+            phasekit makes of it is the same: systems, loads and pictures read the attributes.
+
+        Raises
+        ------
+        ParameterError
+            If a name or a unit is unknown, a unit is one of something else, or a variable has
+            no attribute ``units``.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=10 * pk.rpm)
+        >>> folds = pk.critical(disk, "omega1").phasekit.to(critical_fold="rpm", a="mm")
+        >>> folds.critical_fold.attrs["units"], folds.a.item()
+        ('rpm', 24.0)
+        """
+        if units is not None and not isinstance(units, Mapping):
+            raise bad("units", units, "a mapping of names to units, {'beta': 'deg'}")
+        given = dict(units or {})
+        for name in units_by_name:
+            if name in given:
+                raise ParameterError(f"{name}: got it in units and as a keyword, wants it once")
+        return in_units(self._ds, {**given, **units_by_name})
+
+    def table(self, units: Mapping[str, str] | None = None, **units_by_name: str) -> pd.DataFrame:
+        """Return a table for reading and for spreadsheets: names for codes, units in the head.
+
+        Parameters
+        ----------
+        units : mapping of str to str, optional
+            Units of some columns, as in `to`.
+        **units_by_name
+            The same by keyword.
+
+        Returns
+        -------
+        pandas.DataFrame
+            A row for each cell of the dims that most variables have; variables with others are
+            left out, and rows of what is absent. ``.to_csv(path)`` writes it.
+
+        Raises
+        ------
+        ParameterError
+            As `to`.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> ds = pk.equilibria(pk.Coefficients(2.0, 1.0, 0.0))
+        >>> ds.phasekit.table(phi="deg")[["phi (deg)", "kind"]].round(3)
+                      phi (deg)    kind
+        equilibrium
+        lower_center       60.0  center
+        lower_saddle        0.0  saddle
+        upper_center      -60.0  center
+        upper_saddle      180.0  saddle
+        """
+        return table_of(self.to(units, **units_by_name))
+
+    @state_arguments
     def rotators(
         self,
         on: str = "equilibria",
@@ -100,6 +180,7 @@ class PhasekitAccessor:
         """
         return self._on_map("rotators", on, phi0, dphi0, parameters)
 
+    @state_arguments
     def bearing_forces(
         self,
         on: str = "equilibria",
@@ -151,7 +232,7 @@ class PhasekitAccessor:
         from phasekit.labelled.loads import on_map
 
         system = self.system().replace(**parameters)
-        return on_map(self._ds, system, what, on, phi0, dphi0)
+        return on_map(in_si(self._ds), system, what, on, phi0, dphi0)
 
     @property
     def plot(self) -> MapPlots:
@@ -212,11 +293,11 @@ class MapPlots:
 
     def bifurcation_diagram(self, **options: Any) -> Any:
         """Draw the equilibria against a swept parameter; returns the Axes."""
-        return picture("bifurcation_diagram")(self._ds, **options)
+        return picture("bifurcation_diagram")(in_si(self._ds), **options)
 
     def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
-        return picture("parameter_map")(self._ds, variable, **options)
+        return picture("parameter_map")(in_si(self._ds), variable, **options)
 
     def hodograph(self, rotator: str = "R022", **options: Any) -> Any:
         """Draw a rotator's hodograph for the one selected cell, or of motions; returns the Axes."""
@@ -232,11 +313,11 @@ class MapPlots:
 
     def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
         """Draw the load on the separatrices over two swept parameters; returns the Axes."""
-        return picture("bearing_load_map")(self._ds, variable, **options)
+        return picture("bearing_load_map")(in_si(self._ds), variable, **options)
 
     def _cell_or_motion(self) -> Model | xr.Dataset:
         along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
-        return self._ds if along and "time" in self._ds.dims else self._cell()
+        return in_si(self._ds) if along and "time" in self._ds.dims else self._cell()
 
     def _cell(self) -> Model:
         system = PhasekitAccessor(self._ds).system()

@@ -13,10 +13,11 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.states import at_states
-from phasekit.labels.arguments import NumberLike
+from phasekit.labels.arguments import NumberLike, state_arguments
 from phasekit.table.quantities import select
 
 
+@state_arguments
 def potential(system: Any, phi: NumberLike) -> xr.Dataset:
     """Potential V of the equation of motion, per unit of inertia.
 
@@ -51,6 +52,7 @@ def potential(system: Any, phi: NumberLike) -> xr.Dataset:
     return _at_states("potential", system, phi=phi)
 
 
+@state_arguments
 def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
     """Gradient V' of the potential: ``phi'' = -V'``.
 
@@ -84,6 +86,7 @@ def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
     return _at_states("potential_gradient", system, phi=phi)
 
 
+@state_arguments
 def curvature(system: Any, phi: NumberLike) -> xr.Dataset:
     """Curvature V'' of the potential.
 
@@ -117,6 +120,7 @@ def curvature(system: Any, phi: NumberLike) -> xr.Dataset:
     return _at_states("potential_curvature", system, phi=phi)
 
 
+@state_arguments
 def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     """Energy integral of a state: constant along every motion.
 
@@ -151,6 +155,7 @@ def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     return _at_states("energy_integral", system, phi=phi, dphi=dphi)
 
 
+@state_arguments
 def phase_velocity(system: Any, phi: NumberLike, energy: NumberLike) -> xr.Dataset:
     """Angular velocity at an angle, on the level of an energy.
 

@@ -21,7 +21,7 @@ from phasekit.maps.stored_arrays import read_plan
 from phasekit.maps.unfinished import COMPUTED
 from phasekit.maps.whole import open_map
 from phasekit.systems.identity import SCHEMA
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 from phasekit.table.quantities import plan_passes
 
 
@@ -65,9 +65,8 @@ class MapInfo:
         model = str(ds.attrs["phasekit_model"])
         made = f"phasekit {ds.attrs.get('phasekit_version', '?')}, schema {ds.attrs[SCHEMA]}"
         lines = [f"{self.name}: map of {model}, made by {made}"]
-        inputs = (
-            {p.name for p in MODELS[model].declared} | set(STATES) if model in MODELS else set()
-        )
+        declared = models()[model].declared if model in models() else ()
+        inputs = {p.name for p in declared} | set(STATES)
         fixed = [
             f"{name} = {coord.item():.6g}{_unit(coord)}"
             for name, coord in ds.coords.items()

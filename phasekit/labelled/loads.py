@@ -16,7 +16,8 @@ import xarray as xr
 from phasekit.cells.dispatch import passes_of
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import NumberLike, bad, numeric, one_of
+from phasekit.labels.arguments import NumberLike, bad, numeric, one_of, state_arguments
+from phasekit.labels.conversion import in_si
 from phasekit.systems.as_system import as_system
 from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.system import Model
@@ -30,6 +31,7 @@ CURVES = ("equilibria", "separatrix", "orbit")
 SELECTED = ("equilibrium", "saddle", "side")
 
 
+@state_arguments
 def rotators(
     disk: GyroRotorDisk,
     phi: NumberLike | xr.Dataset,
@@ -87,6 +89,7 @@ def rotators(
     return _at(system, select("rotators"), states)
 
 
+@state_arguments
 def bearing_forces(
     disk: GyroRotorDisk,
     phi: NumberLike | xr.Dataset,
@@ -153,6 +156,7 @@ def bearing_forces(
     return _at(system, rows, states, carrier=carrier)
 
 
+@state_arguments
 def fixed_bearing_forces(
     disk: GyroRotorDisk,
     phi: NumberLike | xr.Dataset,
@@ -219,7 +223,7 @@ def _states(
     if not is_disk(system):
         raise bad("disk", disk, "a GyroRotorDisk")
     if isinstance(phi, xr.Dataset):
-        motion = phi
+        motion = in_si(phi)
         if dphi is not None:
             raise bad("dphi", dphi, "nothing beside a motion, which has its own")
         for name in ("motion_phi", "motion_dphi"):

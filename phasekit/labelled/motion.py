@@ -12,11 +12,12 @@ import xarray as xr
 from phasekit.cells.dispatch import pass_from
 from phasekit.cells.states import at_states
 from phasekit.labelled.orbits import noted
-from phasekit.labels.arguments import NumberLike
+from phasekit.labels.arguments import NumberLike, state_arguments
 from phasekit.systems.as_system import as_system
 from phasekit.table.quantities import select
 
 
+@state_arguments
 def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.Dataset:
     """States after times, exact for any time: no integration, so no error that grows with steps.
 

@@ -16,7 +16,7 @@ import xarray as xr
 from phasekit.cells.dispatch import SIDES, pass_from
 from phasekit.cells.states import at_states
 from phasekit.errors import OrbitFamily, ParameterError
-from phasekit.labels.arguments import NumberLike, bad, describe, numeric, one_of
+from phasekit.labels.arguments import NumberLike, bad, describe, numeric, one_of, state_arguments
 from phasekit.systems.as_system import as_system
 from phasekit.table.quantities import select
 
@@ -24,6 +24,7 @@ from phasekit.table.quantities import select
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
 
 
+@state_arguments
 def orbits(
     system: Any,
     phi0: NumberLike | None = None,
@@ -64,11 +65,12 @@ def orbits(
         ``orbit_kind`` (`OrbitKind`), ``orbit_energy`` in s^-2, ``period`` in s (infinite on a
         separatrix; that of small oscillations at a center), ``frequency`` and ``action`` in
         s^-1 (the action is NaN on a separatrix), ``phi_min`` and ``phi_max`` in rad (unwrapped;
-        NaN for a rotation). Cells without an orbit, below the center or at an absent saddle, are
-        not_computed and NaN. A state is an equilibrium if it is at rest and V' = 0 there in
-        floating point, and asymptotic if its energy is a saddle's within the rounding of the
-        state; so the double next to a center is a libration of almost no action. An orbit of a
-        `Potential` that leaves the line, or its interval, is unbounded; its period is infinite.
+        NaN for a rotation), and ``amplitude``, half the way between them. Cells without an orbit,
+        below the center or at an absent saddle, are not_computed and NaN. A state is an equilibrium
+        if it is at rest and V' = 0 there in floating point, and asymptotic if its energy is a
+        saddle's within the rounding of the state; so the double next to a center is a libration of
+        almost no action. An orbit of a `Potential` that leaves the line, or its interval, is
+        unbounded; its period is infinite.
         Results of a `Potential` have estimates of their errors, ``period_error`` and
         ``action_error``.
 
@@ -144,6 +146,7 @@ def noted(ds: xr.Dataset, **attrs: str) -> xr.Dataset:
     return ds
 
 
+@state_arguments
 def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     """Action and angle variable of states, and how the frequency changes with the action.
 

@@ -11,6 +11,7 @@ import xarray as xr
 
 from phasekit.cells.dispatch import passes_of
 from phasekit.cells.evaluate import evaluate
+from phasekit.cells.invalid import warn_of_invalid
 from phasekit.labelled.in_box import equilibria_in_box
 from phasekit.labels.arguments import bad
 from phasekit.systems.as_system import as_system
@@ -120,4 +121,5 @@ def separatrices(system: Any) -> xr.Dataset:
 
 def _of_system(group: str, system: Any) -> xr.Dataset:
     system, rows = as_system(system), select(group)
+    warn_of_invalid(system, stacklevel=3)
     return evaluate(system, rows, passes_of(system, rows))

@@ -11,7 +11,7 @@ import difflib
 import functools
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 import xarray as xr
@@ -19,15 +19,27 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
-from phasekit.labels.units import factor
+from phasekit.labels.units import factor, si_unit
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "describe", "flag", "numeric"]
-__all__ += ["named", "number", "one_of", "pair", "reals", "same", "unknown", "whole"]
+__all__ += [
+    "named",
+    "number",
+    "one_of",
+    "pair",
+    "reals",
+    "same",
+    "unknown",
+    "variable_in_si",
+    "whole",
+]
 
 #: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
 NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
 #: What is kept of it: a float, a read-only 1-D array, or a DataArray of float64.
 Value: TypeAlias = float | FloatArray | xr.DataArray
+
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
@@ -123,10 +135,14 @@ def _data_array(argument: str, value: xr.DataArray, wants: str, units: str | Non
     # Only the coordinates of its own dims travel on: others (the fixed parameters of the map
     # that it was taken from, say) would contradict the system that it is put into.
     coords: dict[Any, Any] = {
-        dim: value.coords[dim] for dim in value.dims if _is_plain_axis(value, dim)
+        dim: value.coords[dim] if own is held else own
+        for dim in value.dims
+        if _is_plain_axis(value, dim)
+        for held in [value.coords[dim].variable]
+        for own in [variable_in_si(str(dim), held)]
     }
-    axis = coords.get(value.dims[0])
-    if value.ndim == 1 and kept.chunks is None and axis is not None:
+    axis = value.coords.get(value.dims[0])
+    if value.ndim == 1 and kept.chunks is None and value.dims[0] in coords and axis is not None:
         # An axis that is its own coordinate stays so in other units.
         if not kept.equals(value.variable) and value.variable.equals(axis.variable):  # type: ignore[no-untyped-call]
             coords = {value.dims[0]: kept}
@@ -143,6 +159,16 @@ def _converted(argument: str, value: xr.Variable, units: str | None) -> xr.Varia
     data = value.data / float(1 / times) if 1 / times % 1 == 0 else value.data * float(times)
     attrs = {key: item for key, item in value.attrs.items() if key != "units"}
     return xr.Variable(value.dims, data, attrs if units is None else {**attrs, "units": units})
+
+
+def variable_in_si(argument: str, value: xr.Variable) -> xr.Variable:
+    """Return numbers in SI units or radians; the variable itself where its unit is not known."""
+    given = value.attrs.get("units")
+    return (
+        value
+        if given is None or value.dtype.kind not in "iuf"
+        else _converted(argument, value, si_unit(given) or given)
+    )
 
 
 def _is_plain_axis(value: xr.DataArray, dim: Any) -> bool:
@@ -207,6 +233,37 @@ def brief(value: Value) -> str:
         return f"<{value.size} values, {value[0]:.6g} to {value[-1]:.6g}>"
     sizes = ", ".join(f"{dim}: {size}" for dim, size in value.sizes.items())
     return f"<{'lazy ' if value.chunks is not None else ''}DataArray ({sizes})>"
+
+
+def state_arguments(function: Function) -> Function:
+    """Let a function take the parts of a state by any name that they have anywhere.
+
+    An angle is ``phi`` where it is a state, ``phi0`` where a motion starts there, ``state_phi`` as
+    the coordinate of results, and has the name of the coordinate in a system that names it; so are
+    its rates. The first argument is the system, or an accessor.
+    """
+    own = {name.rstrip("0"): name for name in inspect.signature(function).parameters}
+    own = {stem: name for stem, name in own.items() if stem in ("phi", "dphi", "ddphi")}
+    other = {
+        alias: name
+        for stem, name in own.items()
+        for alias in (stem, f"{stem}0", f"state_{stem}")
+        if alias != name
+    }
+
+    @functools.wraps(function)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        names = dict(other)
+        coordinate = getattr(args[0], "coordinate", None) if args else None
+        if isinstance(coordinate, str):
+            names |= {stem.replace("phi", coordinate): name for stem, name in own.items()}
+        for name in [name for name in kwargs if name in names and name not in own.values()]:
+            if names[name] in kwargs:
+                raise ParameterError(f"{name}: got it besides {names[name]}, wants it once")
+            kwargs[names[name]] = kwargs.pop(name)
+        return function(*args, **kwargs)
+
+    return cast(Function, called)
 
 
 def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., Any]:

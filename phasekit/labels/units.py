@@ -89,6 +89,16 @@ def usual(unit: str) -> str:
     return _ALIASES.get(plain, plain)
 
 
+def si_unit(unit: object) -> str | None:
+    """Return the SI unit, or radians, to which a unit leads; None where it is not known.
+
+    >>> si_unit("mm"), si_unit("rpm"), si_unit("parsec")
+    ('m', 's-1', None)
+    """
+    name = usual(unit) if isinstance(unit, str) else ""
+    return next((held for held, fits in UNITS.items() if name == held or name in fits), None)
+
+
 def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:
     """Return the number by which values in `unit` become values in the unit `wanted`.
 

@@ -27,7 +27,7 @@ from phasekit.maps.parts import Part
 from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan, fingerprint
 from phasekit.maps.plan_file import GROUP, PLAN_KEY, plan_bytes, plan_from
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 
@@ -186,7 +186,7 @@ def refuse_strange(store: Any, name: str) -> None:
     keys = files.every_key(store)
     own = {GROUP, *str(zarr_group(store).attrs.get(_NAMED, "")).split()}
     own |= {*ROWS, *STATES, *LABELS}
-    own |= {parameter.name for model in MODELS.values() for parameter in model.declared}
+    own |= {parameter.name for model in models().values() for parameter in model.declared}
     with contextlib.suppress(ParameterError):  # a plan that is damaged
         plan = read_plan(store)
         if plan is None:  # written in one go, with any arrays

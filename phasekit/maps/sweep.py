@@ -12,6 +12,7 @@ import xarray as xr
 
 from phasekit.cells.dispatch import inputs_of, is_offered, passes_of
 from phasekit.cells.evaluate import Layout, evaluate, lay_out, leaves
+from phasekit.cells.invalid import warn_of_invalid
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
@@ -57,8 +58,8 @@ def sweep(
     axes : mapping of str to array_like, optional
         Values of the swept parameters: 1-D lists, arrays or ranges, each a dim of the map, in
         the order given; or DataArrays, which broadcast by the names of their dims. Likewise the
-        states that the quantities need (``state_phi``, ``state_dphi``, ``time``, ...), which may
-        be single numbers as well.
+        states that the quantities need (``state_phi``, ``state_dphi``, ``time``, ..., or ``phi``,
+        ``dphi``, ``t`` as the labelled functions call them), which may be single numbers as well.
     of : str or iterable of str, default ("equilibria", "separatrices")
         Quantities, or groups of them; `quantities` lists them.
     store : path, URL or zarr store, optional
@@ -93,7 +94,8 @@ def sweep(
         The quantities with units, equations and sources. Swept parameters are dimension
         coordinates, fixed ones scalar coordinates; ``ds.phasekit.system()`` rebuilds the system
         of any selection. Cells whose parameters are not valid hold NaN, and -1 in n_equilibria.
-        With a Zarr store it is opened from there, as `open_map` does.
+        With a Zarr store it is opened from there, as `open_map` does. An `InvalidCellsWarning` says
+        how many cells are empty because their parameters are not legal.
 
     Raises
     ------
@@ -124,6 +126,7 @@ def sweep(
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
         layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
+        warn_of_invalid(layout.system)
         sweep_into(
             place,
             layout,
@@ -141,6 +144,7 @@ def sweep(
     dtypes = check_dtypes(dtype, rows)
     rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     target = None if place is None else WholeTarget(place, overwrite=overwrite)
+    warn_of_invalid(swept)
     more = inputs_of(swept, rows)
     ds = evaluate(swept, (*rows, *more), passes, states=states, order=order, progress=progress)
     if more:
@@ -212,10 +216,13 @@ def _axes(
     given.update(by_name)
     valid = [parameter.name for parameter in system.declared] + states
     kept: dict[str, Value] = {}
-    for name, value in given.items():
+    for key, value in given.items():
+        name = key if key in valid else _state_called(key, system)
         if name not in valid:
-            raise _unknown_axis(system, name, valid)
-        kept[name] = numeric(name, value, system.unit_of(name))
+            raise _unknown_axis(system, key, valid)
+        if name in kept or (name != key and name in given):
+            raise ParameterError(f"{key}: got it besides {name}, wants it once")
+        kept[name] = numeric(key, value, system.unit_of(name))
         if isinstance(kept[name], float) and name not in states:
             raise bad(
                 name,
@@ -229,6 +236,15 @@ def _axes(
             f"as in pk.sweep(system, {valid[0]}=[...])"
         )
     return kept
+
+
+def _state_called(key: Any, system: Model) -> str:
+    """Return the state that an argument of the labelled functions is, which may have its name."""
+    stem = str(key).rstrip("0")
+    coordinate = getattr(system, "coordinate", None)
+    if isinstance(coordinate, str) and stem in (coordinate, f"d{coordinate}"):
+        stem = "phi" if stem == coordinate else "dphi"
+    return "time" if stem == "t" else f"state_{stem}"
 
 
 def _unknown_axis(system: Model, name: Any, valid: list[str]) -> ParameterError:

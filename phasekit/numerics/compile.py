@@ -19,6 +19,8 @@ import numpy.typing as npt
 from numba import njit
 from numba.extending import overload
 
+from phasekit.numerics import waits as waits  # says that something is compiled
+
 Array = npt.NDArray[np.float64]
 Outputs = tuple[npt.NDArray[Any], ...]
 Function = TypeVar("Function", bound=Callable[..., Any])

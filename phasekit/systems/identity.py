@@ -11,6 +11,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import describe
+from phasekit.labels.conversion import in_si
 from phasekit.systems.parameter import Parameter
 from phasekit.version import __version__
 
@@ -59,6 +60,7 @@ def parameter_values(ds: xr.Dataset, declared: Iterable[Parameter]) -> dict[str,
     ParameterError
         If the coordinate of a parameter that is not optional is gone.
     """
+    ds = in_si(ds)
     values: dict[str, Any] = {}
     for parameter in declared:
         name = parameter.name

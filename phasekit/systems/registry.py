@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import describe
@@ -17,6 +18,13 @@ HOMES = (
 )
 
 
+def models() -> Mapping[str, type[Model]]:
+    """Return every model by its name."""
+    for module in HOMES:
+        importlib.import_module(module)
+    return MODELS
+
+
 def model_named(argument: str, name: object) -> type[Model]:
     """Return the model of a name.
 
@@ -25,11 +33,9 @@ def model_named(argument: str, name: object) -> type[Model]:
     ParameterError
         If there is none.
     """
-    if name not in MODELS:
-        for module in HOMES:
-            importlib.import_module(module)
-    if not isinstance(name, str) or name not in MODELS:
+    known = MODELS if name in MODELS else models()
+    if not isinstance(name, str) or name not in known:
         raise ParameterError(
-            f"{argument}: got a map of the model {describe(name)}, wants one of {', '.join(MODELS)}"
+            f"{argument}: got a map of the model {describe(name)}, wants one of {', '.join(known)}"
         )
-    return MODELS[name]
+    return known[name]

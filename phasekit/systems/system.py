@@ -34,6 +34,7 @@ from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter, attrs_of
+from phasekit.systems.summary import summary
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -254,6 +255,18 @@ class Model(Lawful):
         """Write the parameters, long arrays by their ends."""
         shown = ", ".join(f"{name}={brief(value)}" for name, value in self.parameters.items())
         return f"{type(self).__name__}({shown})"
+
+    def __str__(self) -> str:
+        """Say what it is: parameters in everyday units, equilibria, the nearest folds."""
+        return str(summary(self))
+
+    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
+        """Say so in IPython, where the representation alone would be meant for programs."""
+        printer.text(str(self))
+
+    def _repr_html_(self) -> str:
+        """Say so in a notebook."""
+        return summary(self).html
 
     def __eq__(self, other: object) -> bool:
         """Whether it is the same model with equal parameters; NaN equals NaN."""

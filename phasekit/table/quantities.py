@@ -7,6 +7,8 @@ there that names the array function which computes it; nothing else has to chang
 
 from __future__ import annotations
 
+import html
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from phasekit.errors import ParameterError
@@ -172,19 +174,34 @@ class Quantities(Mapping[str, Quantity]):
         """Return the number of quantities."""
         return len(self._rows)
 
+    def _lines(self) -> list[tuple[str, ...]]:
+        return [
+            ("quantity", "group", "dims", "units", "meaning"),
+            *(
+                (row.name, row.group, ", ".join(row.dims), row.units, row.long_name)
+                for row in self._rows.values()
+            ),
+        ]
+
     def __repr__(self) -> str:
         """Write the table."""
-        head = ("quantity", "group", "dims", "units", "meaning")
-        table = [
-            (row.name, row.group, ", ".join(row.dims), row.units, row.long_name)
-            for row in self._rows.values()
-        ]
-        widths = [max(len(line[i]) for line in [head, *table]) for i in range(4)]
+        lines = self._lines()
+        widths = [max(len(line[i]) for line in lines) for i in range(4)]
         return "\n".join(
             "  ".join(text.ljust(width) for text, width in zip(line, widths, strict=False))
             + f"  {line[-1]}"
-            for line in [head, *table]
+            for line in lines
         )
+
+    def _repr_html_(self) -> str:
+        """Write the table for a notebook."""
+        rows = [
+            "".join(f"<{tag} style='text-align: left'>{html.escape(text)}</{tag}>" for text in line)
+            for tag, line in zip(
+                itertools.chain(["th"], itertools.repeat("td")), self._lines(), strict=False
+            )
+        ]
+        return f"<table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
 
 def quantities() -> Quantities:

@@ -16,7 +16,16 @@ SINGLE = pk.Coefficients(0.4, 1.2, 0.7)  # one saddle
 HETEROCLINIC = pk.Coefficients(2.0, 0.0, 1.0)
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
 PENDULUM = pk.Pendulum(length=0.5, g=10.0)
-ORBITS = ["orbit_kind", "orbit_energy", "period", "frequency", "action", "phi_min", "phi_max"]
+ORBITS = [
+    "orbit_kind",
+    "orbit_energy",
+    "period",
+    "frequency",
+    "action",
+    "phi_min",
+    "phi_max",
+    "amplitude",
+]
 ANGLES = ["frequency", "action", "orbit_family", "angle", "twist"]
 PHI, DPHI = np.linspace(-3, 3, 7), np.linspace(-6.0, 6.0, 7)
 
@@ -408,7 +417,7 @@ def test_results_merge():
         pk.near_separatrix(DISK, 0.1),
     ]
     ds = xr.merge(parts, compat="identical", join="exact")
-    assert len(ds.data_vars) == 18 + 1 + 7 + 3 + 2 + 2 + 2 + 1
+    assert len(ds.data_vars) == 18 + 1 + 8 + 3 + 2 + 2 + 2 + 1
     assert ds.phasekit.system() == DISK
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,14 @@ class Orbits(NamedTuple):
     """Least angle, rad, unwrapped round the state; NaN for a rotation."""
     phi_max: Array
     """Greatest angle, rad."""
+    amplitude: Array
+    """Half the way from the least angle to the greatest, rad."""
+
+    @classmethod
+    def of(cls, arrays: Arrays, shape: tuple[int, ...]) -> Self:
+        """Return what a kernel found, from `allocate`, in the shape of its cells."""
+        found = [array.reshape(shape) for array in arrays]
+        return cls._make([*found, 0.5 * (found[-1] - found[-2])])
 
 
 def orbits(
@@ -86,7 +94,7 @@ def orbits(
     arrays = (*cells.arrays, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
     out = allocate(shape)
     launch(kernels.orbits, arrays, out[0].size, (out,), threads)
-    return Orbits(*(array.reshape(shape) for array in out))
+    return Orbits.of(out, shape)
 
 
 def orbits_at_energy(
@@ -225,7 +233,7 @@ def _at_levels(
     )
     out = allocate(shape)
     launch(kernels.levels, arrays, out[0].size, (out,), threads)
-    return Orbits(*(array.reshape(shape) for array in out))
+    return Orbits.of(out, shape)
 
 
 def allocate(shape: tuple[int, ...]) -> Arrays:

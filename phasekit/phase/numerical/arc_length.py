@@ -174,5 +174,7 @@ class ArcLength:
         speed = v * np.sqrt(self.law.inertia(x)[0])
         found = rounds.orbits(ground, self.length([x]), np.array([speed]))
         ends = (self.place(found.phi_min), self.place(found.phi_max))
-        found = found._replace(phi_min=ends[0], phi_max=ends[1])
+        found = found._replace(
+            phi_min=ends[0], phi_max=ends[1], amplitude=0.5 * (ends[1] - ends[0])
+        )
         return rounds.Orbits._make(field[0] for field in found)

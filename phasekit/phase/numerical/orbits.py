@@ -30,6 +30,7 @@ class Orbits(NamedTuple):
     action: Array
     phi_min: Array
     phi_max: Array
+    amplitude: Array
     period_error: Array
     """Estimated error of the period, by its quadrature; 0 where the period is infinite."""
     action_error: Array
@@ -154,7 +155,10 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         round_ = (kind == OrbitKind.ROTATION) | ~valid
         low, high = np.where(round_, np.nan, low), np.where(round_, np.nan, high)
         frequency = 2.0 * np.pi / period
-    return Orbits(kind, energy, period, frequency, action, low, high, period_error, action_error)
+    reach = 0.5 * (high - low)
+    return Orbits(
+        kind, energy, period, frequency, action, low, high, reach, period_error, action_error
+    )
 
 
 def _turning_point(x: Array, way: Array, end: End, systems: Systems) -> Array:

@@ -13,7 +13,8 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.plot.parts.units import Angles, Units, as_units
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.registry import models
+from phasekit.systems.system import Model
 
 SYMBOLS = {
     "beta": r"$\beta$",
@@ -119,7 +120,7 @@ def dataset(
 
 def model_in(ds: xr.Dataset) -> type[Model] | None:
     """Return the model that a Dataset names, if all that it needs is there."""
-    model = MODELS.get(str(ds.attrs.get(MODEL)))
+    model = models().get(str(ds.attrs.get(MODEL)))
     if model is None or ds.attrs.get(SCHEMA) != SCHEMA_VERSION:
         return None
     needed = (parameter.name for parameter in model.declared if not parameter.optional)

@@ -1,0 +1,86 @@
+"""Names: of states in every function, of the coordinate of any potential, of turning points."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import phasekit as pk
+
+SYSTEM = pk.Coefficients(4.0, 1.0, 0.5)
+DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0, m=2.0, half_span=0.15)
+WELL = pk.Potential("x^4/4 - x^2/2", "x")
+STATES = ({"phi": 0.5, "dphi": 0.2}, {"phi0": 0.5, "dphi0": 0.2}, {"state_phi": 0.5, "dphi": 0.2})
+
+
+@pytest.mark.parametrize(
+    "function", [pk.orbits, pk.energy, pk.action_angle], ids=lambda f: f.__name__
+)
+@pytest.mark.parametrize("state", STATES, ids=lambda s: "-".join(s))
+def test_a_state_may_have_any_of_its_names(function, state):
+    xr.testing.assert_identical(function(SYSTEM, **state), function(SYSTEM, 0.5, 0.2))
+
+
+@pytest.mark.parametrize("state", STATES, ids=lambda s: "-".join(s))
+def test_motions_and_loads_take_them_too(state):
+    times = [0.0, 0.5]
+    xr.testing.assert_identical(pk.flow(SYSTEM, **state, t=times), pk.flow(SYSTEM, 0.5, 0.2, times))
+    for function in (pk.rotators, pk.bearing_forces):
+        xr.testing.assert_identical(function(DISK, **state), function(DISK, 0.5, 0.2))
+    ds = pk.equilibria(DISK)
+    xr.testing.assert_identical(
+        ds.phasekit.bearing_forces("orbit", **state),
+        ds.phasekit.bearing_forces("orbit", phi0=0.5, dphi0=0.2),
+    )
+
+
+def test_sweeps_take_what_the_functions_take():
+    wanted = pk.sweep(SYSTEM, A=[3.0, 4.0], state_phi=0.5, state_dphi=0.2, of="orbits")
+    for state in STATES:
+        xr.testing.assert_identical(pk.sweep(SYSTEM, A=[3.0, 4.0], **state, of="orbits"), wanted)
+    wanted = pk.sweep(SYSTEM, A=[3.0], state_phi=0.5, state_dphi=0.2, time=[1.0, 2.0], of="motion")
+    found = pk.sweep(SYSTEM, A=[3.0], phi0=0.5, dphi0=0.2, t=[1.0, 2.0], of="motion")
+    xr.testing.assert_identical(found, wanted)
+    with pytest.raises(pk.ParameterError, match="phi: got it besides state_phi, wants it once"):
+        pk.sweep(SYSTEM, A=[3.0], state_phi=0.5, phi=0.4, state_dphi=0.2, of="orbits")
+    with pytest.raises(pk.ParameterError, match="'phi' is unknown"):
+        pk.sweep(SYSTEM, A=[3.0], phi=0.5)
+
+
+def test_the_coordinate_of_a_potential_may_name_the_state():
+    xr.testing.assert_identical(pk.orbits(WELL, x=0.5, dx=0.1), pk.orbits(WELL, 0.5, 0.1))
+    xr.testing.assert_identical(pk.flow(WELL, x=0.5, dx=0.1, t=1.0), pk.flow(WELL, 0.5, 0.1, 1.0))
+    assert pk.potential(WELL, x=1.0).potential.item() == -0.25
+
+
+def test_a_state_is_given_once():
+    with pytest.raises(pk.ParameterError, match="phi: got it besides phi0, wants it once"):
+        pk.orbits(SYSTEM, phi0=0.5, phi=0.4, dphi0=0.2)
+    with pytest.raises(TypeError, match="multiple values"):
+        pk.energy(SYSTEM, 0.5, 0.2, phi0=0.4)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'phy'"):
+        pk.energy(SYSTEM, phy=0.5, dphi=0.2)
+
+
+def test_the_amplitude_is_half_the_way_between_the_turning_points():
+    # Released from rest at 0.5 a pendulum swings as far to the other side.
+    swing = pk.orbits(pk.Pendulum(length=1.0), [0.5, 3.0, 0.0, 0.0], [0.0, 0.0, 0.0, 9.0])
+    np.testing.assert_allclose(swing.amplitude, [0.5, 3.0, 0.0, np.nan], rtol=1e-15)
+    assert swing.amplitude.attrs["units"] == "rad"
+    # x^4/4 - x^2/2 = h < 0: x^2 = 1 +- sqrt(1 + 4 h)
+    h = -0.15
+    low, high = np.sqrt(1 + np.array([-1, 1]) * np.sqrt(1 + 4 * h))
+    found = pk.orbits(WELL, energy=h)
+    assert found.amplitude.item() == pytest.approx((high - low) / 2, rel=1e-14)
+    assert found.amplitude.attrs["units"] == "1"
+    xr.testing.assert_equal(found.amplitude, (found.phi_max - found.phi_min) / 2)
+    assert "amplitude" in pk.quantities().groups["orbits"]
+
+
+def test_critical_values_in_the_parameters_of_the_analogues():
+    # The astroid |h_x|^(2/3) + |h_y|^(2/3) = (2 K)^(2/3)
+    magnet = pk.StonerWohlfarth(K=1.0, h_x=0.0, h_y=0.5)
+    field = (2.0 ** (2 / 3) - 0.5 ** (2 / 3)) ** 1.5
+    found = pk.critical(magnet, "h_x").critical_fold.sel(fold="minus").item()
+    assert found == pytest.approx(field, rel=1e-14)
+    found = pk.critical(magnet, "K").critical_fold
+    assert found.attrs["parameter"] == "K"

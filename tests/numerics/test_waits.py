@@ -1,0 +1,70 @@
+"""Whoever waits for more than two seconds is told why."""
+
+import sys
+import time
+import types
+
+import numba
+import pytest
+from numba.core import event
+
+from phasekit.cells import tiling
+from phasekit.numerics import waits
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    monkeypatch.setattr(waits, "watched", lambda: True)
+    monkeypatch.setattr(waits, "PATIENCE", 0.01)
+
+
+def compiled(module, seconds=0.0):
+    """Compile a function of a module, which takes at least so long."""
+    space = {"__name__": module}
+    exec("def double(x):\n    return 2 * x", space)
+
+    class Slow(event.Listener):
+        def on_start(self, started):
+            time.sleep(seconds)
+
+        def on_end(self, ended):
+            pass
+
+    with event.install_listener("numba:compile", Slow()):
+        assert numba.njit(space["double"])(2) == 4
+
+
+def test_compiling_is_said_once(terminal, capfd):
+    compiled("phasekit.made_up", 0.3)
+    text = "phasekit: compiling once for this machine, which takes some seconds\n"
+    assert capfd.readouterr().err == text
+
+
+def test_functions_of_others_and_quick_ones_are_not_said(terminal, monkeypatch, capfd):
+    compiled("somebody.elses", 0.3)
+    monkeypatch.setattr(waits, "PATIENCE", 60.0)
+    compiled("phasekit.made_up")
+    assert capfd.readouterr().err == ""
+
+
+def test_nothing_is_said_where_nobody_looks(monkeypatch, capfd):
+    monkeypatch.setattr(waits, "PATIENCE", 0.01)
+    assert not waits.watched()
+    compiled("phasekit.made_up", 0.1)
+    assert capfd.readouterr().err == ""
+
+
+def notebook(monkeypatch, config):
+    shell = types.SimpleNamespace(config=config)
+    module = types.SimpleNamespace(get_ipython=lambda: shell)
+    monkeypatch.setitem(sys.modules, "IPython", module)
+
+
+def test_a_notebook_is_looked_at(monkeypatch):
+    notebook(monkeypatch, {"TerminalInteractiveShell": {}})
+    assert not waits.watched()
+    notebook(monkeypatch, {"IPKernelApp": {}})
+    assert waits.watched()
+    with tiling.progress_bar(10, None) as bar:
+        assert bar.total == 10
+        bar.update(10)
