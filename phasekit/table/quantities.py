@@ -14,7 +14,7 @@ from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.table import loads, numerical, orbits, phase_space, steady
+from phasekit.table import loads, numerical, orbits, perturbed, phase_space, steady
 from phasekit.table.row import ROWS, Pass, Quantity
 
 QUANTITIES: tuple[Quantity, ...] = (
@@ -22,6 +22,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     *orbits.QUANTITIES,
     *loads.QUANTITIES,
     *steady.QUANTITIES,
+    *perturbed.QUANTITIES,
 )
 ROWS.update({row.name: row for row in QUANTITIES})
 
@@ -32,6 +33,7 @@ PASSES: tuple[Pass, ...] = (
     *loads.PASSES,
     *steady.PASSES,
     *numerical.PASSES,
+    *perturbed.PASSES,
 )
 
 
