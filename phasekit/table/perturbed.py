@@ -5,6 +5,8 @@ from __future__ import annotations
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.table.row import LAW, SIDES, Pass, Quantity
 
+REGION = ("region",)
+CAPTURE = "[Neishtadt1975]; [GoldreichPeale1966] (18)"
 MELNIKOV = "[GuckenheimerHolmes1983] section 4.5; [Melnikov1963]"
 
 _GENERAL = PerturbedConservative
@@ -35,12 +37,24 @@ QUANTITIES: tuple[Quantity, ...] = (
              "multiples are the others",
              "nu x = pi, cosh(k (x + i y)) = (-S + i k^2)/sqrt(D)", MELNIKOV,
              of=PerturbedTrigonometric),
+    Quantity("capture_flux", "capture", REGION, "float64", "s-2",
+             "energy that a round of the region's separatrix loses: rate at which it takes phase",
+             "damping S + dS/dt", CAPTURE, of=_GENERAL),
+    Quantity("capture_probability", "capture", REGION, "float64", "1",
+             "probability that a motion led to the separatrix ends in the region",
+             "P_i = Theta_i/sum Theta, 0 or 1 where one region gives phase away", CAPTURE,
+             of=_GENERAL),
 )
 # fmt: on
 
+_CAPTURE = "phasekit.perturbation.capture:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
 
 PASSES: tuple[Pass, ...] = (
     Pass(_MELNIKOV + "melnikov", (LAW,), ("melnikov",), PerturbedTrigonometric),
     Pass(_MELNIKOV + "quiet_frequency", (LAW,), ("quiet_frequencies",), PerturbedTrigonometric),
+    Pass("phasekit.perturbation.quadrature:melnikov", (LAW,), ("melnikov",), _GENERAL),
+    Pass(_CAPTURE + "capture", (LAW,), ("capture",), PerturbedTrigonometric),
+    Pass(_CAPTURE + "capture_numerical", (LAW,), ("capture",), _GENERAL),
+    Pass("phasekit.perturbation.quadrature:most", (LAW,), ("labels",), _GENERAL),
 )
