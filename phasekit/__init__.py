@@ -58,8 +58,10 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import orbits as orbits
     from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.perturbed import capture as capture
+    from phasekit.labelled.perturbed import critical_torque as critical_torque
     from phasekit.labelled.perturbed import melnikov as melnikov
     from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
+    from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.maps.sweep import sweep as sweep
@@ -116,7 +118,13 @@ _MODULES = {
     "phasekit.systems.disk": ("GyroRotorDisk",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
-    "phasekit.labelled.perturbed": ("capture", "melnikov", "quiet_frequencies"),
+    "phasekit.labelled.perturbed": (
+        "capture",
+        "critical_torque",
+        "melnikov",
+        "quiet_frequencies",
+        "retrapping_torque",
+    ),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.problem": ("Problem",),

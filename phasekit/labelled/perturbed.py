@@ -156,6 +156,72 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
     return ds
 
 
+def critical_torque(system: Any) -> xr.Dataset:
+    """Least and greatest constant torque under which an equilibrium exists.
+
+    Parameters
+    ----------
+    system : system
+        A system with coefficients (A, B, C), perturbed or not; a torque of its own does not count.
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``direction`` (minus, plus): ``critical_torque`` in s^-2, signed, and ``critical_phi``
+        in rad, where equilibria merge.
+
+    Raises
+    ------
+    ParameterError
+        If the system is unusable.
+
+    Notes
+    -----
+    The extremes of V', exact: V'' = 0 is the equation of equilibria of another system,
+    ``V''(phi; A, B, C) = V'(phi - pi/4; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.critical_torque(pk.Pendulum(length=1.0, g=9.81)).critical_torque.values.round(9).tolist()
+    [-9.81, 9.81]
+    """
+    return _of_system("critical_torque", system)
+
+
+def retrapping_torque(perturbed: Any) -> xr.Dataset:
+    """Least constant torque that keeps a rotation going, at small damping.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with coefficients (A, B, C) and damping; a torque of its own does not count.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``retrapping_torque`` in s^-2 on ``direction`` (minus, plus), signed.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, or omega1 is a function of time.
+
+    Notes
+    -----
+    Over one turn of the winding separatrix the torque gives what damping takes,
+    ``2 pi torque = damping S + quadratic int |phi'|^3 dt``: first order in the damping.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> damped = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.1)
+    >>> pk.retrapping_torque(damped).retrapping_torque.values.round(6).tolist()  # 0.4/pi
+    [-0.127324, 0.127324]
+    """
+    return _of_system("retrapping_torque", perturbed)
+
+
 def _of_system(group: str, system: Any) -> xr.Dataset:
     system, rows = as_system(system), select(group)
     return evaluate(system, rows, passes_of(system, rows))

@@ -115,7 +115,7 @@ def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov
         )
         found.append(_cells(law, formula, one, own))
     fields = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return Melnikov._make(x.reshape(*shape, *x.shape[1:]) for x in fields)
+    return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in fields)
 
 
 def _cells(

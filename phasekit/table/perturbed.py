@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
-from phasekit.table.row import LAW, SIDES, Pass, Quantity
+from phasekit.table.row import ABC, LAW, SIDES, Pass, Quantity
 
-REGION = ("region",)
+REGION, DIRECTION = ("region",), ("direction",)
+TORQUE = "derivative of [Veljovic2015] (12), corrected coefficients"
 CAPTURE = "[Neishtadt1975]; [GoldreichPeale1966] (18)"
 MELNIKOV = "[GuckenheimerHolmes1983] section 4.5; [Melnikov1963]"
 
@@ -44,10 +45,20 @@ QUANTITIES: tuple[Quantity, ...] = (
              "probability that a motion led to the separatrix ends in the region",
              "P_i = Theta_i/sum Theta, 0 or 1 where one region gives phase away", CAPTURE,
              of=_GENERAL),
+    Quantity("critical_torque", "critical_torque", DIRECTION, "float64", "s-2",
+             "least and greatest constant torque, over the inertia, under which an equilibrium "
+             "exists", "extremes of V'(phi), where V''(phi) = 0", TORQUE),
+    Quantity("critical_phi", "critical_torque", DIRECTION, "float64", "rad",
+             "angle at which equilibria merge under the critical torque", "V''(phi) = 0", TORQUE),
+    Quantity("retrapping_torque", "retrapping_torque", DIRECTION, "float64", "s-2",
+             "least constant torque, over the inertia, that keeps a rotation going, at small "
+             "damping", "(damping S + quadratic int |phi'|^3 dt)/(2 pi) of a winding separatrix",
+             "[Stewart1968]; " + MELNIKOV, of=PerturbedTrigonometric),
 )
 # fmt: on
 
 _CAPTURE = "phasekit.perturbation.capture:"
+_TORQUE = "phasekit.perturbation.torque:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
 
 PASSES: tuple[Pass, ...] = (
@@ -56,5 +67,9 @@ PASSES: tuple[Pass, ...] = (
     Pass("phasekit.perturbation.quadrature:melnikov", (LAW,), ("melnikov",), _GENERAL),
     Pass(_CAPTURE + "capture", (LAW,), ("capture",), PerturbedTrigonometric),
     Pass(_CAPTURE + "capture_numerical", (LAW,), ("capture",), _GENERAL),
+    Pass(_TORQUE + "critical_torque", ABC, ("critical_torque",)),
+    Pass(_TORQUE + "critical_of_perturbed", (LAW,), ("critical_torque",), PerturbedTrigonometric),
+    Pass(_TORQUE + "retrapping_torque", (LAW,), ("retrapping_torque",), PerturbedTrigonometric),
+    Pass(_TORQUE + "torqued_equilibria", (LAW,), ("equilibria",), PerturbedTrigonometric),
     Pass("phasekit.perturbation.quadrature:most", (LAW,), ("labels",), _GENERAL),
 )
