@@ -58,6 +58,11 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import action_angle as action_angle
     from phasekit.labelled.orbits import orbits as orbits
     from phasekit.labelled.orbits import state_of as state_of
+    from phasekit.labelled.perturbed import capture as capture
+    from phasekit.labelled.perturbed import critical_torque as critical_torque
+    from phasekit.labelled.perturbed import melnikov as melnikov
+    from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
+    from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.maps.sweep import sweep as sweep
@@ -69,6 +74,8 @@ if TYPE_CHECKING:
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
     from phasekit.systems.disk import GyroRotorDisk as GyroRotorDisk
     from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
+    from phasekit.systems.harmonic import Harmonic as Harmonic
+    from phasekit.systems.perturbed import Perturbed as Perturbed
     from phasekit.systems.potential import Potential as Potential
     from phasekit.systems.problem import Problem as Problem
     from phasekit.systems.system import Coefficients as Coefficients
@@ -98,6 +105,8 @@ _MODULES = {
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.systems.free_rotor": ("FreeGyroRotor",),
+    "phasekit.systems.harmonic": ("Harmonic",),
+    "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
     "phasekit.labelled.energy": (
         "curvature",
@@ -111,6 +120,13 @@ _MODULES = {
     "phasekit.systems.disk": ("GyroRotorDisk",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
+    "phasekit.labelled.perturbed": (
+        "capture",
+        "critical_torque",
+        "melnikov",
+        "quiet_frequencies",
+        "retrapping_torque",
+    ),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.problem": ("Problem",),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -170,7 +171,9 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
-        return rows, passes
+        words = [system.law.words(row.name, row.units, row.long_name) for row in kept]
+        told = (replace(row, **w) if w else row for row, w in zip(kept, words, strict=True))
+        return tuple(told), passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
     counts = [one for one in quantities.PASSES if one.groups == ("labels",)]

@@ -1,0 +1,227 @@
+"""Perturbed systems, labelled: Melnikov's function, capture, escape, torques, resonances."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.dispatch import passes_of
+from phasekit.cells.evaluate import evaluate
+from phasekit.labels.arguments import one_of, whole
+from phasekit.systems.as_system import as_system
+from phasekit.table.quantities import select
+
+
+def melnikov(perturbed: Any) -> xr.Dataset:
+    """Melnikov's function on the separatrices: when damping and drive make motion irregular.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with damping and drive.
+
+    Returns
+    -------
+    xarray.Dataset
+        On (``saddle``, ``side``): ``melnikov_mean`` in s^-2, the energy that the loop gains on
+        average; ``melnikov_amplitude`` in s^-2 and ``melnikov_phase`` in rad of
+        ``M(t0) = mean + amplitude cos(nu t0 + phase)``; ``chaos_threshold``, the amplitude of the
+        forcing from which on stable and unstable manifold intersect transversally, at the given
+        damping (NaN without, infinite where the loop does not respond); ``turnstile_area`` in
+        s^-1, what crosses in one period to first order without damping.
+
+        With several harmonics of different frequencies the amplitude is the greatest value over
+        all times against the mean, the phase NaN, and the threshold that of the first harmonic of
+        the forcing, the others growing in proportion; of frequencies without a common period the
+        turnstile is NaN. Without forcing the threshold is that of the first modulated parameter.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, or omega1 is a function of time.
+
+    Notes
+    -----
+    First order in damping and drive ([GuckenheimerHolmes1983] section 4.5). The integrals along
+    the separatrices of (A, B, C) are sums of residues; those of a `Potential` are quadratures,
+    NaN where they would lose more than six digits. Time is that of `separatrix_motion`. Of a
+    modulated omega1 the torque of omega1' counts as well.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> eight = pk.Coefficients(1.0, 0.35, 0.12)
+    >>> driven = pk.Perturbed(eight, damping=1.0, forcing=pk.Harmonic(1.0, frequency=1.0))
+    >>> pk.melnikov(driven).chaos_threshold.sel(saddle="lower").values.round(9).tolist()
+    [0.814751185, 1.119291703]
+    """
+    return _of_system("melnikov", perturbed)
+
+
+def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
+    """Frequencies of a torque to which the lobes of a figure-eight do not respond.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with coefficients (A, B, C), perturbed.
+    n : int, default 8
+        How many of them.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``quiet_frequency`` in s^-1 on (``saddle``, ``side``, ``order``): the zeros of Melnikov's
+        function of a torque ``cos(nu t)``, multiples of the first; NaN for loops that wind.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, or n is not a whole number >= 1.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> driven = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), forcing=pk.Harmonic(1.0, 1.0))
+    >>> quiet = pk.quiet_frequencies(driven, n=2).quiet_frequency.sel(saddle="lower")
+    >>> nu = quiet.sel(side="left", order=2).item()
+    >>> at = pk.melnikov(driven.replace(forcing_frequency=nu))
+    >>> bool(abs(at.melnikov_amplitude.sel(saddle="lower", side="left")) < 1e-12)
+    True
+    """
+    number = whole("n", n, "a whole number >= 1")
+    ds = _of_system("quiet_frequencies", perturbed)
+    attrs = {"long_name": "number of the quiet frequency"}
+    order = xr.DataArray(np.arange(1, number + 1), dims="order", attrs=attrs)
+    first = ds.quiet_frequency
+    listed = first * order
+    listed.attrs = {**first.attrs, "long_name": "frequency to which the lobe does not respond"}
+    return ds.assign(quiet_frequency=listed).assign_coords(order=order)
+
+
+def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
+    """Into which well a motion falls that is slowly led to a separatrix.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with damping, and parameters that drift or a constant torque.
+    start : {"outside", "rotation"}
+        Where the motion comes from: round both wells, from outside the figure-eight of the lower
+        saddle; or from rotation beyond the winding separatrix, braked by the torque (forward where
+        there is none).
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``region`` (left, right, none): ``capture_flux`` in s^-2 and ``capture_probability``,
+        which sums to 1. Left and right are the lobes of the lower saddle; in a system with one
+        well it is the side from which the rotation came that stays empty. "none": it is not
+        captured, or never comes to the separatrix. NaN where there is no such separatrix.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, start is unknown, or omega1 is a function of time.
+
+    Notes
+    -----
+    Each region takes phase at the rate ``damping S + dS/dt`` of its area S; the probability is the
+    ratio of the fluxes if both are positive ([Neishtadt1975]). From rotation it is
+    ``2/(1 + 2 torque w/(damping S))`` with the width w = 2 pi of a cell
+    ([GoldreichPeale1966]), 1 where it would be more. First order in damping and drift, for motions
+    whose actions are spread; right at the separatrix the error is of the order rate log(rate).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> damped = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.003)
+    >>> pk.capture(damped).capture_probability.values.round(6).tolist()
+    [0.28055, 0.71945, 0.0]
+    """
+    rotation = bool(one_of("start", start, ("outside", "rotation")))
+    system, rows = as_system(perturbed), select("capture")
+    passes = passes_of(system, rows)
+    if rotation:
+        passes = tuple(
+            replace(one, function=functools.partial(one.resolved, rotation=True)) for one in passes
+        )
+    ds = evaluate(system, rows, passes)
+    for variable in ds.data_vars.values():
+        variable.attrs["start"] = start
+    return ds
+
+
+def critical_torque(system: Any) -> xr.Dataset:
+    """Least and greatest constant torque under which an equilibrium exists.
+
+    Parameters
+    ----------
+    system : system
+        A system with coefficients (A, B, C), perturbed or not; a torque of its own does not count.
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``direction`` (minus, plus): ``critical_torque`` in s^-2, signed, and ``critical_phi``
+        in rad, where equilibria merge.
+
+    Raises
+    ------
+    ParameterError
+        If the system is unusable.
+
+    Notes
+    -----
+    The extremes of V', exact: V'' = 0 is the equation of equilibria of another system,
+    ``V''(phi; A, B, C) = V'(phi - pi/4; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.critical_torque(pk.Pendulum(length=1.0, g=9.81)).critical_torque.values.round(9).tolist()
+    [-9.81, 9.81]
+    """
+    return _of_system("critical_torque", system)
+
+
+def retrapping_torque(perturbed: Any) -> xr.Dataset:
+    """Least constant torque that keeps a rotation going, at small damping.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with coefficients (A, B, C) and damping; a torque of its own does not count.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``retrapping_torque`` in s^-2 on ``direction`` (minus, plus), signed.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, or omega1 is a function of time.
+
+    Notes
+    -----
+    Over one turn of the winding separatrix the torque gives what damping takes,
+    ``2 pi torque = damping S + quadratic int |phi'|^3 dt``: first order in the damping.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> damped = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.1)
+    >>> pk.retrapping_torque(damped).retrapping_torque.values.round(6).tolist()  # 0.4/pi
+    [-0.127324, 0.127324]
+    """
+    return _of_system("retrapping_torque", perturbed)
+
+
+def _of_system(group: str, system: Any) -> xr.Dataset:
+    system, rows = as_system(system), select(group)
+    return evaluate(system, rows, passes_of(system, rows))
