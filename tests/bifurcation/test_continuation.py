@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.kernels import defining
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.kernels.newton import refine
-from phasekit.bifurcation.continuation.machine_code import compile_expressions
+from phasekit.numerics.machine_code import compile_expressions
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
