@@ -68,6 +68,8 @@ if TYPE_CHECKING:
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
     from phasekit.systems.disk import GyroRotorDisk as GyroRotorDisk
     from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
+    from phasekit.systems.harmonic import Harmonic as Harmonic
+    from phasekit.systems.perturbed import Perturbed as Perturbed
     from phasekit.systems.potential import Potential as Potential
     from phasekit.systems.problem import Problem as Problem
     from phasekit.systems.system import Coefficients as Coefficients
@@ -96,6 +98,8 @@ _MODULES = {
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.systems.free_rotor": ("FreeGyroRotor",),
+    "phasekit.systems.harmonic": ("Harmonic",),
+    "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
     "phasekit.labelled.energy": (
         "curvature",

@@ -14,6 +14,7 @@ HOMES = (
     "phasekit.systems.analogues",
     "phasekit.systems.potential",
     "phasekit.systems.free_rotor",
+    "phasekit.systems.perturbed",
 )
 
 

@@ -1,0 +1,115 @@
+"""Laws with damping and drive: what is added to a potential, by name.
+
+``x'' + V'(x; p(t)) = -d x' - q |x'| x' + N + sum F cos(nu t + phase) + E(x) omega'(t)``, with
+parameters ``p(t) = p + P cos(nu t + phase)`` or ``p + rate t``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from phasekit.laws.ladder import Conservative, Law
+
+#: What every perturbed law has beside the parameters of its potential.
+OWN = ("damping", "quadratic", "torque", "kT")
+#: The fields of a harmonic.
+HARMONIC = ("amplitude", "frequency", "phase")
+
+
+def forcing_names(number: int) -> tuple[str, ...]:
+    """Names of the parameters of the harmonic of a number, from 0, of the forcing."""
+    prefix = "forcing" if number == 0 else f"forcing{number + 1}"
+    return tuple(f"{prefix}_{part}" for part in HARMONIC)
+
+
+def modulation_names(parameter: str) -> tuple[str, ...]:
+    """Names of the parameters of the harmonic of a modulated parameter."""
+    return tuple(f"modulation_{parameter}_{part}" for part in HARMONIC)
+
+
+def drift_name(parameter: str) -> str:
+    """Name of the rate at which a parameter drifts."""
+    return f"drift_{parameter}"
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A parameter that is an angular velocity of the frame, and the torque of its change.
+
+    Attributes
+    ----------
+    parameter : str
+        Its name.
+    euler : callable
+        Of the parameters by name: (E0, Es, Ec) of ``E = E0 + Es sin phi + Ec cos phi``.
+    """
+
+    parameter: str
+    euler: Callable[[Mapping[str, Any]], tuple[Any, Any, Any]]
+
+
+@dataclass(frozen=True)
+class PerturbedConservative(Law):
+    """One degree of freedom in a potential, damped and driven.
+
+    Attributes
+    ----------
+    base : Conservative
+        The law of the potential.
+    names : tuple of str
+        All parameters, in the order of the values.
+    inputs : tuple of str
+        Those of the potential, as its law takes them.
+    harmonics : int
+        Number of harmonics of the forcing.
+    modulated, drifting : tuple of str
+        Parameters of the potential that vary.
+    rate : Rate, optional
+        The angular velocity of the frame, where the potential has one.
+    prescribed : Any
+        That angular velocity as a function or a table of time.
+    """
+
+    called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
+
+    base: Conservative
+    names: tuple[str, ...]
+    inputs: tuple[str, ...]
+    harmonics: int = 0
+    modulated: tuple[str, ...] = ()
+    drifting: tuple[str, ...] = ()
+    rate: Rate | None = None
+    prescribed: Any = field(default=None, compare=False)
+
+    @property
+    def may_be_incomplete(self) -> bool:
+        """Whether equilibria of the potential may be missed."""
+        return self.base.may_be_incomplete
+
+    def check_searchable(self) -> None:
+        """Refuse where equilibria of the potential cannot all be found."""
+        self.base.check_searchable()
+
+    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
+        """What is said of a quantity: as of the potential."""
+        return self.base.words(name, units, long_name)
+
+    def values(self, *arrays: Any) -> dict[str, Any]:
+        """Values by name."""
+        return dict(zip(self.names, arrays, strict=True))
+
+    def euler(self, values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+        """(E0, Es, Ec) of the torque ``(E0 + Es sin phi + Ec cos phi) omega'(t)``."""
+        return (0.0, 0.0, 0.0) if self.rate is None else self.rate.euler(values)
+
+
+@dataclass(frozen=True)
+class PerturbedTrigonometric(PerturbedConservative):
+    """The same in the potential of (A, B, C)."""
+
+    called: ClassVar[str] = (
+        "a perturbed system with coefficients (A, B, C), pk.Perturbed(system, damping=...)"
+    )
+    labels_fixed: ClassVar[bool] = True
