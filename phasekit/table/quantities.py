@@ -13,8 +13,9 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.table import loads, numerical, orbits, phase_space, steady
+from phasekit.table import loads, motion, numerical, orbits, phase_space, steady
 from phasekit.table.row import ROWS, Pass, Quantity
 
 QUANTITIES: tuple[Quantity, ...] = (
@@ -22,6 +23,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     *orbits.QUANTITIES,
     *loads.QUANTITIES,
     *steady.QUANTITIES,
+    *motion.QUANTITIES,
 )
 ROWS.update({row.name: row for row in QUANTITIES})
 
@@ -32,6 +34,7 @@ PASSES: tuple[Pass, ...] = (
     *loads.PASSES,
     *steady.PASSES,
     *numerical.PASSES,
+    *motion.PASSES,
 )
 
 
@@ -39,6 +42,8 @@ def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
     """What is said of a row on a rung below that of (A, B, C): equation, source, units, ..."""
     if issubclass(rung, Routhian):
         return steady.ROUTH.get(row.name, {})
+    if issubclass(rung, PerturbedConservative) and row.name in motion.PERTURBED:
+        return motion.PERTURBED[row.name]
     return {"equation": row.general} if row.general else {}
 
 

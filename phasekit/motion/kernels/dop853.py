@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 from scipy.integrate import DOP853
 
 from phasekit.numerics.compile import Array, inline, routine
@@ -17,27 +18,36 @@ from phasekit.numerics.lanes import LANES, invoke
 
 STAGES = 12
 ROWS = 16
-A, B, C = np.ascontiguousarray(DOP853.A), np.ascontiguousarray(DOP853.B), DOP853.C.copy()
-A_MORE, C_MORE = np.ascontiguousarray(DOP853.A_EXTRA), DOP853.C_EXTRA.copy()
-E3, E5 = DOP853.E3.copy(), DOP853.E5.copy()
-D = np.ascontiguousarray(DOP853.D)
+C, C_MORE, D = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
+#: Rows that are summed at a time.
+TOGETHER = 4
+
+
+def packed(*sums: Array) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Weights of sums without their zeros, and the rows they belong to, filled up with zeros."""
+    most = -(-max(np.count_nonzero(one) for one in sums) // TOGETHER) * TOGETHER
+    weights, places = np.zeros((len(sums), most)), np.zeros((len(sums), most), np.int64)
+    for row, one in enumerate(sums):
+        used = np.flatnonzero(one)
+        weights[row, : used.size], places[row, : used.size] = one[used], used
+    return weights, places
+
+
+#: Sums for the stages 1 to 11, for the end, for the stages 13 to 15 and for both errors.
+WEIGHTS, PLACES = packed(*DOP853.A[1:], DOP853.B, *DOP853.A_EXTRA, DOP853.E3, DOP853.E5)
+_, MORE, THIRD, FIFTH = 11, 12, 15, 16
 
 #: Least and greatest change of the step, and what of the step that just fits is taken.
 SHORTEST, LONGEST, SAFETY = 0.2, 10.0, 0.9
-ORDER = 8
 
 
 @inline
 def drive_at(table: Array, t: float, z: Array, lane: int) -> None:
-    """Time, and the value and slope at it of a function in Chebyshev pieces.
+    """Value and slope at a time of a function in Chebyshev pieces.
 
     Rows of the table: start, half-width, number of coefficients, coefficients.
     """
-    z[lane] = t
-    pieces = table.shape[0]
-    if pieces == 0:
-        return
-    low, high = 0, pieces
+    low, high = 0, table.shape[0]
     while high - low > 1:
         middle = (low + high) >> 1
         if table[middle, 0] <= t:
@@ -61,19 +71,45 @@ def rates(
 ) -> None:
     """Rates of all lanes at the states y and the times t + c h."""
     for lane in range(LANES):
-        drive_at(table, t[lane] + c * h[lane], z, lane)
+        z[lane] = t[lane] + c * h[lane]
+    if table.shape[0] > 0:
+        for lane in range(LANES):
+            drive_at(table, z[lane], z, lane)
     invoke(address, y, p, z, k)
 
 
+@routine
+def add_up(which: int, k: Array, y: Array) -> None:
+    """y = weighted sum of rows of k."""
+    for j in range(0, WEIGHTS.shape[1], TOGETHER):
+        w0, w1, w2, w3 = (
+            WEIGHTS[which, j],
+            WEIGHTS[which, j + 1],
+            WEIGHTS[which, j + 2],
+            WEIGHTS[which, j + 3],
+        )
+        if j > 0 and w0 == 0.0:
+            break
+        k0, k1, k2, k3 = (
+            k[PLACES[which, j]],
+            k[PLACES[which, j + 1]],
+            k[PLACES[which, j + 2]],
+            k[PLACES[which, j + 3]],
+        )
+        if j == 0:
+            for m in range(y.size):
+                y[m] = (w0 * k0[m] + w1 * k1[m]) + (w2 * k2[m] + w3 * k3[m])
+        else:
+            for m in range(y.size):
+                y[m] += (w0 * k0[m] + w1 * k1[m]) + (w2 * k2[m] + w3 * k3[m])
+
+
 @inline
-def stage(i: int, x: Array, h: Array, k: Array, y: Array) -> None:
-    """State of a stage from the rates of those before."""
+def state_of(which: int, x: Array, h: Array, k: Array, y: Array) -> None:
+    """y = x + h times a weighted sum of rows of k."""
+    add_up(which, k, y)
     for m in range(x.size):
-        total = A[i, 0] * k[0, m]
-        for j in range(1, i):
-            if A[i, j] != 0.0:
-                total += A[i, j] * k[j, m]
-        y[m] = x[m] + h[m] * total
+        y[m] = x[m] + h[m] * y[m]
 
 
 @routine
@@ -81,57 +117,36 @@ def attempt(
     address: int, table: Array, t: Array, h: Array, x: Array, k: Array, y: Array, p: Array, z: Array
 ) -> None:
     """Try a step of every lane: k[0] are the rates at x, y becomes the end, k[12] its rates."""
-    stage(1, x, h, k, y)
-    rates(address, table, t, h, C[1], y, p, z, k[1])
-    stage(2, x, h, k, y)
-    rates(address, table, t, h, C[2], y, p, z, k[2])
-    stage(3, x, h, k, y)
-    rates(address, table, t, h, C[3], y, p, z, k[3])
-    stage(4, x, h, k, y)
-    rates(address, table, t, h, C[4], y, p, z, k[4])
-    stage(5, x, h, k, y)
-    rates(address, table, t, h, C[5], y, p, z, k[5])
-    stage(6, x, h, k, y)
-    rates(address, table, t, h, C[6], y, p, z, k[6])
-    stage(7, x, h, k, y)
-    rates(address, table, t, h, C[7], y, p, z, k[7])
-    stage(8, x, h, k, y)
-    rates(address, table, t, h, C[8], y, p, z, k[8])
-    stage(9, x, h, k, y)
-    rates(address, table, t, h, C[9], y, p, z, k[9])
-    stage(10, x, h, k, y)
-    rates(address, table, t, h, C[10], y, p, z, k[10])
-    stage(11, x, h, k, y)
-    rates(address, table, t, h, 1.0, y, p, z, k[11])
-    for m in range(x.size):
-        total = 0.0
-        for j in range(STAGES):
-            if B[j] != 0.0:
-                total += B[j] * k[j, m]
-        y[m] = x[m] + h[m] * total
-    rates(address, table, t, h, 1.0, y, p, z, k[12])
+    for i in range(1, STAGES + 1):
+        state_of(i - 1, x, h, k, y)
+        rates(address, table, t, h, C[i] if i < STAGES else 1.0, y, p, z, k[i])
 
 
 @routine
 def errors(
-    h: Array, x: Array, y: Array, k: Array, unit: float, rtol: float, atol: float, size: Array
+    h: Array,
+    x: Array,
+    y: Array,
+    k: Array,
+    unit: float,
+    rtol: float,
+    atol: float,
+    spare: Array,
+    size: Array,
 ) -> None:
     """Error of each lane's step over what is allowed.
 
     A coordinate beyond `unit` counts as `unit`, so that an angle which runs on is held as closely
     as at first. A tangent vector is held against its length.
     """
-    third, fifth = np.zeros(LANES), np.zeros(LANES)
+    third, fifth = spare[0], spare[1]
+    add_up(THIRD, k, third)
+    add_up(FIFTH, k, fifth)
     n = x.size // LANES
-    for c in range(n):
-        for lane in range(LANES):
+    for lane in range(LANES):
+        e3 = e5 = 0.0
+        for c in range(n):
             m = c * LANES + lane
-            e3 = e5 = 0.0
-            for j in range(STAGES):
-                if E3[j] != 0.0:
-                    e3 += E3[j] * k[j, m]
-                if E5[j] != 0.0:
-                    e5 += E5[j] * k[j, m]
             if c < 2:
                 scale = max(abs(x[m]), abs(y[m]))
                 if c == 0 and scale > unit:
@@ -140,11 +155,10 @@ def errors(
                 other = m + LANES if c % 2 == 0 else m - LANES
                 scale = max(math.hypot(x[m], x[other]), math.hypot(y[m], y[other]))
             scale = 1.0 / (atol + rtol * scale)
-            third[lane] += (e3 * scale) ** 2
-            fifth[lane] += (e5 * scale) ** 2
-    for lane in range(LANES):
-        below = fifth[lane] + 0.01 * third[lane]
-        size[lane] = abs(h[lane]) * fifth[lane] / math.sqrt(below * n) if below > 0.0 else below
+            e3 += (third[m] * scale) ** 2
+            e5 += (fifth[m] * scale) ** 2
+        below = e5 + 0.01 * e3
+        size[lane] = abs(h[lane]) * e5 / math.sqrt(below * n) if below > 0.0 else below
 
 
 @inline
@@ -152,8 +166,8 @@ def next_step(error: float) -> float:
     """Factor by which a step may change that made an error over what is allowed."""
     if error == 0.0:
         return LONGEST
-    # NaN and infinity come out as the least.
-    factor = SAFETY * error ** (-1.0 / ORDER)
+    # The eighth root; NaN and infinity come out as the least.
+    factor = SAFETY / math.sqrt(math.sqrt(math.sqrt(error)))
     return min(LONGEST, max(SHORTEST, factor)) if factor > SHORTEST else SHORTEST
 
 
@@ -163,11 +177,7 @@ def densify(
 ) -> None:
     """The three further stages from which states within the step follow; y is lost."""
     for i in range(3):
-        for m in range(x.size):
-            total = 0.0
-            for j in range(STAGES + 1 + i):
-                total += A_MORE[i, j] * k[j, m]
-            y[m] = x[m] + h[m] * total
+        state_of(MORE + i, x, h, k, y)
         rates(address, table, t, h, C_MORE[i], y, p, z, k[13 + i])
 
 
