@@ -57,6 +57,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import action_angle as action_angle
     from phasekit.labelled.orbits import orbits as orbits
     from phasekit.labelled.orbits import state_of as state_of
+    from phasekit.labelled.perturbed import melnikov as melnikov
+    from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.maps.sweep import sweep as sweep
@@ -113,6 +115,7 @@ _MODULES = {
     "phasekit.systems.disk": ("GyroRotorDisk",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
+    "phasekit.labelled.perturbed": ("melnikov", "quiet_frequencies"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.problem": ("Problem",),

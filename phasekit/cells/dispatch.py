@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy as np
 from phasekit.labels.arguments import bad, one_of
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.ladder import Law
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.as_system import stands_on
 from phasekit.systems.system import Model
 from phasekit.table import quantities
@@ -170,9 +172,14 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
-        return rows, passes
+        words = [system.law.words(row.name, row.units, row.long_name) for row in kept]
+        told = (replace(row, **w) if w else row for row, w in zip(kept, words, strict=True))
+        return tuple(told), passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
+    labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
+    if issubclass(system.rung, PerturbedConservative) and not labelled:
+        return numbered.worded(system, kept), passes  # no equilibrium is looked for
     counts = [one for one in quantities.PASSES if one.groups == ("labels",)]
     (count,) = (one for one in counts if issubclass(system.rung, one.of))
     return numbered.fitted(system, kept, passes, bound(count, system, set(system.parameters)))

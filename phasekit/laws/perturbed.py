@@ -6,11 +6,15 @@ parameters ``p(t) = p + P cos(nu t + phase)`` or ``p + rate t``.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
+import numpy as np
+
 from phasekit.laws.ladder import Conservative, Law
+from phasekit.laws.trigonometric import Trigonometric
 
 #: What every perturbed law has beside the parameters of its potential.
 OWN = ("damping", "quadratic", "torque", "kT")
@@ -70,6 +74,8 @@ class PerturbedConservative(Law):
         The angular velocity of the frame, where the potential has one.
     prescribed : Any
         That angular velocity as a function or a table of time.
+    unit : str
+        Unit of the amplitude of the first harmonic, of the forcing or else of a modulation.
     """
 
     called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
@@ -82,6 +88,7 @@ class PerturbedConservative(Law):
     drifting: tuple[str, ...] = ()
     rate: Rate | None = None
     prescribed: Any = field(default=None, compare=False)
+    unit: str = "s-2"
 
     @property
     def may_be_incomplete(self) -> bool:
@@ -94,11 +101,35 @@ class PerturbedConservative(Law):
 
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity: as of the potential."""
-        return self.base.words(name, units, long_name)
+        words = dict(self.base.words(name, units, long_name))
+        if name == "chaos_threshold" and self.unit != units:
+            words["units"] = self.unit
+        if name in ("motion_phi", "motion_dphi"):
+            words["equation"] = "phi'' + V'(phi; p(t)) = -d phi' - q |phi'| phi' + N + F(t)"
+        return words
 
     def values(self, *arrays: Any) -> dict[str, Any]:
-        """Values by name."""
-        return dict(zip(self.names, arrays, strict=True))
+        """Values by name, as arrays; NaN where they leave their domain."""
+        values = {n: np.asarray(x, float) for n, x in zip(self.names, arrays, strict=True)}
+        domains: Mapping[str, tuple[float, float]] = getattr(self.base, "domains", {})
+        least = {n: math.ulp(0.0) for n in self.names if n.endswith("_frequency")}
+        bounds = {**domains, **{n: (low, math.inf) for n, low in least.items()}}
+        bounds["kT"] = (0.0, math.inf)
+        for name, (low, high) in bounds.items():
+            if name in values:
+                x = values[name]
+                inside = np.isfinite(x) & (x >= low) & (x <= high)
+                values[name] = x if inside.all() else np.where(inside, x, np.nan)
+        return values
+
+    def harmonic(self, values: Mapping[str, Any], names: tuple[str, ...]) -> tuple[Any, Any, Any]:
+        """Amplitude, frequency and phase of a harmonic."""
+        amplitude, frequency, phase = (values[name] for name in names)
+        return amplitude, frequency, phase
+
+    def forcing(self, values: Mapping[str, Any]) -> list[tuple[Any, Any, Any]]:
+        """The harmonics of the forcing."""
+        return [self.harmonic(values, forcing_names(i)) for i in range(self.harmonics)]
 
     def euler(self, values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
         """(E0, Es, Ec) of the torque ``(E0 + Es sin phi + Ec cos phi) omega'(t)``."""
@@ -109,7 +140,23 @@ class PerturbedConservative(Law):
 class PerturbedTrigonometric(PerturbedConservative):
     """The same in the potential of (A, B, C)."""
 
+    base: Trigonometric
+
     called: ClassVar[str] = (
         "a perturbed system with coefficients (A, B, C), pk.Perturbed(system, damping=...)"
     )
     labels_fixed: ClassVar[bool] = True
+    default: ClassVar[Mapping[str, str]] = Trigonometric.default
+
+    def coefficients(self, values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+        """A, B and C."""
+        return self.base.coefficients({name: values[name] for name in self.inputs})
+
+    def derivatives(self, values: Mapping[str, Any], parameter: str) -> tuple[Any, Any, Any]:
+        """Derivatives of A, B and C by a parameter, to rounding: of a complex step."""
+        used = {name: np.asarray(values[name], complex) for name in self.inputs}
+        step = 1e-100
+        used[parameter] = used[parameter] + 1j * step
+        *products, scale = self.base(used)
+        dA, dB, dC = (np.imag(np.asarray(product / scale)) / step for product in products)
+        return dA, dB, dC

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.dispatch import passes_of
 from phasekit.cells.evaluate import Layout, leaves
 from phasekit.cells.tiling import cut
 from phasekit.errors import ParameterError, StoreError
@@ -83,7 +84,8 @@ class Left:
 
     def tiles(self, place: Place, layout: Layout, indices: Iterable[Index]) -> Iterator[Tile]:
         """Return tiles with what is needed to compute them."""
-        part, passes = self.part, self.part.passes
+        part = self.part
+        passes = passes_of(layout.system, part.rows)
         names = {name for one in passes for name in leaves(layout.system, one.inputs, passes)}
         missing = sorted(names - layout.grid.inputs.keys())
         if missing:

@@ -9,8 +9,7 @@ from math import prod
 from phasekit.cells.evaluate import Box
 from phasekit.errors import ParameterError
 from phasekit.labels.memory import SHARE, available_memory, human
-from phasekit.table.quantities import plan_passes
-from phasekit.table.row import ROWS, Pass, Quantity
+from phasekit.table.row import ROWS, Quantity
 
 #: Cells of a tile, where its results stay below `MOST_BYTES`. Small maps are cut as well, so that
 #: there is work for several processes, but not into tiles below `FEWEST_CELLS`.
@@ -46,11 +45,6 @@ class Part:
     def rows(self) -> tuple[Quantity, ...]:
         """The rows of the table, with the dtypes that are stored."""
         return tuple(replace(ROWS[name], dtype=dtype) for name, dtype in self.quantities.items())
-
-    @property
-    def passes(self) -> tuple[Pass, ...]:
-        """The passes that compute it."""
-        return plan_passes(self.rows)
 
     @property
     def cell_bytes(self) -> int:

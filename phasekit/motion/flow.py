@@ -8,7 +8,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    drift_name,
+    forcing_names,
+    modulation_names,
+)
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.motion.prescribed import table_of
 from phasekit.motion.rates import rates_of
 
@@ -75,7 +81,7 @@ def flow(
             return full.reshape(())
         return np.broadcast_to(full.squeeze(inner), cells).reshape(-1)
 
-    named = {name: flat(value) for name, value in zip(law.names, values, strict=True)}
+    named = law.values(*map(flat, values))
     count = int(np.prod(cells, dtype=int))
     states = np.stack([np.broadcast_to(flat(x), (count,)) for x in (phi, dphi)], axis=-1)
     full = t.reshape((1,) * (len(shape) - t.ndim) + t.shape)
@@ -84,11 +90,56 @@ def flow(
     width = int(np.prod([shape[axis] for axis in inner], dtype=int))
     if not alone:
         times = np.broadcast_to(times, (*cells, *(shape[axis] for axis in inner)))
-    found = motions(law, named, states, times.reshape(-1, width), rtol, atol, threads)
-    _tell(found)
+    times = times.reshape(-1, width)
+    found = _motions(law, named, states, times, rtol, atol, threads)
     order = np.argsort((*outer, *inner))
-    results = found.states.reshape(*cells, *(shape[axis] for axis in inner), 2)
+    results = found.reshape(*cells, *(shape[axis] for axis in inner), 2)
     return Motion(*(results[..., i].transpose(order) for i in range(2)))
+
+
+def _motions(
+    law: PerturbedConservative,
+    values: dict[str, Array],
+    states: Array,
+    times: Array,
+    *how: Any,
+) -> Array:
+    """States of motions, by the exact flow where nothing disturbs them."""
+    still = _is_still(law, values, len(states))
+    if not still.any():
+        found = motions(law, values, states, times, *how)
+        _tell(found)
+        return found.states
+    from phasekit.phase.exact.flow import flow as exact
+
+    def some(array: Array, which: Any) -> Array:
+        return array[which] if array.ndim and len(array) > 1 else array
+
+    result = np.empty((len(states), times.shape[1], 2))
+    own = {name: some(value, still) for name, value in values.items()}
+    assert isinstance(law.base, Trigonometric)
+    A, B, C = (np.reshape(x, (-1, 1)) for x in law.base.coefficients(own))
+    phi, dphi = states[still].T[..., None]
+    result[still] = np.stack(exact(A, B, C, phi, dphi, some(times, still)), axis=-1)
+    if not still.all():
+        rest = {name: some(value, ~still) for name, value in values.items()}
+        found = motions(law, rest, states[~still], some(times, ~still), *how)
+        _tell(found)
+        result[~still] = found.states
+    return result
+
+
+def _is_still(law: PerturbedConservative, values: dict[str, Array], count: int) -> Any:
+    """In which cells there is neither damping nor torque nor anything that varies."""
+    if not isinstance(law.base, Trigonometric) or law.prescribed is not None:
+        return np.zeros(count, bool)
+    names = ["damping", "quadratic", "torque"]
+    names += [forcing_names(i)[0] for i in range(law.harmonics)]
+    names += [modulation_names(name)[0] for name in law.modulated]
+    names += [drift_name(name) for name in law.drifting]
+    return np.broadcast_to(
+        np.all(np.broadcast_arrays(*(values[n] == 0.0 for n in names)), axis=0), (count,)
+    )
 
 
 def _time_axes(arrays: tuple[Array, ...], t: Array, n: int) -> tuple[int, ...]:
@@ -146,7 +197,8 @@ def motions(
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
             arrays = (code.address, table, 0.0, rising, unit, rtol, atol, most, code.kink, states)
-            launch(kernel, (*arrays, parameters), count, (out, reached, taken), threads, WEIGHT)
+            groups: Any = (out, reached, taken)
+            launch(kernel, (*arrays, parameters), count, groups, threads, WEIGHT)
         back = np.argsort(order, axis=1)[..., None]
         out = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
         wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]

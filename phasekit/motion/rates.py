@@ -171,9 +171,7 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
     return Rates(address, tuple(used), kink)
 
 
-def _euler(
-    form: _Form, rate: Any, parameter: Any, harmonic: Any, x: Any, t: Any, dw: Any
-) -> Any:
+def _euler(form: _Form, rate: Any, parameter: Any, harmonic: Any, x: Any, t: Any, dw: Any) -> Any:
     """The torque of the change of the frame's angular velocity."""
     import sympy as sp
 

@@ -183,9 +183,7 @@ def compile_lanes(
 
 
 @intrinsic
-def invoke(
-    typing_context: Any, address: Any, x: Any, p: Any, z: Any, out: Any
-) -> tuple[Any, Any]:
+def invoke(typing_context: Any, address: Any, x: Any, p: Any, z: Any, out: Any) -> tuple[Any, Any]:
     """Call the function at an address with contiguous arrays x, p, z and out."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:

@@ -145,12 +145,15 @@ class Writer:
         self.values: dict[Any, Any] = {}
 
     def constant(self, value: float) -> Any:
+        """A number."""
         return ir.Constant(self.kind, value)
 
     def known(self, value: bool) -> Any:
+        """A truth."""
         return ir.Constant(self.truth, int(value))
 
     def load(self, array: Any, index: int) -> Any:
+        """An entry of an argument."""
         return self.builder.load(self.place(array, index))
 
     def store(self, value: Any, index: int) -> None:
@@ -158,6 +161,7 @@ class Writer:
         self.builder.store(value, self.place(self.arrays[3], index))
 
     def place(self, array: Any, index: int) -> Any:
+        """Pointer to an entry."""
         return self.builder.gep(array, [ir.Constant(ir.IntType(64), index)])
 
     def clear(self, array: Any, count: int) -> None:
@@ -169,6 +173,7 @@ class Writer:
         self.builder.call(memset, [start, zero, ir.Constant(long, 8 * count), no])
 
     def library(self, name: str, *args: Any) -> Any:
+        """Call a function of the C library."""
         known = self.module.globals.get(name)
         if known is None:
             kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * len(args))
@@ -220,7 +225,8 @@ class Writer:
         if name in ("sign", "Heaviside"):
             value, zero = self.write(e.args[0]), self.constant(0.0)
             below, middle = (-1.0, 0.0) if name == "sign" else (0.0, 0.5)
-            other = b.select(b.fcmp_ordered("<", value, zero), self.constant(below), self.constant(middle))
+            values = self.constant(below), self.constant(middle)
+            other = b.select(b.fcmp_ordered("<", value, zero), *values)
             return b.select(b.fcmp_ordered(">", value, zero), self.constant(1.0), other)
         if name in ("Max", "Min"):
             value = self.write(e.args[0])

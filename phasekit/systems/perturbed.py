@@ -191,8 +191,13 @@ class Perturbed(Model):
             drifting=tuple(self.drift),
             rate=parts.RATES.get(type(self.system).__name__),
             prescribed=self.omega1,
+            unit=self._driven_unit(),
         )
         return law
+
+    def _driven_unit(self) -> str:
+        modulated = [p.units for p in self.system.declared if p.name in list(self.modulation)[:1]]
+        return modulated[0] if modulated and not self.forcing else "s-2"
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
         """Names of the parameters of the potential."""

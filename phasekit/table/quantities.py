@@ -13,9 +13,8 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
-from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.table import loads, motion, numerical, orbits, phase_space, steady
+from phasekit.table import loads, motion, numerical, orbits, perturbed, phase_space, steady
 from phasekit.table.row import ROWS, Pass, Quantity
 
 QUANTITIES: tuple[Quantity, ...] = (
@@ -24,6 +23,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     *loads.QUANTITIES,
     *steady.QUANTITIES,
     *motion.QUANTITIES,
+    *perturbed.QUANTITIES,
 )
 ROWS.update({row.name: row for row in QUANTITIES})
 
@@ -35,6 +35,7 @@ PASSES: tuple[Pass, ...] = (
     *steady.PASSES,
     *numerical.PASSES,
     *motion.PASSES,
+    *perturbed.PASSES,
 )
 
 
@@ -42,8 +43,6 @@ def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
     """What is said of a row on a rung below that of (A, B, C): equation, source, units, ..."""
     if issubclass(rung, Routhian):
         return steady.ROUTH.get(row.name, {})
-    if issubclass(rung, PerturbedConservative) and row.name in motion.PERTURBED:
-        return motion.PERTURBED[row.name]
     return {"equation": row.general} if row.general else {}
 
 

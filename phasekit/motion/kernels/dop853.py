@@ -75,12 +75,12 @@ def rates(
     if table.shape[0] > 0:
         for lane in range(LANES):
             drive_at(table, z[lane], z, lane)
-    invoke(address, y, p, z, k)
+    invoke(address, y, p, z, k)  # type: ignore[call-arg]
 
 
 @routine
 def add_up(which: int, k: Array, y: Array) -> None:
-    """y = weighted sum of rows of k."""
+    """Y = weighted sum of rows of k."""
     for j in range(0, WEIGHTS.shape[1], TOGETHER):
         w0, w1, w2, w3 = (
             WEIGHTS[which, j],
@@ -106,7 +106,7 @@ def add_up(which: int, k: Array, y: Array) -> None:
 
 @inline
 def state_of(which: int, x: Array, h: Array, k: Array, y: Array) -> None:
-    """y = x + h times a weighted sum of rows of k."""
+    """Y = x + h times a weighted sum of rows of k."""
     add_up(which, k, y)
     for m in range(x.size):
         y[m] = x[m] + h[m] * y[m]

@@ -20,6 +20,7 @@ from phasekit.motion.kernels.stepping import (
     TRY,
     WHOLES,
     T,
+    Whole,
     advance,
     begin,
     commit,
@@ -31,7 +32,7 @@ from phasekit.numerics.lanes import LANES
 
 @routine
 def load(
-    lane: int, cell: int, states: Array, parameters: Array, x: Array, p: Array, whole: Array
+    lane: int, cell: int, states: Array, parameters: Array, x: Array, p: Array, whole: Whole
 ) -> None:
     """Put a cell into a lane."""
     whole[CELL, lane] = cell
@@ -81,8 +82,9 @@ def motions(
 ) -> None:
     """Integrate the motions of cells; times are all after the start or all before it, in order.
 
-    `times` is of shape (cells, times), or (1, times) where they are the same, `states` is of shape (cells, n), `parameters` of shape (parameters, cells), `out` of shape
-    (cells, times, n); NaN where a motion did not come to a time.
+    `times` is of shape (cells, times), or (1, times) where they are the same; `states` of shape
+    (cells, n), `parameters` of shape (parameters, cells), `out` of shape (cells, times, 2): NaN
+    where a motion did not come to a time.
     """
     size = states.shape[1] * LANES
     x, y, spare, h = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
@@ -130,9 +132,7 @@ def motions(
             if fresh > 0:
                 continue
             break
-        advance(
-            address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole
-        )
+        advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
         dense = False
         for lane in range(LANES):
             if whole[ACCEPTED, lane] == 1 and written[lane] < times.shape[1]:

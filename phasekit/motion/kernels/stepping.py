@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from phasekit.motion.kernels.dop853 import (
     attempt,
@@ -19,6 +20,8 @@ from phasekit.motion.kernels.dop853 import (
 )
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.lanes import LANES
+
+Whole = npt.NDArray[np.int64]
 
 #: Rows of `real`: time, next step, the step that is tried, where the lane stops, error of the
 #: step over what is allowed, step that is tried to end at a turn.
@@ -73,7 +76,7 @@ def turn_at(v0: float, v1: float, a0: float, a1: float) -> float:
 
 @routine
 def ends_well(
-    lane: int, x: Array, k: Array, y: Array, p: Array, kink: int, real: Array, whole: Array
+    lane: int, x: Array, k: Array, y: Array, p: Array, kink: int, real: Array, whole: Whole
 ) -> bool:
     """Whether a step may end where it does: not beyond a turn."""
     tried, rate = real[TRY, lane], y[LANES + lane]
@@ -116,7 +119,7 @@ def judge(
     p: Array,
     kink: int,
     real: Array,
-    whole: Array,
+    whole: Whole,
 ) -> None:
     """Accept the step of a lane or not, and say how long the next one is."""
     whole[STEPS, lane] += 1
@@ -156,7 +159,7 @@ def advance(
     kink: int,
     h: Array,
     real: Array,
-    whole: Array,
+    whole: Whole,
 ) -> None:
     """Try a step of every lane, and judge it; y and k[12] are its end, x and k[0] its start."""
     for lane in range(LANES):
@@ -180,7 +183,7 @@ def advance(
 
 
 @routine
-def commit(x: Array, k: Array, y: Array, real: Array, whole: Array) -> None:
+def commit(x: Array, k: Array, y: Array, real: Array, whole: Whole) -> None:
     """Go on to the ends of the accepted steps."""
     for lane in range(LANES):
         if whole[ACCEPTED, lane] == 0:

@@ -1,0 +1,186 @@
+"""Melnikov's function on the separatrices: its mean and its oscillation, in closed form.
+
+``M(t0)``, the energy that a motion along the unperturbed separatrix gains to first order, is the
+distance between the stable and the unstable manifold times the speed. All is per unit of inertia.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import Loop
+from phasekit.inputs import bad
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    PerturbedTrigonometric,
+    drift_name,
+    modulation_names,
+)
+from phasekit.perturbation.harmonics import reach
+from phasekit.perturbation.transforms import area_rates, transforms
+from phasekit.phase.exact.separatrices import Separatrices, separatrices
+
+Array = npt.NDArray[np.float64]
+#: One harmonic: its transform per unit of amplitude, amplitude, frequency and phase.
+Part = tuple[Any, Any, Any, Any]
+
+NODES, WEIGHTS = (np.asarray(x) for x in np.polynomial.legendre.leggauss(24))
+
+
+class Melnikov(NamedTuple):
+    """Melnikov's function; the last axes are saddle and side."""
+
+    melnikov_mean: Array
+    melnikov_amplitude: Array
+    melnikov_phase: Array
+    chaos_threshold: Array
+    turnstile_area: Array
+
+
+def melnikov(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Melnikov:
+    """Melnikov's function along the separatrices of (A, B, C)."""
+    refuse_prescribed(law, "melnikov")
+    values = law.values(*parameters)
+    A, B, C = law.coefficients(values)
+    loops = separatrices(A, B, C)
+    mean = means(law, values, loops)
+    return assembled(mean, oscillations(law, values, loops), undamped(law, values))
+
+
+def refuse_prescribed(law: PerturbedConservative, what: str) -> None:
+    """Refuse a function or table of time, which is no harmonic."""
+    if law.prescribed is not None:
+        hint = "use modulation={'omega1': pk.Harmonic(...)} or drift={'omega1': rate}"
+        raise bad("omega1", law.prescribed, f"None for {what}, which is in closed form", hint)
+
+
+def side_areas(loops: Separatrices) -> Array:
+    """Integral of phi'^2 over time along the loop on each side."""
+    loop = loops.loop[..., None]
+    lobe = np.where(loop == Loop.HETEROCLINIC, 0.5, 1.0) * loops.lobe_area
+    return np.where(loop == Loop.WINDING, loops.winding_area[..., None], lobe)
+
+
+def net_angles(loops: Separatrices) -> Array:
+    """Angle by which the loop on each side leads on."""
+    turn = 2.0 * np.pi * np.array([-1.0, 1.0])
+    arc = np.where(loops.loop[..., None] == Loop.HETEROCLINIC, loops.turning_offset, np.nan)
+    net = np.where(loops.loop[..., None] == Loop.WINDING, turn, arc)
+    return np.where(loops.loop[..., None] == Loop.LOBES, 0.0, net)
+
+
+def means(law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatrices) -> Array:
+    """The mean: what damping takes, a torque gives, and drift takes as the area changes."""
+    A, B, C = law.coefficients(values)
+    each = {name: np.asarray(x)[..., None, None] for name, x in values.items()}
+    mean = -each["damping"] * side_areas(loops)
+    mean = mean + np.where(each["torque"] == 0.0, 0.0, each["torque"] * net_angles(loops))
+    if np.any(values["quadratic"] != 0.0):
+        mean = mean - each["quadratic"] * cubes(A, loops)
+    for parameter in law.drifting:
+        rate = values[drift_name(parameter)]
+        slopes = (rate * slope for slope in law.derivatives(values, parameter))
+        change = area_rates(A, B, C, loops.saddle_phi, loops.saddle_exponent, loops.loop, *slopes)
+        if law.rate is not None and law.rate.parameter == parameter:
+            level = np.asarray(law.euler(values)[0])[..., None, None]
+            winds = loops.loop[..., None] == Loop.WINDING
+            change = change - np.where(winds, rate[..., None, None] * level * net_angles(loops), 0.0)
+        mean = mean - np.where(rate[..., None, None] == 0.0, 0.0, change)
+    return np.asarray(mean)
+
+
+def cubes(A: Any, loops: Separatrices) -> Array:
+    """Integral of |phi'|^3 over time, which is that of phi'^2 over the angle."""
+    whole = np.where(
+        loops.loop[..., None] == Loop.WINDING,
+        2.0 * np.pi * np.array([-1.0, 1.0]),
+        loops.turning_offset,
+    )
+    theta = 0.5 * whole[..., None] * (NODES + 1.0)
+    phi, k = (x[..., None, None] for x in (loops.saddle_phi, loops.saddle_exponent))
+    inner = np.asarray(A)[..., None, None, None] * (np.cos(theta + 2.0 * phi) - np.cos(2.0 * phi))
+    square = 2.0 * np.sin(0.5 * theta) ** 2 * (inner + 2.0 * k * k)
+    passes = np.where(loops.loop[..., None] == Loop.LOBES, 2.0, 1.0)
+    return np.asarray(passes * 0.5 * np.abs(whole) * (square @ WEIGHTS))
+
+
+def oscillations(
+    law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatrices
+) -> list[Part]:
+    """The harmonics: those of the forcing, then those of modulated parameters."""
+    A, B, C = law.coefficients(values)
+    at = (A, B, C, loops.saddle_phi, loops.saddle_exponent, loops.loop)
+    parts: list[Part] = []
+    for amplitude, nu, phase in law.forcing(values):
+        parts.append((transforms(*at, nu, 1.0, 0.0, 0.0, 0.0), amplitude, nu, phase))
+    for parameter in law.modulated:
+        amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
+        dA, dB, dC = law.derivatives(values, parameter)
+        g0, gs, gc = 0.0, -dB, dC
+        if law.rate is not None and law.rate.parameter == parameter:
+            E0, Es, Ec = (1j * nu * part for part in law.euler(values))
+            g0, gs, gc = E0, gs + Es, gc + Ec
+        parts.append((transforms(*at, nu, g0, gs, gc, 0.5 * dA), amplitude, nu, phase))
+    return parts
+
+
+def undamped(law: PerturbedConservative, values: dict[str, Any]) -> Any:
+    """Whether nothing makes the motion gain or lose energy on average."""
+    rates = [values["damping"], values["quadratic"], *(values[drift_name(p)] for p in law.drifting)]
+    return np.logical_and.reduce(np.broadcast_arrays(*(np.asarray(r) == 0.0 for r in rates)))
+
+
+def assembled(mean: Array, parts: Sequence[Part], unmoved: Any) -> Melnikov:
+    """Mean, amplitude, phase, threshold and turnstile of Melnikov's function."""
+    if not parts:
+        nothing = np.full(mean.shape, np.nan)
+        still = np.where(np.isnan(mean), np.nan, 0.0)
+        return Melnikov(mean, still, nothing, nothing.copy(), still.copy())
+    spread = [
+        np.broadcast_arrays(Z, *(np.asarray(x)[..., None, None] for x in (a, nu, phase)), mean)[:4]
+        for Z, a, nu, phase in parts
+    ]
+    shape = np.broadcast_shapes(*(Z.shape for Z, *_ in spread))
+    Z = np.stack(
+        [np.broadcast_to(z * a * np.exp(1j * phase), shape) for z, a, _, phase in spread], -1
+    )
+    nu = np.stack([np.broadcast_to(n, shape) for _, _, n, _ in spread], -1)
+    mean = np.broadcast_to(mean, shape)
+    amplitude, area = reach(Z, nu, np.where(mean > 0.0, -1.0, 1.0))
+    same = (nu == nu[..., :1]).all(axis=-1)
+    total = Z.sum(axis=-1)
+    phase = np.where(same & (total != 0.0), np.angle(total), np.nan)
+    size = np.abs(mean)
+    with np.errstate(all="ignore"):
+        if len(parts) == 1:
+            threshold = size / np.abs(spread[0][0])
+        else:
+            first = np.abs(spread[0][1])
+            threshold = np.where(first == 0.0, np.nan, first * size / amplitude)
+    none = np.asarray(unmoved)[..., None, None] & (mean == 0.0)
+    threshold = np.where(none, np.nan, threshold)
+    return Melnikov(np.array(mean), amplitude, phase, threshold, area)
+
+
+def quiet_frequency(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Array:
+    """The least frequency of a torque that leaves a lobe as it is; its multiples do as well."""
+    refuse_prescribed(law, "quiet_frequencies")
+    values = law.values(*parameters)
+    A, B, C = law.coefficients(values)
+    loops = separatrices(A, B, C)
+    phi, k = loops.saddle_phi, loops.saddle_exponent
+    A, B, C = (np.asarray(x)[..., None] for x in (A, B, C))
+    with np.errstate(all="ignore"):
+        # cosh(a) = (-S + i k^2)/sqrt D; sinh(Re a) = |(k^2, Re q)|/sqrt D, q = i k sqrt(A) e^{i phi}
+        q = 1j * k * np.sqrt(A.astype(complex)) * np.exp(1j * phi)
+        # D = mu (A - mu) in the forms that do not cancel, mu = B/cos phi
+        upright = B / np.cos(phi) * (k * k + A * np.sin(phi) ** 2)
+        level = C / np.sin(phi) * (k * k - A * np.cos(phi) ** 2)
+        root = np.sqrt(np.where(A >= 0.0, upright, level))
+        x = np.arcsinh(np.hypot(k * k, q.real) / root)
+        quiet = np.where(loops.loop == Loop.LOBES, np.pi * k / x, np.nan)
+    return np.repeat(quiet[..., None], 2, axis=-1)
