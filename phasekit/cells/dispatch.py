@@ -16,6 +16,7 @@ import numpy as np
 from phasekit.labels.arguments import bad, one_of
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.ladder import Law
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.as_system import stands_on
 from phasekit.systems.system import Model
 from phasekit.table import quantities
@@ -176,6 +177,9 @@ def fitted(
         return tuple(told), passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
+    labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
+    if issubclass(system.rung, PerturbedConservative) and not labelled:
+        return numbered.worded(system, kept), passes  # no equilibrium is looked for
     counts = [one for one in quantities.PASSES if one.groups == ("labels",)]
     (count,) = (one for one in counts if issubclass(system.rung, one.of))
     return numbered.fitted(system, kept, passes, bound(count, system, set(system.parameters)))

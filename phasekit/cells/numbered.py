@@ -66,6 +66,11 @@ def fitted(
     ]
 
 
+def worded(system: Model, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+    """Return rows without label dims with the words that the system's results have."""
+    return [_worded(row, system, dict(LABELS)) for row in rows]
+
+
 def _most(system: Model, count: Pass) -> tuple[int, int]:
     """Greatest numbers of equilibria and saddles over all cells of the parameters."""
     grid = make_grid(system.parameters)

@@ -5,36 +5,55 @@ Array parameters of the system and of the states span the result's dims, times t
 
 from __future__ import annotations
 
+import functools
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import pass_from
+from phasekit.cells.dispatch import pass_from, passes_of
 from phasekit.cells.states import at_states
 from phasekit.labelled.orbits import noted
-from phasekit.labels.arguments import NumberLike, state_arguments
+from phasekit.labels.arguments import NumberLike, bad, number, state_arguments
+from phasekit.motion.flow import ATOL, RTOL
 from phasekit.systems.as_system import as_system
+from phasekit.systems.perturbed import Perturbed
 from phasekit.table.quantities import select
 
 
 @state_arguments
-def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.Dataset:
-    """States after times, exact for any time: no integration, so no error that grows with steps.
+def flow(
+    system: Any,
+    phi0: NumberLike,
+    dphi0: NumberLike,
+    t: NumberLike,
+    *,
+    rtol: float | None = None,
+    atol: float | None = None,
+) -> xr.Dataset:
+    """States after times, exact for any time; with damping and drive integrated.
 
     Parameters
     ----------
     system : system
-        Any system.
+        Any system. Without damping and drive there is no integration, so no error that grows
+        with steps.
     phi0, dphi0 : float, 1-D array_like or xarray.DataArray
         States at t = 0: angles in rad, angular velocities in s^-1.
     t : float, 1-D array_like or xarray.DataArray
         Times in s, of either sign and in any order. A bare array makes the dim ``time``.
+    rtol, atol : float, optional
+        Of a `Perturbed` system: the error of a step that is allowed, relative (default 1e-10) and
+        absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is relative to
+        one radian.
 
     Returns
     -------
     xarray.Dataset
         ``motion_phi`` in rad, continuous in time (a rotation runs past pi), and ``motion_dphi``
-        in s^-1.
+        in s^-1. NaN where a motion with damping and drive could not be followed to a time, which
+        a RuntimeWarning says.
 
     Raises
     ------
@@ -43,7 +62,12 @@ def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.
 
     Notes
     -----
-    Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones.
+    Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones. Damped
+    and driven motions are integrated by the Runge-Kutta method DOP853 of order 8
+    ([HairerNorsettWanner1993] II.5) in compiled code, eight at a time, on all cores; times within
+    a step come from its interpolation of the seventh order. With quadratic damping, which is not
+    smooth where the motion turns, steps end there. Where damping, torque and drive are all zero,
+    the motion in the potential of (A, B, C) is the exact one.
 
     Examples
     --------
@@ -54,7 +78,38 @@ def flow(system: Any, phi0: NumberLike, dphi0: NumberLike, t: NumberLike) -> xr.
     ('point', 'time')
     """
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
+    system = as_system(system)
+    if not isinstance(system, Perturbed):
+        for name, value in (("rtol", rtol), ("atol", atol)):
+            if value is not None:
+                raise bad(name, value, "nothing, because this system's motion is exact")
+    else:
+        if np.any(np.asarray(system.kT) > 0.0):
+            raise bad(
+                "kT", system.kT, "0 for a motion: noise is not integrated", "use .replace(kT=0)"
+            )
+        tolerances = checked_tolerances(rtol, atol)
+        (one,) = passes_of(system, select("motion"))
+        one = replace(one, function=functools.partial(one.resolved, **tolerances))
+        return at_states(system, select("motion"), states, (one,))
     return at_states(system, select("motion"), states)
+
+
+def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:
+    """Tolerances of an integration by name, the defaults where nothing is said.
+
+    Raises
+    ------
+    ParameterError
+        If one is no number, or so small that rounding hides it.
+    """
+    found = {}
+    for name, value, default in (("rtol", rtol, RTOL), ("atol", atol, ATOL)):
+        wants = "a number from 1e-14 to 0.1"
+        found[name] = default if value is None else number(name, value, wants)
+        if not 1e-14 <= found[name] <= 0.1:
+            raise bad(name, value, wants)
+    return found
 
 
 def separatrix_motion(

@@ -104,6 +104,8 @@ class PerturbedConservative(Law):
         words = dict(self.base.words(name, units, long_name))
         if name == "chaos_threshold" and self.unit != units:
             words["units"] = self.unit
+        if name in ("motion_phi", "motion_dphi"):
+            words["equation"] = "phi'' + V'(phi; p(t)) = -d phi' - q |phi'| phi' + N + F(t)"
         return words
 
     def values(self, *arrays: Any) -> dict[str, Any]:

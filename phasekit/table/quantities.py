@@ -16,7 +16,7 @@ from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.table import loads, numerical, orbits, perturbed, phase_space, steady
+from phasekit.table import loads, motion, numerical, orbits, perturbed, phase_space, steady
 from phasekit.table.row import REGISTERED, Pass, Quantity
 
 QUANTITIES: tuple[Quantity, ...] = (
@@ -24,6 +24,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     *orbits.QUANTITIES,
     *loads.QUANTITIES,
     *steady.QUANTITIES,
+    *motion.QUANTITIES,
     *perturbed.QUANTITIES,
 )
 #: Every row by its name.
@@ -37,6 +38,7 @@ PASSES: tuple[Pass, ...] = (
     *loads.PASSES,
     *steady.PASSES,
     *numerical.PASSES,
+    *motion.PASSES,
     *perturbed.PASSES,
 )
 

@@ -14,7 +14,6 @@ from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.kernels import defining
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.kernels.newton import refine
-from phasekit.bifurcation.continuation.machine_code import compile_expressions
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
@@ -24,6 +23,7 @@ from phasekit.bifurcation.continuation.spectrum import (
 from phasekit.errors import ParameterError
 from phasekit.laws.formulas import read_formula as parse
 from phasekit.laws.formulas import symbols_of
+from phasekit.numerics.machine_code import compile_expressions
 
 FORMULAS = [
     "x + 2*y - 3",

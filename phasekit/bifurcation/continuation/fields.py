@@ -97,7 +97,7 @@ def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
     """
     import sympy
 
-    from phasekit.bifurcation.continuation.machine_code import COMPILED, DIFFERENTIABLE
+    from phasekit.numerics.machine_code import COMPILED, DIFFERENTIABLE
 
     for part in expression.atoms(sympy.Function):
         name = type(part).__name__
@@ -148,7 +148,7 @@ def _first(
     parameters: tuple[str, ...],
     active: tuple[int, ...],
 ) -> int:
-    from phasekit.bifurcation.continuation.machine_code import compile_expressions
+    from phasekit.numerics.machine_code import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
     entries, count = _jet(expressions, u)
@@ -164,7 +164,7 @@ def _second(
 ) -> int:
     import sympy
 
-    from phasekit.bifurcation.continuation.machine_code import compile_expressions
+    from phasekit.numerics.machine_code import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
@@ -185,7 +185,7 @@ def _terms(
     parameters: tuple[str, ...],
     active: tuple[int, ...],
 ) -> int:
-    from phasekit.bifurcation.continuation.machine_code import compile_expressions
+    from phasekit.numerics.machine_code import compile_expressions
 
     _, places = _unknowns(states, parameters, active)
     return compile_expressions([*expressions, *map(_magnitude, expressions)], places)
@@ -227,7 +227,7 @@ def _third(
 ) -> int:
     import sympy
 
-    from phasekit.bifurcation.continuation.machine_code import compile_expressions
+    from phasekit.numerics.machine_code import compile_expressions
 
     u, places = _unknowns(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(3 * len(u))]

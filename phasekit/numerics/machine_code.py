@@ -57,6 +57,7 @@ def compile_expressions(
     expressions: Sequence[sympy.Expr] | Mapping[int, sympy.Expr],
     inputs: Mapping[sympy.Symbol, tuple[int, int]],
     count: int | None = None,
+    writer_class: type[Writer] | None = None,
 ) -> int:
     """Address of ``void (double *x, double *p, double *z, double *out)``.
 
@@ -68,6 +69,8 @@ def compile_expressions(
         Symbol -> (which array: 0 x, 1 p, 2 z; place in it).
     count : int, optional
         Length of ``out``; default: as many as there are expressions.
+    writer_class : type, optional
+        What writes the instructions; default: one double for each value.
 
     Raises
     ------
@@ -79,7 +82,8 @@ def compile_expressions(
     module.triple = llvm.get_process_triple()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer] * 4), name="fill")
     builder = ir.IRBuilder(function.append_basic_block())
-    writer = _Writer(module, builder, function.args, inputs)
+    kind = Writer if writer_class is None else writer_class
+    writer = kind(module, builder, function.args, inputs)
     if not isinstance(expressions, Mapping):
         expressions = dict(enumerate(expressions))
     if count is not None and len(expressions) < count:
@@ -90,9 +94,9 @@ def compile_expressions(
     for symbol, expression in shared:
         writer.values[symbol] = writer.write(expression)
     for i, result in zip(expressions, results, strict=True):
-        builder.store(writer.write(result), writer.place(function.args[3], i))
+        writer.store(writer.write(result), i)
     builder.ret_void()
-    return _machine_code(str(module))
+    return _machine_code(str(module), host=writer.host)
 
 
 @functools.cache
@@ -105,18 +109,29 @@ def _target() -> Any:
     return llvm.Target.from_triple(llvm.get_process_triple())
 
 
-def _machine_code(text: str) -> int:
+def _machine_code(text: str, *, host: bool) -> int:
     target = _target()
     module = llvm.parse_assembly(text)
     module.verify()
-    engine = llvm.create_mcjit_compiler(module, target.create_target_machine(opt=2))
+    options = {}
+    if host:
+        features = llvm.get_host_cpu_features()
+        options = {"cpu": llvm.get_host_cpu_name(), "features": features.flatten()}
+    engine = llvm.create_mcjit_compiler(module, target.create_target_machine(opt=2, **options))
     engine.finalize_object()
     _KEPT.append(engine)
     return int(engine.get_function_address("fill"))
 
 
-class _Writer:
+class Writer:
     """Writes expressions as instructions; every value is a double."""
+
+    kind: Any = _DOUBLE
+    truth: Any = ir.IntType(1)
+    #: Flags of sums and products.
+    flags: tuple[str, ...] = ()
+    #: Whether the code uses all that this machine's processor has.
+    host = False
 
     def __init__(
         self,
@@ -129,7 +144,24 @@ class _Writer:
         self.arrays, self.inputs = arrays, inputs
         self.values: dict[Any, Any] = {}
 
+    def constant(self, value: float) -> Any:
+        """A number."""
+        return ir.Constant(self.kind, value)
+
+    def known(self, value: bool) -> Any:
+        """A truth."""
+        return ir.Constant(self.truth, int(value))
+
+    def load(self, array: Any, index: int) -> Any:
+        """An entry of an argument."""
+        return self.builder.load(self.place(array, index))
+
+    def store(self, value: Any, index: int) -> None:
+        """Store an entry of the result."""
+        self.builder.store(value, self.place(self.arrays[3], index))
+
     def place(self, array: Any, index: int) -> Any:
+        """Pointer to an entry."""
         return self.builder.gep(array, [ir.Constant(ir.IntType(64), index)])
 
     def clear(self, array: Any, count: int) -> None:
@@ -141,6 +173,7 @@ class _Writer:
         self.builder.call(memset, [start, zero, ir.Constant(long, 8 * count), no])
 
     def library(self, name: str, *args: Any) -> Any:
+        """Call a function of the C library."""
         known = self.module.globals.get(name)
         if known is None:
             kind = ir.FunctionType(_DOUBLE, [_DOUBLE] * len(args))
@@ -157,9 +190,9 @@ class _Writer:
         b = self.builder
         if e.is_Symbol:
             which, index = self.inputs[e]
-            return b.load(self.place(self.arrays[which], index))
+            return self.load(self.arrays[which], index)
         if e.is_number and e.is_real is not False:  # sympy does not know it of besselj(0, 2)
-            return ir.Constant(_DOUBLE, float(e))
+            return self.constant(float(e))
         if e.is_Add:
             # Products with a negative coefficient are subtracted.
             value = None
@@ -169,7 +202,11 @@ class _Writer:
                 if value is None:
                     value = b.fneg(part) if minus else part
                 else:
-                    value = b.fsub(value, part) if minus else b.fadd(value, part)
+                    value = (
+                        b.fsub(value, part, flags=self.flags)
+                        if minus
+                        else b.fadd(value, part, flags=self.flags)
+                    )
             return value
         if e.is_Mul:
             return self._product(e)
@@ -182,14 +219,15 @@ class _Writer:
             return self.library("atan2", *(self.write(x) for x in e.args))
         if name == "Abs":
             value = self.write(e.args[0])
-            return b.select(b.fcmp_ordered("<", value, _constant(0.0)), b.fneg(value), value)
+            return b.select(b.fcmp_ordered("<", value, self.constant(0.0)), b.fneg(value), value)
         if name == "DiracDelta":
-            return _constant(0.0)  # the derivative of a jump, anywhere but on it
+            return self.constant(0.0)  # the derivative of a jump, anywhere but on it
         if name in ("sign", "Heaviside"):
-            value, zero = self.write(e.args[0]), _constant(0.0)
+            value, zero = self.write(e.args[0]), self.constant(0.0)
             below, middle = (-1.0, 0.0) if name == "sign" else (0.0, 0.5)
-            other = b.select(b.fcmp_ordered("<", value, zero), _constant(below), _constant(middle))
-            return b.select(b.fcmp_ordered(">", value, zero), _constant(1.0), other)
+            values = self.constant(below), self.constant(middle)
+            other = b.select(b.fcmp_ordered("<", value, zero), *values)
+            return b.select(b.fcmp_ordered(">", value, zero), self.constant(1.0), other)
         if name in ("Max", "Min"):
             value = self.write(e.args[0])
             for argument in e.args[1:]:
@@ -198,7 +236,7 @@ class _Writer:
                 value = b.select(better, other, value)
             return value
         if name == "Piecewise":
-            value = _constant(math.nan)
+            value = self.constant(math.nan)
             for part, condition in reversed(e.args):
                 value = b.select(self._condition(condition), self.write(part), value)
             return value
@@ -209,7 +247,7 @@ class _Writer:
 
     def _condition(self, c: Any) -> Any:
         if c in (sympy.true, sympy.false):
-            return ir.Constant(ir.IntType(1), int(bool(c)))
+            return self.known(bool(c))
         if type(c) in _COMPARISONS:
             left, right = self.write(c.lhs), self.write(c.rhs)
             return self.builder.fcmp_ordered(_COMPARISONS[type(c)], left, right)
@@ -234,9 +272,9 @@ class _Writer:
         minus = above and above[0] == -1
         if minus:
             above = above[1:]
-        value = self.write(above[0]) if above else _constant(1.0)
+        value = self.write(above[0]) if above else self.constant(1.0)
         for factor in above[1:]:
-            value = b.fmul(value, self.write(factor))
+            value = b.fmul(value, self.write(factor), flags=self.flags)
         if below:
             divisor = self.write(below[0])
             for factor in below[1:]:
@@ -248,11 +286,11 @@ class _Writer:
         b, exponent = self.builder, e.exp
         if exponent.is_Integer and 0 < abs(int(exponent)) <= 64:
             value = self._repeated(base, abs(int(exponent)))
-            return value if exponent > 0 else b.fdiv(_constant(1.0), value)
+            return value if exponent > 0 else b.fdiv(self.constant(1.0), value)
         if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) <= 64:
             root = self.library("sqrt", base)
             value = self._repeated(root, abs(int(exponent.p)))
-            return value if exponent > 0 else b.fdiv(_constant(1.0), value)
+            return value if exponent > 0 else b.fdiv(self.constant(1.0), value)
         if e.base is sympy.E:
             return self.library("exp", self.write(exponent))
         return self.library("pow", base, self.write(exponent))
@@ -266,7 +304,3 @@ class _Writer:
             if not times:
                 return result
             value = self.builder.fmul(value, value)
-
-
-def _constant(value: float) -> Any:
-    return ir.Constant(_DOUBLE, value)

@@ -1,0 +1,225 @@
+"""States of damped and driven motions at given times."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    drift_name,
+    forcing_names,
+    modulation_names,
+)
+from phasekit.laws.trigonometric import Trigonometric
+from phasekit.motion.prescribed import table_of
+from phasekit.motion.rates import rates_of
+
+Array = npt.NDArray[np.float64]
+
+#: Error of a step that is allowed, relative and absolute, and steps that a motion may take.
+RTOL, ATOL, MOST = 1e-10, 1e-12, 10_000_000
+#: Work of a motion, in the cells by which `launch` counts.
+WEIGHT = 5_000
+#: States of a motion that did not come to its end.
+EXHAUSTED, FAILED = 3, 4
+
+
+class Motion(NamedTuple):
+    """The group "motion"."""
+
+    motion_phi: Array
+    motion_dphi: Array
+
+
+class Cells(NamedTuple):
+    """Motions side by side."""
+
+    states: Array
+    """Of shape (cells, times, 2); NaN where a motion did not come to a time."""
+    status: npt.NDArray[np.int64]
+    steps: npt.NDArray[np.int64]
+
+
+def flow(
+    law: PerturbedConservative,
+    *arrays: npt.ArrayLike,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    threads: int | None = None,
+) -> Motion:
+    """States after times from t = 0.
+
+    Parameters
+    ----------
+    law : PerturbedConservative
+        The law.
+    *arrays : array_like
+        Its parameters, then angles and angular velocities at t = 0, then times; they broadcast.
+    rtol, atol : float
+        Error of a step that is allowed, relative and absolute.
+    threads : int, optional
+        Default: all cores where there are many motions.
+
+    Returns
+    -------
+    Motion
+        NaN where a motion did not come to a time, which a RuntimeWarning says.
+    """
+    *values, phi, dphi, t = (np.asarray(array, dtype=float) for array in arrays)
+    shape = np.broadcast_shapes(*(array.shape for array in (*values, phi, dphi, t)))
+    inner = _time_axes((*values, phi, dphi), t, len(shape))
+    outer = tuple(axis for axis in range(len(shape)) if axis not in inner)
+    cells = tuple(shape[axis] for axis in outer)
+
+    def flat(array: Array) -> Array:
+        full = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
+        if full.size == 1:
+            return full.reshape(())
+        return np.broadcast_to(full.squeeze(inner), cells).reshape(-1)
+
+    named = law.values(*map(flat, values))
+    count = int(np.prod(cells, dtype=int))
+    states = np.stack([np.broadcast_to(flat(x), (count,)) for x in (phi, dphi)], axis=-1)
+    full = t.reshape((1,) * (len(shape) - t.ndim) + t.shape)
+    times = np.transpose(full, (*outer, *inner))
+    alone = all(full.shape[axis] == 1 for axis in outer)
+    width = int(np.prod([shape[axis] for axis in inner], dtype=int))
+    if not alone:
+        times = np.broadcast_to(times, (*cells, *(shape[axis] for axis in inner)))
+    times = times.reshape(-1, width)
+    found = _motions(law, named, states, times, rtol, atol, threads)
+    order = np.argsort((*outer, *inner))
+    results = found.reshape(*cells, *(shape[axis] for axis in inner), 2)
+    return Motion(*(results[..., i].transpose(order) for i in range(2)))
+
+
+def _motions(
+    law: PerturbedConservative,
+    values: dict[str, Array],
+    states: Array,
+    times: Array,
+    *how: Any,
+) -> Array:
+    """States of motions, by the exact flow where nothing disturbs them."""
+    still = _is_still(law, values, len(states))
+    if not still.any():
+        found = motions(law, values, states, times, *how)
+        _tell(found)
+        return found.states
+    from phasekit.phase.exact.flow import flow as exact
+
+    def some(array: Array, which: Any) -> Array:
+        return array[which] if array.ndim and len(array) > 1 else array
+
+    result = np.empty((len(states), times.shape[1], 2))
+    own = {name: some(value, still) for name, value in values.items()}
+    assert isinstance(law.base, Trigonometric)
+    A, B, C = (np.reshape(x, (-1, 1)) for x in law.base.coefficients(own))
+    phi, dphi = states[still].T[..., None]
+    result[still] = np.stack(exact(A, B, C, phi, dphi, some(times, still)), axis=-1)
+    if not still.all():
+        rest = {name: some(value, ~still) for name, value in values.items()}
+        found = motions(law, rest, states[~still], some(times, ~still), *how)
+        _tell(found)
+        result[~still] = found.states
+    return result
+
+
+def _is_still(law: PerturbedConservative, values: dict[str, Array], count: int) -> Any:
+    """In which cells there is neither damping nor torque nor anything that varies."""
+    if not isinstance(law.base, Trigonometric) or law.prescribed is not None:
+        return np.zeros(count, bool)
+    names = ["damping", "quadratic", "torque"]
+    names += [forcing_names(i)[0] for i in range(law.harmonics)]
+    names += [modulation_names(name)[0] for name in law.modulated]
+    names += [drift_name(name) for name in law.drifting]
+    return np.broadcast_to(
+        np.all(np.broadcast_arrays(*(values[n] == 0.0 for n in names)), axis=0), (count,)
+    )
+
+
+def _time_axes(arrays: tuple[Array, ...], t: Array, n: int) -> tuple[int, ...]:
+    """Axes along which times vary and nothing else does: one motion has them all."""
+
+    def sizes(array: Array) -> tuple[int, ...]:
+        return (1,) * (n - array.ndim) + array.shape
+
+    used = [any(sizes(array)[axis] > 1 for array in arrays) for axis in range(n)]
+    return tuple(axis for axis in range(n) if sizes(t)[axis] > 1 and not used[axis])
+
+
+def motions(
+    law: PerturbedConservative,
+    values: dict[str, Array],
+    states: Array,
+    times: Array,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    threads: int | None = None,
+    most: int = MOST,
+) -> Cells:
+    """Integrate from t = 0 to times of either sign, in any order.
+
+    Parameters
+    ----------
+    law, values, rtol, atol, threads
+        As in `flow`; values of parameters in the cells, by name.
+    states : array, shape (cells, 2)
+        States at t = 0.
+    times : array, shape (cells, times) or (1, times)
+        Times of each cell, or of all.
+    most : int
+        Steps that a motion may take.
+    """
+    from phasekit.motion.kernels.motions import motions as kernel
+    from phasekit.numerics.launch import launch
+
+    code, parameters = rates_of(law, values)
+    count = len(states)
+    parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
+    finite = np.where(np.isfinite(times), times, 0.0)
+    table = table_of(law.prescribed, float(finite.min(initial=0)), float(finite.max(initial=0)))
+    unit = 1.0 if law.base.period is None else law.base.period / (2.0 * np.pi)
+    result = np.full((count, times.shape[1], 2), np.nan)
+    status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    for sense in (1.0, -1.0):
+        ahead = sense * times > 0.0
+        if sense < 0.0 and not ahead.any():
+            continue
+        own = np.where(ahead, times, 0.0)
+        order = np.argsort(sense * own, axis=1)
+        rising = np.array(np.take_along_axis(own, order, axis=1))
+        out = np.empty((count, times.shape[1], 2))
+        reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
+        if count and times.shape[1]:
+            arrays = (code.address, table, 0.0, rising, unit, rtol, atol, most, code.kink, states)
+            groups: Any = (out, reached, taken)
+            launch(kernel, (*arrays, parameters), count, groups, threads, WEIGHT)
+        back = np.argsort(order, axis=1)[..., None]
+        out = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
+        wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]
+        result = np.where(wanted, out, result)
+        status, steps = np.maximum(status, reached), steps + taken
+    return Cells(result, status, steps)
+
+
+def _tell(found: Cells) -> None:
+    """Say how many motions did not come to their ends, and why."""
+    valid = np.isfinite(found.status)
+    reasons: dict[int, Any] = {
+        EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol",
+        FAILED: "their steps become too short: they run to infinity, or the law has no value there",
+    }
+    for code, reason in reasons.items():
+        lost = valid & (found.status == code)
+        if lost.any():
+            warnings.warn(
+                f"motion_phi: {lost.sum()} of {lost.size} motions end before their last time, "
+                f"because {reason}",
+                RuntimeWarning,
+                stacklevel=3,
+            )

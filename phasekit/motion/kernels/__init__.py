@@ -1,0 +1,1 @@
+"""Compiled integration of many motions at once, eight in the lanes of the processor."""

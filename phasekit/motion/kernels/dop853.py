@@ -1,0 +1,198 @@
+"""One step of the Runge-Kutta method DOP853, of eight motions in the lanes of the processor.
+
+Each lane has its own time, step and error. Component c of lane l stands in place 8 c + l. The
+components come in pairs, the coordinate and its rate, then tangent vectors of the motion.
+[HairerNorsettWanner1993] section II.5 and II.10.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+from scipy.integrate import DOP853
+
+from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.lanes import LANES, invoke
+
+STAGES = 12
+ROWS = 16
+C, C_MORE, D = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
+#: Rows that are summed at a time.
+TOGETHER = 4
+
+
+def packed(*sums: Array) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Weights of sums without their zeros, and the rows they belong to, filled up with zeros."""
+    most = -(-max(np.count_nonzero(one) for one in sums) // TOGETHER) * TOGETHER
+    weights, places = np.zeros((len(sums), most)), np.zeros((len(sums), most), np.int64)
+    for row, one in enumerate(sums):
+        used = np.flatnonzero(one)
+        weights[row, : used.size], places[row, : used.size] = one[used], used
+    return weights, places
+
+
+#: Sums for the stages 1 to 11, for the end, for the stages 13 to 15 and for both errors.
+WEIGHTS, PLACES = packed(*DOP853.A[1:], DOP853.B, *DOP853.A_EXTRA, DOP853.E3, DOP853.E5)
+_, MORE, THIRD, FIFTH = 11, 12, 15, 16
+
+#: Least and greatest change of the step, and what of the step that just fits is taken.
+SHORTEST, LONGEST, SAFETY = 0.2, 10.0, 0.9
+
+
+@inline
+def drive_at(table: Array, t: float, z: Array, lane: int) -> None:
+    """Value and slope at a time of a function in Chebyshev pieces.
+
+    Rows of the table: start, half-width, number of coefficients, coefficients.
+    """
+    low, high = 0, table.shape[0]
+    while high - low > 1:
+        middle = (low + high) >> 1
+        if table[middle, 0] <= t:
+            low = middle
+        else:
+            high = middle
+    half = table[low, 1]
+    s = (t - table[low, 0]) / half - 1.0
+    # Clenshaw, with that of the derivative.
+    b1 = b2 = d1 = d2 = 0.0
+    for j in range(int(table[low, 2]) - 1, 0, -1):
+        d1, d2 = 2.0 * s * d1 - d2 + 2.0 * b1, d1
+        b1, b2 = 2.0 * s * b1 - b2 + table[low, 3 + j], b1
+    z[LANES + lane] = s * b1 - b2 + table[low, 3]
+    z[2 * LANES + lane] = (b1 + s * d1 - d2) / half
+
+
+@routine
+def rates(
+    address: int, table: Array, t: Array, h: Array, c: float, y: Array, p: Array, z: Array, k: Array
+) -> None:
+    """Rates of all lanes at the states y and the times t + c h."""
+    for lane in range(LANES):
+        z[lane] = t[lane] + c * h[lane]
+    if table.shape[0] > 0:
+        for lane in range(LANES):
+            drive_at(table, z[lane], z, lane)
+    invoke(address, y, p, z, k)  # type: ignore[call-arg]
+
+
+@routine
+def add_up(which: int, k: Array, y: Array) -> None:
+    """Y = weighted sum of rows of k."""
+    for j in range(0, WEIGHTS.shape[1], TOGETHER):
+        w0, w1, w2, w3 = (
+            WEIGHTS[which, j],
+            WEIGHTS[which, j + 1],
+            WEIGHTS[which, j + 2],
+            WEIGHTS[which, j + 3],
+        )
+        if j > 0 and w0 == 0.0:
+            break
+        k0, k1, k2, k3 = (
+            k[PLACES[which, j]],
+            k[PLACES[which, j + 1]],
+            k[PLACES[which, j + 2]],
+            k[PLACES[which, j + 3]],
+        )
+        if j == 0:
+            for m in range(y.size):
+                y[m] = (w0 * k0[m] + w1 * k1[m]) + (w2 * k2[m] + w3 * k3[m])
+        else:
+            for m in range(y.size):
+                y[m] += (w0 * k0[m] + w1 * k1[m]) + (w2 * k2[m] + w3 * k3[m])
+
+
+@inline
+def state_of(which: int, x: Array, h: Array, k: Array, y: Array) -> None:
+    """Y = x + h times a weighted sum of rows of k."""
+    add_up(which, k, y)
+    for m in range(x.size):
+        y[m] = x[m] + h[m] * y[m]
+
+
+@routine
+def attempt(
+    address: int, table: Array, t: Array, h: Array, x: Array, k: Array, y: Array, p: Array, z: Array
+) -> None:
+    """Try a step of every lane: k[0] are the rates at x, y becomes the end, k[12] its rates."""
+    for i in range(1, STAGES + 1):
+        state_of(i - 1, x, h, k, y)
+        rates(address, table, t, h, C[i] if i < STAGES else 1.0, y, p, z, k[i])
+
+
+@routine
+def errors(
+    h: Array,
+    x: Array,
+    y: Array,
+    k: Array,
+    unit: float,
+    rtol: float,
+    atol: float,
+    spare: Array,
+    size: Array,
+) -> None:
+    """Error of each lane's step over what is allowed.
+
+    A coordinate beyond `unit` counts as `unit`, so that an angle which runs on is held as closely
+    as at first. A tangent vector is held against its length.
+    """
+    third, fifth = spare[0], spare[1]
+    add_up(THIRD, k, third)
+    add_up(FIFTH, k, fifth)
+    n = x.size // LANES
+    for lane in range(LANES):
+        e3 = e5 = 0.0
+        for c in range(n):
+            m = c * LANES + lane
+            if c < 2:
+                scale = max(abs(x[m]), abs(y[m]))
+                if c == 0 and scale > unit:
+                    scale = unit
+            else:
+                other = m + LANES if c % 2 == 0 else m - LANES
+                scale = max(math.hypot(x[m], x[other]), math.hypot(y[m], y[other]))
+            scale = 1.0 / (atol + rtol * scale)
+            e3 += (third[m] * scale) ** 2
+            e5 += (fifth[m] * scale) ** 2
+        below = e5 + 0.01 * e3
+        size[lane] = abs(h[lane]) * e5 / math.sqrt(below * n) if below > 0.0 else below
+
+
+@inline
+def next_step(error: float) -> float:
+    """Factor by which a step may change that made an error over what is allowed."""
+    if error == 0.0:
+        return LONGEST
+    # The eighth root; NaN and infinity come out as the least.
+    factor = SAFETY / math.sqrt(math.sqrt(math.sqrt(error)))
+    return min(LONGEST, max(SHORTEST, factor)) if factor > SHORTEST else SHORTEST
+
+
+@routine
+def densify(
+    address: int, table: Array, t: Array, h: Array, x: Array, k: Array, y: Array, p: Array, z: Array
+) -> None:
+    """The three further stages from which states within the step follow; y is lost."""
+    for i in range(3):
+        state_of(MORE + i, x, h, k, y)
+        rates(address, table, t, h, C_MORE[i], y, p, z, k[13 + i])
+
+
+@inline
+def within(s: float, h: float, x: Array, end: Array, k: Array, m: int) -> float:
+    """Entry m of the state at the part s of a step, to the seventh order."""
+    change = end[m] - x[m]
+    first, last = h * k[0, m], h * k[12, m]
+    total = 0.0
+    for i in range(3, -1, -1):
+        row = 0.0
+        for j in range(ROWS):
+            row += D[i, j] * k[j, m]
+        total = (total + h * row) * (s if i % 2 == 1 else 1.0 - s)
+    total = (total + 2.0 * change - last - first) * s
+    total = (total + first - change) * (1.0 - s)
+    total = (total + change) * s
+    return x[m] + total

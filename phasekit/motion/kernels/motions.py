@@ -1,0 +1,149 @@
+"""Motions from many states, at given times."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from phasekit.motion.kernels.dop853 import ROWS, densify, within
+from phasekit.motion.kernels.stepping import (
+    ACCEPTED,
+    AIMS,
+    ARRIVED,
+    CELL,
+    END,
+    IDLE,
+    REALS,
+    REJECTED,
+    RUNNING,
+    STATE,
+    STEPS,
+    TRY,
+    WHOLES,
+    T,
+    Whole,
+    advance,
+    begin,
+    commit,
+    renew,
+)
+from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.lanes import LANES
+
+
+@routine
+def load(
+    lane: int, cell: int, states: Array, parameters: Array, x: Array, p: Array, whole: Whole
+) -> None:
+    """Put a cell into a lane."""
+    whole[CELL, lane] = cell
+    whole[STATE, lane] = RUNNING
+    whole[STEPS, lane] = whole[REJECTED, lane] = whole[AIMS, lane] = 0
+    for c in range(states.shape[1]):
+        x[c * LANES + lane] = states[cell, c]
+    for c in range(parameters.shape[0]):
+        p[c * LANES + lane] = parameters[c, cell]
+
+
+@routine
+def write(
+    lane: int, times: Array, done: int, x: Array, k: Array, y: Array, real: Array, out: Array
+) -> int:
+    """Write the states of a lane at the times within its step; return how many are written."""
+    start, step = real[T, lane], real[TRY, lane]
+    sense = 1.0 if step > 0.0 else -1.0
+    last = step == real[END, lane] - start
+    while done < times.size and (last or sense * (times[done] - start) <= sense * step):
+        s = min((times[done] - start) / step, 1.0)
+        for c in range(out.shape[1]):
+            m = c * LANES + lane
+            out[done, c] = y[m] if s == 1.0 else within(s, step, x, y, k, m)
+        done += 1
+    return done
+
+
+@kernel
+def motions(
+    address: int,
+    table: Array,
+    start: float,
+    times: Array,
+    unit: float,
+    rtol: float,
+    atol: float,
+    most: int,
+    kink: int,
+    states: Array,
+    parameters: Array,
+    first: int,
+    stop: int,
+    out: Array,
+    status: Array,
+    steps: Array,
+) -> None:
+    """Integrate the motions of cells; times are all after the start or all before it, in order.
+
+    `times` is of shape (cells, times), or (1, times) where they are the same; `states` of shape
+    (cells, n), `parameters` of shape (parameters, cells), `out` of shape (cells, times, 2): NaN
+    where a motion did not come to a time.
+    """
+    size = states.shape[1] * LANES
+    x, y, spare, h = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    k = np.zeros((ROWS, size))
+    p = np.zeros(max(parameters.shape[0], 1) * LANES)
+    z = np.zeros(3 * LANES)
+    real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
+    written = np.zeros(LANES, np.int64)
+    cell = first
+    while True:
+        fresh = 0
+        for lane in range(LANES):
+            if whole[STATE, lane] == RUNNING:
+                continue
+            if whole[STATE, lane] != IDLE:
+                old = whole[CELL, lane]
+                status[old] = whole[STATE, lane]
+                steps[old] = whole[STEPS, lane]
+                out[old, written[lane] :] = np.nan
+                whole[STATE, lane] = IDLE
+            if cell < stop:
+                load(lane, cell, states, parameters, x, p, whole)
+                real[T, lane] = start
+                own_times = times[cell if times.shape[0] > 1 else 0]
+                real[END, lane] = own_times[-1]
+                written[lane] = 0
+                while written[lane] < own_times.size and own_times[written[lane]] == start:
+                    out[cell, written[lane]] = states[cell, :2]
+                    written[lane] += 1
+                if written[lane] == own_times.size:
+                    whole[STATE, lane] = ARRIVED
+                whole[ACCEPTED, lane] = 2
+                fresh += 1
+                cell += 1
+        if fresh > 0:
+            renew(address, table, x, k, p, z, h, real)
+            for lane in range(LANES):
+                if whole[ACCEPTED, lane] == 2:
+                    begin(lane, x, k, p, kink, real, rtol, atol)
+                    whole[ACCEPTED, lane] = 0
+        running = False
+        for lane in range(LANES):
+            running = running or whole[STATE, lane] == RUNNING
+        if not running:
+            if fresh > 0:
+                continue
+            break
+        advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
+        dense = False
+        for lane in range(LANES):
+            if whole[ACCEPTED, lane] == 1 and written[lane] < times.shape[1]:
+                row = whole[CELL, lane] if times.shape[0] > 1 else 0
+                passed = abs(times[row, written[lane]] - real[T, lane]) < abs(real[TRY, lane])
+                dense = dense or passed
+        if dense:
+            densify(address, table, real[T], h, x, k, spare, p, z)
+        for lane in range(LANES):
+            if whole[ACCEPTED, lane] == 1:
+                own = out[whole[CELL, lane]]
+                row = whole[CELL, lane] if times.shape[0] > 1 else 0
+                written[lane] = write(lane, times[row], written[lane], x, k, y, real, own)
+        commit(x, k, y, real, whole)

@@ -1,0 +1,206 @@
+"""Adaptive steps of eight motions: how long, whether accepted, and the turns at which they end.
+
+A lane's numbers stand in two arrays, `real` and `whole`, whose rows are named here. Quadratic
+damping is smooth on either side of phi' = 0 alone: there the steps of such motions end, and within
+a step its sign, a parameter of the rates, stays.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.motion.kernels.dop853 import (
+    attempt,
+    errors,
+    next_step,
+    rates,
+)
+from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.lanes import LANES
+
+Whole = npt.NDArray[np.int64]
+
+#: Rows of `real`: time, next step, the step that is tried, where the lane stops, error of the
+#: step over what is allowed, step that is tried to end at a turn.
+T, H, TRY, END, ERROR, AIM = range(6)
+REALS = 6
+#: Rows of `whole`: cell, state, whether the step was accepted, steps so far, whether the last was
+#: rejected, tries to end at a turn.
+CELL, STATE, ACCEPTED, STEPS, REJECTED, AIMS = range(6)
+WHOLES = 6
+
+#: States: nothing to do, under way, at its end, too many steps, steps too short.
+IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED = range(5)
+
+_EPS = float(np.finfo(float).eps)
+_MOST_AIMS = 12
+
+
+@routine
+def begin(
+    lane: int, x: Array, k: Array, p: Array, kink: int, real: Array, rtol: float, atol: float
+) -> None:
+    """First step of a motion, and the sign of its rate."""
+    sense = 1.0 if real[END, lane] >= real[T, lane] else -1.0
+    size = speed = 0.0
+    for m in range(lane, x.size, LANES):
+        scale = atol + rtol * abs(x[m])
+        size += (x[m] / scale) ** 2
+        speed += (k[0, m] / scale) ** 2
+    size, speed = math.sqrt(size), math.sqrt(speed)
+    h = 0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6
+    real[H, lane] = sense * min(h, abs(real[END, lane] - real[T, lane]))
+    real[AIM, lane] = 0.0
+    if kink >= 0:
+        rate, bend = x[LANES + lane], sense * k[0, LANES + lane]
+        p[kink * LANES + lane] = np.sign(rate) if rate != 0.0 else np.sign(bend)
+
+
+@inline
+def turn_at(v0: float, v1: float, a0: float, a1: float) -> float:
+    """Part of a step at which the cubic with these ends and slopes vanishes; v0 v1 < 0."""
+    low, high = 0.0, 1.0
+    for _ in range(60):
+        s = 0.5 * (low + high)
+        r = 1.0 - s
+        v = r * r * ((1.0 + 2.0 * s) * v0 + s * a0) + s * s * ((1.0 + 2.0 * r) * v1 - r * a1)
+        if (v > 0.0) == (v0 > 0.0):
+            low = s
+        else:
+            high = s
+    return 0.5 * (low + high)
+
+
+@routine
+def ends_well(
+    lane: int, x: Array, k: Array, y: Array, p: Array, kink: int, real: Array, whole: Whole
+) -> bool:
+    """Whether a step may end where it does: not beyond a turn."""
+    tried, rate = real[TRY, lane], y[LANES + lane]
+    sign = p[kink * LANES + lane]
+    if sign * rate >= 0.0 and real[AIM, lane] == 0.0:
+        return True
+    slope = k[12, LANES + lane]
+    rest = -rate / slope if slope != 0.0 else 0.0
+    close = abs(rest) <= 4.0 * _EPS * max(abs(real[T, lane]), abs(tried))
+    if close or whole[AIMS, lane] >= _MOST_AIMS or sign == 0.0:
+        sense = 1.0 if tried >= 0.0 else -1.0
+        turned = np.sign(sense * slope)
+        p[kink * LANES + lane] = turned if turned != 0.0 else np.sign(rate)
+        real[AIM, lane] = 0.0
+        whole[AIMS, lane] = 0
+        return True
+    if sign * rate < 0.0:  # somewhat before: by the cubic, which the next tries refine
+        before, bend = x[LANES + lane], k[0, LANES + lane]
+        if sign * before > 0.0:
+            aim = tried * turn_at(before, rate, tried * bend, tried * slope)
+        else:
+            aim = tried + rest
+    else:
+        aim = tried + rest
+    sense = 1.0 if tried >= 0.0 else -1.0
+    if not 0.0 < sense * aim < 2.0 * abs(tried):
+        aim = 0.5 * tried
+    real[AIM, lane] = aim
+    whole[AIMS, lane] += 1
+    return False
+
+
+@inline
+def judge(
+    lane: int,
+    most: int,
+    x: Array,
+    k: Array,
+    y: Array,
+    p: Array,
+    kink: int,
+    real: Array,
+    whole: Whole,
+) -> None:
+    """Accept the step of a lane or not, and say how long the next one is."""
+    whole[STEPS, lane] += 1
+    error, tried = real[ERROR, lane], real[TRY, lane]
+    change = next_step(error)
+    if not error <= 1.0:
+        whole[REJECTED, lane] = 1
+        real[AIM, lane] = 0.0
+        real[H, lane] = tried * min(change, 1.0)
+        if not abs(real[H, lane]) > 4.0 * _EPS * abs(real[T, lane]) or real[H, lane] == 0.0:
+            whole[STATE, lane] = FAILED
+    elif kink < 0 or ends_well(lane, x, k, y, p, kink, real, whole):
+        whole[ACCEPTED, lane] = 1
+        if whole[REJECTED, lane] == 1:
+            change = min(change, 1.0)
+        whole[REJECTED, lane] = 0
+        # A step that was cut short says little of the next one.
+        if abs(tried * change) > abs(real[H, lane]) or abs(tried) >= abs(real[H, lane]):
+            real[H, lane] = tried * change
+    if whole[STATE, lane] == RUNNING and whole[STEPS, lane] >= most:
+        whole[STATE, lane] = EXHAUSTED
+
+
+@routine
+def advance(
+    address: int,
+    table: Array,
+    unit: float,
+    rtol: float,
+    atol: float,
+    most: int,
+    x: Array,
+    k: Array,
+    y: Array,
+    p: Array,
+    z: Array,
+    kink: int,
+    h: Array,
+    real: Array,
+    whole: Whole,
+) -> None:
+    """Try a step of every lane, and judge it; y and k[12] are its end, x and k[0] its start."""
+    for lane in range(LANES):
+        rest = real[END, lane] - real[T, lane]
+        step = real[AIM, lane] if real[AIM, lane] != 0.0 else real[H, lane]
+        if whole[STATE, lane] != RUNNING:
+            step = 0.0
+        elif abs(step) >= abs(rest):
+            step = rest
+        elif abs(step) > 0.5 * abs(rest) and real[AIM, lane] == 0.0:
+            step = 0.5 * rest  # rather than leave a short one
+        real[TRY, lane] = step
+        whole[ACCEPTED, lane] = 0
+    for m in range(x.size):
+        h[m] = real[TRY, m % LANES]
+    attempt(address, table, real[T], h, x, k, y, p, z)
+    errors(h, x, y, k, unit, rtol, atol, k[13:], real[ERROR])
+    for lane in range(LANES):
+        if whole[STATE, lane] == RUNNING:
+            judge(lane, most, x, k, y, p, kink, real, whole)
+
+
+@routine
+def commit(x: Array, k: Array, y: Array, real: Array, whole: Whole) -> None:
+    """Go on to the ends of the accepted steps."""
+    for lane in range(LANES):
+        if whole[ACCEPTED, lane] == 0:
+            continue
+        for m in range(lane, x.size, LANES):
+            x[m] = y[m]
+            k[0, m] = k[12, m]
+        if real[TRY, lane] == real[END, lane] - real[T, lane]:
+            real[T, lane] = real[END, lane]
+            whole[STATE, lane] = ARRIVED
+        else:
+            real[T, lane] += real[TRY, lane]
+
+
+@routine
+def renew(
+    address: int, table: Array, x: Array, k: Array, p: Array, z: Array, h: Array, real: Array
+) -> None:
+    """Rates of all lanes where they are."""
+    rates(address, table, real[T], h, 0.0, x, p, z, k[0])

@@ -1,0 +1,196 @@
+"""The law of a perturbed motion as machine code: rates of eight states at once.
+
+The code takes the state (coordinate, rate, and tangent vectors), the time with what is prescribed
+of it, and parameters: the coefficients (A, B, C) where they do not vary, else the parameters of
+the potential, then damping and drive.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import ParameterError
+from phasekit.laws.ladder import Conservative
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    drift_name,
+    forcing_names,
+    modulation_names,
+)
+from phasekit.laws.trigonometric import Trigonometric
+
+Array = npt.NDArray[np.float64]
+
+#: Which array of the code an entry is in.
+_STATE, _PARAMETER, _TIME = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Machine code of a law, and what it takes."""
+
+    address: int
+    names: tuple[str, ...]
+    """Its parameters: names of the law's, of its coefficients, or of the torque of omega'."""
+    kink: int
+    """Place of the sign of the rate among the parameters; -1 without quadratic damping."""
+
+
+def rates_of(
+    law: PerturbedConservative, values: Mapping[str, Array], tangents: int = 0
+) -> tuple[Rates, Array]:
+    """Return the machine code of a law, and its parameters, of shape (parameters, cells).
+
+    Parameters
+    ----------
+    law : PerturbedConservative
+        The law.
+    values : mapping of str to array
+        Values of its parameters in the cells, that broadcast.
+    tangents : int
+        How many tangent vectors move along.
+
+    Raises
+    ------
+    ParameterError
+        If the potential holds a function that has no machine code, or varies in more than the
+        angular velocity of its frame.
+    """
+    quadratic = bool(np.any(np.asarray(values["quadratic"]) != 0.0))
+    code = _compiled(_Form.of(law), _Same(law.base), law.rate, quadratic, tangents)
+    known: dict[str, Any] = dict(values)
+    if {"A", "B", "C"} <= set(code.names) and isinstance(law.base, Trigonometric):
+        inputs = {name: np.asarray(values[name], float) for name in law.inputs}
+        with np.errstate(all="ignore"):
+            known.update(zip("ABC", law.base.coefficients(inputs), strict=True))
+    if "euler_0" in code.names:
+        euler = law.euler({name: np.asarray(value, float) for name, value in values.items()})
+        known.update(zip(_EULER, euler, strict=True))
+    known["sign"] = 0.0
+    columns = [np.atleast_1d(np.asarray(known[name], float)) for name in code.names]
+    return code, np.stack(np.broadcast_arrays(*columns))
+
+
+_EULER = ("euler_0", "euler_s", "euler_c")
+
+
+@dataclass(frozen=True)
+class _Form:
+    """What of a law its machine code depends on, beside the potential."""
+
+    inputs: tuple[str, ...]
+    harmonics: int
+    modulated: tuple[str, ...]
+    drifting: tuple[str, ...]
+    prescribed: bool
+
+    @classmethod
+    def of(cls, law: PerturbedConservative) -> _Form:
+        return cls(
+            law.inputs, law.harmonics, law.modulated, law.drifting, law.prescribed is not None
+        )
+
+    @property
+    def varies(self) -> bool:
+        """Whether the potential does."""
+        return bool(self.modulated or self.drifting or self.prescribed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Same:
+    """A law of a potential, of which there is one for equal formulas."""
+
+    base: Conservative
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Same) and self.base is other.base
+
+    def __hash__(self) -> int:
+        return id(self.base)
+
+
+@functools.lru_cache(maxsize=128)
+def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: int) -> Rates:
+    import sympy as sp
+
+    from phasekit.numerics.lanes import compile_lanes
+
+    base = same.base
+    x, v, t, w, dw = (sp.Symbol(f"_{name}", real=True) for name in "xvtwd")
+    used: dict[str, Any] = {}
+
+    def parameter(name: str) -> Any:
+        return used.setdefault(name, sp.Symbol(f"_p{len(used)}", real=True))
+
+    def harmonic(names: Sequence[str]) -> Any:
+        amplitude, frequency, phase = map(parameter, names)
+        return amplitude * sp.cos(frequency * t + phase), frequency * t + phase
+
+    if isinstance(base, Trigonometric) and not form.varies:
+        A, B, C = map(parameter, "ABC")
+        slope = (B - A * sp.cos(x)) * sp.sin(x) - C * sp.cos(x)
+    else:
+        symbols = {}
+        for name in form.inputs:
+            symbols[name] = parameter(name)
+            if form.prescribed and rate is not None and name == rate.parameter:
+                symbols[name] = w
+            if name in form.modulated:
+                symbols[name] += harmonic(modulation_names(name))[0]
+            if name in form.drifting:
+                symbols[name] += parameter(drift_name(name)) * t
+        symbols[base.coordinate] = x
+        slope = base.gradient_formula(symbols)
+    force = parameter("torque") - slope - parameter("damping") * v
+    for number in range(form.harmonics):
+        force += harmonic(forcing_names(number))[0]
+    if rate is not None and form.varies:
+        force += _euler(form, rate, parameter, harmonic, x, t, dw)
+    kink = -1
+    if quadratic:
+        force -= parameter("quadratic") * parameter("sign") * v * v
+        kink = list(used).index("sign")
+    expressions = [v, force]
+    places = {x: (_STATE, 0), v: (_STATE, 1), t: (_TIME, 0), w: (_TIME, 1), dw: (_TIME, 2)}
+    slopes = force.diff(x), force.diff(v)
+    for i in range(tangents):
+        pair = sp.symbols(f"_u{i} _w{i}", real=True)
+        expressions += [pair[1], slopes[0] * pair[0] + slopes[1] * pair[1]]
+        places.update({symbol: (_STATE, 2 + 2 * i + j) for j, symbol in enumerate(pair)})
+    places.update({symbol: (_PARAMETER, i) for i, symbol in enumerate(used.values())})
+    try:
+        address = compile_lanes(expressions, places)
+    except ParameterError as error:
+        raise ParameterError(f"system: {error}") from None
+    return Rates(address, tuple(used), kink)
+
+
+def _euler(form: _Form, rate: Any, parameter: Any, harmonic: Any, x: Any, t: Any, dw: Any) -> Any:
+    """The torque of the change of the frame's angular velocity."""
+    import sympy as sp
+
+    varying = {*form.modulated, *form.drifting}
+    change: Any = dw if form.prescribed else 0
+    if rate.parameter in form.modulated:
+        names = modulation_names(rate.parameter)
+        _, phase = harmonic(names)
+        change -= parameter(names[0]) * parameter(names[1]) * sp.sin(phase)
+    if rate.parameter in form.drifting:
+        change += parameter(drift_name(rate.parameter))
+    if change == 0:
+        return 0
+    others = varying - {rate.parameter}
+    if others:
+        raise ParameterError(
+            f"modulation, drift: got {', '.join(sorted(others))} beside {rate.parameter}, wants "
+            f"{rate.parameter} alone or not at all: its change is a torque that depends on the "
+            "others, which is not integrated"
+        )
+    still, sine, cosine = map(parameter, _EULER)
+    return (still + sine * sp.sin(x) + cosine * sp.cos(x)) * change
