@@ -33,6 +33,10 @@ LABELS = {
     "bogdanov_takens": "BT",
     "generalized_hopf": "GH",
     "zero_hopf": "ZH",
+    "fold_of_cycles": "LPC",
+    "period_doubling": "PD",
+    "torus": "TR",
+    "cycle_branch_point": "BPC",
     "end": "EP",
 }
 
