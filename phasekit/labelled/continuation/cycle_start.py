@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -125,7 +124,7 @@ def continue_orbit(
     found = starts.settled(cycles, guess)
     start = _start(cycles, found, f"from the orbit given at {parameter} = {value:.9g}")
     if start.dy[1] < 0.0:
-        start = replace(start, dx=-start.dx, dy=-start.dy)
+        start = start.flipped()
     return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
 
 

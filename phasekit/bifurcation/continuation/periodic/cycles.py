@@ -237,6 +237,17 @@ class Cycles:
             before = size
         return Solution(Orbit(mesh, x, y), dx[1], dy[1], 0, residual, sign, divergence, W, message)
 
+    def looked_at(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+        """An orbit that was found otherwise, with its residual and condensed equations."""
+        c = collocation.scheme(self.m)
+        W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
+        jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        _, residual, divergence = kernels.condense(
+            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side, orbit.x,
+            orbit.y, W,
+        )  # fmt: skip
+        return self._found(orbit, dx, dy, 1, residual, 0.0, divergence, W)
+
     def _found(
         self, orbit: Orbit, dx: Array, dy: Array, steps: int, residual: float, sign: float,
         divergence: float, W: Array,

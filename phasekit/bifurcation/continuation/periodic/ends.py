@@ -96,7 +96,8 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
     point = point_of(cycles, found, before.arclength + part * made.step, part * made.step)
     from dataclasses import replace
 
-    return replace(point, dx=side * found.dx, dy=side * found.dy)
+    # Its determinant has the parameter's row, which goes the way of the tangent that it gave.
+    return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
 
 
 def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:

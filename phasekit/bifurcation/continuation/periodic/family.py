@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -60,15 +60,10 @@ class Path:
     stops: tuple[Stop, Stop]
 
 
-def reversed_point(point: Point) -> Point:
-    """A point of a family that is followed the other way round."""
-    return replace(point, dx=-point.dx, dy=-point.dy, arclength=-point.arclength)
-
-
 def join(start: Point, tracks: Tracks, first: Stop) -> Path:
     """One path of two tracks from the same start; without a first track, ``first`` says why."""
     backward, forward = tracks
-    behind = [] if backward is None else [reversed_point(p) for p in backward.points[::-1]]
+    behind = [] if backward is None else [p.flipped() for p in backward.points[::-1]]
     ahead = [] if forward is None else list(forward.points)
     stops = (
         first if backward is None else backward.stop,
@@ -101,4 +96,4 @@ def go_on(cycles: Cycles, track: Track | None, points: int, start: Point) -> Tra
     return Track((*track.points, *more.points), more.state, more.stop)
 
 
-__all__ = ["Found", "Path", "State", "Tracks", "go_on", "join", "reversed_point", "run"]
+__all__ = ["Found", "Path", "State", "Tracks", "go_on", "join", "run"]

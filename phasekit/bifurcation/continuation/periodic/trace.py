@@ -36,6 +36,10 @@ class Point:
     liouville_error: float
     mesh_error: float
 
+    def flipped(self) -> Point:
+        """The same point of a family that is followed the other way round."""
+        return replace(self, dx=-self.dx, dy=-self.dy, sign=-self.sign, arclength=-self.arclength)
+
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
