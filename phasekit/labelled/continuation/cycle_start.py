@@ -87,9 +87,7 @@ def from_hopf(point: SpecialPoint, options: ContinuationOptions | None) -> Cycle
         raise bad("point", "no pair of complex eigenvalues", "a Hopf point that has converged")
     k = pairs[np.argmin(np.abs(values.real[pairs]))]
     p = point.parameters[name]
-    found = starts.from_hopf(
-        cycles, point.special.u[:n], p, float(values.imag[k]), vectors[:, k], options.initial_step
-    )
+    found = starts.from_hopf(cycles, point.special.u[:n], p, float(values.imag[k]), vectors[:, k])
     start = _start(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
     origin = Stop("hopf", f"the Hopf point at {name} = {p:.12g}")
     tracks = (None, run(cycles, start, "forward")[1])
@@ -184,8 +182,31 @@ def orbit_of(cycles: Cycles, problem: Problem, found: Solution, where: str) -> x
 
 
 def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
-    """The other branch at a special point of cycles."""
-    raise bad("point", point.kind, "a period doubling or a branch point of cycles")
+    """The other branch at a period doubling or a branch point of cycles."""
+    if point.kind not in ("period_doubling", "cycle_branch_point"):
+        raise bad("point", point.kind, "a period doubling or a branch point of cycles")
+    if point.status != "converged":
+        raise bad("point", point.status, "a point that has converged", point.message)
+    cycles, problem = point.branch.known()
+    options = cycles.options if options is None else check_options(options)
+    if isinstance(direction, bool) or direction != 0:
+        raise bad("direction", direction, "0: there is one other branch")
+    cycles = cycles.replace(options=options)
+    here = point.special.point
+    name = point.branch.parameter
+    where = f"the {point.kind.replace('_', ' ')} at {name} = {point.parameters[name]:.12g}"
+    checked = cycles.looked_at(here.orbit, here.dx, here.dy)
+    size = options.initial_step
+    if point.kind == "period_doubling":
+        cycles, orbit, dx = starts.doubled(cycles, here.orbit, checked.W)
+        start = _start(cycles, starts.off(cycles, orbit, dx, size), f"beside {where}")
+        tracks = (None, run(cycles, start, "forward")[1])
+        origin = Stop("period_doubling", where)
+        return make_cycles(problem, cycles, start, tracks, point.branch.record, origin)
+    dx = starts.null_vector(cycles, here.orbit, checked.W, 1.0, (here.dx, here.dy))
+    start = _start(cycles, starts.off(cycles, here.orbit, dx, size), f"beside {where}")
+    tracks = run(cycles, start, options.directions)
+    return make_cycles(problem, cycles, start, tracks, point.branch.record)
 
 
 def point_curve(point: CyclePoint, parameter: str, span: Any, options: Any) -> Any:

@@ -50,7 +50,7 @@ class Solution:
     steps : int
         Newton steps; 0 if it did not converge.
     residual : float
-        Largest |x' - T f| beside the largest |T f| of that state.
+        Largest |x' - T f| beside the largest |T f|, both on scaled axes.
     sign : float
         Sign of the determinant of the equations with the tangent as last row.
     divergence : float
@@ -205,7 +205,18 @@ class Cycles:
             with np.errstate(all="ignore"):
                 jets = self.jets(mesh, x, y, self.m, self.sizes)
                 sign, residual, divergence = kernels.condense(
-                    jets, self.forced, mesh, c.nodes, c.weights, c.value, c.slope, c.side, x, y, W
+                    jets,
+                    self.forced,
+                    mesh,
+                    c.nodes,
+                    c.weights,
+                    c.value,
+                    c.slope,
+                    c.side,
+                    self.scale,
+                    x,
+                    y,
+                    W,
                 )
                 if sign == 0.0:
                     message = "f or its derivatives are not finite"
@@ -243,7 +254,7 @@ class Cycles:
         W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
         jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
         _, residual, divergence = kernels.condense(
-            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side, orbit.x,
+            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale, orbit.x,
             orbit.y, W,
         )  # fmt: skip
         return self._found(orbit, dx, dy, 1, residual, 0.0, divergence, W)

@@ -30,6 +30,13 @@ def end_of(
             "hopf",
             f"the orbits shrink to an equilibrium, a Hopf point near {name} = {made.orbit.y[1]:.9g}",
         )
+    if _through_doubling(cycles, before.orbit, made.orbit):
+        name = cycles.field.parameters[cycles.active[0]]
+        return None, Stop(
+            "period_doubling",
+            f"both halves of the orbit become the same at a period doubling near {name} = "
+            f"{made.orbit.y[1]:.9g}",
+        )
     for k, place in enumerate(cycles.active):
         p = made.orbit.y[1 + k]
         if cycles.low[k] < p < cycles.high[k]:
@@ -75,6 +82,28 @@ def _through_hopf(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     from phasekit.bifurcation.continuation.periodic import kernels
 
     return kernels.inner(b.mesh, c.weights, c.value, one, two, weight) < 0.0
+
+
+def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
+    """Whether both halves of the orbit changed places, as they do where they become the same."""
+    if cycles.forced and cycles.multiple % 2:
+        return False
+    at = np.linspace(0.0, 0.5, 65)[:-1]
+
+    def halves(orbit: Orbit) -> Array:
+        one, two = (
+            collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at + shift)
+            for shift in (0.0, 0.5)
+        )
+        return np.asarray((two - one - 0.5 * cycles.turns) / cycles.scale)
+
+    one, two = halves(a), halves(b)
+    small = np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2))
+    if float(np.sum(one * two)) >= 0.0 or not small:
+        return False
+    # Orbits with the symmetry x(s + 1/2) = -x(s) keep halves that are far apart.
+    size = float(np.mean(cycles.amplitudes(b) / cycles.scale))
+    return bool(min(np.sqrt(np.mean(one**2)), np.sqrt(np.mean(two**2))) < 0.2 * size)
 
 
 def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -> Point | None:

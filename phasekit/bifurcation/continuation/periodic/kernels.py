@@ -99,12 +99,12 @@ def jets(
 @kernel
 def condense(
     jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
-    slope: Array, side: float, x: Array, y: Array, W: Array,
+    slope: Array, side: float, scale: Array, x: Array, y: Array, W: Array,
 ) -> tuple[float, float, float]:  # fmt: skip
     """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
 
-    Returns the sign of the determinants, the largest residual beside the largest |T f| of its
-    state, and the integral of the trace of T f_x.
+    Returns the sign of the determinants, the largest residual beside the largest |T f|, both on
+    scaled axes, and the integral of the trace of T f_x.
     """
     m, n = nodes.size, x.shape[1]
     q = y.size
@@ -112,7 +112,7 @@ def condense(
     width = size + n + q + 1
     t = 1 if forced else 0
     M = np.empty((size, width))
-    speed, worst = np.zeros(n), np.zeros(n)
+    speed, worst = 0.0, 0.0
     sign, divergence = 1.0, 0.0
     for j in range(mesh.size - 1):
         h = mesh[j + 1] - mesh[j]
@@ -140,8 +140,10 @@ def condense(
                 for k in range(1, q):
                     M[row, size + n + k] = h * y[0] * jet_[at, base + n + t + k - 1]
                 M[row, width - 1] = -total
-                speed[c] = max(speed[c], abs(y[0] * f))
-                worst[c] = max(worst[c], abs(total / h))
+                speed = max(speed, abs(y[0] * f) / scale[c])
+                worst = max(worst, abs(total / h) / scale[c])
+                if not np.isfinite(total):
+                    return 0.0, np.inf, np.nan
                 divergence += h * weights[i] * y[0] * jet_[at, base + c]
         found = eliminate(M, size, size, width) * side**n
         if found == 0.0:
@@ -151,12 +153,7 @@ def condense(
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
-    residual = 0.0
-    for c in range(n):
-        if not np.isfinite(worst[c]):
-            return 0.0, np.inf, np.nan
-        if worst[c] > 0.0:
-            residual = max(residual, worst[c] / speed[c] if speed[c] > 0.0 else np.inf)
+    residual = worst / speed if speed > 0.0 else np.inf
     return sign, residual, divergence
 
 
