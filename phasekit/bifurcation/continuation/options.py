@@ -63,7 +63,7 @@ class ContinuationOptions:
     intervals : int, optional
         Of periodic orbits: a fixed number of mesh intervals. By default as many are taken as the
         mesh tolerance asks for, at each point anew.
-    max_intervals : int, default 400
+    max_intervals : int, default 1000
         Of periodic orbits: the most mesh intervals; a branch that needs more ends as stuck.
     mesh_tolerance : float, default 1e-8
         Of periodic orbits: estimated error of the states between mesh points, beside their
@@ -97,7 +97,7 @@ class ContinuationOptions:
     scales: Mapping[str, float] = field(default_factory=dict)
     degree: int = 4
     intervals: int | None = None
-    max_intervals: int = 400
+    max_intervals: int = 1000
     mesh_tolerance: float = 1e-8
 
     def __post_init__(self) -> None:

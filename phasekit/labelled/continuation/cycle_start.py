@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -165,7 +166,7 @@ def sampled(
         x = x.copy()
         x[-1] = x[0] + turns
     m = ContinuationOptions().degree
-    count = int(np.clip(len(at) // m, starts.FIRST, 200))
+    count = int(np.clip(len(at) // (4 * m), starts.FIRST, 200))
     # Mesh points where the samples are dense.
     mesh = np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(at)), at)
     mesh[0], mesh[-1] = 0.0, 1.0
@@ -204,7 +205,13 @@ def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
         origin = Stop("period_doubling", where)
         return make_cycles(problem, cycles, start, tracks, point.branch.record, origin)
     dx = starts.null_vector(cycles, here.orbit, checked.W, 1.0, (here.dx, here.dy))
-    start = _start(cycles, starts.off(cycles, here.orbit, dx, size), f"beside {where}")
+    sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
+    one, two = (_start(cycles, side, f"beside {where}").orbit for side in sides)
+    mesh = here.orbit.mesh
+    one, two = cycles.on(mesh, one)[0], cycles.on(mesh, two)[0]
+    dx, dy = one.x - two.x, one.y - two.y
+    length = np.sqrt(cycles.inner(mesh, dx, dx, dy, dy))
+    start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
     tracks = run(cycles, start, options.directions)
     return make_cycles(problem, cycles, start, tracks, point.branch.record)
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation
+from phasekit.bifurcation.continuation.periodic import collocation, starts, trace
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
+SLOW, LOST = 1e-6, 1e-3  # the same where the multiplier 1 is wrong by so much
 LONG = 3.0  # times the period of the start, from where on it can be that of a homoclinic orbit
 
 
@@ -25,11 +27,7 @@ def end_of(
 ) -> tuple[Point | None, Stop] | None:
     """The last point and the reason, if the family ends between two points."""
     if not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
-        name = cycles.field.parameters[cycles.active[0]]
-        return None, Stop(
-            "hopf",
-            f"the orbits shrink to an equilibrium, a Hopf point near {name} = {made.orbit.y[1]:.9g}",
-        )
+        return _at_hopf(cycles, before, made)
     if _through_doubling(cycles, before.orbit, made.orbit):
         name = cycles.field.parameters[cycles.active[0]]
         return None, Stop(
@@ -59,9 +57,17 @@ def end_of(
 
 
 def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
+    """Whether the period grows and the parameter stands still.
+
+    Before a saddle-node it never quite does, but then the multipliers are lost first.
+    """
     rate = made.dy[0] / made.orbit.y[0]
-    still = abs(made.dy[1]) / cycles.width[0] < STILL * abs(rate)
-    return bool(rate > 0.0 and still and made.orbit.y[0] > LONG * start.orbit.y[0])
+    if not rate > 0.0:
+        return False
+    still = abs(made.dy[1]) / cycles.width[0] / rate
+    if made.trivial_error > LOST and still < SLOW:
+        return True
+    return bool(still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0])
 
 
 def shape(cycles: Cycles, orbit: Orbit) -> Array:
@@ -74,14 +80,76 @@ def _through_hopf(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     """Whether the orbit turned inside out between two points, which it does through a Hopf point."""
     if np.any(cycles.turns):
         return False
-    if a.intervals != b.intervals or not np.array_equal(a.mesh, b.mesh):
-        a, _ = cycles.on(b.mesh, a)
-    one, two = shape(cycles, a), shape(cycles, b)
-    weight = cycles.scale * 0.0 + 1.0
-    c = collocation.scheme(cycles.m)
-    from phasekit.bifurcation.continuation.periodic import kernels
+    a, _ = cycles.on(b.mesh, a)
+    one, two = (shape(cycles, orbit) * cycles.scale for orbit in (a, b))
+    nothing = np.zeros(cycles.q)
+    return cycles.inner(b.mesh, one, two, nothing, nothing) < 0.0
 
-    return kernels.inner(b.mesh, c.weights, c.value, one, two, weight) < 0.0
+
+def _at_hopf(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, Stop]:
+    """A last small orbit, and the Hopf point that it surrounds."""
+    a = before.orbit
+    name = cycles.field.parameters[cycles.active[0]]
+    middle = collocation.mean(a.mesh, a.x, cycles.m)
+    said = "the orbits shrink to an equilibrium, a Hopf point"
+    near = Stop("hopf", f"{said} near {name} = {made.orbit.y[1]:.9g}")
+    found = hopf_near(cycles, middle, a.y)
+    if found is None:
+        return None, near
+    x, y = found
+    wave = shape(cycles, a) * cycles.scale
+    rest = Orbit(a.mesh, np.tile(x, (len(a.x), 1)), y)
+    last = starts.off(cycles, rest, wave, starts.SMALL * cycles.options.initial_step)
+    stop = Stop("hopf", f"{said} at {name} = {y[1]:.12g}")
+    if not last.converged or abs(last.orbit.y[0] / y[0] - 1.0) > 0.01:
+        return None, stop
+    # `off` leaves it outwards; the family comes inwards.
+    point = trace.point_of(cycles, last, before.arclength + 0.5 * made.step, 0.5 * made.step)
+    return replace(point, dx=-point.dx, dy=-point.dy, sign=-point.sign), stop
+
+
+def hopf_near(cycles: Cycles, x: Array, y: Array) -> tuple[Array, Array] | None:
+    """The Hopf point near an equilibrium: the state, and y = (period, parameter)."""
+    mesh, n = np.array([0.0, 1.0]), cycles.n
+    omega = 2.0 * np.pi / y[0]
+    x, p = x.copy(), float(y[1])
+
+    def growth(p: float) -> tuple[float, float] | None:
+        for step in range(30):
+            at = np.tile(x, (cycles.m + 1, 1))
+            jets = cycles.jets(mesh, at, np.array([y[0], p]), cycles.m, cycles.sizes)[0]
+            slopes = jets[n:].reshape(n, -1)[:, :n]
+            if not np.isfinite(jets).all():
+                return None
+            try:
+                dx = np.linalg.solve(slopes, -jets[:n])
+            except np.linalg.LinAlgError:
+                return None
+            x[:] += dx
+            if step and np.max(np.abs(dx) / cycles.scale) < 1e-14:
+                break
+        values = np.linalg.eigvals(slopes)
+        values = values[values.imag > 0.0]
+        if not len(values):
+            return None
+        one = values[np.argmin(np.abs(values - 1j * omega))]
+        return float(one.real), float(one.imag)
+
+    before = growth(p)
+    step = 1e-4 * cycles.width[0]
+    for _ in range(30):
+        after = growth(p + step)
+        if before is None or after is None:
+            return None
+        p += step
+        if after[0] == before[0] or abs(step) < 1e-15 * cycles.width[0]:
+            break
+        step = -after[0] * step / (after[0] - before[0])
+        before = after
+    assert after is not None
+    if abs(after[0]) > 1e-9 * after[1] or abs(after[1] / omega - 1.0) > 0.2:
+        return None
+    return x, np.array([2.0 * np.pi / after[1], p])
 
 
 def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
@@ -108,8 +176,6 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
 
 def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -> Point | None:
     """The point between two others where a free parameter has a value."""
-    from phasekit.bifurcation.continuation.periodic.trace import point_of
-
     a, b = before.orbit, made.orbit
     mesh = b.mesh
     a, (dx,) = cycles.on(mesh, a, before.dx)
@@ -122,9 +188,7 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
         return None
     found.orbit.y[1 + k] = value
     side = np.sign(cycles.inner(mesh, dx, found.dx, before.dy, found.dy)) or 1.0
-    point = point_of(cycles, found, before.arclength + part * made.step, part * made.step)
-    from dataclasses import replace
-
+    point = trace.point_of(cycles, found, before.arclength + part * made.step, part * made.step)
     # Its determinant has the parameter's row, which goes the way of the tangent that it gave.
     return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
 

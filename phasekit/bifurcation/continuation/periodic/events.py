@@ -137,7 +137,8 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
     if len(cycles.active) != 1:
         return found
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
-        if not (a.trusted and b.trusted):
+        singular = a.sign == 0.0 or b.sign == 0.0  # a branch point that the path begins at
+        if singular or not (a.trusted and b.trusted):
             continue
         for one in _between(cycles, a, b, DEPTH):
             found.append(replace(one, index=i))

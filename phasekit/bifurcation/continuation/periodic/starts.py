@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
-from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for
+from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +27,9 @@ def settled(cycles: Cycles, guess: Orbit, *, iterations: int = 40) -> Solution:
             return found
         mesh = finer(cycles, found.orbit)
         if mesh is None:
-            return found
+            mesh = fitted(cycles, found.orbit)
+            if len(mesh) >= len(found.orbit.mesh):
+                return found
         guess, _ = cycles.on(mesh, found.orbit)
     return found
 
