@@ -38,6 +38,19 @@ _CURVES: dict[str, style.Look] = {
         "linewidth": 1.4,
         "label": "neutral saddle",
     },
+    "fold_of_cycles": {
+        "color": style.BLACK,
+        "linestyle": "-",
+        "linewidth": 2.0,
+        "label": "fold of cycles",
+    },
+    "period_doubling": {
+        "color": style.ORANGE,
+        "linestyle": "-",
+        "linewidth": 2.0,
+        "label": "period doubling",
+    },
+    "torus": {"color": style.SKY, "linestyle": "-", "linewidth": 2.0, "label": "torus"},
     "branch_point": {
         "color": style.PURPLE,
         "linestyle": (0, (7, 2, 1.5, 2)),
@@ -57,6 +70,10 @@ _MARKS = {
     "BT": ("P", style.SKY),
     "GH": ("h", style.SKY),
     "ZH": ("X", style.SKY),
+    "LPC": ("s", "white"),
+    "PD": ("d", style.ORANGE),
+    "TR": ("o", style.SKY),
+    "BPC": ("^", "white"),
 }
 
 
@@ -74,7 +91,8 @@ def branch(
     """Draw one branch or several, with their special points labelled.
 
     Stable equilibria (centers of a conservative problem) are solid, unstable ones (saddles)
-    dashed. Curves in two parameters are drawn in the plane of both.
+    dashed. Curves in two parameters are drawn in the plane of both. Of periodic orbits the largest
+    and the least value of a state are drawn.
 
     Parameters
     ----------
@@ -82,7 +100,7 @@ def branch(
         What `continuation`, `diagram`, `.switch` or `.curve` return.
     x, y : str, optional
         Variables of ``branch.points``; default: the parameter and the first state, or the two
-        parameters.
+        parameters. Of periodic orbits a state stands for its ``_max`` and ``_min``.
     sel : mapping of str to label, optional
         Of a recorded quantity with more dims which one: ``sel={"bearing": "A2"}``.
     angles : {"rad", "deg"}
@@ -121,7 +139,7 @@ def branch(
     if y is None:
         y = first.free[1] if len(first.free) > 1 else first.problem_state[0]
     style.angle_factor(angles)
-    columns = [(_column(one, "x", x, sel), _column(one, "y", y, sel)) for one in several]
+    several, columns = _columns(several, x, y, sel)
     axes = style.axes_for(ax, legend=legend)
     handles: dict[str, Artist] = {}
     for one, pair in zip(several, columns, strict=True):
@@ -176,6 +194,19 @@ def _several(branches: Any) -> list[Branch]:
     return several
 
 
+def _columns(
+    several: list[Branch], x: str, y: str, sel: Mapping[str, Any] | None
+) -> tuple[list[Branch], list[tuple[xr.DataArray, xr.DataArray]]]:
+    """What to draw of which branch: of the states of periodic orbits the largest and the least."""
+    branches, columns = [], []
+    for one in several:
+        cycle = one.kind == "cycle" and y in one.problem_state
+        for name in (f"{y}_max", f"{y}_min") if cycle else (y,):
+            branches.append(one)
+            columns.append((_column(one, "x", x, sel), _column(one, "y", name, sel)))
+    return branches, columns
+
+
 def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None) -> xr.DataArray:
     """A quantity of a branch along its points."""
     points = one.points
@@ -221,7 +252,7 @@ def _looks(one: Branch) -> list[style.Look]:
     if one.kind == "hopf":
         pair = [str(name) or "hopf" for name in points.kind_of_pair.values]
         return [_CURVES[name] for name in pair]
-    if one.kind != "equilibrium":
+    if one.kind not in ("equilibrium", "cycle"):
         return [_CURVES[one.kind]] * points.sizes["point"]
     if "kind" in points:
         kinds = points.kind.values.copy()

@@ -137,7 +137,7 @@ class CycleBranch(Branch):
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made again of what was traced, as when a branch is loaded."""
         cycles, problem = self.known()
-        skip = ("field", "clock", "memory")
+        skip = ("field", "clock")
         kept = {f.name: getattr(cycles, f.name) for f in fields(cycles) if f.name not in skip}
         return _again, (problem, kept, self.start, self.tracks, dict(self.record), self.origin)
 

@@ -94,8 +94,8 @@ def points_of(
     for name in rows[0]:
         kind = np.int64 if name in ("n_unstable", "n_intervals") else np.float64
         data[name] = (dim, np.array([row[name] for row in rows], dtype=kind))
-    for name, words in _CHECKS.items():
-        data[name] = (*data[name], {"long_name": words})
+    for name, text in _CHECKS.items():
+        data[name] = (*data[name], {"long_name": text})
     data["period"] = (*data["period"], {"long_name": "period of the orbit"})
     data["n_intervals"] = (*data["n_intervals"], {"long_name": "mesh intervals"})
     data["n_unstable"] = (

@@ -51,7 +51,7 @@ class CyclePoint(SpecialPoint):
         """A state, a parameter or the period by name."""
         return self.period if name == "period" else super().__getitem__(name)
 
-    def switch(self, *, direction: int = 0, options: Any = None) -> CycleBranch:  # type: ignore[override]
+    def switch(self, *, direction: int = 0, options: Any = None) -> CycleBranch:
         """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
         module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
         return module.switched(self, direction, options)  # type: ignore[no-any-return]

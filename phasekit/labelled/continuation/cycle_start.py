@@ -116,7 +116,7 @@ def continue_orbit(
         raise bad(
             "span", (low, high), f"a span that holds the problem's own {parameter} = {value:.9g}"
         )
-    guess, turns, multiple = given_orbit(problem, orbit, value)
+    guess, turns, multiple = given_orbit(problem, orbit, value, options.degree)
     cycles = cycles_of(
         problem, [parameter], [(low, high)], scale_of(guess.x), turns, options, multiple
     )
@@ -127,7 +127,9 @@ def continue_orbit(
     return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
 
 
-def given_orbit(problem: Problem, orbit: Any, value: float) -> tuple[Orbit, FloatArray, int]:
+def given_orbit(
+    problem: Problem, orbit: Any, value: float, m: int
+) -> tuple[Orbit, FloatArray, int]:
     """An orbit that `periodic_orbit` or `Branch.orbit` returned, as a guess."""
     if not isinstance(orbit, xr.Dataset) or "time" not in orbit.dims or "period" not in orbit:
         raise bad("orbit", orbit, "what pk.periodic_orbit or branch.orbit(i) returns")
@@ -137,11 +139,11 @@ def given_orbit(problem: Problem, orbit: Any, value: float) -> tuple[Orbit, Floa
     period = float(orbit["period"])
     at = np.asarray(orbit["time"].values, dtype=float) / period
     x = np.stack([np.asarray(orbit[name].values, dtype=float) for name in problem.state], axis=1)
-    return sampled(problem, at - at[0], x, period, value)
+    return sampled(problem, at - at[0], x, period, value, m)
 
 
 def sampled(
-    problem: Problem, at: FloatArray, x: FloatArray, period: float, value: float
+    problem: Problem, at: FloatArray, x: FloatArray, period: float, value: float, m: int
 ) -> tuple[Orbit, FloatArray, int]:
     """A guess through samples over a period, with its turns and periods of the forcing."""
     from scipy.interpolate import PchipInterpolator
@@ -165,7 +167,6 @@ def sampled(
     else:
         x = x.copy()
         x[-1] = x[0] + turns
-    m = ContinuationOptions().degree
     count = int(np.clip(len(at) // (4 * m), starts.FIRST, 200))
     # Mesh points where the samples are dense.
     mesh = np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(at)), at)
@@ -201,9 +202,9 @@ def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
     if point.kind == "period_doubling":
         cycles, orbit, dx = starts.doubled(cycles, here.orbit, checked.W)
         start = _start(cycles, starts.off(cycles, orbit, dx, size), f"beside {where}")
-        tracks = (None, run(cycles, start, "forward")[1])
+        forward = run(cycles, start, "forward")[1]
         origin = Stop("period_doubling", where)
-        return make_cycles(problem, cycles, start, tracks, point.branch.record, origin)
+        return make_cycles(problem, cycles, start, (None, forward), point.branch.record, origin)
     dx = starts.null_vector(cycles, here.orbit, checked.W, 1.0, (here.dx, here.dy))
     sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
     one, two = (_start(cycles, side, f"beside {where}").orbit for side in sides)

@@ -106,7 +106,9 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
     n, k, forced = len(problem.state), len(active), problem.time is not None
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
     shapes.update({name: (k,) for name in ("width", "low", "high")}, par=(len(names) + forced,))
-    arrays = {name: stored.array(f"cycles_{name}", shapes[name]) for name in _ARRAYS}
+    arrays: dict[str, Any] = {
+        name: stored.array(f"cycles_{name}", shapes[name]) for name in _ARRAYS
+    }
     multiple = stored.spec["multiple"]
     if not isinstance(multiple, int) or multiple < 1:
         raise ValueError(f"multiple: got {multiple!r:.80}, wants a whole number >= 1")

@@ -102,7 +102,7 @@ def periodic_orbit(
         ds = x0
         if "period" not in ds:
             ds = _with_period(ds, period)
-        guesses = [given_orbit(problem, ds, value)]
+        guesses = [given_orbit(problem, ds, value, options.degree)]
         return _found(problem, guesses, options, "from the samples")
     if isinstance(x0, Mapping):
         missing = [name for name in problem.state if name not in x0]
@@ -122,14 +122,14 @@ def periodic_orbit(
             raise bad("settle", settle, "None with samples")
         closed = np.max(np.abs(x[-1] - x[0])) < 1e-6 * np.max(np.abs(x - x.mean(axis=0)))
         at = np.linspace(0.0, 1.0, len(x), endpoint=bool(closed))
-        guesses = [sampled(problem, at, x, period, value)]
+        guesses = [sampled(problem, at, x, period, value, options.degree)]
         return _found(problem, guesses, options, "from the samples")
     x = x.reshape(n)
     run = _Simulation(problem)
     if period is not None:
         start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
         at, states = run(start, 0.0, period, SAMPLES)
-        guesses = [sampled(problem, at / period, states, period, value)]
+        guesses = [sampled(problem, at / period, states, period, value, options.degree)]
         return _found(problem, guesses, options, f"from x0 = {x.tolist()} with period {period:.6g}")
     return _searched(problem, x, settle, run, value, options)
 
@@ -260,7 +260,7 @@ def _searched(
         unit = unit or period
         at, states = run(x, 0.0, period, SAMPLES)
         try:
-            guesses = [sampled(problem, at / period, states, period, value)]
+            guesses = [sampled(problem, at / period, states, period, value, options.degree)]
             return _found(problem, guesses, options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
             said = error

@@ -84,7 +84,7 @@ def times(mesh: Array, m: int) -> Array:
 def pieces(x: Array, m: int) -> Array:
     """Values by interval, shape (intervals, m + 1, ...); neighbours share one."""
     count = (len(x) - 1) // m
-    return x[np.arange(count)[:, None] * m + np.arange(m + 1)]
+    return np.asarray(x[np.arange(count)[:, None] * m + np.arange(m + 1)])
 
 
 def gathered(parts: Array, m: int) -> Array:

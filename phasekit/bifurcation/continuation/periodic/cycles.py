@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -116,7 +116,6 @@ class Cycles:
     high: Array
     period: Array
     options: ContinuationOptions
-    memory: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def n(self) -> int:
@@ -147,7 +146,7 @@ class Cycles:
 
     def replace(self, **changes: Any) -> Cycles:
         """A copy with some attributes changed."""
-        return replace(self, memory={}, **changes)
+        return replace(self, **changes)
 
     def own_period(self, y: Array) -> tuple[float, Array]:
         """The period of the forcing, times the multiple, and its derivatives."""
@@ -165,7 +164,7 @@ class Cycles:
         return float(states + np.sum(dy_a[1:] * dy_b[1:] / self.width**2))
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
-        """Bordering rows: phase (or period), then the direction; with what they are at the orbit."""
+        """Bordering rows, phase or period first, direction last; with their values at the orbit."""
         c = collocation.scheme(self.m)
         rows = np.empty((self.q, *orbit.x.shape))
         kernels.borders(
@@ -190,6 +189,8 @@ class Cycles:
         mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
         o = self.options
         n, q = self.n, self.q
+        if x.shape != ((len(mesh) - 1) * self.m + 1, n) or y.shape != (q,):
+            raise ValueError(f"an orbit of shape {x.shape} with {y.shape} on {len(mesh)} points")
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         rows_y = rows_y.copy()
@@ -254,8 +255,8 @@ class Cycles:
         W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
         jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
         _, residual, divergence = kernels.condense(
-            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale, orbit.x,
-            orbit.y, W,
+            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
+            self.scale, orbit.x, orbit.y, W,
         )  # fmt: skip
         return self._found(orbit, dx, dy, 1, residual, 0.0, divergence, W)
 

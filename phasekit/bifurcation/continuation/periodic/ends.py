@@ -1,4 +1,4 @@
-"""Where a family of periodic orbits ends: at a bound, a Hopf point, a homoclinic orbit, its start."""
+"""Where families of periodic orbits end: at bounds, Hopf points, homoclinic orbits, their start."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 
 STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
-SLOW, LOST = 1e-6, 1e-3  # the same where the multiplier 1 is wrong by so much
+SLOW = 1e-4  # the same, where no step succeeds
+INFINITE = "stands still: an orbit that takes infinite time is near"
 LONG = 3.0  # times the period of the start, from where on it can be that of a homoclinic orbit
 
 
@@ -49,7 +50,7 @@ def end_of(
         return made, Stop(
             "homoclinic",
             f"the period grows beyond {made.orbit.y[0]:.6g} while {name} = {made.orbit.y[1]:.12g} "
-            "stands still: an orbit that takes infinite time is near",
+            f"{INFINITE}",
         )
     if _closes(cycles, before, made, start):
         return start, Stop("closed", "the family closed on its start")
@@ -57,17 +58,28 @@ def end_of(
 
 
 def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
-    """Whether the period grows and the parameter stands still.
-
-    Before a saddle-node it never quite does, but then the multipliers are lost first.
-    """
+    """Whether the period grows and the parameter stands still."""
     rate = made.dy[0] / made.orbit.y[0]
     if not rate > 0.0:
         return False
     still = abs(made.dy[1]) / cycles.width[0] / rate
-    if made.trivial_error > LOST and still < SLOW:
-        return True
     return bool(still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0])
+
+
+def when_stuck(cycles: Cycles, state: State, start: Point, stop: Stop) -> Stop:
+    """Why no step succeeds: a homoclinic orbit, where the period has grown and grows on."""
+    orbit, rate = state.orbit, state.dy[0] / state.orbit.y[0]
+    if cycles.forced or len(cycles.active) > 1 or not rate > 0.0:
+        return stop
+    still = abs(state.dy[1]) / cycles.width[0] / rate
+    if still > SLOW or orbit.y[0] < LONG * start.orbit.y[0]:
+        return stop
+    name = cycles.field.parameters[cycles.active[0]]
+    return Stop(
+        "homoclinic",
+        f"the period grows beyond {orbit.y[0]:.6g} while {name} = {orbit.y[1]:.12g} {INFINITE}; "
+        f"{stop.message}",
+    )
 
 
 def shape(cycles: Cycles, orbit: Orbit) -> Array:
@@ -77,7 +89,7 @@ def shape(cycles: Cycles, orbit: Orbit) -> Array:
 
 
 def _through_hopf(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
-    """Whether the orbit turned inside out between two points, which it does through a Hopf point."""
+    """Whether the orbit turned inside out between two points, as it does through a Hopf point."""
     if np.any(cycles.turns):
         return False
     a, _ = cycles.on(b.mesh, a)

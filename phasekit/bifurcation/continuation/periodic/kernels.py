@@ -347,7 +347,7 @@ def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Arr
             for k in range(n):
                 for d in range(n):
                     step[d, k] = 0.0
-                for again in range(2):
+                for _ in range(2):
                     for d in range(k):
                         total = 0.0
                         for i in range(n):

@@ -1,4 +1,4 @@
-"""A family of periodic orbits followed in one direction, point by point, until something ends it."""
+"""A family of periodic orbits followed in one direction, until something ends it."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
         made, state_or_stop = advance(cycles, state)
         if made is None:
             assert isinstance(state_or_stop, Stop)
-            return Track(tuple(found), state, state_or_stop)
+            return Track(tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop))
         assert isinstance(state_or_stop, State)
         end = ends.end_of(cycles, state, made, start)
         if end is not None:
