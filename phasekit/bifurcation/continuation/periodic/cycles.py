@@ -101,6 +101,8 @@ class Cycles:
         Bounds of the free parameters.
     period : ndarray
         Periods of the states that are angles, else 0.
+    fixed : bool
+        Whether the period keeps its value, for which one more parameter is free.
     """
 
     field: Field
@@ -116,11 +118,12 @@ class Cycles:
     high: Array
     period: Array
     options: ContinuationOptions
+    fixed: bool = False
 
     @property
     def n(self) -> int:
         """Number of states."""
-        return len(self.field.states)
+        return len(self.scale)
 
     @property
     def m(self) -> int:
@@ -131,6 +134,11 @@ class Cycles:
     def q(self) -> int:
         """Number of free parameters and the period."""
         return 1 + len(self.active)
+
+    @cached_property
+    def closure(self) -> Array:
+        """By what each state is multiplied after a period."""
+        return np.ones(self.n)
 
     @cached_property
     def jets(self) -> Jets:
@@ -171,6 +179,8 @@ class Cycles:
             orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows
         )
         rows_y = np.zeros((self.q, self.q))
+        if self.fixed:
+            rows_y[1, 0] = 1.0
         rows_y[-1, 1:] = dy[1:] / self.width**2
         return rows, rows_y, np.einsum("rkn,kn->r", rows, orbit.x) + rows_y @ orbit.y
 
@@ -222,8 +232,8 @@ class Cycles:
                 if sign == 0.0:
                     message = "f or its derivatives are not finite"
                     break
-                gap = x[0] + self.turns - x[-1]
-                sign *= kernels.solve(W, rows, rows_y, right, gap, 1.0, self.m, dx, dy)
+                gap = self.closure * x[0] + self.turns - x[-1]
+                sign *= kernels.solve(W, rows, rows_y, right, gap, self.closure, self.m, dx, dy)
             if sign == 0.0:
                 message = "the equations are singular"
                 break

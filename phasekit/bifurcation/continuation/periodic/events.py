@@ -17,6 +17,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
+from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.starts import null_vector
 from phasekit.bifurcation.continuation.periodic.trace import Point, point_of
 
 Array = npt.NDArray[np.float64]
@@ -188,7 +190,26 @@ def refined(stretch: Stretch, kind: str) -> Found | None:
         mu = nontrivial(point.multipliers, forced)
         if np.min(np.abs(mu - 1.0)) > 1e-2:
             return None
-    return Found(kind, point, -1, interval, "converged", "", {})
+    return Found(
+        kind, point, -1, interval, "converged", "", _normal_form(stretch.cycles, kind, point)
+    )
+
+
+def _normal_form(cycles: Cycles, kind: str, point: Point) -> dict[str, float]:
+    """Coefficients of the normal form."""
+    if kind == FOLD:
+        return at_fold(cycles, point.orbit, point.dx, point.dy)
+    if kind == DOUBLING:
+        W = cycles.looked_at(point.orbit, point.dx, point.dy).W
+        v = null_vector(cycles, point.orbit, W, -1.0)
+        return at_doubling(cycles, point.orbit, v)
+    if kind == TORUS:
+        mu = nontrivial(point.multipliers, cycles.forced)
+        mu = mu[mu.imag > 0.0]
+        if len(mu):
+            one = mu[np.argmin(np.abs(np.abs(mu) - 1.0))]
+            return at_torus(cycles, point.orbit, float(np.angle(one)))
+    return {}
 
 
 def _root(stretch: Stretch, test: Callable[[Point, bool], float]) -> Point | None:

@@ -159,7 +159,7 @@ def condense(
 
 @kernel
 def solve(
-    W: Array, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: float, m: int,
+    W: Array, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, m: int,
     dx: Array, dy: Array,
 ) -> float:  # fmt: skip
     """Solve the condensed system; the sign of its determinant, 0 if it is singular.
@@ -169,7 +169,7 @@ def solve(
     rows, rows_y, right
         The bordering rows, shape (y, places, n) and (y, y), and their right sides.
     gap, sigma
-        x_N = sigma x_0 + gap closes the chain.
+        x_N = sigma x_0 + gap closes the chain, sigma a sign for each state.
     dx, dy
         The solution, shape (2, places, n) and (2, y): that of the right sides given, and the one
         of a 1 in the last row alone.
@@ -261,14 +261,14 @@ def solve(
     D = np.zeros((end, end + 2))
     for i in range(n):
         for k in range(n):
-            D[i, k] = sigma * C[i, k] + A[i, k]
+            D[i, k] = sigma[k] * C[i, k] + A[i, k]
             E[i, q] -= C[i, k] * gap[k]
         for k in range(q):
             D[i, n + k] = E[i, k]
         D[i, end] = E[i, q]
     for r in range(q):
         for k in range(n):
-            D[n + r, k] = sigma * current[r, k] + at_first[r, k]
+            D[n + r, k] = sigma[k] * current[r, k] + at_first[r, k]
             edge[r, q] -= current[r, k] * gap[k]
         for k in range(q):
             D[n + r, n + k] = edge[r, k]
@@ -294,7 +294,7 @@ def solve(
             dy[which, k] = D[n + k, column]
         for c in range(n):
             dx[which, 0, c] = D[c, column]
-            dx[which, count * m, c] = sigma * D[c, column] + constant * gap[c]
+            dx[which, count * m, c] = sigma[c] * D[c, column] + constant * gap[c]
         for j in range(count - 1, 0, -1):
             for i in range(n - 1, -1, -1):
                 total = constant * store[j, i, 3 * n + q]

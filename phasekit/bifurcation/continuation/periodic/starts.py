@@ -145,6 +145,8 @@ def null_vector(
             if v is not row
             else row / len(row)
         )
-        kernels.solve(V, rows, rows_y, np.zeros(q + 1), np.zeros(n), sigma, cycles.m, dx, dy)
+        kernels.solve(
+            V, rows, rows_y, np.zeros(q + 1), np.zeros(n), np.full(n, sigma), cycles.m, dx, dy
+        )
         v = dx[1] / np.sqrt(cycles.inner(orbit.mesh, dx[1], dx[1], nothing, nothing))
     return np.asarray(v)
