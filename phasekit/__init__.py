@@ -40,7 +40,9 @@ if TYPE_CHECKING:
     from phasekit.labelled.bifurcation_set import bifurcation_set as bifurcation_set
     from phasekit.labelled.continuation.branch import Branch as Branch
     from phasekit.labelled.continuation.continuation import continuation as continuation
+    from phasekit.labelled.continuation.cycle_branch import CycleBranch as CycleBranch
     from phasekit.labelled.continuation.diagram import diagram as diagram
+    from phasekit.labelled.continuation.periodic_orbit import periodic_orbit as periodic_orbit
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
     from phasekit.labelled.energy import curvature as curvature
@@ -101,7 +103,9 @@ _MODULES = {
     "phasekit.labelled.continuation.branch": ("Branch",),
     "phasekit.labelled.continuation.continuation": ("continuation",),
     "phasekit.labelled.critical": ("critical",),
+    "phasekit.labelled.continuation.cycle_branch": ("CycleBranch",),
     "phasekit.labelled.continuation.diagram": ("diagram",),
+    "phasekit.labelled.continuation.periodic_orbit": ("periodic_orbit",),
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.systems.free_rotor": ("FreeGyroRotor",),

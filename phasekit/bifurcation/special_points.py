@@ -11,6 +11,8 @@ from typing import Literal
 
 #: What `detect=` asks for.
 Group = Literal["fold", "branch_point", "hopf"]
+#: Curves in two parameters: of equilibria, of periodic orbits.
+Curve = Literal["fold", "branch_point", "hopf", "fold_of_cycles", "period_doubling", "torus"]
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class PointKind:
     #: What has to be detected for it to be looked for; None: whatever is.
     detected: Group | None = "branch_point"
     #: The curve of its kind in two parameters.
-    curve: Group | None = None
+    curve: Curve | None = None
     found_by: tuple[str, ...] = ("continuation",)
 
 
@@ -113,6 +115,27 @@ for _kind in (
         "zero_hopf", "ZH", "an eigenvalue zero beside a pair on the imaginary axis",
         "determinant of f_x along a Hopf curve, real part of a pair along folds",
         "Hopf point and fold", (), "X", 9, "SKY", None,
+    ),
+    PointKind(
+        "fold_of_cycles", "LPC", "two periodic orbits merge and vanish",
+        "derivative of the characteristic polynomial of the multipliers at 1",
+        "the orbit, and a multiplier 1 beside the trivial one", (), "s", 7, "white", None,
+        "fold_of_cycles",
+    ),
+    PointKind(
+        "period_doubling", "PD", "a multiplier passes -1; orbits of twice the period begin",
+        "determinant of M + 1", "the orbit, and a multiplier -1", (), "d", 8, "ORANGE", None,
+        "period_doubling",
+    ),
+    PointKind(
+        "torus", "TR", "a pair of multipliers passes the unit circle; a torus begins",
+        "bialternate product of M less 1, real pairs apart",
+        "the orbit, and a pair of multipliers on the circle", (), "o", 7, "SKY", None, "torus",
+    ),
+    PointKind(
+        "cycle_branch_point", "BPC", "families of periodic orbits cross",
+        "determinant of the collocation equations, bordered", "as of a fold of cycles, with one "
+        "null vector more", (), "^", 8, "white", None,
     ),
     PointKind(
         "no_force", "NF", "A = B = C = 0: every angle is an equilibrium",

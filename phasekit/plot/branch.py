@@ -47,6 +47,19 @@ _CURVES: dict[str, style.Look] = {
         "linewidth": 1.4,
         "label": "neutral saddle",
     },
+    "fold_of_cycles": {
+        "color": style.BLACK,
+        "linestyle": "-",
+        "linewidth": 2.0,
+        "label": "fold of cycles",
+    },
+    "period_doubling": {
+        "color": style.ORANGE,
+        "linestyle": "-",
+        "linewidth": 2.0,
+        "label": "period doubling",
+    },
+    "torus": {"color": style.SKY, "linestyle": "-", "linewidth": 2.0, "label": "torus"},
     "branch_point": {
         "color": style.PURPLE,
         "linestyle": (0, (7, 2, 1.5, 2)),
@@ -72,7 +85,8 @@ def branch(
     """Draw one branch or several, with their special points labelled.
 
     Stable equilibria (centers of a conservative problem) are solid, unstable ones (saddles)
-    dashed. Curves in two parameters are drawn in the plane of both.
+    dashed. Curves in two parameters are drawn in the plane of both. Of periodic orbits the largest
+    and the least value of a state are drawn.
 
     Parameters
     ----------
@@ -80,7 +94,7 @@ def branch(
         What `continuation`, `diagram`, `.switch` or `.curve` return.
     x, y : str, optional
         Variables of ``branch.points``; default: the parameter and the first state, or the two
-        parameters.
+        parameters. Of periodic orbits a state stands for its ``_max`` and ``_min``.
     sel : mapping of str to label, optional
         Of a recorded quantity with more dims which one: ``sel={"bearing": "A2"}``.
     angles : {"rad", "deg"}
@@ -123,7 +137,7 @@ def branch(
     x = first.free[0] if x is None else x
     if y is None:
         y = first.free[1] if len(first.free) > 1 else first.problem_state[0]
-    columns = [(_column(one, "x", x, sel), _column(one, "y", y, sel)) for one in several]
+    several, columns = _columns(several, x, y, sel)
     held = {str(c.name): str(c.attrs.get("units", "")) for c in columns[0]}
     shown = Units.of(angles, units, held)
     circle = Circle.of_axis(columns[0][1], shown, cut)
@@ -181,6 +195,19 @@ def _several(branches: Any) -> list[Branch]:
     if not several:
         raise bad("branches", branches, "at least one Branch")
     return several
+
+
+def _columns(
+    several: list[Branch], x: str, y: str, sel: Mapping[str, Any] | None
+) -> tuple[list[Branch], list[tuple[xr.DataArray, xr.DataArray]]]:
+    """What to draw of which branch: of the states of periodic orbits the largest and the least."""
+    branches, columns = [], []
+    for one in several:
+        cycle = one.kind == "cycle" and y in one.problem_state
+        for name in (f"{y}_max", f"{y}_min") if cycle else (y,):
+            branches.append(one)
+            columns.append((_column(one, "x", x, sel), _column(one, "y", name, sel)))
+    return branches, columns
 
 
 def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None) -> xr.DataArray:
@@ -246,7 +273,7 @@ def _looks(one: Branch) -> list[style.Look]:
     if one.kind == "hopf":
         pair = [str(name) or "hopf" for name in points.kind_of_pair.values]
         return [_CURVES[name] for name in pair]
-    if one.kind != "equilibrium":
+    if one.kind not in ("equilibrium", "cycle"):
         return [_CURVES[one.kind]] * points.sizes["point"]
     if "kind" in points:
         kinds = points.kind.values.copy()

@@ -15,11 +15,7 @@ from phasekit.labels.arguments import bad, flag, reals, unknown
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.as_system import as_system, stands_on
-from phasekit.systems.problem_parts import (
-    make_field,
-    names_of,
-    values_of,
-)
+from phasekit.systems.problem_parts import clock_of, make_field, names_of, values_of
 from phasekit.systems.system import MODELS, Model
 
 FloatArray = npt.NDArray[np.float64]
@@ -46,6 +42,11 @@ class Problem:
         Without it derivatives are central differences.
     periods : mapping of str to float, optional
         States that are angles, with their periods: points that differ by a period are the same.
+    time : str, optional
+        Of a forced system, the name of time: a symbol in formulas, an argument like a parameter of
+        a function.
+    period : str, sympy.Expr or float, optional
+        The period of f in time, a number or a formula of the parameters; it comes with `time`.
     conservative : bool, default False
         Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
@@ -69,6 +70,12 @@ class Problem:
     (-5.0, -10.0)
     >>> Problem.from_specification(cusp.specification())
     Problem(x' = l*x + mu - x**3; mu=-1.0, l=1.0)
+    >>> duffing = Problem(
+    ...     ["v", "F*cos(w*t) - d*v - x - x**3"], ("x", "v"), {"d": 0.04, "F": 0.015, "w": 1.0},
+    ...     time="t", period="2*pi/w",
+    ... )
+    >>> duffing([0.0, 0.0], t=0.0).tolist(), round(duffing.replace(w=2.0).forcing_period, 9)
+    ([0.0, 0.015], 3.141592654)
     >>> Problem.from_system(pk.Pendulum(length=0.5))
     Problem(phi' = -V'(phi) of Pendulum(length=0.5, g=9.80665))
     """
@@ -79,9 +86,11 @@ class Problem:
         "f",
         "jac",
         "parameters",
+        "period",
         "periods",
         "state",
         "system",
+        "time",
     )
 
     f: Any
@@ -89,6 +98,8 @@ class Problem:
     state: tuple[str, ...]
     parameters: Mapping[str, float]
     periods: Mapping[str, float]
+    time: str | None
+    period: Any
     conservative: bool
     system: Model | None
     _field: Field
@@ -101,6 +112,8 @@ class Problem:
         jac: Callable[..., Any] | None = None,
         *,
         periods: Mapping[str, float] | None = None,
+        time: str | None = None,
+        period: Any = None,
         conservative: bool = False,
     ) -> None:
         states = names_of("state", (state,) if isinstance(state, str) else state)
@@ -119,15 +132,24 @@ class Problem:
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
             raise bad("conservative", True, "one state (the force) or pairs of states")
+        clock = clock_of(time, period, states, values)
+        if clock is not None and conservative:
+            raise bad("conservative", True, "False with time: a forced system has no energy")
+        self._set("time", time)
+        self._set("period", clock)
         self._set("state", states)
         self._set("parameters", MappingProxyType(values))
         self._set("periods", MappingProxyType(angles))
         self._set("conservative", bool(conservative))
         self._set("jac", jac)
         self._set("system", None)
-        field, kept = make_field(f, jac, states, tuple(values))
+        field, kept = make_field(f, jac, states, (*values, *self._times()))
         self._set("f", kept)
         self._set("_field", field)
+
+    def _times(self) -> tuple[str, ...]:
+        """The name of time, if f depends on it."""
+        return () if self.time is None else (self.time,)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -139,7 +161,8 @@ class Problem:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
         arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
-        return _made, (type(self), *arguments, self.conservative, self.system)
+        more = {"conservative": self.conservative, "time": self.time, "period": self.period}
+        return _made, (type(self), *arguments, more, self.system)
 
     @property
     def field(self) -> Field:
@@ -236,12 +259,21 @@ class Problem:
         return copy
 
     def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:
-        """Value of f at a state, with some parameters changed."""
+        """Value of f at a state (and, of a forced system, a time), with some parameters changed."""
+        at = changes.pop(self.time, 0.0) if self.time is not None else 0.0
         problem = self.replace(**changes) if changes else self
-        return problem.derivatives(x)[0]
+        return problem.derivatives(x, at)[0]
 
-    def derivatives(self, x: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Value of f and its matrix of derivatives by the states."""
+    @property
+    def forcing_period(self) -> float:
+        """The period of f in time; infinite if f does not depend on it."""
+        if self.period is None:
+            return np.inf
+        symbols = symbols_of(self.parameters)
+        return float(self.period.subs({symbols[k]: v for k, v in self.parameters.items()}))
+
+    def derivatives(self, x: npt.ArrayLike, time: float = 0.0) -> tuple[FloatArray, FloatArray]:
+        """Value of f and its matrix of derivatives by the states, at a time if f depends on it."""
         from phasekit.bifurcation.continuation.curve import Curve
         from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
         from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -252,7 +284,7 @@ class Problem:
         if x.shape != (n,):
             raise bad("x", x, wants)
         infinite = np.full(n, np.inf)
-        par = np.array(list(self.parameters.values()))
+        par = np.array([*self.parameters.values(), *(time for _ in self._times())])
         curve = Curve(
             self.field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite,
             infinite, ContinuationOptions(),
@@ -269,6 +301,8 @@ class Problem:
             "periods": dict(self.periods),
             "conservative": self.conservative,
         }
+        if self.time is not None:
+            spec.update(time=self.time, period=write_formula(self.period))
         if self.system is not None:
             spec["system"] = type(self.system).__name__
             spec["system_parameters"] = self.system.arguments
@@ -284,7 +318,7 @@ class Problem:
             return None
         return cls(
             spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
-            conservative=spec["conservative"],
+            conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
         )  # fmt: skip
 
     def __repr__(self) -> str:
@@ -303,16 +337,19 @@ class Problem:
             equations = f"({', '.join(self.state)})' = {name}(x, **parameters), {self.kind}"
         notes = [f"{name}={value!r}" for name, value in self.parameters.items()]
         notes += [f"{name} modulo {value:.6g}" for name, value in self.periods.items()]
+        if self.time is not None:
+            notes.append(f"{self.time} modulo {self.period}")
         notes += ["conservative"] * self.conservative
         return f"Problem({equations}{'; ' if notes else ''}{', '.join(notes)})"
 
 
 def _made(
     kind: type[Problem], f: Any, state: Any, parameters: Any, jac: Any, periods: Any,
-    conservative: bool, system: Any,
+    more: Any, system: Any,
 ) -> Problem:  # fmt: skip
     """The problem of its arguments, for copies and pickles."""
-    problem = kind(f, state, parameters, jac, periods=periods, conservative=conservative)
+    more = more if isinstance(more, dict) else {"conservative": more}
+    problem = kind(f, state, parameters, jac, periods=periods, **more)
     problem._set("system", system)
     return problem
 

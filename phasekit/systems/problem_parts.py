@@ -46,6 +46,40 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
     return values
 
 
+def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str, float]) -> Any:
+    """The period of a forced right-hand side as a formula of the parameters; None without time.
+
+    Raises
+    ------
+    ParameterError
+        If one of both is missing, or the period is no positive number at the parameters.
+    """
+    if time is None and period is None:
+        return None
+    if time is None:
+        raise bad("time", time, "the name of time in f, beside its period")
+    names_of("time", (time,))
+    if time in states or time in values:
+        raise bad("time", time, "a name that is neither a state nor a parameter")
+    if period is None:
+        raise bad("period", period, f"the period of f in {time}: a number or a formula")
+    symbols = symbols_of(values)
+    if isinstance(period, str) or hasattr(period, "free_symbols"):
+        formula = take_formula(period, symbols, "period", "declare it in parameters")
+    else:
+        import sympy
+
+        formula = sympy.Float(number("period", period, "a number > 0, or a formula", None), 17)
+    refuse_uncompiled(formula, set(symbols.values()), "period")
+    try:
+        length = float(formula.subs({symbols[k]: v for k, v in values.items()}))
+    except (TypeError, ValueError):
+        length = float("nan")
+    if not 0.0 < length < float("inf"):
+        raise bad("period", period, "a positive number at the parameters", f"it is {length} there")
+    return formula
+
+
 def expressions_of(
     given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str]
 ) -> list[Any]:

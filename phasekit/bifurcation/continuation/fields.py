@@ -198,7 +198,7 @@ def _magnitude(e: Any) -> Any:
     """
     import sympy
 
-    from phasekit.bifurcation.continuation.machine_code import DIFFERENTIABLE
+    from phasekit.numerics.machine_code import DIFFERENTIABLE
 
     if e.is_Add:
         return sympy.Add(*map(_magnitude, e.args))

@@ -58,6 +58,16 @@ class ContinuationOptions:
         Limits of states by name (and of other free parameters): the branch ends on them.
     scales : mapping of str to float, optional
         Sizes of states by name, where those found along the branch mislead.
+    degree : int, default 4
+        Of periodic orbits: degree of the polynomials between the ends of mesh intervals, 2 to 7.
+    intervals : int, optional
+        Of periodic orbits: a fixed number of mesh intervals. By default as many are taken as the
+        mesh tolerance asks for, at each point anew.
+    max_intervals : int, default 1000
+        Of periodic orbits: the most mesh intervals; a branch that needs more ends as stuck.
+    mesh_tolerance : float, default 1e-8
+        Of periodic orbits: estimated error of the states between mesh points, beside their
+        amplitudes, above which the mesh is refined. Periods and multipliers are more accurate.
 
     Raises
     ------
@@ -85,15 +95,31 @@ class ContinuationOptions:
     detect: tuple[str, ...] = DETECTABLE
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     scales: Mapping[str, float] = field(default_factory=dict)
+    degree: int = 4
+    intervals: int | None = None
+    max_intervals: int = 1000
+    mesh_tolerance: float = 1e-8
 
     def __post_init__(self) -> None:
         """Check every value."""
-        for name in ("max_step", "min_step", "initial_step", "tolerance", "turn", "max_turn"):
+        for name in (
+            "max_step",
+            "min_step",
+            "initial_step",
+            "tolerance",
+            "turn",
+            "max_turn",
+            "mesh_tolerance",
+        ):
             value = _number(name, getattr(self, name))
             if not value > 0.0:
                 raise bad(name, value, "a number > 0")
             object.__setattr__(self, name, value)
-        for name in ("max_points", "max_iterations"):
+        if not 2 <= whole("degree", self.degree, "a whole number from 2 to 7") <= 7:
+            raise bad("degree", self.degree, "a whole number from 2 to 7")
+        if self.intervals is not None and whole("intervals", self.intervals, "None or >= 4") < 4:
+            raise bad("intervals", self.intervals, "None, or a whole number >= 4")
+        for name in ("max_points", "max_iterations", "max_intervals"):
             value = whole(name, getattr(self, name), "a whole number >= 1")
             object.__setattr__(self, name, value)
         if not self.min_step <= self.initial_step:

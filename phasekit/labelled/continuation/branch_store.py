@@ -84,6 +84,10 @@ def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
         else:
             given = stored.problem()
         functions = stored.functions(record or {})
+        if stored.spec["kind"] == "cycle":
+            from phasekit.labelled.continuation.cycle_store import made_again
+
+            return made_again(stored, given, functions)
         curve = stored.curve(given)
         start, tracks = stored.traces(curve)
     if problem is not None or any(functions.values()):

@@ -27,10 +27,11 @@ def continuation(
     *,
     x0: Any = None,
     span: Sequence[float],
+    orbit: Any = None,
     record: Mapping[str, Callable[..., Any]] | Sequence[str] | None = None,
     options: ContinuationOptions | None = None,
 ) -> Branch:
-    """Follow a branch of equilibria along a parameter, through its folds, to the ends of a span.
+    """Follow a branch of equilibria or periodic orbits along a parameter, through its folds.
 
     Parameters
     ----------
@@ -45,9 +46,13 @@ def continuation(
         upper_saddle.
     span : (float, float)
         Lowest and highest value of the parameter; it holds the problem's own.
+    orbit : xarray.Dataset, optional
+        A periodic orbit, of `periodic_orbit` or ``branch.orbit(i)``, in place of x0: the branch is
+        one of periodic orbits then (`CycleBranch`).
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
-        names of quantities.
+        names of quantities. Of periodic orbits the least, largest and mean value of such a function
+        over the orbit are recorded, as ``q_min``, ``q_max`` and ``q_mean``.
     options : ContinuationOptions, optional
         Steps, tolerances, bounds, directions.
 
@@ -81,6 +86,12 @@ def continuation(
     """
     problem = as_problem(problem)
     options = check_options(options)
+    if orbit is not None:
+        from phasekit.labelled.continuation.cycle_start import continue_orbit
+
+        if x0 is not None:
+            raise bad("x0", x0, "None with an orbit")
+        return continue_orbit(problem, parameter, orbit, span, _record(problem, record), options)
     low, high = _span(problem, parameter, span)
     guess = _start(problem, x0)
     curve = equilibrium_curve(problem, parameter, (low, high), options)
@@ -108,6 +119,11 @@ def equilibrium_curve(
     problem: Problem, parameter: str, span: tuple[float, float], options: ContinuationOptions
 ) -> Curve:
     """The curve of equilibria in one parameter, its states not yet scaled."""
+    if problem.time is not None:
+        raise bad(
+            "problem", problem, "one whose f does not depend on time, for equilibria",
+            "follow periodic orbits: pk.continuation(..., orbit=pk.periodic_orbit(problem, x0))",
+        )  # fmt: skip
     n = len(problem.state)
     names = list(problem.parameters)
     for name in (*options.bounds, *options.scales):

@@ -128,7 +128,7 @@ class SpecialPoint:
         return self.parameters[name]
 
     def switch(self, *, direction: int = 0, options: Any = None) -> Branch:
-        """Another branch through a branch point.
+        """Another branch through a branch point, or the periodic orbits of a Hopf point.
 
         Parameters
         ----------
@@ -140,7 +140,9 @@ class SpecialPoint:
         Raises
         ------
         ParameterError
-            If it is no branch point, or the direction is not known.
+            If it is no branch point or Hopf point, or the direction is not known.
+        ConvergenceError
+            If no periodic orbit is found near a Hopf point.
 
         See Also
         --------
@@ -157,8 +159,19 @@ class SpecialPoint:
         >>> (point,) = branch.special("BP")
         >>> point.corank, len(point.directions)
         (2, 3)
+        >>> brusselator = pk.Problem(
+        ...     ["1 - (b + 1)*x + x**2*y", "b*x - x**2*y"], ("x", "y"), {"b": 1.5}
+        ... )
+        >>> rest = pk.continuation(brusselator, "b", x0=[1.0, 1.5], span=(1, 3))
+        >>> cycles = rest.special("H")[0].switch()
+        >>> cycles.kind, round(float(cycles.points.period[0]), 2)
+        ('cycle', 6.28)
         >>> sides = [point.switch(direction=i) for i in range(3)]
         """
+        if self.kind == "hopf":
+            from phasekit.labelled.continuation.cycle_start import from_hopf
+
+            return from_hopf(self, options)
         return _module("switch")(  # type: ignore[no-any-return]
             self, direction=direction, options=options
         )

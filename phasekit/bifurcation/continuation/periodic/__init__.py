@@ -1,0 +1,1 @@
+"""Periodic orbits by collocation: found, followed, their multipliers and bifurcations."""

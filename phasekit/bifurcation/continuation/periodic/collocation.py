@@ -1,0 +1,172 @@
+"""Piecewise polynomials of degree m on a mesh, and the Gauss points at which they meet x' = T f.
+
+Time s runs from 0 to 1 over a period. In each interval of the mesh a polynomial is given by its
+values at m + 1 even places, the first and last of which it shares with its neighbours
+([AscherMattheijRussell1995] chapter 5; [Doedel1991]). At the ends of intervals solutions have the
+order 2m, elsewhere m + 1.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Scheme:
+    """Collocation with m Gauss points an interval.
+
+    Attributes
+    ----------
+    m : int
+        Degree.
+    nodes, weights : ndarray, shape (m,)
+        Gauss points and weights on (0, 1).
+    value, slope : ndarray, shape (m, m + 1)
+        From the values at even places to those, and to derivatives, at Gauss points.
+    high : ndarray, shape (m + 1,)
+        From the values at even places to the m-th derivative, which is constant.
+    side : float
+        Sign of the determinant of the slopes by all places but the first.
+    """
+
+    m: int
+    nodes: Array
+    weights: Array
+    value: Array
+    slope: Array
+    high: Array
+    side: float
+
+
+@functools.cache
+def scheme(m: int) -> Scheme:
+    """The scheme of a degree."""
+    nodes, weights = np.polynomial.legendre.leggauss(m)
+    nodes = 0.5 * (nodes + 1.0)
+    value, slope = basis(m, nodes)
+    places = np.arange(m + 1.0)
+    high = np.array([float(m) ** m / np.prod((p - places)[places != p]) for p in places])
+    high *= float(np.prod(np.arange(1.0, m + 1.0)))
+    side = float(np.sign(np.linalg.det(slope[:, 1:])))
+    return Scheme(m, nodes, 0.5 * weights, value, slope, high, side)
+
+
+def basis(m: int, at: Array) -> tuple[Array, Array]:
+    """Lagrange polynomials of even places on [0, 1] and their derivatives, at some places."""
+    places = np.arange(m + 1.0) / m
+    at = np.asarray(at, dtype=float)
+    value = np.ones((len(at), m + 1))
+    slope = np.zeros((len(at), m + 1))
+    for k in range(m + 1):
+        others = [j for j in range(m + 1) if j != k]
+        for j in others:
+            value[:, k] *= (at - places[j]) / (places[k] - places[j])
+            part = np.ones(len(at)) / (places[k] - places[j])
+            for i in others:
+                if i != j:
+                    part *= (at - places[i]) / (places[k] - places[i])
+            slope[:, k] += part
+    return value, slope
+
+
+def times(mesh: Array, m: int) -> Array:
+    """The times of all places of a mesh."""
+    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * (np.arange(m) / m)
+    return np.append(inner.ravel(), mesh[-1])
+
+
+def pieces(x: Array, m: int) -> Array:
+    """Values by interval, shape (intervals, m + 1, ...); neighbours share one."""
+    count = (len(x) - 1) // m
+    return np.asarray(x[np.arange(count)[:, None] * m + np.arange(m + 1)])
+
+
+def gathered(parts: Array, m: int) -> Array:
+    """Sums over intervals of what they say of their places: the transpose of `pieces`."""
+    count = len(parts)
+    out = np.zeros((count * m + 1, *parts.shape[2:]))
+    out[:-1] = parts[:, :m].reshape(count * m, *parts.shape[2:])
+    out[m::m] += parts[:, m]
+    return out
+
+
+def interpolate(mesh: Array, x: Array, m: int, at: Array) -> Array:
+    """Values of a piecewise polynomial at times in [0, 1]."""
+    where = np.clip(np.searchsorted(mesh, at, side="right") - 1, 0, len(mesh) - 2)
+    value, _ = basis(m, (at - mesh[where]) / (mesh[where + 1] - mesh[where]))
+    return np.asarray(np.einsum("ij,ij...->i...", value, pieces(x, m)[where]))
+
+
+def at_gauss(x: Array, m: int) -> Array:
+    """Values at all Gauss points, shape (intervals, m, states)."""
+    return np.asarray(scheme(m).value @ pieces(x, m))
+
+
+def slopes_at_gauss(mesh: Array, x: Array, m: int) -> Array:
+    """Derivatives by s at all Gauss points."""
+    return np.asarray((scheme(m).slope @ pieces(x, m)) / np.diff(mesh)[:, None, None])
+
+
+def functional(mesh: Array, values: Array, m: int) -> Array:
+    """The row r with sum(r * x) = integral of values . x ds, of values at Gauss points."""
+    c = scheme(m)
+    weighted = values * (np.diff(mesh)[:, None] * c.weights)[..., None]
+    return gathered(c.value.T @ weighted, m)
+
+
+def mean(mesh: Array, x: Array, m: int) -> Array:
+    """Integral over a period."""
+    c = scheme(m)
+    return np.asarray(np.einsum("j,i,jin->n", np.diff(mesh), c.weights, at_gauss(x, m)))
+
+
+def highest(mesh: Array, x: Array, m: int, scale: Array) -> Array:
+    """Size of the derivative of order m + 1 on each interval, on scaled axes.
+
+    The m-th derivative is constant on intervals; its jumps, over the distances of their middles,
+    are the next one, with which the error goes.
+    """
+    h = np.diff(mesh)
+    constant = np.einsum("k,jkn->jn", scheme(m).high, pieces(x, m)) / h[:, None] ** m
+    gap = 0.5 * (h + np.roll(h, 1))
+    jump = np.abs(constant - np.roll(constant, 1, axis=0)) / gap[:, None] / scale
+    both = 0.5 * (jump + np.roll(jump, -1, axis=0))
+    return np.asarray(np.max(both, axis=1))
+
+
+def error(mesh: Array, x: Array, m: int, scale: Array) -> float:
+    """Largest estimated error of the polynomials between the ends of intervals, on scaled axes."""
+    return float(np.max(highest(mesh, x, m, scale) * np.diff(mesh) ** (m + 1))) * factor(m)
+
+
+@functools.cache
+def factor(m: int) -> float:
+    """Largest of the polynomials whose error it is: x^(m+1) h^(m+1) times this is the error.
+
+    The error of collocation at interior places is the integral of the product over Gauss points.
+    """
+    nodes = scheme(m).nodes
+    inside = np.polynomial.Polynomial.fromroots(nodes).integ(lbnd=0.0)
+    sizes = np.abs(inside(np.linspace(0.0, 1.0, 201)))
+    factorial = float(np.prod(np.arange(1.0, m + 1.0)))
+    return float(np.max(sizes)) / factorial
+
+
+def even(mesh: Array, x: Array, m: int, scale: Array, count: int) -> Array:
+    """A mesh of so many intervals over which the error is spread evenly."""
+    density = highest(mesh, x, m, scale) ** (1.0 / (m + 1))
+    # A part of it everywhere, so that no interval grows where nothing seems to happen.
+    whole = float(np.sum(density * np.diff(mesh)))
+    if not whole > 0.0 or not np.isfinite(whole):
+        return np.linspace(0.0, 1.0, count + 1)
+    density = density + 0.2 * whole
+    reached = np.concatenate([[0.0], np.cumsum(density * np.diff(mesh))])
+    new = np.interp(np.linspace(0.0, reached[-1], count + 1), reached, mesh)
+    new[0], new[-1] = 0.0, 1.0
+    return np.asarray(new)

@@ -1,0 +1,302 @@
+"""One family of periodic orbits: its equations, and Newton's method for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic.jets import Jets
+from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+FLAT = (
+    1e-7  # a Newton step that no longer shrinks counts below this, where the residual is rounding
+)
+ROUNDING = 1e-11  # of the residual, relative
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A closed curve: values at all places of a mesh, and y = (period, free parameters)."""
+
+    mesh: Array
+    x: Array
+    y: Array
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals."""
+        return len(self.mesh) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What Newton's method left: the orbit, the direction in which it goes on, and checks.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    dx, dy : ndarray
+        The unit tangent.
+    steps : int
+        Newton steps; 0 if it did not converge.
+    residual : float
+        Largest |x' - T f| beside the largest |T f|, both on scaled axes.
+    sign : float
+        Sign of the determinant of the equations with the tangent as last row.
+    divergence : float
+        Integral of the trace of f_x over the period.
+    W : ndarray
+        The condensed equations (see `kernels.condense`).
+    """
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    steps: int
+    residual: float
+    sign: float
+    divergence: float
+    W: Array
+    message: str = ""
+
+    @property
+    def converged(self) -> bool:
+        """Whether Newton's method came to an end."""
+        return self.steps > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Periodic orbits of a field over its free parameters.
+
+    Attributes
+    ----------
+    field : Field
+        The right-hand side; of a forced system time is the last of its parameters.
+    par : ndarray
+        All parameters; those that are free are not used.
+    active : tuple of int
+        Places of the free parameters.
+    forced : bool
+        Whether f depends on time.
+    clock : int
+        Of a forced system, machine code of its period and the derivatives by free parameters.
+    multiple : int
+        How many periods of the forcing the orbit takes.
+    turns : ndarray
+        By how much each state grows over a period: angles only.
+    scale, width : ndarray
+        Sizes of the states and of the free parameters.
+    low, high : ndarray
+        Bounds of the free parameters.
+    period : ndarray
+        Periods of the states that are angles, else 0.
+    fixed : bool
+        Whether the period keeps its value, for which one more parameter is free.
+    """
+
+    field: Field
+    par: Array
+    active: tuple[int, ...]
+    forced: bool
+    clock: int
+    multiple: int
+    turns: Array
+    scale: Array
+    width: Array
+    low: Array
+    high: Array
+    period: Array
+    options: ContinuationOptions
+    fixed: bool = False
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.scale)
+
+    @property
+    def m(self) -> int:
+        """Degree of the polynomials."""
+        return self.options.degree
+
+    @property
+    def q(self) -> int:
+        """Number of free parameters and the period."""
+        return 1 + len(self.active)
+
+    @cached_property
+    def closure(self) -> Array:
+        """By what each state is multiplied after a period."""
+        return np.ones(self.n)
+
+    @cached_property
+    def jets(self) -> Jets:
+        """The right-hand side with its derivatives."""
+        time = (len(self.par) - 1,) if self.forced else ()
+        return Jets(self.field, self.par, (*time, *self.active), self.forced)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Sizes of states and active parameters, for differences."""
+        time = np.ones(1) if self.forced else np.ones(0)
+        return np.concatenate([self.scale, time, self.width])
+
+    def replace(self, **changes: Any) -> Cycles:
+        """A copy with some attributes changed."""
+        return replace(self, **changes)
+
+    def own_period(self, y: Array) -> tuple[float, Array]:
+        """The period of the forcing, times the multiple, and its derivatives."""
+        k = len(self.active)
+        w = np.zeros(2 * k + 1)
+        w[:k] = y[1:]
+        par = self.par.copy()
+        kernels.evaluate(self.clock, par, w, k)
+        return self.multiple * float(w[k]), self.multiple * w[k + 1 :]
+
+    def inner(self, mesh: Array, a: Array, b: Array, dy_a: Array, dy_b: Array) -> float:
+        """Inner product of two directions: the mean over states and time, and the parameters."""
+        c = collocation.scheme(self.m)
+        states = kernels.inner(mesh, c.weights, c.value, a, b, self.scale)
+        return float(states + np.sum(dy_a[1:] * dy_b[1:] / self.width**2))
+
+    def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
+        """Bordering rows, phase or period first, direction last; with their values at the orbit."""
+        c = collocation.scheme(self.m)
+        rows = np.empty((self.q, *orbit.x.shape))
+        kernels.borders(
+            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows
+        )
+        rows_y = np.zeros((self.q, self.q))
+        if self.fixed:
+            rows_y[1, 0] = 1.0
+        rows_y[-1, 1:] = dy[1:] / self.width**2
+        return rows, rows_y, np.einsum("rkn,kn->r", rows, orbit.x) + rows_y @ orbit.y
+
+    def correct(
+        self,
+        guess: Orbit,
+        rows: Array,
+        rows_y: Array,
+        target: Array,
+        *,
+        iterations: int | None = None,
+        damped: bool = False,
+    ) -> Solution:
+        """Newton's method in the plane rows . x + rows_y . y = target."""
+        c = collocation.scheme(self.m)
+        mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
+        o = self.options
+        n, q = self.n, self.q
+        if x.shape != ((len(mesh) - 1) * self.m + 1, n) or y.shape != (q,):
+            raise ValueError(f"an orbit of shape {x.shape} with {y.shape} on {len(mesh)} points")
+        W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
+        dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
+        rows_y = rows_y.copy()
+        before = np.inf
+        sign = residual = divergence = np.nan
+        message = "Newton's method did not converge"
+        for step in range(1, (iterations or o.max_iterations) + 1):
+            right = target - (rows.reshape(q, -1) @ x.ravel() + rows_y @ y)
+            if self.forced:
+                period, slope = self.own_period(y)
+                rows_y[0, 0], rows_y[0, 1:] = 1.0, -slope
+                right[0] = period - y[0]
+            with np.errstate(all="ignore"):
+                jets = self.jets(mesh, x, y, self.m, self.sizes)
+                sign, residual, divergence = kernels.condense(
+                    jets,
+                    self.forced,
+                    mesh,
+                    c.nodes,
+                    c.weights,
+                    c.value,
+                    c.slope,
+                    c.side,
+                    self.scale,
+                    x,
+                    y,
+                    W,
+                )
+                if sign == 0.0:
+                    message = "f or its derivatives are not finite"
+                    break
+                gap = self.closure * x[0] + self.turns - x[-1]
+                sign *= kernels.solve(W, rows, rows_y, right, gap, self.closure, self.m, dx, dy)
+            if sign == 0.0:
+                message = "the equations are singular"
+                break
+            size = float(np.max(np.max(np.abs(dx[0]), axis=0) / self.scale))
+            size = max(size, abs(float(dy[0, 0])) / y[0])
+            size = max(size, float(np.max(np.abs(dy[0, 1:]) / self.width, initial=0.0)))
+            if not np.isfinite(size):
+                break
+            part = 1.0
+            if damped:
+                part = min(1.0, 0.5 / size)
+            x += part * dx[0]
+            y += part * dy[0]
+            if not y[0] > 0.0:
+                break
+            flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
+            if part == 1.0 and (size <= o.tolerance or flat):
+                return self._found(
+                    Orbit(mesh, x, y), dx[1], dy[1], step, residual, sign, divergence, W
+                )
+            if not damped and step > 2 and size > 2.0 * before:
+                break
+            before = size
+        return Solution(Orbit(mesh, x, y), dx[1], dy[1], 0, residual, sign, divergence, W, message)
+
+    def looked_at(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+        """An orbit that was found otherwise, with its residual and condensed equations."""
+        c = collocation.scheme(self.m)
+        W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
+        jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        _, residual, divergence = kernels.condense(
+            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
+            self.scale, orbit.x, orbit.y, W,
+        )  # fmt: skip
+        return self._found(orbit, dx, dy, 1, residual, 0.0, divergence, W)
+
+    def _found(
+        self, orbit: Orbit, dx: Array, dy: Array, steps: int, residual: float, sign: float,
+        divergence: float, W: Array,
+    ) -> Solution:  # fmt: skip
+        length = np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy))
+        if not length > 0.0:
+            length = 1.0
+        return Solution(orbit, dx / length, dy / length, steps, residual, sign, divergence, W)
+
+    def multipliers(self, W: Array) -> tuple[Complex, float]:
+        """Floquet multipliers and the logarithm of the size of their product."""
+        n = self.n
+        return multipliers(W[:, (self.m - 1) * n :, :n])
+
+    def amplitudes(self, orbit: Orbit) -> Array:
+        """Half the range of each state, without its turns; where it hardly moves, a part of all."""
+        flat = orbit.x - np.outer(collocation.times(orbit.mesh, self.m), self.turns)
+        half = 0.5 * (np.max(flat, axis=0) - np.min(flat, axis=0))
+        whole = half / self.scale
+        return np.asarray(self.scale * np.maximum(whole, 1e-3 * float(np.max(whole))))
+
+    def mesh_error(self, orbit: Orbit) -> float:
+        """Largest estimated error of a state, beside its amplitude."""
+        return collocation.error(orbit.mesh, orbit.x, self.m, self.amplitudes(orbit))
+
+    def on(self, mesh: Array, orbit: Orbit, *more: Array) -> tuple[Orbit, tuple[Array, ...]]:
+        """The orbit, and directions, on another mesh."""
+        at = collocation.times(mesh, self.m)
+        moved = [collocation.interpolate(orbit.mesh, one, self.m, at) for one in (orbit.x, *more)]
+        return Orbit(mesh, moved[0], orbit.y.copy()), tuple(moved[1:])

@@ -1,0 +1,209 @@
+"""Where families of periodic orbits end: at bounds, Hopf points, homoclinic orbits, their start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.periodic import collocation, starts, trace
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+
+if TYPE_CHECKING:
+    from phasekit.bifurcation.continuation.periodic.trace import Point, State
+
+Array = npt.NDArray[np.float64]
+
+STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
+SLOW = 1e-4  # the same, where no step succeeds
+INFINITE = "stands still: an orbit that takes infinite time is near"
+LONG = 3.0  # times the period of the start, from where on it can be that of a homoclinic orbit
+
+
+def end_of(
+    cycles: Cycles, before: State, made: Point, start: Point
+) -> tuple[Point | None, Stop] | None:
+    """The last point and the reason, if the family ends between two points."""
+    if not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
+        return _at_hopf(cycles, before, made)
+    if _through_doubling(cycles, before.orbit, made.orbit):
+        name = cycles.field.parameters[cycles.active[0]]
+        return None, Stop(
+            "period_doubling",
+            f"both halves of the orbit become the same at a period doubling near {name} = "
+            f"{made.orbit.y[1]:.9g}",
+        )
+    for k, place in enumerate(cycles.active):
+        p = made.orbit.y[1 + k]
+        if cycles.low[k] < p < cycles.high[k]:
+            continue
+        upper = p >= cycles.high[k]
+        bound = float(cycles.high[k] if upper else cycles.low[k])
+        name, side = cycles.field.parameters[place], "upper" if upper else "lower"
+        last = at_value(cycles, before, made, k, bound)
+        return last, Stop("bound", f"{name} met its {side} bound {bound:.9g}")
+    if not cycles.forced and len(cycles.active) == 1 and _homoclinic(cycles, made, start):
+        name = cycles.field.parameters[cycles.active[0]]
+        return made, Stop(
+            "homoclinic",
+            f"the period grows beyond {made.orbit.y[0]:.6g} while {name} = {made.orbit.y[1]:.12g} "
+            f"{INFINITE}",
+        )
+    if _closes(cycles, before, made, start):
+        return start, Stop("closed", "the family closed on its start")
+    return None
+
+
+def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
+    """Whether the period grows and the parameter stands still."""
+    rate = made.dy[0] / made.orbit.y[0]
+    if not rate > 0.0:
+        return False
+    still = abs(made.dy[1]) / cycles.width[0] / rate
+    return bool(still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0])
+
+
+def when_stuck(cycles: Cycles, state: State, start: Point, stop: Stop) -> Stop:
+    """Why no step succeeds: a homoclinic orbit, where the period has grown and grows on."""
+    orbit, rate = state.orbit, state.dy[0] / state.orbit.y[0]
+    if cycles.forced or len(cycles.active) > 1 or not rate > 0.0:
+        return stop
+    still = abs(state.dy[1]) / cycles.width[0] / rate
+    if still > SLOW or orbit.y[0] < LONG * start.orbit.y[0]:
+        return stop
+    name = cycles.field.parameters[cycles.active[0]]
+    return Stop(
+        "homoclinic",
+        f"the period grows beyond {orbit.y[0]:.6g} while {name} = {orbit.y[1]:.12g} {INFINITE}; "
+        f"{stop.message}",
+    )
+
+
+def shape(cycles: Cycles, orbit: Orbit) -> Array:
+    """The orbit less its mean and turns, on scaled axes."""
+    flat = orbit.x - np.outer(collocation.times(orbit.mesh, cycles.m), cycles.turns)
+    return np.asarray((flat - collocation.mean(orbit.mesh, flat, cycles.m)) / cycles.scale)
+
+
+def _through_hopf(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
+    """Whether the orbit turned inside out between two points, as it does through a Hopf point."""
+    if np.any(cycles.turns):
+        return False
+    a, _ = cycles.on(b.mesh, a)
+    one, two = (shape(cycles, orbit) * cycles.scale for orbit in (a, b))
+    nothing = np.zeros(cycles.q)
+    return cycles.inner(b.mesh, one, two, nothing, nothing) < 0.0
+
+
+def _at_hopf(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, Stop]:
+    """A last small orbit, and the Hopf point that it surrounds."""
+    a = before.orbit
+    name = cycles.field.parameters[cycles.active[0]]
+    middle = collocation.mean(a.mesh, a.x, cycles.m)
+    said = "the orbits shrink to an equilibrium, a Hopf point"
+    near = Stop("hopf", f"{said} near {name} = {made.orbit.y[1]:.9g}")
+    found = hopf_near(cycles, middle, a.y)
+    if found is None:
+        return None, near
+    x, y = found
+    wave = shape(cycles, a) * cycles.scale
+    rest = Orbit(a.mesh, np.tile(x, (len(a.x), 1)), y)
+    last = starts.off(cycles, rest, wave, starts.SMALL * cycles.options.initial_step)
+    stop = Stop("hopf", f"{said} at {name} = {y[1]:.12g}")
+    if not last.converged or abs(last.orbit.y[0] / y[0] - 1.0) > 0.01:
+        return None, stop
+    # `off` leaves it outwards; the family comes inwards.
+    point = trace.point_of(cycles, last, before.arclength + 0.5 * made.step, 0.5 * made.step)
+    return replace(point, dx=-point.dx, dy=-point.dy, sign=-point.sign), stop
+
+
+def hopf_near(cycles: Cycles, x: Array, y: Array) -> tuple[Array, Array] | None:
+    """The Hopf point near an equilibrium: the state, and y = (period, parameter)."""
+    mesh, n = np.array([0.0, 1.0]), cycles.n
+    omega = 2.0 * np.pi / y[0]
+    x, p = x.copy(), float(y[1])
+
+    def growth(p: float) -> tuple[float, float] | None:
+        for step in range(30):
+            at = np.tile(x, (cycles.m + 1, 1))
+            jets = cycles.jets(mesh, at, np.array([y[0], p]), cycles.m, cycles.sizes)[0]
+            slopes = jets[n:].reshape(n, -1)[:, :n]
+            if not np.isfinite(jets).all():
+                return None
+            try:
+                dx = np.linalg.solve(slopes, -jets[:n])
+            except np.linalg.LinAlgError:
+                return None
+            x[:] += dx
+            if step and np.max(np.abs(dx) / cycles.scale) < 1e-14:
+                break
+        values = np.linalg.eigvals(slopes)
+        values = values[values.imag > 0.0]
+        if not len(values):
+            return None
+        one = values[np.argmin(np.abs(values - 1j * omega))]
+        return float(one.real), float(one.imag)
+
+    before = growth(p)
+    step = 1e-4 * cycles.width[0]
+    for _ in range(30):
+        after = growth(p + step)
+        if before is None or after is None:
+            return None
+        p += step
+        if after[0] == before[0] or abs(step) < 1e-15 * cycles.width[0]:
+            break
+        step = -after[0] * step / (after[0] - before[0])
+        before = after
+    assert after is not None
+    if abs(after[0]) > 1e-9 * after[1] or abs(after[1] / omega - 1.0) > 0.2:
+        return None
+    return x, np.array([2.0 * np.pi / after[1], p])
+
+
+def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
+    """Whether both halves of the orbit changed places, as they do where they become the same."""
+    if cycles.forced and cycles.multiple % 2:
+        return False
+    at = np.linspace(0.0, 0.5, 65)[:-1]
+
+    def halves(orbit: Orbit) -> Array:
+        one, two = (
+            collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at + shift)
+            for shift in (0.0, 0.5)
+        )
+        return np.asarray((two - one - 0.5 * cycles.turns) / cycles.scale)
+
+    one, two = halves(a), halves(b)
+    small = np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2))
+    if float(np.sum(one * two)) >= 0.0 or not small:
+        return False
+    # Orbits with the symmetry x(s + 1/2) = -x(s) keep halves that are far apart.
+    size = float(np.mean(cycles.amplitudes(b) / cycles.scale))
+    return bool(min(np.sqrt(np.mean(one**2)), np.sqrt(np.mean(two**2))) < 0.2 * size)
+
+
+def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -> Point | None:
+    """The point between two others where a free parameter has a value."""
+    a, b = before.orbit, made.orbit
+    mesh = b.mesh
+    a, (dx,) = cycles.on(mesh, a, before.dx)
+    part = (value - a.y[1 + k]) / (b.y[1 + k] - a.y[1 + k])
+    guess = Orbit(mesh, a.x + part * (b.x - a.x), a.y + part * (b.y - a.y))
+    rows, rows_y, target = cycles.rows(guess, np.zeros_like(dx), np.zeros(cycles.q))
+    rows_y[-1, 1 + k], target[-1] = 1.0, value
+    found = cycles.correct(guess, rows, rows_y, target, iterations=12)
+    if not found.converged:
+        return None
+    found.orbit.y[1 + k] = value
+    side = np.sign(cycles.inner(mesh, dx, found.dx, before.dy, found.dy)) or 1.0
+    point = trace.point_of(cycles, found, before.arclength + part * made.step, part * made.step)
+    # Its determinant has the parameter's row, which goes the way of the tangent that it gave.
+    return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
+
+
+def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:
+    return False

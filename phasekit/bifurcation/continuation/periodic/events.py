@@ -1,0 +1,289 @@
+"""Special points between the points of a family of periodic orbits.
+
+Each is bracketed by the sign of a test function and refined on it to rounding: folds by the
+tangent's part along the parameter, period doublings by det(M + 1), tori by the product of
+1 - mu_i mu_j, in which real pairs are no bifurcation, branch points by the determinant of the
+bordered equations and det(M - 1) ([Kuznetsov2004] 10.3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.family import Found, Path
+from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.starts import null_vector
+from phasekit.bifurcation.continuation.periodic.trace import Point, point_of
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
+NODES = 9  # points of the family through which a branch point is interpolated
+FOLD, DOUBLING, TORUS, BRANCHING = (
+    "fold_of_cycles",
+    "period_doubling",
+    "torus",
+    "cycle_branch_point",
+)
+
+
+def nontrivial(values: Complex, forced: bool) -> Complex:
+    """Multipliers but for the one that is 1 for every orbit of an autonomous system."""
+    if forced:
+        return values
+    return np.asarray(np.delete(values, int(np.argmin(np.abs(values - 1.0)))))
+
+
+def unstable(values: Complex, forced: bool) -> int:
+    """Number of multipliers outside the unit circle."""
+    return int(np.sum(np.abs(nontrivial(values, forced)) > 1.0))
+
+
+def fold_test(point: Point, forced: bool) -> float:
+    """The tangent's part along the parameter."""
+    return float(point.dy[1])
+
+
+def doubling_test(point: Point, forced: bool) -> float:
+    """det(M + 1), each factor beside its size."""
+    mu = point.multipliers
+    return float(np.prod((1.0 + mu) / (1.0 + np.abs(mu))).real)
+
+
+def torus_test(point: Point, forced: bool) -> float:
+    """Product of 1 - mu_i mu_j over pairs, each beside its size."""
+    mu = nontrivial(point.multipliers, forced)
+    i, j = np.triu_indices(len(mu), 1)
+    both = mu[i] * mu[j]
+    return float(np.prod((1.0 - both) / (1.0 + np.abs(both))).real)
+
+
+def branching_test(point: Point, forced: bool) -> float:
+    """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
+    parts = (1.0 - point.multipliers) / (1.0 + np.abs(point.multipliers))
+    if forced:
+        return float(np.prod(parts).real)
+    n = len(parts)
+    return float(sum(np.prod(np.delete(parts, i)) for i in range(n)).real) if n > 1 else 0.0
+
+
+TESTS: dict[str, Callable[[Point, bool], float]] = {
+    FOLD: fold_test,
+    DOUBLING: doubling_test,
+    TORUS: torus_test,
+    BRANCHING: lambda point, forced: point.sign,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The family between two of its points, by the distance s along the tangent of the first."""
+
+    cycles: Cycles
+    a: Point
+    b: Point
+
+    def __post_init__(self) -> None:
+        """Bring both ends to one mesh."""
+        mesh = self.b.orbit.mesh
+        if self.a.orbit.intervals > self.b.orbit.intervals:
+            mesh = self.a.orbit.mesh
+        a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
+        b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
+        rows, rows_y, target = self.cycles.rows(a, dx, self.a.dy)
+        length = float(np.sum(rows[-1] * (b.x - a.x)) + rows_y[-1] @ (b.y - a.y))
+        # db/ds of the second end, where its tangent has this part along that of the first.
+        rate = float(np.sum(rows[-1] * db) + rows_y[-1] @ self.b.dy)
+        own: dict[str, Any] = {
+            "ends": (a, b), "tangents": ((dx, self.a.dy), (db / rate, self.b.dy / rate)),
+            "rows": (rows, rows_y, target), "length": length,
+        }  # fmt: skip
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
+
+    ends: tuple[Orbit, Orbit] = None  # type: ignore[assignment]
+    tangents: Any = None
+    rows: Any = None
+    length: float = 0.0
+
+    def at(self, s: float) -> Point | None:
+        """The point at a distance; None if Newton's method finds none."""
+        (a, b), ((dx, dy), (ex, ey)) = self.ends, self.tangents
+        t, h = s / self.length, self.length
+        # Cubic through both ends with their tangents.
+        c = (2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2)
+        x = c[0] * a.x + h * c[1] * dx + c[2] * b.x + h * c[3] * ex
+        y = c[0] * a.y + h * c[1] * dy + c[2] * b.y + h * c[3] * ey
+        rows, rows_y, target = self.rows
+        # The phase of the guess, which the second end may have measured by another orbit.
+        target = target.copy()
+        target[-1] += s
+        target[0] = np.sum(rows[0] * x)
+        found = self.cycles.correct(Orbit(a.mesh, x, y), rows, rows_y, target, iterations=12)
+        if not found.converged:
+            return None
+        made = point_of(self.cycles, found, self.a.arclength + s, s)
+        return made
+
+
+def find(cycles: Cycles, path: Path) -> list[Found]:
+    """All special points of a path, refined, in order."""
+    found: list[Found] = []
+    if len(cycles.active) != 1:
+        return found
+    for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
+        singular = a.sign == 0.0 or b.sign == 0.0  # a branch point that the path begins at
+        if singular or not (a.trusted and b.trusted):
+            continue
+        for one in _between(cycles, a, b, DEPTH):
+            found.append(replace(one, index=i))
+    return found
+
+
+def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
+    """The special points between two points of a family."""
+    forced = cycles.forced
+    changed = [
+        kind for kind, test in TESTS.items() if (test(a, forced) >= 0.0) != (test(b, forced) >= 0.0)
+    ]
+    gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
+    if not changed and gap == 0:
+        return []
+    stretch = Stretch(cycles, a, b)
+    found = [refined(stretch, kind) for kind in changed]
+    kept = [one for one in found if one is not None]
+    moves = [2 if one.kind == TORUS else 1 for one in kept]
+    explained = abs(gap) <= sum(moves) and (gap - sum(moves)) % 2 == 0
+    if explained or depth == 0:
+        return sorted(kept, key=lambda one: one.point.arclength)
+    middle = stretch.at(0.5 * stretch.length)
+    if middle is None or not middle.trusted:
+        return sorted(kept, key=lambda one: one.point.arclength)
+    return [*_between(cycles, a, middle, depth - 1), *_between(cycles, middle, b, depth - 1)]
+
+
+def refined(stretch: Stretch, kind: str) -> Found | None:
+    """A special point where its test function vanishes; None if it is none after all."""
+    forced = stretch.cycles.forced
+    point = _branching(stretch) if kind == BRANCHING else _root(stretch, TESTS[kind])
+    p = stretch.a.orbit.y[1], stretch.b.orbit.y[1]
+    interval = (float(min(p)), float(max(p)))
+    if point is None:
+        return Found(
+            kind, stretch.b, -1, interval, "guess",
+            "Newton's method did not converge between the points", {},
+        )  # fmt: skip
+    if kind == TORUS:
+        mu = nontrivial(point.multipliers, forced)
+        i, j = np.triu_indices(len(mu), 1)
+        k = int(np.argmin(np.abs(1.0 - mu[i] * mu[j])))
+        if abs(mu[i[k]].imag) <= 1e-9 * abs(mu[i[k]]):
+            return None  # two real multipliers with the product 1
+    if kind == BRANCHING:
+        mu = nontrivial(point.multipliers, forced)
+        if np.min(np.abs(mu - 1.0)) > 1e-2:
+            return None
+    return Found(
+        kind, point, -1, interval, "converged", "", _normal_form(stretch.cycles, kind, point)
+    )
+
+
+def _normal_form(cycles: Cycles, kind: str, point: Point) -> dict[str, float]:
+    """Coefficients of the normal form."""
+    if kind == FOLD:
+        return at_fold(cycles, point.orbit, point.dx, point.dy)
+    if kind == DOUBLING:
+        W = cycles.looked_at(point.orbit, point.dx, point.dy).W
+        v = null_vector(cycles, point.orbit, W, -1.0)
+        return at_doubling(cycles, point.orbit, v)
+    if kind == TORUS:
+        mu = nontrivial(point.multipliers, cycles.forced)
+        mu = mu[mu.imag > 0.0]
+        if len(mu):
+            one = mu[np.argmin(np.abs(np.abs(mu) - 1.0))]
+            return at_torus(cycles, point.orbit, float(np.angle(one)))
+    return {}
+
+
+def _root(stretch: Stretch, test: Callable[[Point, bool], float]) -> Point | None:
+    """The point of a stretch where a test function vanishes, by secants within a bracket."""
+    forced = stretch.cycles.forced
+    low, high = 0.0, stretch.length
+    left, right = test(stretch.a, forced), test(stretch.b, forced)
+    best: Point | None = None
+    least = np.inf
+    s, before = high, np.inf
+    side = 0
+    f_left, f_right = left, right
+    for _ in range(60):
+        s = (
+            low + (high - low) * f_left / (f_left - f_right)
+            if f_left != f_right
+            else 0.5 * (low + high)
+        )
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        point = stretch.at(s)
+        if point is None:
+            return None
+        value = test(point, forced)
+        if abs(value) < least:
+            best, least = point, abs(value)
+        if value == 0.0 or abs(s - before) <= 1e-14 * stretch.length:
+            break
+        before = s
+        if (value >= 0.0) == (left >= 0.0):
+            low, f_left = s, value
+            if side == -1:
+                f_right *= 0.5  # Illinois
+            side = -1
+        else:
+            high, f_right = s, value
+            if side == 1:
+                f_left *= 0.5
+            side = 1
+        if high - low <= 1e-14 * stretch.length:
+            break
+    return best
+
+
+def _branching(stretch: Stretch) -> Point | None:
+    """A branch point, where the equations are singular: from the points to both of its sides.
+
+    The family is smooth through it, so its points at a distance say where it is to rounding.
+    """
+    cycles = stretch.cycles
+    nodes = 0.5 * stretch.length * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
+    points = [stretch.at(float(s)) for s in nodes]
+    made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
+    if len(made) < NODES - 2:
+        return None
+    at = np.array([s for s, _ in made]) / stretch.length
+    values = np.array([branching_test(p, cycles.forced) for _, p in made])
+    fit = np.polynomial.Polynomial.fit(at, values, len(at) - 1, domain=[0.0, 1.0])
+    roots = fit.roots()
+    inside = roots[(np.abs(roots.imag) < 1e-6) & (roots.real > -1e-9) & (roots.real < 1.0 + 1e-9)]
+    if not len(inside):
+        return None
+    s = float(inside[np.argmin(np.abs(inside.real - 0.5))].real)
+    weights = np.array(
+        [np.prod((s - np.delete(at, k)) / (at[k] - np.delete(at, k))) for k in range(len(at))]
+    )
+    mixed = [
+        sum(w * getattr(p, name) for w, (_, p) in zip(weights, made, strict=True))
+        for name in ("dx", "dy")
+    ]
+    orbit = Orbit(
+        made[0][1].orbit.mesh,
+        np.asarray(sum(w * p.orbit.x for w, (_, p) in zip(weights, made, strict=True))),
+        np.asarray(sum(w * p.orbit.y for w, (_, p) in zip(weights, made, strict=True))),
+    )
+    checked = cycles.looked_at(orbit, *mixed)
+    return point_of(cycles, checked, stretch.a.arclength + s * stretch.length, s * stretch.length)

@@ -1,0 +1,99 @@
+"""A traced family of periodic orbits as one path, with its special points found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.trace import (
+    Point,
+    State,
+    Track,
+    begin,
+    follow,
+)
+
+Array = npt.NDArray[np.float64]
+
+Tracks = tuple[Track | None, Track | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A special point of a family, after one of its points.
+
+    Attributes
+    ----------
+    kind : str
+    point : Point
+    index : int
+        The point of the path before it.
+    interval : tuple of float
+        Values of the parameter at the points between which it was found.
+    status : {"converged", "guess"}
+    message : str
+    normal_form : dict
+    others : tuple
+        Directions (dx, dy) of other families, on the mesh of the point.
+    """
+
+    kind: str
+    point: Point
+    index: int
+    interval: tuple[float, float]
+    status: str
+    message: str
+    normal_form: dict[str, float]
+    others: tuple[tuple[Array, Array], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Points in order along the family, and why it ends on both sides."""
+
+    points: tuple[Point, ...]
+    start: int
+    stops: tuple[Stop, Stop]
+
+
+def join(start: Point, tracks: Tracks, first: Stop) -> Path:
+    """One path of two tracks from the same start; without a first track, ``first`` says why."""
+    backward, forward = tracks
+    behind = [] if backward is None else [p.flipped() for p in backward.points[::-1]]
+    ahead = [] if forward is None else list(forward.points)
+    stops = (
+        first if backward is None else backward.stop,
+        Stop("start", "the start; this direction was not asked for")
+        if forward is None
+        else forward.stop,
+    )
+    if stops[1].reason == "closed":
+        stops = (stops[1], stops[1])
+    return Path((*behind, start, *ahead), len(behind), stops)
+
+
+def run(cycles: Cycles, start: Point, directions: str) -> Tracks:
+    """Follow a family from its start, backward and forward; None where it was not asked for."""
+    most = cycles.options.max_points
+    backward = forward = None
+    if directions != "backward":
+        forward = follow(cycles, begin(cycles, start, True), most, start)
+    closed = forward is not None and forward.stop.reason == "closed"
+    if directions != "forward" and not closed:
+        backward = follow(cycles, begin(cycles, start, False), most, start)
+    return backward, forward
+
+
+def go_on(cycles: Cycles, track: Track | None, points: int, start: Point) -> Track | None:
+    """More points of a track that ended for their number, exactly as if it had never stopped."""
+    if track is None or track.stop.reason != "max_points":
+        return track
+    more = follow(cycles, track.state, points, start)
+    return Track((*track.points, *more.points), more.state, more.stop)
+
+
+__all__ = ["Found", "Path", "State", "Tracks", "go_on", "join", "run"]

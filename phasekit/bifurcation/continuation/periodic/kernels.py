@@ -1,0 +1,439 @@
+"""Compiled parts of Newton's method for collocation: derivatives, condensation, elimination.
+
+The unknowns are the values x at all places of the mesh and y = (T, free parameters). The places
+inside an interval are eliminated first (condensation): x_jk = W_jk x_j + V_jk y + v_jk. What is
+left, x_(j+1) = G_j x_j + ..., is a chain that is closed by x_N = sigma x_0 + gap and bordered by
+one row for each of y. It is eliminated with pivoting over two blocks at a time: a recursion
+forwards would be single shooting, which overflows where orbits are unstable.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.differences import jet
+from phasekit.numerics.native import call
+
+
+@routine
+def eliminate(a: Array, rows: int, pivots: int, width: int) -> float:
+    """Gaussian elimination of the first columns with partial pivoting; the determinant's sign.
+
+    0 if it is singular.
+    """
+    sign = 1.0
+    for j in range(pivots):
+        pivot, size = j, abs(a[j, j])
+        for i in range(j + 1, rows):
+            if abs(a[i, j]) > size:
+                pivot, size = i, abs(a[i, j])
+        if not size > 0.0 or not np.isfinite(size):
+            return 0.0
+        if pivot != j:
+            sign = -sign
+            for k in range(j, width):
+                value = a[j, k]
+                a[j, k] = a[pivot, k]
+                a[pivot, k] = value
+        if a[j, j] < 0.0:
+            sign = -sign
+        inverse = 1.0 / a[j, j]
+        for i in range(j + 1, rows):
+            part = a[i, j] * inverse
+            if part != 0.0:
+                for k in range(j + 1, width):
+                    a[i, k] -= part * a[j, k]
+                a[i, j] = 0.0
+    return sign
+
+
+@routine
+def substitute(a: Array, n: int, first: int, last: int) -> None:
+    """Solve the triangle that `eliminate` left, in the place of the columns first to last."""
+    for j in range(n - 1, -1, -1):
+        inverse = 1.0 / a[j, j]
+        for k in range(first, last):
+            a[j, k] *= inverse
+        for i in range(j):
+            part = a[i, j]
+            if part != 0.0:
+                for k in range(first, last):
+                    a[i, k] -= part * a[j, k]
+
+
+@kernel
+def jets(
+    first: Any, mode: int, par: Array, active: Any, forced: bool, mesh: Array, nodes: Array,
+    value: Array, x: Array, y: Array, scale: Array, out: Array,
+) -> None:  # fmt: skip
+    """F and its derivatives by states and active parameters at all Gauss points."""
+    m, n = nodes.size, x.shape[1]
+    a = active.size
+    count = n + n * (n + a)
+    u, sizes, value_at = 0, n + a, 2 * (n + a)
+    spare = value_at + count
+    w = np.zeros(spare + n + a + 7 * n)
+    for i in range(n + a):
+        w[sizes + i] = scale[i]
+    t = 1 if forced else 0
+    for i in range(t, a):
+        w[u + n + i] = y[1 + i - t]
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for c in range(n):
+                total = 0.0
+                for k in range(m + 1):
+                    total += value[i, k] * x[j * m + k, c]
+                w[u + c] = total
+            if forced:
+                w[u + n] = y[0] * (mesh[j] + h * nodes[i])
+            jet(first, mode, n, w, u, par, active, sizes, value_at, spare)
+            for k in range(count):
+                out[j * m + i, k] = w[value_at + k]
+
+
+@kernel
+def condense(
+    jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
+    slope: Array, side: float, scale: Array, x: Array, y: Array, W: Array,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
+
+    Returns the sign of the determinants, the largest residual beside the largest |T f|, both on
+    scaled axes, and the integral of the trace of T f_x.
+    """
+    m, n = nodes.size, x.shape[1]
+    q = y.size
+    size, a = m * n, (jet_.shape[1] - n) // n - n
+    width = size + n + q + 1
+    t = 1 if forced else 0
+    M = np.empty((size, width))
+    speed, worst = 0.0, 0.0
+    sign, divergence = 1.0, 0.0
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            at = j * m + i
+            s = mesh[j] + h * nodes[i]
+            for c in range(n):
+                row = i * n + c
+                f = jet_[at, c]
+                base = n + c * (n + a)
+                total = -h * y[0] * f
+                for k in range(m + 1):
+                    total += slope[i, k] * x[j * m + k, c]
+                for k in range(m + 1):
+                    # Columns of the places 1 to m, then that of the first one, on the right side.
+                    column, factor = ((k - 1) * n, 1.0) if k > 0 else (size, -1.0)
+                    part = -h * y[0] * value[i, k] * factor
+                    for d in range(n):
+                        M[row, column + d] = part * jet_[at, base + d]
+                    M[row, column + c] += factor * slope[i, k]
+                by_period = f
+                if forced:
+                    by_period += y[0] * s * jet_[at, base + n]
+                M[row, size + n] = h * by_period
+                for k in range(1, q):
+                    M[row, size + n + k] = h * y[0] * jet_[at, base + n + t + k - 1]
+                M[row, width - 1] = -total
+                speed = max(speed, abs(y[0] * f) / scale[c])
+                worst = max(worst, abs(total / h) / scale[c])
+                if not np.isfinite(total):
+                    return 0.0, np.inf, np.nan
+                divergence += h * weights[i] * y[0] * jet_[at, base + c]
+        found = eliminate(M, size, size, width) * side**n
+        if found == 0.0:
+            return 0.0, np.inf, np.nan
+        sign *= found
+        substitute(M, size, size, width)
+        for r in range(size):
+            for k in range(n + q + 1):
+                W[j, r, k] = M[r, size + k]
+    residual = worst / speed if speed > 0.0 else np.inf
+    return sign, residual, divergence
+
+
+@kernel
+def solve(
+    W: Array, rows: Array, rows_y: Array, right: Array, gap: Array, sigma: Array, m: int,
+    dx: Array, dy: Array,
+) -> float:  # fmt: skip
+    """Solve the condensed system; the sign of its determinant, 0 if it is singular.
+
+    Parameters
+    ----------
+    rows, rows_y, right
+        The bordering rows, shape (y, places, n) and (y, y), and their right sides.
+    gap, sigma
+        x_N = sigma x_0 + gap closes the chain, sigma a sign for each state.
+    dx, dy
+        The solution, shape (2, places, n) and (2, y): that of the right sides given, and the one
+        of a 1 in the last row alone.
+    """
+    count, n = W.shape[0], W.shape[2] - dy.shape[1] - 1
+    q = dy.shape[1]
+    last = n + q
+    wide = 3 * n + q + 1
+    # Border: coefficients of x_0, of the current x_j, of y, and the right side.
+    at_first, at_next = np.zeros((q, n)), np.zeros((q, n))
+    current = np.zeros((q, n))
+    edge = np.zeros((q, q + 1))
+    store = np.zeros((count, n, wide))
+    block = np.zeros((2 * n, wide))
+    C, A, E = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, q + 1))
+    top = (m - 1) * n
+    for r in range(q):
+        for k in range(q):
+            edge[r, k] = rows_y[r, k]
+        edge[r, q] = right[r]
+        for c in range(n):
+            current[r, c] = rows[r, 0, c]
+    sign = 1.0
+    for j in range(count):
+        for r in range(q):
+            for c in range(n):
+                at_next[r, c] = rows[r, (j + 1) * m, c]
+            for k in range(m - 1):
+                for c in range(n):
+                    part = rows[r, j * m + 1 + k, c]
+                    if part != 0.0:
+                        at = k * n + c
+                        for d in range(n):
+                            current[r, d] += part * W[j, at, d]
+                        for d in range(q):
+                            edge[r, d] += part * W[j, at, n + d]
+                        edge[r, q] -= part * W[j, at, last]
+        if j == 0:
+            for i in range(n):
+                for k in range(n):
+                    C[i, k] = 1.0 if i == k else 0.0
+                    A[i, k] = -W[0, top + i, k]
+                for k in range(q):
+                    E[i, k] = -W[0, top + i, n + k]
+                E[i, q] = W[0, top + i, last]
+            for r in range(q):
+                for c in range(n):
+                    at_first[r, c] = current[r, c]
+                    current[r, c] = at_next[r, c]
+            continue
+        for i in range(n):
+            for k in range(n):
+                block[i, k] = C[i, k]
+                block[i, n + k] = A[i, k]
+                block[i, 2 * n + k] = 0.0
+                block[n + i, k] = -W[j, top + i, k]
+                block[n + i, n + k] = 0.0
+                block[n + i, 2 * n + k] = 1.0 if i == k else 0.0
+            for k in range(q):
+                block[i, 3 * n + k] = E[i, k]
+                block[n + i, 3 * n + k] = -W[j, top + i, n + k]
+            block[i, 3 * n + q] = E[i, q]
+            block[n + i, 3 * n + q] = W[j, top + i, last]
+        found = eliminate(block, 2 * n, n, wide)
+        if found == 0.0:
+            return 0.0
+        sign *= found
+        for i in range(n):
+            for k in range(wide):
+                store[j, i, k] = block[i, k]
+            for k in range(n):
+                A[i, k] = block[n + i, n + k]
+                C[i, k] = block[n + i, 2 * n + k]
+            for k in range(q + 1):
+                E[i, k] = block[n + i, 3 * n + k]
+        for r in range(q):
+            for i in range(n):
+                part = current[r, i] / block[i, i]
+                for k in range(i + 1, n):
+                    current[r, k] -= part * block[i, k]
+                for k in range(n):
+                    at_first[r, k] -= part * block[i, n + k]
+                    at_next[r, k] -= part * block[i, 2 * n + k]
+                for k in range(q + 1):
+                    edge[r, k] -= part * block[i, 3 * n + k]
+            for c in range(n):
+                current[r, c] = at_next[r, c]
+    end = n + q
+    D = np.zeros((end, end + 2))
+    for i in range(n):
+        for k in range(n):
+            D[i, k] = sigma[k] * C[i, k] + A[i, k]
+            E[i, q] -= C[i, k] * gap[k]
+        for k in range(q):
+            D[i, n + k] = E[i, k]
+        D[i, end] = E[i, q]
+    for r in range(q):
+        for k in range(n):
+            D[n + r, k] = sigma[k] * current[r, k] + at_first[r, k]
+            edge[r, q] -= current[r, k] * gap[k]
+        for k in range(q):
+            D[n + r, n + k] = edge[r, k]
+        D[n + r, end] = edge[r, q]
+    D[end - 1, end + 1] = 1.0
+    for i in range(end):
+        size = 0.0
+        for k in range(end):
+            size = max(size, abs(D[i, k]))
+        if not size > 0.0 or not np.isfinite(size):
+            return 0.0
+        for k in range(end + 2):
+            D[i, k] /= size
+    found = eliminate(D, end, end, end + 2)
+    if found == 0.0:
+        return 0.0
+    sign *= found
+    substitute(D, end, end, end + 2)
+    for which in range(2):
+        constant = 1.0 if which == 0 else 0.0
+        column = end + which
+        for k in range(q):
+            dy[which, k] = D[n + k, column]
+        for c in range(n):
+            dx[which, 0, c] = D[c, column]
+            dx[which, count * m, c] = sigma[c] * D[c, column] + constant * gap[c]
+        for j in range(count - 1, 0, -1):
+            for i in range(n - 1, -1, -1):
+                total = constant * store[j, i, 3 * n + q]
+                for k in range(i + 1, n):
+                    total -= store[j, i, k] * dx[which, j * m, k]
+                for k in range(n):
+                    total -= store[j, i, n + k] * dx[which, 0, k]
+                    total -= store[j, i, 2 * n + k] * dx[which, (j + 1) * m, k]
+                for k in range(q):
+                    total -= store[j, i, 3 * n + k] * dy[which, k]
+                dx[which, j * m, i] = total / store[j, i, i]
+        for j in range(count):
+            for k in range(m - 1):
+                for c in range(n):
+                    at = k * n + c
+                    total = constant * W[j, at, last]
+                    for d in range(n):
+                        total += W[j, at, d] * dx[which, j * m, d]
+                    for d in range(q):
+                        total += W[j, at, n + d] * dy[which, d]
+                    dx[which, j * m + 1 + k, c] = total
+    return sign
+
+
+@kernel
+def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Array) -> None:
+    """Periodic QR: G_N ... G_1 Q = Q' R after some passes, without ever forming the product.
+
+    The triangle is diag(exp(log)) R. Q is any orthogonal matrix and becomes Q'; with the turn
+    Q^T Q' the product is similar to the turn times the triangle ([Lust2001]).
+    """
+    count, n = G.shape[0], G.shape[1]
+    Z = np.empty((n, n))
+    start = np.empty((n, n))
+    step = np.empty((n, n))
+    for turn in range(passes):
+        for i in range(n):
+            log[i] = 0.0
+            for k in range(n):
+                R[i, k] = 1.0 if i == k else 0.0
+                start[i, k] = Q[i, k]
+        for j in range(count):
+            for i in range(n):
+                for k in range(n):
+                    total = 0.0
+                    for d in range(n):
+                        total += G[j, i, d] * Q[d, k]
+                    Z[i, k] = total
+            # Gram-Schmidt, twice, which is as good as reflections.
+            for k in range(n):
+                for d in range(n):
+                    step[d, k] = 0.0
+                for _ in range(2):
+                    for d in range(k):
+                        total = 0.0
+                        for i in range(n):
+                            total += Z[i, d] * Z[i, k]
+                        step[d, k] += total
+                        for i in range(n):
+                            Z[i, k] -= total * Z[i, d]
+                size = 0.0
+                for i in range(n):
+                    size += Z[i, k] * Z[i, k]
+                size = np.sqrt(size)
+                step[k, k] = size
+                for i in range(n):
+                    Z[i, k] /= size
+            for i in range(n):
+                for k in range(n):
+                    Q[i, k] = Z[i, k]
+            if turn < passes - 1:
+                continue
+            # D_new U_new D U = (D_new D) (D^-1 U_new D) U with unit triangles U.
+            for i in range(n):
+                for k in range(i + 1, n):
+                    step[i, k] *= np.exp(log[k] - log[i]) / step[i, i]
+            for i in range(n):
+                for k in range(i + 1, n):
+                    total = R[i, k] + step[i, k]
+                    for d in range(i + 1, k):
+                        total += step[i, d] * R[d, k]
+                    # Upwards from row i: entries of rows below are not needed again.
+                    Z[i, k] = total
+            for i in range(n):
+                for k in range(i + 1, n):
+                    R[i, k] = Z[i, k]
+                log[i] += np.log(step[i, i])
+    for i in range(n):
+        for k in range(n):
+            turn_[i, k] = 0.0
+            for d in range(n):
+                turn_[i, k] += start[d, i] * Q[d, k]
+
+
+@kernel
+def borders(
+    mesh: Array, weights: Array, value: Array, slope: Array, reference: Array, tangent: Array,
+    scale: Array, forced: bool, rows: Array,
+) -> None:  # fmt: skip
+    """Fill the row of the phase condition (the first) and that of the arclength (the last).
+
+    They are the integrals of x . x_ref' and of x . tangent, on scaled axes.
+    """
+    m, n = weights.size, scale.size
+    end = rows.shape[0] - 1
+    rows[:] = 0.0
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for c in range(n):
+                along, across = 0.0, 0.0
+                for k in range(m + 1):
+                    along += slope[i, k] * reference[j * m + k, c]
+                    across += value[i, k] * tangent[j * m + k, c]
+                part = weights[i] / scale[c] ** 2
+                for k in range(m + 1):
+                    if not forced:
+                        rows[0, j * m + k, c] += part * along * value[i, k]
+                    rows[end, j * m + k, c] += h * part / n * across * value[i, k]
+
+
+@kernel
+def inner(mesh: Array, weights: Array, value: Array, a: Array, b: Array, scale: Array) -> float:
+    """Integral of the mean over states of a . b, on scaled axes."""
+    m, n = weights.size, scale.size
+    total = 0.0
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for c in range(n):
+                left, right = 0.0, 0.0
+                for k in range(m + 1):
+                    left += value[i, k] * a[j * m + k, c]
+                    right += value[i, k] * b[j * m + k, c]
+                total += h * weights[i] * left * right / scale[c] ** 2
+    return total / n
+
+
+@kernel
+def evaluate(function: Any, par: Array, w: Array, out: int) -> None:
+    """Call a native function of the numbers at the head of w, which fills w from a place on."""
+    call(function, w, 0, par, 0, out)

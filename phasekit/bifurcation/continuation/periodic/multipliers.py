@@ -1,0 +1,51 @@
+"""Floquet multipliers of a periodic orbit, without forming the product that they belong to."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.periodic import kernels
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+APART = 1e-14  # entries below the diagonal blocks that are rounding
+PASSES = 12
+
+
+def multipliers(G: Array) -> tuple[Complex, float]:
+    """Eigenvalues of G_N ... G_1, largest first, and the logarithm of the size of its determinant.
+
+    The product is brought to block triangular form by orthogonal iteration, each of whose blocks
+    holds multipliers of like size: so small ones are as accurate, relative to themselves, as
+    large ones.
+    """
+    n = G.shape[1]
+    Q, R, log, turn = np.eye(n), np.empty((n, n)), np.empty(n), np.empty((n, n))
+    G = np.ascontiguousarray(G)
+    if not np.isfinite(G).all():
+        return np.full(n, np.nan, dtype=complex), np.nan
+    passes = 0
+    while True:
+        kernels.triangular(G, 2, Q, R, log, turn)
+        passes += 2
+        cuts = _cuts(turn)
+        loose = [i for i in range(1, n) if i not in cuts and abs(log[i - 1] - log[i]) > 0.7]
+        if not loose or passes >= PASSES or not np.isfinite(log).all():
+            break
+    values = []
+    edges = [0, *cuts, n]
+    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        here = slice(first, last)
+        top = float(np.max(log[here]))
+        block = turn[here, here] @ (np.exp(log[here] - top)[:, None] * R[here, here])
+        found = block[0] if last - first == 1 else np.linalg.eigvals(block)
+        values.append(np.asarray(found, dtype=complex) * np.exp(top))
+    whole = np.concatenate(values)
+    return whole[np.argsort(-np.abs(whole), kind="stable")], float(np.sum(log))
+
+
+def _cuts(turn: Array) -> list[int]:
+    """Where a nearly block diagonal orthogonal matrix can be cut."""
+    return [i for i in range(1, len(turn)) if np.max(np.abs(turn[i:, :i])) <= APART]

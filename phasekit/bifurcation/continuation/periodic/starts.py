@@ -1,0 +1,152 @@
+"""First periodic orbits: from samples, from a Hopf point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, fitted
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+
+Array = npt.NDArray[np.float64]
+
+FIRST = 40  # intervals of a first mesh
+SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hopf point
+
+
+def settled(cycles: Cycles, guess: Orbit, *, iterations: int = 40) -> Solution:
+    """The orbit that a guess leads to at fixed parameters, on a mesh that suits it."""
+    for _ in range(8):
+        rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
+        rows_y[-1, -1], target[-1] = 1.0, guess.y[-1]
+        found = cycles.correct(guess, rows, rows_y, target, iterations=iterations, damped=True)
+        if not found.converged:
+            return found
+        mesh = finer(cycles, found.orbit)
+        if mesh is None:
+            mesh = fitted(cycles, found.orbit)
+            if len(mesh) >= len(found.orbit.mesh):
+                return found
+        guess, _ = cycles.on(mesh, found.orbit)
+    return found
+
+
+def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
+    """A mesh that meets the tolerance where that of the orbit does not."""
+    if cycles.options.intervals is not None:
+        return None
+    if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance:
+        return None
+    count = max(count_for(cycles, orbit), int(1.1 * orbit.intervals) + 1)
+    if count > cycles.options.max_intervals:
+        if orbit.intervals >= cycles.options.max_intervals:
+            return None
+        count = cycles.options.max_intervals
+    return collocation.even(orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count)
+
+
+def from_hopf(
+    cycles: Cycles, x: Array, p: float, omega: float, vector: npt.NDArray[np.complex128]
+) -> Solution:
+    """A small orbit near a Hopf point, in the plane of its critical eigenvector."""
+    m = cycles.m
+    mesh = np.linspace(0.0, 1.0, (cycles.options.intervals or 2 * LEAST) + 1)
+    angle = 2.0 * np.pi * collocation.times(mesh, m)
+    wave = np.real(np.exp(1j * angle)[:, None] * vector)
+    middle = Orbit(mesh, np.tile(x, (len(wave), 1)), np.array([2.0 * np.pi / omega, p]))
+    return off(cycles, middle, wave, SMALL * cycles.options.initial_step)
+
+
+def off(cycles: Cycles, middle: Orbit, direction: Array, size: float) -> Solution:
+    """An orbit at a distance from another one, in a direction in which the states leave it.
+
+    The distance is held and the parameter free: at a fixed parameter Newton's method finds the
+    family that is left.
+    """
+    nothing = np.zeros(cycles.q)
+    length = np.sqrt(cycles.inner(middle.mesh, direction, direction, nothing, nothing))
+    dx = direction / length
+    found = _held(cycles, middle, dx, size)
+    for _ in range(8):
+        if found.converged:
+            break
+        size *= 0.3
+        found = _held(cycles, middle, dx, size)
+    for _ in range(6):
+        mesh = finer(cycles, found.orbit) if found.converged else None
+        if mesh is None:
+            break
+        middle, (dx, x) = cycles.on(mesh, middle, dx, found.orbit.x)
+        found = _held(cycles, middle, dx, size, Orbit(mesh, x, found.orbit.y))
+    side = (
+        np.sign(cycles.inner(middle.mesh, dx, found.dx, nothing, nothing))
+        if found.converged
+        else 1.0
+    )
+    if side < 0.0:
+        found = replace(found, dx=-found.dx, dy=-found.dy, sign=-found.sign)
+    return found
+
+
+def _held(
+    cycles: Cycles, middle: Orbit, dx: Array, size: float, guess: Orbit | None = None
+) -> Solution:
+    """The orbit whose part along a direction is given, near a guess."""
+    nothing = np.zeros(cycles.q)
+    away = Orbit(middle.mesh, middle.x + size * dx, middle.y)
+    # The phase is that of the guess: the orbit that is left may have none.
+    rows, rows_y, target = cycles.rows(away if guess is None else guess, dx, nothing)
+    target[-1] = np.sum(rows[-1] * away.x)
+    return cycles.correct(away if guess is None else guess, rows, rows_y, target, iterations=15)
+
+
+def doubled(cycles: Cycles, orbit: Orbit, W: Array) -> tuple[Cycles, Orbit, Array]:
+    """The orbit run through twice, and the direction in which doubled orbits leave it."""
+    v = null_vector(cycles, orbit, W, -1.0)
+    mesh = np.concatenate([0.5 * orbit.mesh, 0.5 + 0.5 * orbit.mesh[1:]])
+    x = np.concatenate([orbit.x, orbit.x[1:] + cycles.turns])
+    y = orbit.y.copy()
+    y[0] *= 2.0
+    made = cycles.replace(multiple=2 * cycles.multiple, turns=2.0 * cycles.turns)
+    return made, Orbit(mesh, x, y), np.concatenate([v, -v[1:]])
+
+
+def null_vector(
+    cycles: Cycles, orbit: Orbit, W: Array, sigma: float, tangent: tuple[Array, Array] | None = None
+) -> Array:
+    """The solution of the variational equations that closes with sigma, of length 1.
+
+    With a tangent, that of the equations with their free parameters which is orthogonal to it. The
+    singular equations are bordered by an arbitrary column and row; the column's factor vanishes.
+    """
+    count, size, n = W.shape[0], W.shape[1], cycles.n
+    q = 0 if tangent is None else cycles.q
+    random = np.random.default_rng(7)
+    V = np.zeros((count, size, n + q + 2))
+    V[:, :, : n + q] = W[:, :, : n + q]
+    V[:, :, n + q] = random.standard_normal((count, size)) / count
+    rows = np.zeros((q + 1, *orbit.x.shape))
+    rows_y = np.zeros((q + 1, q + 1))
+    if tangent is not None:
+        rows[:q], rows_y[:q, :q], _ = cycles.rows(orbit, *tangent)
+        if cycles.forced:
+            rows_y[0, 0], rows_y[0, 1:q] = 1.0, -cycles.own_period(orbit.y)[1]
+    row = random.standard_normal(orbit.x.shape)
+    nothing = np.zeros(cycles.q)
+    dx, dy = np.empty((2, *orbit.x.shape)), np.empty((2, q + 1))
+    v = row
+    for _ in range(3):
+        c = collocation.scheme(cycles.m)
+        rows[-1] = (
+            collocation.functional(orbit.mesh, collocation.at_gauss(v, c.m) / cycles.scale**2, c.m)
+            if v is not row
+            else row / len(row)
+        )
+        kernels.solve(
+            V, rows, rows_y, np.zeros(q + 1), np.zeros(n), np.full(n, sigma), cycles.m, dx, dy
+        )
+        v = dx[1] / np.sqrt(cycles.inner(orbit.mesh, dx[1], dx[1], nothing, nothing))
+    return np.asarray(v)

@@ -1,0 +1,188 @@
+"""A family of periodic orbits followed in one direction, until something ends it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.periodic import collocation, ends
+from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+REMESH = 3  # points after which the mesh follows the orbit
+TRUSTED = 1e-5  # error of the trivial multiplier, or by Liouville's formula, above which no tests
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a family: the orbit, the unit tangent, multipliers and checks."""
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    multipliers: Complex
+    arclength: float
+    step: float
+    newton_steps: int
+    residual: float
+    sign: float
+    trivial_error: float
+    liouville_error: float
+    mesh_error: float
+
+    def flipped(self) -> Point:
+        """The same point of a family that is followed the other way round."""
+        return replace(self, dx=-self.dx, dy=-self.dy, sign=-self.sign, arclength=-self.arclength)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the multipliers pass their checks."""
+        return bool(max(self.trivial_error, self.liouville_error) <= TRUSTED)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that it takes to go on as if the trace had never stopped."""
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    step: float
+    arclength: float
+    since: int  # points since the mesh was last fitted
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Points in one direction from a start, and the state to go on from."""
+
+    points: tuple[Point, ...]
+    state: State
+    stop: Stop
+
+
+def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
+    """A point of what Newton's method found."""
+    values, log = cycles.multipliers(s.W)
+    with np.errstate(all="ignore"):
+        product, exact = np.exp(log), np.exp(s.divergence)
+        defect = abs(product - exact) / max(1.0, exact)
+        if not np.isfinite(exact):
+            defect = abs(log - s.divergence)
+    trivial = 0.0 if cycles.forced else float(np.min(np.abs(values - 1.0)))
+    return Point(
+        s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
+        float(defect), cycles.mesh_error(s.orbit),
+    )  # fmt: skip
+
+
+def begin(cycles: Cycles, start: Point, forward: bool) -> State:
+    """The state of a trace that begins at a point."""
+    side = 1.0 if forward else -1.0
+    return State(start.orbit, side * start.dx, side * start.dy, cycles.options.initial_step, 0.0, 0)
+
+
+def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
+    """Follow a family from a state for at most so many points."""
+    found: list[Point] = []
+    while len(found) < points:
+        made, state_or_stop = advance(cycles, state)
+        if made is None:
+            assert isinstance(state_or_stop, Stop)
+            return Track(tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop))
+        assert isinstance(state_or_stop, State)
+        end = ends.end_of(cycles, state, made, start)
+        if end is not None:
+            last, stop = end
+            if last is not None:
+                found.append(last)
+            return Track(tuple(found), state_or_stop, stop)
+        found.append(made)
+        state = state_or_stop
+    return Track(tuple(found), state, Stop("max_points", f"max_points = {points} were reached"))
+
+
+def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
+    """The next point, and the state from which to go on."""
+    o = cycles.options
+    step = min(state.step, o.max_step)
+    reason = ""
+    while step >= o.min_step:
+        made = attempt(cycles, state, step)
+        if isinstance(made, str):
+            reason = made
+            step *= 0.5
+            continue
+        solution, cosine = made
+        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        if angle > o.max_turn:
+            reason = f"the branch turns by more than max_turn = {o.max_turn:g}"
+            step *= 0.5
+            continue
+        point = point_of(cycles, solution, state.arclength + step, step)
+        grow = float(np.clip(o.turn / max(angle, 1e-3), 0.5, 2.0))
+        if solution.steps > 5:
+            grow = min(grow, 0.7)
+        after = State(
+            solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step),
+            state.arclength + step, state.since + 1,
+        )  # fmt: skip
+        return point, _meshed(cycles, after)
+    where = ", ".join(f"{name} = {v:.9g}" for name, v in _named(cycles, state.orbit).items())
+    return None, Stop(
+        "stuck", f"no step longer than min_step = {o.min_step:g} succeeded at {where}: {reason}"
+    )
+
+
+def _named(cycles: Cycles, orbit: Orbit) -> dict[str, float]:
+    names = [cycles.field.parameters[i] for i in cycles.active]
+    return dict(zip(["period", *names], orbit.y.tolist(), strict=True))
+
+
+def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
+    """Newton's method a step ahead, and the cosine of the turn; or why there is no point."""
+    orbit, dx, dy = state.orbit, state.dx, state.dy
+    guess = Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+    if not guess.y[0] > 0.0:
+        return "the period vanished"
+    for _ in range(4):
+        rows, rows_y, target = cycles.rows(orbit, dx, dy)
+        target[-1] += step
+        found = cycles.correct(guess, rows, rows_y, target)
+        if not found.converged:
+            return found.message
+        if cycles.options.intervals is not None:
+            break
+        error = cycles.mesh_error(found.orbit)
+        if error <= cycles.options.mesh_tolerance:
+            break
+        count = max(count_for(cycles, found.orbit), int(1.1 * found.orbit.intervals) + 1)
+        if count > cycles.options.max_intervals:
+            return (
+                f"the mesh error {error:.2g} asks for {count} intervals, more than max_intervals = "
+                f"{cycles.options.max_intervals}"
+            )
+        mesh = collocation.even(
+            found.orbit.mesh, found.orbit.x, cycles.m, cycles.amplitudes(found.orbit), count
+        )
+        orbit, (dx,) = cycles.on(mesh, orbit, dx)
+        guess, _ = cycles.on(mesh, found.orbit)
+    else:
+        return f"no mesh brings the mesh error {error:.2g} under its tolerance"
+    return found, cycles.inner(orbit.mesh, dx, found.dx, dy, found.dy)
+
+
+def _meshed(cycles: Cycles, state: State) -> State:
+    """The state with a mesh that follows the orbit, every few points."""
+    if state.since < REMESH:
+        return state
+    mesh = fitted(cycles, state.orbit)
+    orbit, (dx,) = cycles.on(mesh, state.orbit, state.dx)
+    length = np.sqrt(cycles.inner(mesh, dx, dx, state.dy, state.dy))
+    return replace(state, orbit=orbit, dx=dx / length, dy=state.dy / length, since=0)

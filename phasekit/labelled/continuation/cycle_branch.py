@@ -1,0 +1,225 @@
+"""`CycleBranch`: a traced family of periodic orbits with its special points."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from os import PathLike
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.events import find
+from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, go_on, join
+from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.bifurcation.special_points import KINDS
+from phasekit.errors import ParameterError
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.cycle_points import orbit_dataset, points_of
+from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
+from phasekit.labels.arguments import bad, whole
+from phasekit.systems.problem import Problem
+
+NO_START = Stop("start", "the start; this direction was not asked for")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CycleBranch(Branch):
+    """A family of periodic orbits, with its special points.
+
+    Made by `continuation` from an orbit, and by `SpecialPoint.switch` at Hopf points, period
+    doublings and branch points of cycles.
+
+    Attributes
+    ----------
+    points : xarray.Dataset
+        On the dim ``point``, in order along the family: the free parameters by name, ``period``,
+        ``multiplier`` (complex, on the dim ``multiplier``, largest first), ``n_unstable``, for
+        each state x ``x_min``, ``x_max`` and ``x_mean``, ``winding``, the checks
+        ``trivial_error``, ``liouville_error``, ``mesh_error`` and ``residual``, ``n_intervals``,
+        ``arclength``, ``special``, ``step``, ``newton_steps``. Of a recorded q also ``q_min``,
+        ``q_max`` and ``q_mean``.
+    special_points : tuple of SpecialPoint
+        In order along the family: fold_of_cycles (LPC), period_doubling (PD), torus (TR),
+        cycle_branch_point (BPC) and end (EP).
+    stops : tuple of Stop
+        Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, closed,
+        max_points, stuck, start) and ``message``.
+    kind : str
+        cycle.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> brusselator = pk.Problem(
+    ...     ["1 - (b + 1)*x + x**2*y", "b*x - x**2*y"], ("x", "y"), {"b": 1.5}
+    ... )
+    >>> rest = pk.continuation(brusselator, "b", x0=[1.0, 1.5], span=(1, 3))
+    >>> (hopf,) = rest.special("H")
+    >>> cycles = hopf.switch()
+    >>> [stop.reason for stop in cycles.stops]
+    ['hopf', 'bound']
+    >>> round(float(cycles.points.period[-1]), 6)
+    7.157198
+    >>> cycles.orbit(-1).sizes["time"] > 100
+    True
+    """
+
+    curve: Cycles | None  # type: ignore[assignment]
+    start: Point  # type: ignore[assignment]
+    tracks: Tracks  # type: ignore[assignment]
+    path: tuple[Point, ...] = ()
+    origin: Stop = NO_START
+
+    def orbit(self, i: int) -> xr.Dataset:
+        """The orbit of a point over time, with its numbers as scalars.
+
+        Parameters
+        ----------
+        i : int
+            The place of the point; negative ones count from the end.
+        """
+        count = len(self.path)
+        at = i if isinstance(i, (int, np.integer)) and not isinstance(i, bool) else count
+        if not -count <= at < count:
+            raise bad("i", i, f"a whole number from {-count} to {count - 1}")
+        cycles, problem = self.known()
+        label = str(self._points["special"].values[at])
+        return orbit_dataset(problem, cycles, self.path[at], label)
+
+    def known(self) -> tuple[Cycles, Problem]:  # type: ignore[override]
+        """The family and the problem, or the error that they are not known."""
+        if self.curve is None or self.problem is None:
+            raise ParameterError(
+                "problem: the branch was loaded without its problem, which is Python code; "
+                "use Branch.load(path, problem=...)"
+            )
+        return self.curve, self.problem
+
+    def to_dataset(self) -> xr.Dataset:
+        """The points with the special points beside them, on the dim ``special_point``."""
+        ds = super().to_dataset()
+        ds["special_period"] = (
+            "special_point", np.array([s["period"] for s in self.special_points]),
+        )  # fmt: skip
+        return ds
+
+    def extend(self, points: int | None = None) -> CycleBranch:
+        """Go on where the family ended for its number of points; a new branch.
+
+        Its points are, bit for bit, those of a branch that was never interrupted.
+        """
+        cycles, problem = self.known()
+        if all(track is None or track.stop.reason != "max_points" for track in self.tracks):
+            reasons = "; ".join(stop.message for stop in self.stops)
+            raise ParameterError(
+                f"extend: the branch ended for other reasons than max_points: {reasons}"
+            )
+        count = cycles.options.max_points if points is None else points
+        count = whole("points", count, "a whole number >= 1")
+        backward, forward = (go_on(cycles, t, count, self.start) for t in self.tracks)
+        if forward is not None and forward.stop.reason == "closed":
+            backward = None
+        made = (backward, forward)
+        return make_cycles(problem, cycles, self.start, made, self.record, self.origin)
+
+    def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
+        """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""
+        importlib.import_module("phasekit.labelled.continuation.cycle_store").save(
+            self, path, overwrite
+        )
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles are made again of what was traced, as when a branch is loaded."""
+        cycles, problem = self.known()
+        skip = ("field", "clock")
+        kept = {f.name: getattr(cycles, f.name) for f in fields(cycles) if f.name not in skip}
+        return _again, (problem, kept, self.start, self.tracks, dict(self.record), self.origin)
+
+    def __repr__(self) -> str:
+        """Write what it is, its range, its special points and why it ends."""
+        u = {name: self._points[name].values for name in (*self.free, "period")}
+        ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
+        lines = [f"<Branch of periodic orbits: {len(self.path)} points, {ranges}"]
+        shown = [s for s in self.special_points if s.kind != "end"]
+        lines += [f"  {special!r}" for special in shown[:20]]
+        lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []
+        lines += [
+            f"  {name}: {stop.reason}, {stop.message}"
+            for name, stop in zip(("first", "last"), self.stops, strict=True)
+        ]
+        return "\n".join(lines) + ">"
+
+
+def make_cycles(
+    problem: Problem,
+    cycles: Cycles,
+    start: Point,
+    tracks: Tracks,
+    record: Mapping[str, Any],
+    origin: Stop = NO_START,
+) -> CycleBranch:
+    """A branch of what was traced: special points are looked for, quantities recorded."""
+    path = join(start, tracks, origin)
+    found = [*find(cycles, path), *_ends(path)]
+    found.sort(key=lambda one: (one.index, one.point.arclength))
+    points, labels, places = list(path.points), [""] * len(path.points), []
+    shift = 0
+    for one in found:
+        if one.kind == "end":
+            places.append(0 if one.index < 0 else len(points) - 1)
+            continue
+        place = one.index + 1 + shift
+        points.insert(place, one.point)
+        labels.insert(place, KINDS[one.kind].label)
+        places.append(place)
+        shift += 1
+    places = [len(points) - 1 if one.kind == "end" and one.index >= 0 else p
+              for one, p in zip(found, places, strict=True)]  # fmt: skip
+    for one, place in zip(found, places, strict=True):
+        if one.kind == "end":
+            labels[place] = KINDS["end"].label
+    names = tuple(cycles.field.parameters[i] for i in cycles.active)
+    branch = CycleBranch(
+        problem, names, cycles.field.states, cycles, start, tracks,
+        points_of(problem, cycles, points, labels, record), (), path.stops, "cycle",
+        MappingProxyType(dict(record)), path=tuple(points), origin=origin,
+    )  # fmt: skip
+    made: tuple[CyclePoint, ...] = tuple(
+        cycle_point(problem, cycles, one, place, branch)
+        for one, place in zip(found, places, strict=True)
+    )
+    object.__setattr__(branch, "special_points", made)
+    return branch
+
+
+def _ends(path: Any) -> list[Found]:
+    if path.stops[1].reason == "closed":
+        return []
+    ends = []
+    for index, point, stop in (
+        (-1, path.points[0], path.stops[0]),
+        (len(path.points), path.points[-1], path.stops[1]),
+    ):
+        at = float(point.orbit.y[1])
+        ends.append(Found("end", point, index, (at, at), "converged", stop.message, {}))
+    return ends
+
+
+def _again(
+    problem: Problem,
+    kept: Mapping[str, Any],
+    start: Point,
+    tracks: Tracks,
+    record: Any,
+    origin: Stop,
+) -> CycleBranch:
+    from phasekit.labelled.continuation.cycle_start import clock_code
+
+    cycles = Cycles(problem.field, clock=clock_code(problem, kept["active"]), **kept)
+    return make_cycles(problem, cycles, start, tracks, record, origin)

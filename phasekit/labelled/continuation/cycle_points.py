@@ -1,0 +1,176 @@
+"""The points of a branch of periodic orbits as a Dataset, and single orbits over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.bifurcation.continuation.periodic import collocation
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+_CHECKS = {
+    "trivial_error": "distance from 1 of the multiplier that is 1; 0 of a forced system",
+    "liouville_error": "product of the multipliers beside exp of the integral of the divergence",
+    "mesh_error": "estimated error of the states beside their amplitudes",
+    "residual": "largest size of x' - f beside that of f",
+}
+ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
+
+
+def critical_count(point: Point, forced: bool, label: str = "") -> int:
+    """Number of multipliers outside the unit circle; -1 where they are not known."""
+    values = point.multipliers
+    if not np.isfinite(values).all() or not point.trusted:
+        return -1
+    if not forced:
+        values = np.delete(values, int(np.argmin(np.abs(values - 1.0))))
+    return int(np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label else 0.0)))
+
+
+def extremes(mesh: FloatArray, x: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
+    """Least and largest values of each column of a piecewise polynomial."""
+    value, _ = collocation.basis(m, np.linspace(0.0, 1.0, 65))
+    low, high = np.min(x, axis=0), np.max(x, axis=0)
+    parts = collocation.pieces(x, m)
+    for c in range(x.shape[1]):
+        for sign, best in ((1.0, high), (-1.0, low)):
+            tops = np.max(sign * parts[:, :, c], axis=1)
+            for j in np.argsort(-tops)[:3]:
+                fine = sign * (value @ parts[j, :, c])
+                k = int(np.argmax(fine))
+                top = float(fine[k])
+                if 0 < k < len(fine) - 1:  # a parabola through the three highest
+                    a, b, d = fine[k - 1 : k + 2]
+                    bend = a - 2.0 * b + d
+                    top = float(b - 0.125 * (d - a) ** 2 / bend) if bend < 0.0 else top
+                best[c] = max(best[c], sign * sign * top) if sign > 0 else min(best[c], -top)
+    return low, high
+
+
+def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:
+    """Numbers of one orbit by name."""
+    orbit, m = point.orbit, cycles.m
+    low, high = extremes(orbit.mesh, orbit.x, m)
+    middle = collocation.mean(orbit.mesh, orbit.x, m)
+    found: dict[str, Any] = {"period": float(orbit.y[0])}
+    for i, name in enumerate(problem.state):
+        found[f"{name}_min"], found[f"{name}_max"] = float(low[i]), float(high[i])
+        found[f"{name}_mean"] = float(middle[i])
+    found["n_unstable"] = critical_count(point, cycles.forced, label)
+    for name in _CHECKS:
+        found[name] = float(getattr(point, name))
+    found["n_intervals"] = orbit.intervals
+    return found
+
+
+def winding(cycles: Cycles) -> list[int]:
+    """Turns of each angle over a period."""
+    angles = cycles.period > 0.0
+    return [int(k) for k in np.round(cycles.turns[angles] / cycles.period[angles])]
+
+
+def points_of(
+    problem: Problem,
+    cycles: Cycles,
+    points: Sequence[Point],
+    labels: Sequence[str],
+    record: Mapping[str, Any],
+) -> xr.Dataset:
+    """The points of a branch, special points in their places."""
+    dim = "point"
+    rows = [summary(problem, cycles, p, one) for p, one in zip(points, labels, strict=True)]
+    free = [cycles.field.parameters[i] for i in cycles.active]
+    data: dict[str, Any] = {}
+    for k, name in enumerate(free):
+        data[name] = (dim, np.array([p.orbit.y[1 + k] for p in points]))
+    for name in rows[0]:
+        kind = np.int64 if name in ("n_unstable", "n_intervals") else np.float64
+        data[name] = (dim, np.array([row[name] for row in rows], dtype=kind))
+    for name, text in _CHECKS.items():
+        data[name] = (*data[name], {"long_name": text})
+    data["period"] = (*data["period"], {"long_name": "period of the orbit"})
+    data["n_intervals"] = (*data["n_intervals"], {"long_name": "mesh intervals"})
+    data["n_unstable"] = (
+        *data["n_unstable"],
+        {"long_name": "number of multipliers outside the unit circle; -1: not known"},
+    )
+    turns = winding(cycles)
+    words = {"long_name": "turns of the angle over a period"}
+    if len(turns) <= 1:
+        data["winding"] = (dim, np.full(len(points), sum(turns), dtype=np.int64), words)
+    else:
+        data["winding"] = ((dim, "angle"), np.tile(np.array(turns), (len(points), 1)), words)
+    data["multiplier"] = (
+        (dim, "multiplier"), np.array([p.multipliers for p in points]),
+        {"long_name": "Floquet multipliers, the largest first"},
+    )  # fmt: skip
+    data["arclength"] = (dim, np.array([p.arclength for p in points]))
+    data["special"] = (dim, np.array(labels, dtype=np.dtypes.StringDType()))
+    data["step"] = (dim, np.array([p.step for p in points]))
+    data["newton_steps"] = (dim, np.array([p.newton_steps for p in points], dtype=np.int64))
+    coords: dict[str, Any] = {k: v for k, v in problem.parameters.items() if k not in free}
+    if len(turns) > 1:
+        coords["angle"] = np.array(list(problem.periods), dtype=np.dtypes.StringDType())
+    if record:
+        data.update(_recorded(problem, cycles, points, record))
+    values = data.pop("multiplier")
+    ds = xr.Dataset(data, coords)
+    ds["multiplier"] = values
+    for array in ds.variables.values():
+        if isinstance(array.data, np.ndarray):
+            array.data.flags.writeable = False
+    return ds
+
+
+def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> xr.Dataset:
+    """One orbit over time, at the places of its mesh, with its numbers as scalars."""
+    orbit = point.orbit
+    at = collocation.times(orbit.mesh, cycles.m) * orbit.y[0]
+    data: dict[str, Any] = {
+        name: ("time", orbit.x[:, i].copy()) for i, name in enumerate(problem.state)
+    }
+    data.update(summary(problem, cycles, point, label))
+    data["multiplier"] = ("multiplier", point.multipliers.copy())
+    turns = winding(cycles)
+    data["winding"] = sum(turns) if len(turns) <= 1 else ("angle", np.array(turns))
+    ds = xr.Dataset(data, {"time": at, **parameters_at(problem, cycles, orbit)})
+    ds = ds.drop_vars("multiplier").assign({"multiplier": ("multiplier", point.multipliers.copy())})
+    return ds
+
+
+def parameters_at(problem: Problem, cycles: Cycles, orbit: Orbit) -> dict[str, float]:
+    """All parameters of the problem at an orbit."""
+    values = dict(problem.parameters)
+    for k, place in enumerate(cycles.active):
+        values[cycles.field.parameters[place]] = float(orbit.y[1 + k])
+    return values
+
+
+def _recorded(
+    problem: Problem, cycles: Cycles, points: Sequence[Point], record: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Least, largest and mean value of each recorded quantity over the orbits."""
+    data: dict[str, Any] = {}
+    for name, function in record.items():
+        found = np.empty((len(points), 3))
+        for i, p in enumerate(points):
+            values = parameters_at(problem, cycles, p.orbit)
+            at = collocation.times(p.orbit.mesh, cycles.m) * p.orbit.y[0]
+            series = np.empty((len(at), 1))
+            for k, x in enumerate(p.orbit.x):
+                time = {} if problem.time is None else {problem.time: float(at[k])}
+                series[k, 0] = float(function(x.copy(), **values, **time))
+            low, high = extremes(p.orbit.mesh, series, cycles.m)
+            middle = collocation.mean(p.orbit.mesh, series, cycles.m)
+            found[i] = low[0], high[0], middle[0]
+        for k, what in enumerate(("min", "max", "mean")):
+            data[f"{name}_{what}"] = ("point", found[:, k])
+    return data

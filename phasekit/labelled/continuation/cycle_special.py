@@ -1,0 +1,76 @@
+"""Special points of branches of periodic orbits."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.family import Found
+from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
+from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.systems.problem import Problem
+
+if TYPE_CHECKING:
+    from phasekit.labelled.continuation.cycle_branch import CycleBranch
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CyclePoint(SpecialPoint):
+    """A periodic orbit at which something happens: LPC, PD, TR, BPC or an end.
+
+    ``x`` is a state on the orbit, ``eigenvalues`` are its multipliers. ``normal_form`` holds the
+    coefficient of the map over one period.
+    """
+
+    special: Found  # type: ignore[assignment]
+    branch: CycleBranch
+
+    @property
+    def corank(self) -> int:
+        """Number of critical multipliers besides the one that is always 1; 0 at ends."""
+        return {"end": 0, "torus": 2}.get(self.kind, 1)
+
+    @property
+    def period(self) -> float:
+        """The period of the orbit."""
+        return float(self.special.point.orbit.y[0])
+
+    @property
+    def orbit(self) -> xr.Dataset:
+        """The orbit over time."""
+        cycles, problem = self.branch.known()
+        return orbit_dataset(problem, cycles, self.special.point, self.label)
+
+    def __getitem__(self, name: str) -> float:
+        """A state, a parameter or the period by name."""
+        return self.period if name == "period" else super().__getitem__(name)
+
+    def switch(self, *, direction: int = 0, options: Any = None) -> CycleBranch:
+        """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
+        module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
+        return module.switched(self, direction, options)  # type: ignore[no-any-return]
+
+    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Any:
+        """The curve of such orbits in this branch's parameter and a second one."""
+        module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
+        return module.point_curve(self, parameter, span, options)
+
+
+def cycle_point(
+    problem: Problem, cycles: Cycles, found: Found, index: int, branch: CycleBranch
+) -> CyclePoint:
+    """A special point of a branch of periodic orbits."""
+    point = found.point
+    x = point.orbit.x[0].copy()
+    x.flags.writeable = False
+    return CyclePoint(
+        found.kind, x, MappingProxyType(parameters_at(problem, cycles, point.orbit)),
+        found.interval, point.residual, found.status, found.message,
+        MappingProxyType(dict(found.normal_form)), point.multipliers.copy(), index, found, branch,
+    )  # fmt: skip

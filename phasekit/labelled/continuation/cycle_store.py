@@ -1,0 +1,195 @@
+"""Branches of periodic orbits on disk: everything that they hold, to the last bit.
+
+The orbits of a track have meshes of their own, so they stand one after another in flat arrays,
+with the number of mesh intervals of each beside them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.family import Tracks
+from phasekit.bifurcation.continuation.periodic.trace import Point, State, Track
+from phasekit.labelled.continuation.branch_stored import Stored, damaged
+from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_start import clock_code
+from phasekit.labels.arguments import flag
+from phasekit.maps.whole import WholeTarget, target_of
+from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+_NAME = "Branch"
+#: Arrays of a family, by name.
+_ARRAYS = ("par", "turns", "scale", "width", "low", "high", "period")
+#: Numbers of a point, in their columns.
+_NUMBERS = (
+    "arclength", "step", "newton_steps", "residual", "sign", "trivial_error", "liouville_error",
+    "mesh_error",
+)  # fmt: skip
+_SIDES = ("backward", "forward")
+
+
+def save(branch: CycleBranch, path: str | PathLike[str], overwrite: bool) -> None:
+    """Write a branch: its points as a Dataset, and what it takes to go on."""
+    cycles, problem = branch.known()
+    flag("overwrite", overwrite)
+    target = WholeTarget(target_of(path), overwrite=overwrite)
+    ds = branch.to_dataset()
+    values = ds["multiplier"].values
+    ds = ds.drop_vars("multiplier")
+    for part, array in (("real", values.real), ("imag", values.imag)):
+        ds[f"multiplier_{part}"] = (("point", "number"), array)
+    raw: dict[str, FloatArray] = {f"cycles_{name}": getattr(cycles, name) for name in _ARRAYS}
+    raw.update(_packed("start", [branch.start]))
+    for side, track in zip(_SIDES, branch.tracks, strict=True):
+        if track is not None:
+            raw.update(_packed(side, track.points))
+            raw.update(_packed_state(f"{side}_state", track.state))
+    for name, array in raw.items():
+        ds[f"raw_{name}"] = (tuple(f"raw_{name}_{k}" for k in range(array.ndim)), array)
+    spec = {
+        "problem": problem.specification(),
+        "free": list(branch.free),
+        "kind": branch.kind,
+        "options": cycles.options.as_dict(),
+        "multiple": cycles.multiple,
+        "origin": [branch.origin.reason, branch.origin.message],
+        "stops": [
+            None if track is None else [track.stop.reason, track.stop.message]
+            for track in branch.tracks
+        ],
+        "record": {name: function is None for name, function in branch.record.items()},
+    }
+    ds.attrs = {
+        MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
+    }  # fmt: skip
+    target.write(ds)
+
+
+def made_again(stored: Stored, problem: Problem, functions: Mapping[str, Any]) -> CycleBranch:
+    """The branch of periodic orbits that a file holds."""
+    with damaged(stored.name, "its periodic orbits"):
+        cycles = _cycles(stored, problem)
+        (start,) = _unpacked(stored, "start", cycles)
+        tracks: list[Track | None] = []
+        for side, stop in zip(_SIDES, stored.spec["stops"], strict=True):
+            if stop is None:
+                tracks.append(None)
+                continue
+            points = _unpacked(stored, side, cycles)
+            state = _unpacked_state(stored, f"{side}_state", cycles)
+            tracks.append(Track(tuple(points), state, Stop(str(stop[0]), str(stop[1]))))
+        both: Tracks = (tracks[0], tracks[1])
+        origin = Stop(*map(str, stored.spec["origin"]))
+    return make_cycles(problem, cycles, start, both, functions, origin)
+
+
+def _cycles(stored: Stored, problem: Problem) -> Cycles:
+    options = dict(stored.spec["options"])
+    options["detect"] = tuple(options["detect"])
+    options["bounds"] = {k: tuple(v) for k, v in options["bounds"].items()}
+    names, free = list(problem.parameters), list(stored.spec["free"])
+    active = tuple(names.index(name) for name in free)
+    if not 1 <= len(set(active)) == len(active) <= 2:
+        raise ValueError(f"free: got {free}, wants one or two different parameters")
+    n, k, forced = len(problem.state), len(active), problem.time is not None
+    shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
+    shapes.update({name: (k,) for name in ("width", "low", "high")}, par=(len(names) + forced,))
+    arrays: dict[str, Any] = {
+        name: stored.array(f"cycles_{name}", shapes[name]) for name in _ARRAYS
+    }
+    multiple = stored.spec["multiple"]
+    if not isinstance(multiple, int) or multiple < 1:
+        raise ValueError(f"multiple: got {multiple!r:.80}, wants a whole number >= 1")
+    if not ((arrays["scale"] > 0.0).all() and (arrays["width"] > 0.0).all()):
+        raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
+    return Cycles(
+        problem.field, active=active, forced=forced, clock=clock_code(problem, active),
+        multiple=multiple, options=ContinuationOptions(**options), **arrays,
+    )  # fmt: skip
+
+
+def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
+    """Points as flat arrays."""
+    n = points[0].orbit.x.shape[1] if points else 0
+    q = len(points[0].dy) if points else 0
+    table = [[float(getattr(p, one)) for one in _NUMBERS] for p in points]
+    values = np.array([p.multipliers for p in points]).reshape(len(points), n)
+
+    def flat(arrays: list[FloatArray], *shape: int) -> FloatArray:
+        return np.concatenate(arrays) if arrays else np.empty((0, *shape))
+
+    return {
+        f"{name}_numbers": np.array(table).reshape(len(points), len(_NUMBERS)),
+        f"{name}_intervals": np.array([float(p.orbit.intervals) for p in points]),
+        f"{name}_mesh": flat([p.orbit.mesh for p in points]),
+        f"{name}_x": flat([p.orbit.x for p in points], n),
+        f"{name}_dx": flat([p.dx for p in points], n),
+        f"{name}_y": np.array([p.orbit.y for p in points]).reshape(len(points), q),
+        f"{name}_dy": np.array([p.dy for p in points]).reshape(len(points), q),
+        f"{name}_real": values.real.copy(),
+        f"{name}_imag": values.imag.copy(),
+    }
+
+
+def _packed_state(name: str, state: State) -> dict[str, FloatArray]:
+    return {
+        f"{name}_mesh": state.orbit.mesh,
+        f"{name}_x": state.orbit.x,
+        f"{name}_dx": state.dx,
+        f"{name}_y": np.stack([state.orbit.y, state.dy]),
+        f"{name}_numbers": np.array([state.step, state.arclength, float(state.since)]),
+    }
+
+
+def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
+    n, q, m = cycles.n, cycles.q, cycles.m
+    counts = stored.array(f"{name}_intervals", (None,))
+    intervals = counts.astype(int)
+    total = len(counts)
+    if (intervals < 1).any() or (intervals != counts).any():
+        raise ValueError(f"raw_{name}_intervals: wants whole numbers >= 1")
+    places = int(np.sum(intervals * m + 1))
+    # Of no points there is nothing that has a shape.
+    width, columns = (n, q) if total else (0, 0)
+    table = stored.array(f"{name}_numbers", (total, len(_NUMBERS)), finite=False)
+    mesh = stored.array(f"{name}_mesh", (int(np.sum(intervals + 1)),))
+    x, dx = (stored.array(f"{name}_{one}", (places, width)) for one in ("x", "dx"))
+    y, dy = (stored.array(f"{name}_{one}", (total, columns)) for one in ("y", "dy"))
+    real, imag = (
+        stored.array(f"{name}_{one}", (total, width), finite=False) for one in ("real", "imag")
+    )
+    points, at, node = [], 0, 0
+    for i, count in enumerate(intervals):
+        here, nodes = slice(at, at + count * m + 1), slice(node, node + count + 1)
+        at, node = here.stop, nodes.stop
+        numbers: dict[str, Any] = dict(zip(_NUMBERS, table[i].tolist(), strict=True))
+        numbers["newton_steps"] = int(numbers["newton_steps"])
+        values = np.empty(n, dtype=complex)
+        values.real, values.imag = real[i], imag[i]
+        points.append(
+            Point(
+                Orbit(mesh[nodes], x[here], y[i].copy()), dx[here], dy[i].copy(), values, **numbers
+            )
+        )
+    return points
+
+
+def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
+    mesh = stored.array(f"{name}_mesh", (None,))
+    places = (len(mesh) - 1) * cycles.m + 1
+    x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
+    y = stored.array(f"{name}_y", (2, cycles.q))
+    step, arclength, since = stored.array(f"{name}_numbers", (3,)).tolist()
+    return State(Orbit(mesh, x, y[0].copy()), dx, y[1].copy(), step, arclength, int(since))

@@ -1,0 +1,305 @@
+"""`periodic_orbit`: from a guess, a simulation or samples to a periodic orbit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.bifurcation.continuation.code_fields import PythonField
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic import kernels, starts
+from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.labelled.continuation.continuation import check_options
+from phasekit.labelled.continuation.cycle_start import (
+    cycles_of,
+    given_orbit,
+    orbit_of,
+    sampled,
+    scale_of,
+)
+from phasekit.labels.arguments import bad, number, numeric
+from phasekit.systems.problem import Problem, as_problem
+
+FloatArray = npt.NDArray[np.float64]
+
+TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
+LONGEST = 2000  # steps of the slowest time scale that a search for a return may take
+SAMPLES = 2001
+
+
+def periodic_orbit(
+    problem: Any,
+    x0: Any,
+    period: float | None = None,
+    *,
+    settle: float | None = None,
+    options: ContinuationOptions | None = None,
+) -> xr.Dataset:
+    """Find a periodic orbit near a state, a simulation or samples.
+
+    Parameters
+    ----------
+    problem : Problem
+        The system, at the parameters of the orbit.
+    x0 : array_like, mapping or xarray.Dataset
+        A state, from which the system is simulated; or one period of samples: an array of shape
+        (samples, states), even in time, or a Dataset of the states on ``time``.
+    period : float, optional
+        About how long the orbit takes. Of a forced system by default the period of the forcing;
+        otherwise of a simulation the time until it returns.
+    settle : float, optional
+        Time that is simulated first, so that transients decay. By default none with a period given,
+        and otherwise as much as it takes.
+    options : ContinuationOptions, optional
+        ``degree``, ``intervals``, ``mesh_tolerance``.
+
+    Returns
+    -------
+    xarray.Dataset
+        The states on ``time``, from 0 to the period, and as scalars ``period``, ``n_unstable``, the
+        checks and extremes that points of a branch have; ``multiplier``. `continuation` takes it
+        as ``orbit=``.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+    ConvergenceError
+        If no periodic orbit is found.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> oscillator = pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 1.0})
+    >>> orbit = pk.periodic_orbit(oscillator, [2.0, 0.0])
+    >>> round(float(orbit.period), 9), int(orbit.n_unstable)
+    (6.663286859, 0)
+    >>> branch = pk.continuation(oscillator, "mu", orbit=orbit, span=(0.5, 2.0))
+    >>> round(float(branch.points.period[-1]), 9)
+    7.629874480
+    """
+    problem = as_problem(problem)
+    options = check_options(options)
+    n = len(problem.state)
+    if period is not None:
+        period = number("period", period, "a number > 0", None)
+        if not period > 0.0:
+            raise bad("period", period, "a number > 0")
+    if settle is not None:
+        settle = number("settle", settle, "a number >= 0", None)
+        if settle < 0.0:
+            raise bad("settle", settle, "a number >= 0")
+    value = next(iter(problem.parameters.values()), 0.0)
+    if not problem.parameters:
+        raise bad("problem", problem, "a problem with at least one parameter")
+    if isinstance(x0, xr.Dataset):
+        if settle is not None:
+            raise bad("settle", settle, "None with samples")
+        ds = x0
+        if "period" not in ds:
+            ds = _with_period(ds, period)
+        guesses = [given_orbit(problem, ds, value, options.degree)]
+        return _found(problem, guesses, options, "from the samples")
+    if isinstance(x0, Mapping):
+        missing = [name for name in problem.state if name not in x0]
+        if missing or len(x0) != n:
+            raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
+        x0 = [x0[name] for name in problem.state]
+    wants = f"{n} numbers ({', '.join(problem.state)}), or samples of shape (samples, {n})"
+    x = np.atleast_1d(np.asarray(numeric("x0", x0, None, wants), dtype=float))
+    if not np.isfinite(x).all() or x.shape[-1] != n or x.ndim > 2:
+        raise bad("x0", x0, wants)
+    if problem.time is not None and period is None:
+        period = problem.forcing_period
+    if x.ndim == 2 and len(x) > 1:
+        if period is None:
+            raise bad("period", None, "a number > 0, with samples")
+        if settle is not None:
+            raise bad("settle", settle, "None with samples")
+        closed = np.max(np.abs(x[-1] - x[0])) < 1e-6 * np.max(np.abs(x - x.mean(axis=0)))
+        at = np.linspace(0.0, 1.0, len(x), endpoint=bool(closed))
+        guesses = [sampled(problem, at, x, period, value, options.degree)]
+        return _found(problem, guesses, options, "from the samples")
+    x = x.reshape(n)
+    run = _Simulation(problem)
+    if period is not None:
+        start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
+        at, states = run(start, 0.0, period, SAMPLES)
+        guesses = [sampled(problem, at / period, states, period, value, options.degree)]
+        return _found(problem, guesses, options, f"from x0 = {x.tolist()} with period {period:.6g}")
+    return _searched(problem, x, settle, run, value, options)
+
+
+def _whole(problem: Problem, settle: float, period: float) -> float:
+    """A time to settle that is whole periods of the forcing."""
+    if problem.time is None:
+        return settle
+    return float(np.ceil(settle / period - 1e-9)) * period
+
+
+def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
+    if "time" not in ds.dims or "time" not in ds.coords:
+        raise bad("x0", list(map(str, ds.dims)), "states on the dim and coordinate 'time'")
+    time = np.asarray(ds["time"].values, dtype=float)
+    if period is None:
+        period = float(time[-1] - time[0])
+    inside = time - time[0] <= period * (1.0 + 1e-12)
+    return ds.isel(time=inside).assign(period=period)
+
+
+def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr.Dataset:
+    """The orbit that the first of some guesses leads to."""
+    name = next(iter(problem.parameters))
+    value = problem.parameters[name]
+    width = max(abs(value), 1.0)
+    said = ""
+    for guess, turns, multiple in guesses:
+        cycles = cycles_of(
+            problem, [name], [(value - width, value + width)], scale_of(guess.x), turns, options,
+            multiple,
+        )  # fmt: skip
+        found = starts.settled(cycles, guess)
+        if not found.converged:
+            said = found.message
+            continue
+        size = float(np.max(np.ptp(found.orbit.x, axis=0) / cycles.scale))
+        if size < 1e-6 and not cycles.forced:
+            said = "it led to an equilibrium"
+            continue
+        found.orbit.y[1] = value
+        return orbit_of(cycles, problem, found, where)
+    raise ConvergenceError(
+        f"x0: no periodic orbit was found {where}: {said}; give another x0 or period, or settle="
+    )
+
+
+class _Simulation:
+    """The motion of a problem from a state."""
+
+    def __init__(self, problem: Problem) -> None:
+        self.problem, n = problem, len(problem.state)
+        par = np.array([*problem.parameters.values(), *([0.0] if problem.time else [])])
+        field: Any = problem.field
+
+        if isinstance(field, PythonField):
+
+            def f(t: float, x: FloatArray) -> FloatArray:
+                time = {} if problem.time is None else {problem.time: t}
+                return field.value(x.copy(), {**problem.parameters, **time})
+        else:
+            address = field.first(())
+            w = np.zeros(n + n * (n + 1))
+
+            def f(t: float, x: FloatArray) -> FloatArray:
+                w[:n] = x
+                if problem.time is not None:
+                    par[-1] = t
+                kernels.evaluate(address, par, w, n)
+                return w[n : 2 * n].copy()
+
+        self.f: Callable[[float, FloatArray], FloatArray] = f
+
+    def __call__(
+        self, x: FloatArray, begin: float, length: float, samples: int = 2, **keywords: Any
+    ) -> tuple[FloatArray, FloatArray]:
+        """Times and states of the motion over some time."""
+        from scipy.integrate import solve_ivp
+
+        at = np.linspace(begin, begin + length, samples)
+        with np.errstate(all="ignore"):
+            try:
+                solution = solve_ivp(
+                    self.f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
+                    atol=1e-10 * max(1e-6, float(np.max(np.abs(x)))), **keywords,
+                )  # fmt: skip
+            except (ValueError, ArithmeticError) as error:
+                if isinstance(error, ParameterError):
+                    raise
+                raise ConvergenceError(
+                    f"x0: the simulation from {x.tolist()} failed: {error}"
+                ) from error
+        if (
+            not solution.success
+            or not np.isfinite(solution.y).all()
+            or solution.y.shape[1] < samples
+        ):
+            raise ConvergenceError(
+                f"x0: the simulation from {x.tolist()} did not reach the time {length:.6g}: "
+                f"{solution.message}"
+            )
+        return at - begin, solution.y.T
+
+
+def _searched(
+    problem: Problem, x: FloatArray, settle: float | None, run: _Simulation, value: float,
+    options: Any,
+) -> xr.Dataset:  # fmt: skip
+    """The orbit near a state from which a simulation returns, after ever longer transients."""
+    if settle:
+        x = run(x, 0.0, settle)[1][-1]
+    said: ConvergenceError | None = None
+    waited = 0.0
+    unit = 0.0
+    for times in TURNS if settle is None else TURNS[:1]:
+        if times:
+            if not unit > 0.0:
+                break
+            more = (times - waited) * unit
+            x = run(x, 0.0, more)[1][-1]
+            waited = times
+        try:
+            period = _return(problem, x, run)
+        except ConvergenceError as error:
+            said = error
+            unit = unit or _pace(run, x)
+            continue
+        unit = unit or period
+        at, states = run(x, 0.0, period, SAMPLES)
+        try:
+            guesses = [sampled(problem, at / period, states, period, value, options.degree)]
+            return _found(problem, guesses, options, f"after a return in {period:.6g}")
+        except ConvergenceError as error:
+            said = error
+    raise said or ConvergenceError("x0: no periodic orbit was found; give a period")
+
+
+def _pace(run: _Simulation, x: FloatArray) -> float:
+    """A time in which the state moves by about its own size."""
+    speed = float(np.linalg.norm(run.f(0.0, x)))
+    return 10.0 * max(float(np.linalg.norm(x)), 1e-3) / speed if speed > 0.0 else 0.0
+
+
+def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
+    """Time until the motion crosses the plane across its start again, where it started."""
+    pace = _pace(run, x)
+    if not pace > 0.0:
+        raise ConvergenceError("x0: it is an equilibrium; give a state off it")
+    angles = np.array([problem.periods.get(name, 0.0) for name in problem.state])
+    length = 2.0 * pace
+    for _ in range(8):
+        at, states = run(x, 0.0, length, SAMPLES)
+        gaps = states - x
+        for i in np.flatnonzero(angles > 0.0):
+            gaps[:, i] -= angles[i] * np.round(gaps[:, i] / angles[i])
+        sizes = np.ptp(states, axis=0)
+        sizes = np.where(angles > 0.0, np.where(angles > 0.0, angles, 1.0), sizes)
+        sizes = np.where(sizes > 0.0, sizes, 1.0)
+        normal = run.f(0.0, x) / sizes**2
+        side = gaps @ normal
+        near = np.sqrt(np.mean((gaps / sizes) ** 2, axis=1))
+        crossing = np.flatnonzero((side[:-1] < 0.0) & (side[1:] >= 0.0))
+        crossing = crossing[near[crossing] < 0.25]
+        if len(crossing):
+            close = near[crossing]
+            # The first return that is about as near as any.
+            k = crossing[np.flatnonzero(close <= 2.0 * np.min(close) + 0.01)[0]]
+            part = side[k] / (side[k] - side[k + 1])
+            return float(at[k] + part * (at[k + 1] - at[k]))
+        length *= 3.0
+    raise ConvergenceError(
+        f"x0: the motion from {x.tolist()} does not return within {length / 3.0:.4g}; give a period"
+    )
