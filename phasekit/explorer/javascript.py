@@ -11,16 +11,19 @@ from typing import Any
 
 from phasekit.errors import ParameterError
 
+#: Functions that the page has besides those of JavaScript, and those whose order is whole.
+SPECIAL = (
+    "erf erfc erfi erfinv gamma loggamma polygamma airyai airyaiprime airybi airybiprime LambertW "
+    "Si Ci Ei fresnels fresnelc elliptic_k elliptic_e besselj bessely besseli besselk"
+).split()
+ORDERED = "besselj bessely besseli besselk polygamma".split()
 #: Functions by the names of their classes in sympy.
 FUNCTIONS = {
     **{name: f"Math.{name}" for name in "sin cos tan sinh cosh tanh exp log".split()},
     **{name: f"Math.{name}" for name in "asin acos atan asinh acosh atanh atan2".split()},
     **{"Abs": "Math.abs", "Max": "Math.max", "Min": "Math.min", "sign": "Math.sign"},
     "Heaviside": "special.heaviside",
-    **{name: f"special.{name}" for name in "erf erfc erfi gamma loggamma LambertW".split()},
-    **{name: f"special.{name}" for name in "besselj besseli".split()},
-    **{name: f"special.{name}" for name in "elliptic_k elliptic_e".split()},
-    **{name: f"special.{name}" for name in "Si Ci Ei fresnels fresnelc".split()},
+    **{name: f"special.{name}" for name in SPECIAL},
 }
 _COMPARISONS = {
     "StrictLessThan": "<",
@@ -95,6 +98,11 @@ def write(node: Any, names: Mapping[Any, str]) -> str:
         return f"Math.exp({write(node.args[0], names)})"
     if kind == "Piecewise":
         return _piecewise(node, names)
+    if kind in ORDERED and not node.args[0].is_Integer:
+        raise ParameterError(
+            f"system: got a potential with {kind} of the order {node.args[0]}, wants a whole order "
+            "for the page; the library itself takes any"
+        )
     if kind in FUNCTIONS:
         arguments = node.args[:1] if kind == "Heaviside" else node.args
         return f"{FUNCTIONS[kind]}({', '.join(write(arg, names) for arg in arguments)})"

@@ -133,8 +133,34 @@ def _potential(system: Potential) -> str:
     ends = formula.interval or (-float("inf"), float("inf"))
     lines += [
         f"powers: {powers}",
+        f"joints: [{', '.join(joints(formula.expression, x, names))}]",
         f"period: {'null' if formula.period is None else javascript.number(formula.period)}",
         f"ends: [{javascript.number(ends[0])}, {javascript.number(ends[1])}]",
         "loads: null",
     ]
     return '{kind: "potential",\n' + ",\n".join(lines) + "}"
+
+
+def joints(expression: Any, x: Any, names: dict[Any, str]) -> list[str]:
+    """Write functions that vanish where a formula goes over to another branch.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> x = sympy.Symbol("x", real=True)
+    >>> joints(abs(x - 1) + sympy.Max(x, x**2), x, {x: "x"})
+    ['(x, p) => { return (-1)+x; }', '(x, p) => { return x+(-(x*x)); }']
+    """
+    import sympy as sp
+
+    found = []
+    for part in sp.preorder_traversal(expression):
+        if isinstance(part, (sp.Abs, sp.sign, sp.Heaviside)):
+            found.append(part.args[0])
+        elif isinstance(part, (sp.Max, sp.Min)):
+            found += [one - part.args[0] for one in part.args[1:]]
+            found += [one - part.args[1] for one in part.args[2:]]
+        elif part.is_Relational:
+            found.append(part.lhs - part.rhs)
+    moving = [part for part in dict.fromkeys(found) if part.has(x)]
+    return sorted(javascript.function([part], names, "x, p") for part in moving)

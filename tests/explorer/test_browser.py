@@ -7,11 +7,13 @@ import math
 import os
 from pathlib import Path
 
+import mpmath
 import numpy as np
 import pytest
 from explorer.browser import Browser, installed
 
 import phasekit as pk
+from phasekit.explorer import javascript
 
 BROWSER = installed()
 COUNT = int(os.environ.get("PHASEKIT_EXPLORED", "6"))
@@ -96,8 +98,8 @@ RANDOM = {
 
 def close(got, wants, scale=1.0, tolerance=1e-9):
     got, wants = number(got), float(wants)
-    if math.isnan(wants) or math.isinf(wants):
-        assert str(got) == str(wants), (got, wants)
+    if not math.isfinite(wants):
+        assert math.isnan(got) == math.isnan(wants) and (math.isnan(wants) or got == wants)
     else:
         assert abs(got - wants) <= tolerance * max(abs(wants), scale), (got, wants)
 
@@ -181,6 +183,104 @@ def same_motions(flow, system, states, times, speed):
         for (phi, dphi), i in zip(found, range(len(times)), strict=True):
             close(phi, wants.motion_phi[i].item())
             close(dphi, wants.motion_dphi[i].item(), speed)
+
+
+POTENTIALS = {
+    "double well": pk.Potential("x^4/4 - mu*x^2/2 + c*x", "x", {"mu": 1.3, "c": 0.1}),
+    "one well": pk.Potential("cosh(x) + a*x", "x", {"a": 0.4}, interval=(-4, 4)),
+    "two saddles": pk.Potential("x^2/2 - x^4/4", "x"),
+    "escape": pk.Potential("x^2/2 - k*x^3/3", "x", {"k": 0.7}),
+    "circle": pk.Potential("-cos(q) + b*cos(2*q) + 0.2*sin(3*q)", "q", {"b": 0.6}, period="2*pi"),
+    "short circle": pk.Potential("cos(2*pi*q/3)*h", "q", {"h": 2.0}, period=3.0),
+    "morse": pk.Potential("(1 - exp(-x))^2", "x", interval=(-2, 12)),
+    "branches": pk.Potential(
+        "Piecewise((x^2, x < 0.5), (x - 0.25 + (x - 0.5)^4, True))", "x", interval=(-2, 2)
+    ),
+    "special": pk.Potential("erf(x)^2 + loggamma(x + 6)/9", "x", interval=(-4, 4)),
+}
+
+
+# Of functions without known bounds the library says that it proved nothing.
+@pytest.mark.filterwarnings("ignore:equilibria of:RuntimeWarning")
+@pytest.mark.parametrize("name", POTENTIALS)
+def test_numbers_of_potentials_are_those_of_the_library(shown, name):
+    system = POTENTIALS[name]
+    ds = pk.equilibria(system)
+    rng = np.random.default_rng(5)
+    low, high = ds.phi.min().item() - 0.3, ds.phi.max().item() + 0.3
+    states = np.column_stack([rng.uniform(low, high, 8), 0.6 * rng.normal(size=8)])
+    page = shown(system, f"#orbits={states[0, 0]}_{states[0, 1]}")
+    (found,) = known(page, [[list(system.parameters.values()), states.tolist(), []]])
+    wants = [(x, KINDS[kind]) for x, kind in zip(ds.phi.values, ds.kind.values, strict=True)]
+    got = sorted((one[0], one[1]) for one in found["points"])
+    assert len(got) == len(wants) > 0
+    for (x, kind), (phi, other) in zip(got, sorted(wants), strict=True):
+        assert kind == other
+        close(x, phi)
+    same_loops_of_a_potential(found["loops"], system)
+    orbits = pk.orbits(system, *states.T)
+    assert len(found["orbits"]) == 8
+    for i, (kind, _, period, action, least, greatest, energy) in enumerate(found["orbits"]):
+        one = orbits.isel(point=i)
+        assert ORBITS[one.orbit_kind.item()] == kind
+        close(period, one.period.item(), 0.0)
+        close(action, one.action.item(), 0.0)
+        if kind == "libration":
+            close(least, one.phi_min.item())
+            close(greatest, one.phi_max.item())
+        close(energy, one.orbit_energy.item())
+
+
+def same_loops_of_a_potential(loops, system):
+    ds = pk.separatrices(system)
+    there = np.flatnonzero(ds.loop.values > 0) if "saddle" in ds.dims else []
+    assert len(loops) == len(there)
+    for i, (x, *sides) in zip(there, loops, strict=True):
+        close(x, ds.saddle_phi[i].item())
+        for side, (kind, area, _) in zip(("left", "right"), (sides[:3], sides[3:]), strict=True):
+            lobe = ds.lobe_area[i].sel(side=side).item()
+            close(area, ds.winding_area[i].item() if kind == "winding" else lobe)
+
+
+SPECIAL = {
+    **{name: np.linspace(-3.0, 3.0, 13) for name in ("erf", "erfc", "erfi", "Si")},
+    **{name: np.linspace(-12.0, 5.0, 18) for name in ("airyai", "airyaiprime")},
+    **{name: np.linspace(-12.0, 5.0, 18) for name in ("airybi", "airybiprime")},
+    **{name: np.linspace(-3.0, 3.0, 13) for name in ("fresnels", "fresnelc")},
+    **{name: np.linspace(0.2, 9.0, 12) for name in ("Ci", "loggamma")},
+    "Ei": np.array([-3.0, -0.2, 0.4, 5.0]),
+    "gamma": np.array([-2.5, -0.3, 0.1, 1.0, 4.5, 20.0]),
+    "erfinv": np.array([-0.999, -0.6, -0.2, 0.0, 0.1, 0.7, 0.9999999]),
+    "LambertW": np.array([-0.35, -0.1, 0.0, 0.5, 3.0, 1e4]),
+    "elliptic_k": np.array([-3.0, 0.0, 0.5, 0.99]),
+    "elliptic_e": np.array([-3.0, 0.0, 0.5, 0.99]),
+    "besselj": np.linspace(-20.0, 20.0, 9),
+    "besseli": np.linspace(-9.0, 9.0, 9),
+    "bessely": np.array([0.05, 0.7, 3.0, 15.0]),
+    "besselk": np.array([0.05, 0.7, 3.0, 15.0]),
+    "polygamma": np.array([-1.5, 0.1, 1.0, 4.5, 30.0]),
+}
+
+
+def test_special_functions_are_those_of_mpmath(shown):
+    page = shown(DISK)
+    assert set(SPECIAL) == set(javascript.SPECIAL)
+    names = {"LambertW": "lambertw", "Si": "si", "Ci": "ci", "Ei": "ei"}
+    names |= {"elliptic_k": "ellipk", "elliptic_e": "ellipe", "polygamma": "psi"}
+    for name, points in SPECIAL.items():
+        orders = (0, 1, 3) if name in javascript.ORDERED else (None,)
+        for order in orders:
+            first = () if order is None else (order,)
+            arguments = [[*first, float(x)] for x in points]
+            found = page.run(f"{json.dumps(arguments)}.map((a) => phasekit.special.{name}(...a))")
+            assert len(found) == len(points) > 3
+            for (*_, x), value in zip(arguments, found, strict=True):
+                if name.startswith("airy"):
+                    derivative = int(name.endswith("prime"))
+                    wants = getattr(mpmath, name[:6])(x, derivative=derivative)
+                else:
+                    wants = getattr(mpmath, names.get(name, name))(*first, x)
+                assert float(value) == pytest.approx(float(wants.real), rel=2e-9, abs=1e-11), (name, order, x)
 
 
 def test_pictures_follow_the_theme_and_the_width(shown, tmp_path):

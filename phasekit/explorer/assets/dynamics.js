@@ -106,7 +106,8 @@ class Potential {
     let near = null;
     this.rise = (x, d) => {
       if (near === null) near = 0.02 * (this.window()[1] - this.window()[0]);
-      if (Math.abs(d) > near) return this.V(x + d) - this.V(x);
+      const whole = Math.abs(d) > near || law.joints.some((f) => f(x, p) * f(x + d, p) < 0);
+      if (whole) return this.V(x + d) - this.V(x);
       let sum = 0;
       for (const [node, weight] of GAUSS) sum += weight * this.slope(x + node * d);
       return sum * d;
@@ -142,9 +143,13 @@ class Potential {
         .filter((x) => x >= low && x <= high)
         .map((x) => ({ x }));
     }
-    return brackets(this.slope, this.bend, ...this.window(), SCAN).map(([a, b, sign]) => ({
-      x: sign === 0 ? a : root(this.slope, this.bend, a, b, sign),
-    }));
+    // A circle is cut where no symmetry puts an equilibrium.
+    const [low, high] = this.window();
+    const shift = this.circle ? 0.01234 * this.period : 0;
+    return brackets(this.slope, this.bend, low + shift, high + shift, SCAN).map(([a, b, sign]) => {
+      const x = sign === 0 ? a : root(this.slope, this.bend, a, b, sign);
+      return { x: x > high ? Math.max(low, x - this.period) : x };
+    });
   }
 
   // The theorem on their location, for A, B, C >= 0; symmetries lead there. One is in the first
@@ -270,7 +275,7 @@ class Potential {
       const sides = {};
       for (const [name, side] of [["left", -1], ["right", 1]]) {
         const end = this.turning(saddle.x, 0, side, i);
-        const one = { kind: "unbounded", area: NaN, offset: NaN };
+        const one = { kind: "unbounded", area: Infinity, offset: NaN };
         if (end.turns) {
           one.kind = "winding";
           one.area = this.action(saddle.x, 0, saddle.x, saddle.x + side * this.period);
@@ -304,7 +309,9 @@ class Potential {
       const depth = near && !(saddle && angle > Math.PI / 2) ? -this.rise(s, d) : -this.rise(t, -back);
       return Math.sqrt(2 * Math.max(0, depth)) * 0.5 * Math.sin(angle);
     };
-    return Math.abs(length) * integral(f, [0, Math.PI / 2, Math.PI]);
+    const [low, high] = [Math.min(s, t), Math.max(s, t)];
+    const angles = this.stops(low, high).slice(1, -1).map((x) => 2 * Math.asin(Math.sqrt((x - s) / length)));
+    return Math.abs(length) * integral(f, [0, Math.PI / 2, Math.PI, ...angles].sort((x, y) => x - y));
   }
 
   // Integral of the speed from a to b, of the motion that has v^2/2 = kinetic at x.
@@ -313,15 +320,24 @@ class Potential {
     return Math.abs(integral(speed, this.stops(a, b)));
   }
 
+  // Where an integral is cut: at equilibria, and where the formula changes its branch.
   stops(a, b) {
     const [low, high] = [Math.min(a, b), Math.max(a, b)];
     const inside = [];
+    for (const joint of this.law.joints ?? []) {
+      const f = (x) => joint(x, this.p);
+      for (let i = 1; i <= SCAN; i++) {
+        const [x, y] = [low + ((high - low) * (i - 1)) / SCAN, low + ((high - low) * i) / SCAN];
+        if (f(y) === 0) inside.push(y);
+        else if (f(x) * f(y) < 0) inside.push(root(f, null, x, y, f(x)));
+      }
+    }
     const n = this.points.length;
     for (let i = -n; n && i < 2 * n; i++) {
       const x = this.at(i);
       if (x !== null && x > low && x < high) inside.push(x);
     }
-    return [low, ...inside, high];
+    return [low, ...inside.filter((x) => x > low && x < high).sort((x, y) => x - y), high];
   }
 
   // ------------------------------------------------------------------ orbits

@@ -186,7 +186,8 @@ function realRoots(coefficients) {
     const one = Math.abs(c[i] / top) ** (1 / (degree - i));
     reach = Math.max(reach, 2 * one);
   }
-  reach = reach * 1.01 + Number.MIN_VALUE;
+  if (reach === 0) return [0];
+  reach *= 1.01;
   const ends = [-reach, ...realRoots(slope), reach];
   const found = [];
   const keep = (x) => {
@@ -196,7 +197,7 @@ function realRoots(coefficients) {
     const [a, b] = [ends[i - 1], ends[i]];
     const [fa, fb] = [at(a), at(b)];
     if (fa === 0 && i > 1) keep(a);
-    if (fa * fb < 0) keep(root(at, slopeAt, a, b, fa));
+    if ((fa < 0 && fb > 0) || (fa > 0 && fb < 0)) keep(root(at, slopeAt, a, b, fa));
   }
   return found;
 }

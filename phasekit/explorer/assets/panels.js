@@ -119,7 +119,10 @@ function drawSeparatrices(plot, pot, { view: { low, high } }) {
 function drawStreams(plot, pot, { view: { low, high, speed }, damping }) {
   const force = (x, v) => -pot.slope(x) - damping * v;
   const rate = Math.sqrt(pot.size) + damping;
-  const stop = (x, v) => !(Math.abs(v) < 2 * speed) || x < low - 3 * (high - low) || x > high + 3 * (high - low);
+  const stop = (x, v) =>
+    !(Math.abs(v) < 2 * speed) ||
+    Math.abs(x - 0.5 * (low + high)) > 3.5 * (high - low) ||
+    (Math.abs(v) < 1e-5 * speed && Math.abs(pot.slope(x)) < 1e-3 * speed * rate);
   plot.style("level", 1);
   for (let i = 0; i < 6; i++) {
     for (let j = 0; j < 6; j++) {
@@ -135,7 +138,7 @@ function drawStreams(plot, pot, { view: { low, high, speed }, damping }) {
       plot.style("separatrix", width, way > 0 ? [5, 3] : []);
       for (const side of [-1, 1]) {
         const d = side * 1e-4 * (high - low);
-        plot.curve(wrapped(pot, path(force, saddle.x + d, d * exponent, (way * 0.05) / rate, 700, stop)));
+        plot.curve(wrapped(pot, path(force, saddle.x + d, d * exponent, (way * 0.07) / rate, 500, stop)));
       }
     }
   }

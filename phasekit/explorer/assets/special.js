@@ -79,6 +79,109 @@ const special = {
     return sum / count;
   },
 
+  besselk(n, x) {
+    if (!(x > 0)) return NaN;
+    const most = Math.acosh(1 + 750 / x); // beyond, nothing is left
+    const f = (t) => Math.exp(-x * Math.cosh(t)) * Math.cosh(n * t);
+    return integral(f, special.stretches(most));
+  },
+
+  bessely(n, x) {
+    if (!(x > 0) || !Number.isInteger(n)) return NaN;
+    const sign = n % 2 ? -1 : 1;
+    const wave = (t) => Math.sin(x * Math.sin(t) - n * t);
+    const most = Math.asinh((750 + 40 * Math.abs(n)) / x);
+    const tail = (t) => (Math.exp(n * t) + sign * Math.exp(-n * t)) * Math.exp(-x * Math.sinh(t));
+    const turns = special.stretches(Math.PI);
+    const whole = integral(wave, turns, 1e-14) - integral(tail, special.stretches(most));
+    return whole / Math.PI;
+  },
+
+  polygamma(n, x) {
+    if (!Number.isInteger(n) || n < 0) return NaN;
+    let factorial = 1; // of n
+    for (let k = 2; k <= n; k++) factorial *= k;
+    const sign = n % 2 ? 1 : -1;
+    let shift = 0;
+    while (x < 20 + n) shift += (sign * factorial) / x++ ** (n + 1);
+    const bernoulli = [1 / 6, -1 / 30, 1 / 42, -1 / 30, 5 / 66, -691 / 2730];
+    let sum = n ? factorial / n / x ** n : -Math.log(x);
+    sum += factorial / (2 * x ** (n + 1));
+    bernoulli.forEach((b, i) => {
+      const k = i + 1;
+      let ratio = n ? 1 : 1 / (2 * k); // (2k + n - 1)!/(2k)!
+      for (let j = 2 * k + 1; j < 2 * k + n; j++) ratio *= j;
+      sum += (b * ratio) / x ** (2 * k + n);
+    });
+    return shift + sign * sum;
+  },
+
+  erfinv(y) {
+    if (!(Math.abs(y) < 1)) return Math.abs(y) === 1 ? y * Infinity : NaN;
+    const w = -Math.log((1 - y) * (1 + y));
+    const a = 2 / (Math.PI * 0.147) - 0.5 * w;
+    let x = Math.sign(y) * Math.sqrt(Math.max(0, Math.sqrt(a * a + w / 0.147) - a));
+    for (let i = 0; i < 20; i++) {
+      const f = Math.abs(y) < 0.5 ? special.erf(x) - y : Math.sign(y) * (1 - Math.abs(y) - special.erfc(Math.abs(x)));
+      const u = (f * Math.sqrt(Math.PI) * Math.exp(x * x)) / 2;
+      const step = u / (1 + x * u);
+      x -= step;
+      if (Math.abs(step) <= 1e-16 * Math.abs(x)) break;
+    }
+    return x;
+  },
+
+  airyai: (x) => special.airy(x)[0],
+  airyaiprime: (x) => special.airy(x)[1],
+  airybi: (x) => special.airy(x)[2],
+  airybiprime: (x) => special.airy(x)[3],
+
+  // Ai, Ai', Bi, Bi': the series about 0, beyond it asymptotic ones; Ai by K where it is small.
+  airy(x) {
+    const [a, b] = [0.355028053887817239, 0.258819403792806798];
+    const far = Math.abs(x) > 8;
+    if (far && x < 0) return special.airyWave(-x);
+    let [f, df, g, dg] = [1, 0, x, 1];
+    let [s, t] = [1, x];
+    for (let k = 1; k < 400; k++) {
+      const cube = x * x * x;
+      const [n, m] = [3 * k, 3 * k + 1];
+      s *= cube / ((n - 1) * n);
+      t *= cube / (n * m);
+      f += s;
+      g += t;
+      df += x ? (n * s) / x : 0;
+      dg += x ? (m * t) / x : 0;
+      if (Math.abs(s) + Math.abs(t) < 1e-17 * (Math.abs(f) + Math.abs(g))) break;
+    }
+    const root3 = Math.sqrt(3);
+    let [ai, aip] = [a * f - b * g, a * df - b * dg];
+    if (x > 2) {
+      const z = (2 / 3) * x ** 1.5;
+      ai = (Math.sqrt(x / 3) / Math.PI) * special.besselk(1 / 3, z);
+      aip = (-x / (Math.PI * root3)) * special.besselk(2 / 3, z);
+    }
+    return [ai, aip, root3 * (a * f + b * g), root3 * (a * df + b * dg)];
+  },
+
+  airyWave(x) {
+    const z = (2 / 3) * x ** 1.5;
+    const sums = [0, 0, 0, 0]; // even and odd terms, of the functions and of their derivatives
+    let u = 1;
+    for (let k = 0; k < 12; k++) {
+      const v = k ? (-(6 * k + 1) / (6 * k - 1)) * u : 1;
+      const sign = k % 4 < 2 ? 1 : -1;
+      sums[k % 2] += (sign * u) / z ** k;
+      sums[2 + (k % 2)] += (sign * v) / z ** k;
+      u *= ((6 * k + 5) * (6 * k + 3) * (6 * k + 1)) / (216 * (k + 1) * (2 * k + 1));
+    }
+    const [p, q, r, s] = sums;
+    const [c, d] = [Math.cos(z - Math.PI / 4), Math.sin(z - Math.PI / 4)];
+    const small = 1 / (Math.sqrt(Math.PI) * x ** 0.25);
+    const large = x ** 0.25 / Math.sqrt(Math.PI);
+    return [small * (c * p + d * q), large * (d * r - c * s), small * (c * q - d * p), large * (c * r + d * s)];
+  },
+
   elliptic_k: (m) => special.elliptic(m)[0],
   elliptic_e: (m) => special.elliptic(m)[1],
 
