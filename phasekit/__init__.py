@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from phasekit.errors import PhasekitError as PhasekitError
     from phasekit.errors import StoreError as StoreError
     from phasekit.errors import Topology as Topology
+    from phasekit.explorer.explore import explore as explore
     from phasekit.labelled.asymptotics import near_center as near_center
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
     from phasekit.labelled.atlas import branches as branches
@@ -98,6 +99,7 @@ _MODULES = {
         "StoreError",
         "Topology",
     ),
+    "phasekit.explorer.explore": ("explore",),
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.atlas": ("branches",),
     "phasekit.labelled.continuation.branch": ("Branch",),

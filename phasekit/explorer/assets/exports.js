@@ -1,0 +1,105 @@
+// What one takes away: the picture, the data, the lines of Python.
+
+function download(name, blob) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  document.body.append(link);
+  link.click();
+  link.remove();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+// All pictures of the page on one.
+function picture(canvases, caption) {
+  const ratio = window.devicePixelRatio || 1;
+  const shown = canvases.filter((one) => one.offsetParent !== null);
+  const width = Math.max(...shown.map((one) => one.width));
+  const gap = 8 * ratio;
+  const columns = shown.length > 2 ? 2 : 1;
+  const heights = Array(columns).fill(32 * ratio);
+  const places = shown.map((one) => {
+    const column = heights.indexOf(Math.min(...heights));
+    const place = [column * (width + gap), heights[column]];
+    heights[column] += one.height + gap;
+    return place;
+  });
+  const whole = document.createElement("canvas");
+  whole.width = columns * width + (columns - 1) * gap;
+  whole.height = Math.max(...heights);
+  const c = whole.getContext("2d");
+  c.fillStyle = paint("card");
+  c.fillRect(0, 0, whole.width, whole.height);
+  c.fillStyle = paint("ink");
+  c.font = `${13 * ratio}px system-ui, 'DejaVu Sans', sans-serif`;
+  c.fillText(caption, 8 * ratio, 20 * ratio, whole.width - 16 * ratio);
+  shown.forEach((one, i) => c.drawImage(one, ...places[i]));
+  return new Promise((done) => whole.toBlob(done, "image/png"));
+}
+
+// Numbers of everything that is shown; what is not finite is written as text.
+function dataOf(scene) {
+  const { pot } = scene;
+  const values = Object.fromEntries(NAMES.map((name, i) => [name, state.values[i]]));
+  return {
+    model: FACTS.model,
+    law: FACTS.law,
+    parameters: values,
+    damping: state.damping,
+    torque: state.torque,
+    coefficients: pot.coefficients ?? null,
+    equilibria: pot.points.map(({ x, kind, label, energy, curvature }) => ({ [FACTS.coordinate]: x, kind, label: label ?? null, energy, curvature })),
+    separatrices: pot.separatrices().map(({ saddle, left, right, exponent, shares }) => ({ saddle: saddle.x, exponent, left, right, shares })),
+    orbits: scene.orbits.map((one) => {
+      const points = orbitCurve(pot, one, scene.damping, scene.view);
+      const found = { ...pot.orbit(...one), columns: [FACTS.coordinate, `d${FACTS.coordinate}`] };
+      if (!scene.loaded) return { ...found, states: points };
+      found.columns.push("force_A2", "force_B2");
+      return { ...found, states: forceCurves(LAW, scene.p, points) };
+    }),
+    map: scene.map ? { x: state.x, y: state.y, fold: scene.map.edges } : null,
+  };
+}
+
+const toText = (value) =>
+  JSON.stringify(value, (key, one) => (typeof one === "number" && !Number.isFinite(one) ? String(one) : one), 1);
+
+// Lines that make the same system and the same numbers with the library.
+function pythonOf(scene) {
+  const { imports, start, end, mapping } = FACTS.python;
+  const given = NAMES.map((name, i) => [name, state.values[i]]).filter(([, value]) => value !== null);
+  const text = given.map(([name, value]) => (mapping ? `'${name}': ${value}` : `${name}=${value}`)).join(", ");
+  const lines = ["import numpy as np", "import phasekit as pk"];
+  if (imports) lines.push(imports);
+  lines.push("", `system = ${start}${text}${end}`);
+  const tilted = state.torque !== 0 || state.damping !== 0;
+  if (!tilted) lines.push("equilibria = pk.equilibria(system)", "separatrices = pk.separatrices(system)");
+  const starts = `[${scene.orbits.map((one) => `(${one[0]}, ${one[1]})`).join(", ")}]`;
+  if (tilted) lines.push(...motionLines(starts));
+  else {
+    if (scene.orbits.length) {
+      lines.push(`starts = ${starts}`, "x0, v0 = np.transpose(starts)", "orbits = pk.orbits(system, x0, v0)");
+      if (scene.loaded) lines.push("motion = pk.flow(system, x0[-1], v0[-1], np.linspace(0.0, 10.0, 401))", "forces = pk.bearing_forces(system, motion)");
+    }
+    lines.push(`pk.plot.phase_portrait(system${scene.orbits.length ? ", orbits=starts" : ""})`);
+  }
+  return `${lines.join("\n")}\n`;
+}
+
+function motionLines(starts) {
+  const x = FACTS.coordinate === "v" ? "q" : FACTS.coordinate;
+  return [
+    `damping, torque = ${state.damping}, ${state.torque}`,
+    "",
+    "from scipy.integrate import solve_ivp",
+    "",
+    "",
+    `def motion(t, state):`,
+    `    ${x}, v = state`,
+    `    return v, -float(pk.gradient(system, ${x}).gradient) - damping * v + torque`,
+    "",
+    "",
+    `starts = ${starts}`,
+    "paths = [solve_ivp(motion, (0.0, 10.0), start, rtol=1e-10, atol=1e-12) for start in starts]",
+  ];
+}

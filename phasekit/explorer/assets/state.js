@@ -1,0 +1,114 @@
+// What the page shows, and how a link says it.
+
+const FACTS = JSON.parse(document.getElementById("facts").textContent);
+const NAMES = FACTS.parameters.map((one) => one.name);
+const TORQUE = "torque";
+
+// Axes of diagram and map: parameters that the law depends on, and the torque.
+const AXES = [...FACTS.parameters.filter((one) => FACTS.used.includes(one.name)).map((one) => one.name), TORQUE];
+
+function startState() {
+  return {
+    values: FACTS.parameters.map((one) => one.value),
+    damping: 0,
+    torque: 0,
+    orbits: [],
+    diagram: AXES[0],
+    x: AXES[0],
+    y: AXES.includes("a") ? "a" : AXES[1] ?? TORQUE,
+    angles: "rad",
+    theme: "",
+  };
+}
+
+const state = startState();
+
+// Ranges of the sliders: as they came, widened where a value lies outside.
+const ranges = FACTS.parameters.map((one) => [one.low, one.high]);
+const torqueRange = [-1, 1];
+const dampingRange = [0, 1];
+
+function rangeOf(name) {
+  return name === TORQUE ? torqueRange : ranges[NAMES.indexOf(name)];
+}
+
+function valueOf(name) {
+  return name === TORQUE ? state.torque : state.values[NAMES.indexOf(name)];
+}
+
+function setValue(name, value) {
+  if (name === TORQUE) state.torque = value;
+  else state.values[NAMES.indexOf(name)] = value;
+  const range = rangeOf(name);
+  if (value < range[0]) range[0] = value;
+  if (value > range[1]) range[1] = value;
+}
+
+// Why a parameter cannot have a value, or "".
+function refused(index, value) {
+  const one = FACTS.parameters[index];
+  const low = one.least ?? -Infinity;
+  const high = one.most ?? Infinity;
+  const inside = Number.isFinite(value) && value >= low && value <= high && !(one.positive && !(value > 0));
+  return inside ? "" : `${one.name}: wants ${one.wants}`;
+}
+
+function writeLink() {
+  const parts = [];
+  state.values.forEach((value, i) => {
+    if (value !== null) parts.push([`p.${NAMES[i]}`, String(value)]);
+  });
+  if (state.damping) parts.push(["damping", String(state.damping)]);
+  if (state.torque) parts.push(["torque", String(state.torque)]);
+  if (state.orbits.length) parts.push(["orbits", state.orbits.map((one) => one.join("_")).join("~")]);
+  parts.push(["diagram", state.diagram], ["x", state.x], ["y", state.y], ["angles", state.angles]);
+  if (state.theme) parts.push(["theme", state.theme]);
+  return `#${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&")}`;
+}
+
+// Takes what is legal of a link, and says what is not.
+function readLink(text) {
+  const complaints = [];
+  const given = new URLSearchParams(text.replace(/^#/, "").replace(/\+/g, "%2B"));
+  const finite = (key, value, low) => {
+    const number = value.trim() === "" ? NaN : Number(value);
+    if (Number.isFinite(number) && number >= low) return number;
+    complaints.push(`${key}: wants a number${low === 0 ? " >= 0" : ""}`);
+    return null;
+  };
+  for (const [key, value] of given) {
+    const index = key.startsWith("p.") ? NAMES.indexOf(key.slice(2)) : -1;
+    if (index >= 0) {
+      const number = value.trim() === "" ? NaN : Number(value);
+      const why = refused(index, number);
+      if (why) complaints.push(why);
+      else setValue(NAMES[index], number);
+    } else if (key === "damping") {
+      state.damping = finite(key, value, 0) ?? state.damping;
+      dampingRange[1] = Math.max(dampingRange[1], state.damping);
+    } else if (key === "torque") setValue(TORQUE, finite(key, value, -Infinity) ?? state.torque);
+    else if (key === "orbits") {
+      const found = value.split("~").map((one) => one.split("_").map(Number));
+      const whole = found.filter((one) => one.length === 2 && one.every(Number.isFinite));
+      if (whole.length < found.length) complaints.push("orbits: wants pairs of numbers");
+      state.orbits = whole.slice(-8);
+    } else if (["diagram", "x", "y"].includes(key) && AXES.includes(value)) state[key] = value;
+    else if (key === "angles" && ["rad", "deg"].includes(value)) state.angles = value;
+    else if (key === "theme" && ["light", "dark"].includes(value)) state.theme = value;
+    else complaints.push(`${key}: not known here`);
+  }
+  return complaints;
+}
+
+// The potential at the page's state, or with an axis at another value.
+function potentialAt(name = null, value = 0, other = null, second = 0) {
+  const p = state.values.slice();
+  let { torque } = state;
+  for (const [axis, x] of [[name, value], [other, second]]) {
+    if (axis === TORQUE) torque = x;
+    else if (axis !== null) p[NAMES.indexOf(axis)] = x;
+  }
+  return [p.map((x) => (x === null ? NaN : x)), torque];
+}
+
+const make = (p, torque) => new Potential(LAW, p, torque);

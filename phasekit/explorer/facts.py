@@ -1,0 +1,102 @@
+"""What the page is told of a system: its parameters, their ranges, and the Python that makes it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from phasekit.systems.parameter import Parameter
+from phasekit.systems.potential import Potential
+from phasekit.systems.system import Model
+
+#: How far a slider goes beyond the value that it starts at, as a multiple of it.
+FACTOR = 2.5
+
+
+def facts_of(system: Model, values: dict[str, float]) -> dict[str, Any]:
+    """Return the facts as what JSON can hold.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> facts = facts_of(pk.Pendulum(length=2.0, g=10.0), {"length": 2.0, "g": 10.0})
+    >>> facts["parameters"][0]["low"], facts["parameters"][0]["high"], facts["python"]["start"]
+    (0.04, 5.0, 'pk.Pendulum(')
+    """
+    is_angle = not isinstance(system, Potential) or (
+        system.period is not None and abs(system.period - 2.0 * math.pi) < 1e-12
+    )
+    return {
+        "model": type(system).__name__,
+        "law": _words(system),
+        "coordinate": system.coordinate if isinstance(system, Potential) else "phi",
+        "angle": is_angle,
+        "parameters": [_parameter(p, values, system) for p in system.declared],
+        "used": list(system.formula_inputs()),
+        "machine": hasattr(system, "half_span"),
+        "python": _python(system),
+    }
+
+
+def _parameter(parameter: Parameter, values: dict[str, float], system: Model) -> dict[str, Any]:
+    value = values.get(parameter.name)
+    like = [
+        abs(values[p.name]) for p in system.declared
+        if p.units == parameter.units and values.get(p.name)
+    ]  # fmt: skip
+    low, high = slider(parameter, value, max(like, default=1.0))
+    return {
+        "name": parameter.name,
+        "units": "" if parameter.units == "1" else parameter.units,
+        "meaning": parameter.long_name,
+        "value": value,
+        "low": low,
+        "high": high,
+        "least": parameter.low if math.isfinite(parameter.low) else None,
+        "most": parameter.high if math.isfinite(parameter.high) else None,
+        "positive": parameter.positive,
+        "wants": parameter.wants,
+    }
+
+
+def slider(parameter: Parameter, value: float | None, size: float) -> tuple[float, float]:
+    """Return the range of a slider: the domain if it is finite, else some way round the value.
+
+    Examples
+    --------
+    >>> slider(Parameter(name="a", units="m", long_name="distance"), 2.0, 1.0)
+    (-5.0, 5.0)
+    """
+    reach = FACTOR * (abs(value) if value else size)
+    reach = min(max(reach, 1e-150), 1e150)
+    low = parameter.low if math.isfinite(parameter.low) else -reach
+    high = parameter.high if math.isfinite(parameter.high) else reach
+    if parameter.positive:
+        low = 0.008 * reach
+    return float(min(low, value if value is not None else low)), float(max(high, value or low))
+
+
+def _words(system: Model) -> str:
+    if isinstance(system, Potential):
+        return f"V = {system.formula.text}"
+    return "V = -B cos φ + (A/2) cos² φ - C sin φ"
+
+
+def _python(system: Model) -> dict[str, Any]:
+    """Return what stands before and after the parameters where Python makes the system."""
+    import phasekit
+
+    kind = type(system)
+    if isinstance(system, Potential):
+        circle = f", period={system.period!r}" if system.period is not None else ""
+        line = f", interval={system.interval!r}" if system.interval is not None else ""
+        start = f"pk.Potential({system.formula.text!r}, {system.coordinate!r}, {{"
+        return {"imports": "", "start": start, "end": f"}}{circle}{line})", "mapping": True}
+    public = getattr(phasekit, kind.__name__, None) is kind
+    return {
+        "imports": "" if public else f"from {kind.__module__} import {kind.__name__}",
+        "start": f"{'pk.' if public else ''}{kind.__name__}(",
+        "end": ")",
+        "mapping": False,
+    }
+

@@ -1,0 +1,78 @@
+"""The page of the explorer: one static file of markup, style, script and what it shows."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import html
+import json
+from importlib import resources
+from typing import Any
+
+from phasekit.explorer.law import law_of
+from phasekit.explorer.facts import facts_of
+from phasekit.systems.system import Model
+
+#: In the order in which they stand in the one script.
+SCRIPTS = (
+    "numerics", "special", "dynamics", "drawing", "panels", "exports", "state", "main",
+)  # fmt: skip
+
+
+def page(system: Model, parameters: dict[str, float]) -> str:
+    """Return the page of one system as HTML.
+
+    Nothing that a user wrote becomes markup or script: names, formulas and values stand in a
+    block of JSON, which is shown as text; the law is printed by `phasekit.explorer.javascript`.
+    The policy of the page allows this one script, by its hash, and no request.
+    """
+    facts = facts_of(system, parameters)
+    style = asset("style.css")
+    script = "\n".join(
+        (
+            '"use strict";\n(() => {',
+            *(asset(f"{name}.js") for name in SCRIPTS[:2]),
+            f"const LAW = {law_of(system)};",
+            *(asset(f"{name}.js") for name in SCRIPTS[2:]),
+            "})();",
+        )
+    )
+    policy = (
+        f"default-src 'none'; script-src {_hash(script)}; style-src {_hash(style)}; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+    parts = {
+        "policy": policy,
+        "title": html.escape(facts["model"]),
+        "style": style,
+        "facts": data(facts),
+        "script": script,
+    }
+    before, *pieces = asset("page.html").split("{{")
+    text = [before]
+    for piece in pieces:
+        name, _, after = piece.partition("}}")
+        text += [parts[name.strip()], after]
+    return "".join(text)
+
+
+def data(value: Any) -> str:
+    """Write JSON that cannot end the block it stands in.
+
+    Examples
+    --------
+    >>> data("</script>")
+    '"\\\\u003c/script\\\\u003e"'
+    """
+    text = json.dumps(value, ensure_ascii=True, allow_nan=False, sort_keys=True)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def asset(name: str) -> str:
+    """Return the text of a file of the page."""
+    return resources.files("phasekit.explorer").joinpath("assets", name).read_text("utf-8")
+
+
+def _hash(text: str) -> str:
+    digest = hashlib.sha256(text.encode()).digest()
+    return f"'sha256-{base64.b64encode(digest).decode()}'"
