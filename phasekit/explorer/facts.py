@@ -99,4 +99,3 @@ def _python(system: Model) -> dict[str, Any]:
         "end": ")",
         "mapping": False,
     }
-

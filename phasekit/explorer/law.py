@@ -73,7 +73,9 @@ def _loads(
 
     s, c, dphi = sp.symbols("s c dphi", real=True)
     sine, cosine, _ = values["beta"]
-    m, r, e, a, g, omega1, span = (values[n] for n in ("m", "r", "e", "a", "g", "omega1", "half_span"))
+    m, r, e, a, g, omega1, span = (
+        values[n] for n in ("m", "r", "e", "a", "g", "omega1", "half_span")
+    )
     A, B, C, scale = law.products(values)
     ju, thin = m * (r * r / 4 + e * e), m * r * r / 4
     table: Any = _Machine(

@@ -9,8 +9,8 @@ import json
 from importlib import resources
 from typing import Any
 
-from phasekit.explorer.law import law_of
 from phasekit.explorer.facts import facts_of
+from phasekit.explorer.law import law_of
 from phasekit.systems.system import Model
 
 #: In the order in which they stand in the one script.

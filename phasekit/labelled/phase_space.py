@@ -12,10 +12,9 @@ import xarray as xr
 from phasekit.cells.dispatch import passes_of
 from phasekit.cells.evaluate import evaluate
 from phasekit.cells.invalid import warn_of_invalid
-from phasekit.labelled.in_box import equilibria_in_box
 from phasekit.labels.arguments import bad
 from phasekit.systems.as_system import as_system
-from phasekit.systems.problem import Problem
+from phasekit.systems.system import Model
 from phasekit.table.quantities import select
 
 
@@ -73,8 +72,12 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     >>> pk.EquilibriumKind(eq.kind.sel(equilibrium="lower_saddle").item()).name
     'SADDLE'
     """
-    if isinstance(system, Problem):
-        return equilibria_in_box(system, box)
+    if not isinstance(system, (Model, tuple)):  # only then: continuation takes long to load
+        from phasekit.labelled.in_box import equilibria_in_box
+        from phasekit.systems.problem import Problem
+
+        if isinstance(system, Problem):
+            return equilibria_in_box(system, box)
     if box is not None:
         raise bad("box", box, "None: all equilibria of a system are found, wherever they are")
     return _of_system("equilibria", system)
