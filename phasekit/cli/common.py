@@ -14,6 +14,7 @@ from phasekit.cli import Parser
 from phasekit.cli.values import glue_negative_values, is_range, number, span
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
+from phasekit.systems.registry import every_model
 from phasekit.systems.system import MODELS, Model
 
 if TYPE_CHECKING:
@@ -26,9 +27,10 @@ PICTURES = (".pdf", ".png", ".svg")
 
 def model_called(name: Any) -> type[Model]:
     """Return the model of a name."""
-    if not isinstance(name, str) or name not in MODELS:
-        raise unknown("model", name, MODELS)
-    return MODELS[name]
+    models = every_model()
+    if not isinstance(name, str) or name not in models:
+        raise unknown("model", name, models)
+    return models[name]
 
 
 def read_model(
@@ -95,17 +97,19 @@ def path_called(argument: str, name: str) -> Path:
         ) from None
 
 
-def output_file(name: str, *, overwrite: bool, suffixes: Sequence[str] = PICTURES) -> Path:
+def output_file(
+    name: str, *, overwrite: bool, suffixes: Sequence[str] = PICTURES, argument: str = "--out"
+) -> Path:
     """Return the path of a file that may be written; refuse everything else before any work."""
-    path = path_called("--out", name)
+    path = path_called(argument, name)
     if path.suffix.lower() not in suffixes:
         raise ParameterError(
-            f"--out: got {name!r}, wants a name that ends in {' or '.join(suffixes)}"
+            f"{argument}: got {name!r}, wants a name that ends in {' or '.join(suffixes)}"
         )
     if not path.parent.is_dir():
-        raise StoreError(f"--out: the folder {path.parent} does not exist; make it first")
+        raise StoreError(f"{argument}: the folder {path.parent} does not exist; make it first")
     if path.is_dir() or (path.exists() and not overwrite):
-        raise StoreError(f"--out: {path} exists; choose another name or pass --overwrite")
+        raise StoreError(f"{argument}: {path} exists; choose another name or pass --overwrite")
     return path
 
 

@@ -127,5 +127,3 @@ class Explorer:
             f'style="width: 100%; height: {HEIGHT}px; border: 0" loading="lazy" '
             'allow="clipboard-write"></iframe>'
         )
-
-

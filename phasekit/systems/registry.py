@@ -17,6 +17,19 @@ HOMES = (
 )
 
 
+def every_model() -> dict[str, type[Model]]:
+    """Return all models by their names.
+
+    Examples
+    --------
+    >>> "Pendulum" in every_model()
+    True
+    """
+    for module in HOMES:
+        importlib.import_module(module)
+    return MODELS
+
+
 def model_named(argument: str, name: object) -> type[Model]:
     """Return the model of a name.
 
@@ -25,11 +38,9 @@ def model_named(argument: str, name: object) -> type[Model]:
     ParameterError
         If there is none.
     """
-    if name not in MODELS:
-        for module in HOMES:
-            importlib.import_module(module)
-    if not isinstance(name, str) or name not in MODELS:
+    models = MODELS if name in MODELS else every_model()
+    if not isinstance(name, str) or name not in models:
         raise ParameterError(
-            f"{argument}: got a map of the model {describe(name)}, wants one of {', '.join(MODELS)}"
+            f"{argument}: got a map of the model {describe(name)}, wants one of {', '.join(models)}"
         )
-    return MODELS[name]
+    return models[name]

@@ -62,10 +62,13 @@ DISK = pk.GyroRotorDisk(
 KNOWN = """
 (cases) => cases.map(([p, states, times]) => {
   const one = phasekit.make(p, 0);
+  const point = ({x, kind, label, energy, curvature}) => [x, kind, label ?? "", energy, curvature];
+  const sides = ({left, right}) => [left, right].flatMap((s) => [s.kind, s.area, s.offset]);
+  const orbit = (o) => [o.kind, o.family, o.period, o.action, o.low, o.high, o.energy];
   return {
-    points: one.points.map(({x, kind, label, energy, curvature}) => [x, kind, label ?? "", energy, curvature]),
-    loops: one.separatrices().map(({saddle, left, right}) => [saddle.x, left.kind, left.area, left.offset, right.kind, right.area, right.offset]),
-    orbits: states.map(([x, v]) => { const o = one.orbit(x, v); return [o.kind, o.family, o.period, o.action, o.low, o.high, o.energy]; }),
+    points: one.points.map(point),
+    loops: one.separatrices().map((loop) => [loop.saddle.x, ...sides(loop)]),
+    orbits: states.map(([x, v]) => orbit(one.orbit(x, v))),
     flow: states.map(([x, v]) => one.flow(x, v, times)),
   };
 })
@@ -99,7 +102,8 @@ RANDOM = {
 def close(got, wants, scale=1.0, tolerance=1e-9):
     got, wants = number(got), float(wants)
     if not math.isfinite(wants):
-        assert math.isnan(got) == math.isnan(wants) and (math.isnan(wants) or got == wants)
+        assert math.isnan(got) == math.isnan(wants)
+        assert math.isnan(wants) or got == wants
     else:
         assert abs(got - wants) <= tolerance * max(abs(wants), scale), (got, wants)
 
@@ -280,7 +284,11 @@ def test_special_functions_are_those_of_mpmath(shown):
                     wants = getattr(mpmath, name[:6])(x, derivative=derivative)
                 else:
                     wants = getattr(mpmath, names.get(name, name))(*first, x)
-                assert float(value) == pytest.approx(float(wants.real), rel=2e-9, abs=1e-11), (name, order, x)
+                assert float(value) == pytest.approx(float(wants.real), rel=2e-9, abs=1e-11), (
+                    name,
+                    order,
+                    x,
+                )
 
 
 def test_pictures_follow_the_theme_and_the_width(shown, tmp_path):
