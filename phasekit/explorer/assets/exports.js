@@ -87,16 +87,15 @@ function pythonOf(scene) {
 }
 
 function motionLines(starts) {
-  const x = FACTS.coordinate === "v" ? "q" : FACTS.coordinate;
   return [
     `damping, torque = ${state.damping}, ${state.torque}`,
     "",
     "from scipy.integrate import solve_ivp",
     "",
     "",
-    `def motion(t, state):`,
-    `    ${x}, v = state`,
-    `    return v, -float(pk.gradient(system, ${x}).gradient) - damping * v + torque`,
+    "def motion(t, state):",
+    "    x, v = state",
+    "    return v, torque - damping * v - pk.gradient(system, x).potential_gradient.item()",
     "",
     "",
     `starts = ${starts}`,

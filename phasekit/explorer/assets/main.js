@@ -427,4 +427,6 @@ wire();
 load();
 
 // For tests and for the console of the browser.
-window.phasekit = { state, scene, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, dataOf: () => dataOf(scene), update, special };
+window.phasekit = {
+  state, scene, plots, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, dataOf: () => dataOf(scene), update, special,
+};
