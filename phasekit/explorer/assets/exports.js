@@ -50,8 +50,8 @@ function dataOf(scene) {
     coefficients: pot.coefficients ?? null,
     equilibria: pot.points.map(({ x, kind, label, energy, curvature }) => ({ [FACTS.coordinate]: x, kind, label: label ?? null, energy, curvature })),
     separatrices: pot.separatrices().map(({ saddle, left, right, exponent, shares }) => ({ saddle: saddle.x, exponent, left, right, shares })),
-    orbits: scene.orbits.map((one) => {
-      const points = orbitCurve(pot, one, scene.damping, scene.view);
+    orbits: scene.orbits.map((one, i) => {
+      const points = scene.curves[i];
       const found = { ...pot.orbit(...one), columns: [FACTS.coordinate, `d${FACTS.coordinate}`] };
       if (!scene.loaded) return { ...found, states: points };
       found.columns.push("force_A2", "force_B2");

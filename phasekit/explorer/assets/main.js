@@ -20,7 +20,7 @@ const isAngle = (name) => FACTS.parameters.some((one) => one.name === name && on
 const scaleOf = (name) => (isAngle(name) ? state.angles : "");
 const inDegrees = (yes) => (yes && state.angles === "deg" ? Math.PI / 180 : 1);
 const coordinate = () => (FACTS.coordinate === "phi" ? "φ" : FACTS.coordinate);
-const angleText = (x, n) => (FACTS.angle && state.angles === "deg" ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
+const angleText = (x, n) => (FACTS.angle && state.angles === "deg" && Number.isFinite(x) ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
 
 function axisWords(name) {
   if (name === TORQUE) return LAW.kind === "trigonometric" ? "torque, s⁻²" : "torque";
@@ -139,6 +139,7 @@ function update(moved) {
   }
   if ($("alert").textContent.startsWith("At these")) complain([]);
   scene.view = view(pot, state.orbits);
+  scene.curves = state.orbits.map((one) => orbitCurve(pot, one, state.damping, scene.view));
   drawPortrait(plots.portrait, pot, scene);
   drawWell(plots.well, pot, scene);
   drawDiagram(plots.diagram, diagramScene(), (value) => make(...potentialAt(state.diagram, value)));
@@ -156,8 +157,8 @@ function diagramScene() {
 function drawForces() {
   $("forces").hidden = !FACTS.machine;
   if (!FACTS.machine) return;
-  const one = state.orbits.at(-1);
-  scene.forceRows = scene.loaded && one ? forceCurves(LAW, scene.p, orbitCurve(scene.pot, one, state.damping, scene.view)) : [];
+  const points = scene.curves.at(-1);
+  scene.forceRows = scene.loaded && points ? forceCurves(LAW, scene.p, points) : [];
   drawForce(plots.force, scene.forceRows, scene);
 }
 
@@ -240,6 +241,9 @@ function tell() {
       const orbit = pot.orbit(...one);
       return [`${angleText(one[0], 6)}, ${digits(one[1], 6)}`, familyWords(orbit), digits(orbit.period, 11), digits(orbit.action, 11), angleText(orbit.low, 9), angleText(orbit.high, 9), digits(orbit.energy, 9)];
     }));
+  $("orbit-note").textContent = !state.orbits.length
+    ? "A click in the portrait starts one."
+    : state.damping > 0 ? "Family, period, action and turning points are those that the start has without damping." : "";
   const base = location.protocol === "about:" ? "" : location.href.split("#")[0];
   $("link").value = base + writeLink();
   $("python").value = pythonOf(scene);
