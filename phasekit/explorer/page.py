@@ -15,7 +15,8 @@ from phasekit.systems.system import Model
 
 #: In the order in which they stand in the one script.
 SCRIPTS = (
-    "numerics", "special", "dynamics", "drawing", "panels", "exports", "state", "main",
+    "numerics", "special", "dynamics", "orbits", "drawing", "panels", "exports", "state", "words",
+    "main",
 )  # fmt: skip
 
 
