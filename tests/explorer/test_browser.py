@@ -99,6 +99,20 @@ def test_numbers_of_random_systems_are_those_of_the_library(shown, kind):
         same_motions(found["flow"], system, states, moments, speed)
 
 
+def test_saddles_of_one_energy_and_vanishing_coefficients(shown):
+    found = [(-1.0, 0.3, 0.0), (1.0, 0.0, 0.4), (-2.0, 0.0, 0.0), (2.0, 0.0, 0.0)]
+    found += [(0.0, 1.0, 2.0), (3.0, 0.5, 0.0), (-3.0, 0.0, -0.5), (1.0, -2.0, 0.0)]
+    systems = [pk.Coefficients(*values) for values in found]
+    page = shown(systems[0])
+    answers = known(page, [[list(system), [], []] for system in systems])
+    assert len(answers) == len(systems)
+    for answer, system in zip(answers, systems, strict=True):
+        same_equilibria(answer["points"], system, 1.0)
+        same_loops(answer["loops"], system, 1.0)
+    kinds = [loop[1] for loop in answers[0]["loops"]]
+    assert kinds == ["heteroclinic", "heteroclinic"]
+
+
 def same_equilibria(points, system, speed):
     ds = pk.equilibria(system)
     assert len(points) == ds.n_equilibria.item() > 0
