@@ -64,9 +64,16 @@ sphinx_gallery_conf = {
     "plot_gallery": True,
 }
 
+# A page of the explorer, as `pk.explore(...).save(...)` writes it.
+_disk = phasekit.GyroRotorDisk(
+    beta=40 * phasekit.deg, e=0.05, a=0.024, r=0.2, omega1=300 * phasekit.rpm, m=2.0, half_span=0.15
+)
+(_here / "auto_explorer").mkdir(exist_ok=True)
+phasekit.explore(_disk).save(_here / "auto_explorer" / "explorer_page.html")
+
 html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"
-html_static_path = ["_static"]
+html_static_path = ["_static", "auto_explorer"]
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False}
 
 # Quantities, systems, special points and codes have pages that are made of the code.

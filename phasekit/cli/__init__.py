@@ -1,4 +1,4 @@
-"""The command line: ``phasekit demo | portrait | diagram | sweep | info``.
+"""The command line: ``phasekit demo | portrait | diagram | explore | sweep | info``.
 
 What a command needs is imported when it runs, so that ``phasekit --version`` and ``--help`` answer
 at once. Whatever a user can get wrong ends in one line that says what to do, and exit code 2.
@@ -21,6 +21,7 @@ COMMANDS = {
     "demo": "map a real rotor, draw it, store it",
     "portrait": "draw the phase portrait of one system",
     "diagram": "draw the equilibria against one parameter",
+    "explore": "write a page with which a system is looked at by hand, and open it",
     "sweep": "make a map from a TOML file, or go on with it",
     "info": "say what a stored map is and how complete",
 }

@@ -97,17 +97,19 @@ def path_called(argument: str, name: str) -> Path:
         ) from None
 
 
-def output_file(name: str, *, overwrite: bool, suffixes: Sequence[str] = PICTURES) -> Path:
+def output_file(
+    name: str, *, overwrite: bool, suffixes: Sequence[str] = PICTURES, argument: str = "--out"
+) -> Path:
     """Return the path of a file that may be written; refuse everything else before any work."""
-    path = path_called("--out", name)
+    path = path_called(argument, name)
     if path.suffix.lower() not in suffixes:
         raise ParameterError(
-            f"--out: got {name!r}, wants a name that ends in {' or '.join(suffixes)}"
+            f"{argument}: got {name!r}, wants a name that ends in {' or '.join(suffixes)}"
         )
     if not path.parent.is_dir():
-        raise StoreError(f"--out: the folder {path.parent} does not exist; make it first")
+        raise StoreError(f"{argument}: the folder {path.parent} does not exist; make it first")
     if path.is_dir() or (path.exists() and not overwrite):
-        raise StoreError(f"--out: {path} exists; choose another name or pass --overwrite")
+        raise StoreError(f"{argument}: {path} exists; choose another name or pass --overwrite")
     return path
 
 

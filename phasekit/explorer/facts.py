@@ -84,15 +84,13 @@ def _words(system: Model) -> str:
 
 def _python(system: Model) -> dict[str, Any]:
     """Return what stands before and after the parameters where Python makes the system."""
-    import phasekit
-
     kind = type(system)
     if isinstance(system, Potential):
         circle = f", period={system.period!r}" if system.period is not None else ""
         line = f", interval={system.interval!r}" if system.interval is not None else ""
         start = f"pk.Potential({system.formula.text!r}, {system.coordinate!r}, {{"
         return {"imports": "", "start": start, "end": f"}}{circle}{line})", "mapping": True}
-    public = getattr(phasekit, kind.__name__, None) is kind
+    public = kind.__module__.startswith("phasekit.")
     return {
         "imports": "" if public else f"from {kind.__module__} import {kind.__name__}",
         "start": f"{'pk.' if public else ''}{kind.__name__}(",

@@ -79,7 +79,7 @@ def write(node: Any, names: Mapping[Any, str]) -> str:
     >>> import sympy
     >>> x = sympy.Symbol("x")
     >>> write(sympy.sin(x) / 3 - sympy.sqrt(x), {x: "x"})
-    '(-Math.sqrt(x))+(1/3)*Math.sin(x)'
+    '(-(Math.sqrt(x)))+(1/3)*Math.sin(x)'
     """
     if node in names:
         return names[node]

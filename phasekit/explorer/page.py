@@ -15,7 +15,8 @@ from phasekit.systems.system import Model
 
 #: In the order in which they stand in the one script.
 SCRIPTS = (
-    "numerics", "special", "dynamics", "drawing", "panels", "exports", "state", "main",
+    "numerics", "special", "dynamics", "orbits", "drawing", "panels", "exports", "state", "words",
+    "main",
 )  # fmt: skip
 
 
@@ -57,12 +58,12 @@ def page(system: Model, parameters: dict[str, float]) -> str:
 
 
 def data(value: Any) -> str:
-    """Write JSON that cannot end the block it stands in.
+    r"""Write JSON that cannot end the block it stands in.
 
     Examples
     --------
     >>> data("</script>")
-    '"\\\\u003c/script\\\\u003e"'
+    '"\\u003c/script\\u003e"'
     """
     text = json.dumps(value, ensure_ascii=True, allow_nan=False, sort_keys=True)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")

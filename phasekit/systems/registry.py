@@ -20,7 +20,13 @@ HOMES = (
 
 
 def models() -> Mapping[str, type[Model]]:
-    """Return every model by its name."""
+    """Return every model by its name.
+
+    Examples
+    --------
+    >>> "Pendulum" in models()
+    True
+    """
     for module in HOMES:
         importlib.import_module(module)
     return MODELS

@@ -1,4 +1,4 @@
-"""A browser without a window, driven by its own protocol over two pipes: nothing but Python's own."""
+"""A browser without a window, driven by its own protocol over two pipes."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class Plot {
     this.yTicks = ticksOf(...y, labels.yScale, Math.max(3, this.height / 45));
     const widest = Math.max(...this.yTicks.map(([, text]) => this.c.measureText(text).width), 10);
     this.left = widest + 26;
-    this.right = this.width - 10;
+    this.right = this.width - 18;
     this.top = 8;
     this.bottom = this.height - 36;
     this.grid();

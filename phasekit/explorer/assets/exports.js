@@ -50,8 +50,8 @@ function dataOf(scene) {
     coefficients: pot.coefficients ?? null,
     equilibria: pot.points.map(({ x, kind, label, energy, curvature }) => ({ [FACTS.coordinate]: x, kind, label: label ?? null, energy, curvature })),
     separatrices: pot.separatrices().map(({ saddle, left, right, exponent, shares }) => ({ saddle: saddle.x, exponent, left, right, shares })),
-    orbits: scene.orbits.map((one) => {
-      const points = orbitCurve(pot, one, scene.damping, scene.view);
+    orbits: scene.orbits.map((one, i) => {
+      const points = scene.curves[i];
       const found = { ...pot.orbit(...one), columns: [FACTS.coordinate, `d${FACTS.coordinate}`] };
       if (!scene.loaded) return { ...found, states: points };
       found.columns.push("force_A2", "force_B2");
@@ -87,16 +87,15 @@ function pythonOf(scene) {
 }
 
 function motionLines(starts) {
-  const x = FACTS.coordinate === "v" ? "q" : FACTS.coordinate;
   return [
     `damping, torque = ${state.damping}, ${state.torque}`,
     "",
     "from scipy.integrate import solve_ivp",
     "",
     "",
-    `def motion(t, state):`,
-    `    ${x}, v = state`,
-    `    return v, -float(pk.gradient(system, ${x}).gradient) - damping * v + torque`,
+    "def motion(t, state):",
+    "    x, v = state",
+    "    return v, torque - damping * v - pk.gradient(system, x).potential_gradient.item()",
     "",
     "",
     `starts = ${starts}`,

@@ -20,7 +20,7 @@ const isAngle = (name) => FACTS.parameters.some((one) => one.name === name && on
 const scaleOf = (name) => (isAngle(name) ? state.angles : "");
 const inDegrees = (yes) => (yes && state.angles === "deg" ? Math.PI / 180 : 1);
 const coordinate = () => (FACTS.coordinate === "phi" ? "φ" : FACTS.coordinate);
-const angleText = (x, n) => (FACTS.angle && state.angles === "deg" ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
+const angleText = (x, n) => (FACTS.angle && state.angles === "deg" && Number.isFinite(x) ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
 
 function axisWords(name) {
   if (name === TORQUE) return LAW.kind === "trigonometric" ? "torque, s⁻²" : "torque";
@@ -139,6 +139,7 @@ function update(moved) {
   }
   if ($("alert").textContent.startsWith("At these")) complain([]);
   scene.view = view(pot, state.orbits);
+  scene.curves = state.orbits.map((one) => orbitCurve(pot, one, state.damping, scene.view));
   drawPortrait(plots.portrait, pot, scene);
   drawWell(plots.well, pot, scene);
   drawDiagram(plots.diagram, diagramScene(), (value) => make(...potentialAt(state.diagram, value)));
@@ -156,8 +157,8 @@ function diagramScene() {
 function drawForces() {
   $("forces").hidden = !FACTS.machine;
   if (!FACTS.machine) return;
-  const one = state.orbits.at(-1);
-  scene.forceRows = scene.loaded && one ? forceCurves(LAW, scene.p, orbitCurve(scene.pot, one, state.damping, scene.view)) : [];
+  const points = scene.curves.at(-1);
+  scene.forceRows = scene.loaded && points ? forceCurves(LAW, scene.p, points) : [];
   drawForce(plots.force, scene.forceRows, scene);
 }
 
@@ -195,84 +196,6 @@ function continueMap() {
 function drawMap() {
   const at = [valueOf(state.x), valueOf(state.y)];
   scene.map.draw(plots.map, { xName: axisWords(state.x), yName: axisWords(state.y), xScale: scaleOf(state.x), yScale: scaleOf(state.y), at });
-}
-
-// ---------------------------------------------------------------- words
-
-let telling = 0;
-function later(task) {
-  clearTimeout(telling);
-  telling = setTimeout(task, 60);
-}
-
-function table(id, heads, rows) {
-  const head = element("tr", "");
-  heads.forEach((text) => head.append(element("th", text, { scope: "col" })));
-  const body = element("tbody", "");
-  for (const row of rows) {
-    const line = element("tr", "");
-    row.forEach((text, i) => line.append(i ? element("td", text) : element("th", text, { scope: "row" })));
-    body.append(line);
-  }
-  const top = element("thead", "");
-  top.append(head);
-  $(id).replaceChildren(top, body);
-}
-
-const familyWords = (orbit) => (orbit.kind === "libration" || orbit.kind === "rotation" ? `${orbit.kind}, ${LABELS[orbit.family] ?? orbit.family}` : orbit.kind);
-const unitOf = (text) => (LAW.kind === "trigonometric" ? `, ${text}` : "");
-
-// Tables, link and lines of Python; they follow the pictures.
-function tell() {
-  const { pot } = scene;
-  const x = coordinate();
-  table("equilibria", [x, "kind", `V${unitOf("s⁻²")}`, `V″${unitOf("s⁻²")}`],
-    pot.points.map((one) => [angleText(one.x, 10), one.label ? `${one.kind} (${LABELS[one.label]})` : one.kind, digits(one.energy, 8), digits(one.curvature, 8)]));
-  const loops = pot.separatrices();
-  const words = (one, share) => (one.kind === "unbounded" ? one.kind : `${one.kind} ${digits(one.area, 9)}${share === undefined ? "" : ` (${digits(100 * share, 4)} %)`}`);
-  table("separatrices", [`saddle at ${x}`, "left: area", "right: area"],
-    loops.map(({ saddle, left, right, shares }) => [angleText(saddle.x, 8), words(left, shares?.[0]), words(right, shares?.[1])]));
-  $("odds").textContent = loops.some((one) => one.shares)
-    ? "With a little damping, an orbit that comes in from outside is caught by one of the two sides; the shares of the areas, in percent, are the odds of each (exact as the damping goes to zero)."
-    : loops.length ? "Areas enclosed by the separatrices; of one that winds round the circle, the area under one turn." : "There is no saddle, and so no separatrix.";
-  table("orbits", [`start (${x}, d${x}/dt)`, "family", `period${unitOf("s")}`, `action${unitOf("s⁻¹")}`, "least", "greatest", `energy${unitOf("s⁻²")}`],
-    state.orbits.map((one) => {
-      const orbit = pot.orbit(...one);
-      return [`${angleText(one[0], 6)}, ${digits(one[1], 6)}`, familyWords(orbit), digits(orbit.period, 11), digits(orbit.action, 11), angleText(orbit.low, 9), angleText(orbit.high, 9), digits(orbit.energy, 9)];
-    }));
-  const base = location.protocol === "about:" ? "" : location.href.split("#")[0];
-  $("link").value = base + writeLink();
-  $("python").value = pythonOf(scene);
-  const counts = { [CENTER]: 0, [SADDLE]: 0, [DEGENERATE]: 0 };
-  pot.points.forEach((one) => (counts[one.kind] += 1));
-  const say = `${counts[CENTER]} centers and ${counts[SADDLE]} saddles${counts[DEGENERATE] ? `, ${counts[DEGENERATE]} degenerate` : ""}`;
-  if (say !== scene.said) $("status").textContent = scene.said = say;
-  $("portrait-text").textContent = `${say}, at ${pot.points.map((one) => `${angleText(one.x, 4)} (${one.kind})`).join(", ")}; the tables below have the numbers.`;
-  $("map-text").textContent = scene.map ? `${state.x} = ${digits(valueOf(state.x))}, ${state.y} = ${digits(valueOf(state.y))}: ${pot.points.length} equilibria` : "Choose two different parameters.";
-  tellForces();
-}
-
-function tellForces() {
-  if (!FACTS.machine) return;
-  const missing = NAMES.filter((name, i) => state.values[i] === null);
-  const rows = scene.forceRows ?? [];
-  const peak = (k) => Math.max(...rows.map((row) => row[k]).filter(Number.isFinite));
-  $("force-text").textContent = missing.length
-    ? `Give ${missing.join(" and ")} for the forces.`
-    : rows.length
-      ? `Solid: bearing A2, at most ${digits(peak(2))} N; dashed: B2, at most ${digits(peak(3))} N`
-      : "Start an orbit in the portrait.";
-}
-
-function hover(at) {
-  if (!at) {
-    $("hover").textContent = "\u00a0";
-    return;
-  }
-  const orbit = scene.pot.orbit(...at);
-  const action = Number.isFinite(orbit.action) ? `, action ${digits(orbit.action, 7)}` : "";
-  const before = state.damping > 0 ? "without damping: " : "";
-  $("hover").textContent = `${angleText(at[0], 4)}, ${digits(at[1], 4)}: ${before}${familyWords(orbit)}, period ${digits(orbit.period, 7)}${action}`;
 }
 
 // ---------------------------------------------------------------- hands
@@ -427,4 +350,6 @@ wire();
 load();
 
 // For tests and for the console of the browser.
-window.phasekit = { state, scene, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, dataOf: () => dataOf(scene), update, special };
+window.phasekit = {
+  state, scene, plots, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, dataOf: () => dataOf(scene), update, special,
+};

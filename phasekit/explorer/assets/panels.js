@@ -90,7 +90,7 @@ function drawPortrait(plot, pot, scene) {
   plot.style("orbit", 2.2);
   scene.orbits.forEach((one, i) => {
     plot.c.globalAlpha = i === scene.orbits.length - 1 ? 1 : 0.55;
-    drawOrbit(plot, pot, scene, one);
+    drawOrbit(plot, pot, scene, one, scene.curves[i]);
     plot.style("orbit", 2.2);
   });
   plot.c.globalAlpha = 1;
@@ -128,7 +128,7 @@ function drawStreams(plot, pot, { view: { low, high, speed }, damping }) {
     for (let j = 0; j < 6; j++) {
       const x = low + ((high - low) * (i + (j % 2 ? 0.25 : 0.75))) / 6;
       const v = speed * (-0.95 + (1.9 * j) / 5);
-      plot.curve(wrapped(pot, path(force, x, v, 0.06 / rate, 120, stop)));
+      plot.curve(wrapped(pot, path(force, x, v, 0.08 / rate, 60, stop)));
     }
   }
   for (const saddle of pot.points.filter((one) => one.kind === SADDLE)) {
@@ -138,7 +138,7 @@ function drawStreams(plot, pot, { view: { low, high, speed }, damping }) {
       plot.style("separatrix", width, way > 0 ? [5, 3] : []);
       for (const side of [-1, 1]) {
         const d = side * 1e-4 * (high - low);
-        plot.curve(wrapped(pot, path(force, saddle.x + d, d * exponent, (way * 0.07) / rate, 500, stop)));
+        plot.curve(wrapped(pot, path(force, saddle.x + d, d * exponent, (way * 0.09) / rate, 320, stop)));
       }
     }
   }
@@ -169,8 +169,11 @@ function orbitCurve(pot, [x, v], damping, view) {
   if (damping > 0) {
     const rate = Math.sqrt(pot.size) + damping + Math.abs(v);
     const far = 6 * (view.high - view.low);
-    const stop = (y, w) => !(Math.abs(w) < 1e3 * view.speed && Math.abs(y - x) < far) && !pot.circle;
-    return path((y, w) => -pot.slope(y) - damping * w, x, v, 0.05 / rate, Math.min(6000, Math.ceil((30 * rate) / damping / 0.05) + 400), stop);
+    const away = (y, w) => !(Math.abs(w) < 1e3 * view.speed && Math.abs(y - x) < far) && !pot.circle;
+    const settled = (y, w) => Math.abs(w) < 1e-4 * view.speed && Math.abs(pot.slope(y)) < 1e-4 * view.speed * rate;
+    const stop = (y, w) => away(y, w) || settled(y, w);
+    const count = Math.min(3000, Math.ceil((30 * rate) / damping / 0.08) + 400);
+    return path((y, w) => -pot.slope(y) - damping * w, x, v, 0.08 / rate, count, stop);
   }
   const orbit = pot.orbit(x, v);
   const energy = orbit.energy;
@@ -190,8 +193,7 @@ function orbitCurve(pot, [x, v], damping, view) {
   return v === 0 || orbit.kind === "unbounded" ? [...upper, [NaN, NaN], ...mirrored(upper)] : upper.map(([y, w]) => [y, sign * w]);
 }
 
-function drawOrbit(plot, pot, scene, one) {
-  const points = orbitCurve(pot, one, scene.damping, scene.view);
+function drawOrbit(plot, pot, scene, one, points) {
   if (scene.damping > 0) plot.curve(wrapped(pot, points));
   else {
     const turns = pot.circle && !pot.torque ? [-pot.period, 0, pot.period] : [0];

@@ -1,0 +1,329 @@
+"""The page in a browser: every control works, by mouse, keyboard and link; what is taken away."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+pytestmark = pytest.mark.usefixtures("silent")
+
+DISK = pk.GyroRotorDisk(
+    beta=40 * pk.deg, e=0.05, a=0.024, r=0.2, omega1=300 * pk.rpm, m=2.0, half_span=0.15
+)
+WELL = pk.Potential("x^4/4 - mu*x^2/2 + c*x", "x", {"mu": 1.3, "c": 0.1})
+
+
+def state(page):
+    return page.run("phasekit.state")
+
+
+def at(page, canvas, x, y):
+    """Where a point of a picture lies on the screen."""
+    page.place(canvas)
+    return page.run(
+        f"(() => {{ const p = phasekit.plots[{canvas[1:]!r}]; const b = p.canvas"
+        f".getBoundingClientRect(); return [b.x + p.px({x}), b.y + p.py({y})]; }})()"
+    )
+
+
+def test_every_slider_and_every_number_moves_its_parameter(shown):
+    page = shown(DISK)
+    count = page.run("document.querySelectorAll('.slider').length")
+    assert count == len(DISK.declared) + 2
+    for i in range(count):
+        page.run(
+            f"(() => {{ const s = document.querySelectorAll('.slider input[type=range]')[{i}];"
+            " s.focus(); })()"
+        )
+        before = state(page)
+        page.key("ArrowRight", 39)
+        after = state(page)
+        changed = [k for k in ("values", "damping", "torque") if before[k] != after[k]]
+        assert len(changed) == 1
+        if i < len(DISK.declared):
+            moved = [a != b for a, b in zip(before["values"], after["values"], strict=True)]
+            assert moved == [j == i for j in range(len(moved))]
+    names = [parameter.name for parameter in DISK.declared]
+    for text, value, index in (("0.3", 0.3, 0), ("-0.01", -0.01, names.index("a"))):
+        type_in(page, index, text)
+        assert state(page)["values"][index] == value
+        assert page.run("document.getElementById('alert').hidden")
+
+
+def type_in(page, index, text):
+    page.run(
+        f"(() => {{ const e = document.getElementById('value-{index}'); e.value = '{text}';"
+        " e.dispatchEvent(new Event('change')); })()"
+    )
+
+
+def test_what_a_parameter_cannot_be_is_refused_by_its_name(shown):
+    page = shown(DISK)
+    before = state(page)["values"]
+    for index, text in ((0, "4"), (1, "-1"), (5, "0"), (2, "abc"), (2, "")):
+        type_in(page, index, text)
+        assert state(page)["values"] == before
+        said = page.run("document.getElementById('alert').textContent")
+        assert said.startswith(f"{DISK.declared[index].name}: wants a")
+        assert page.run(f"document.getElementById('value-{index}').getAttribute('aria-invalid')")
+    page.run("(() => { phasekit.state.values[3] = 0; phasekit.state.values[1] = 0; })()")
+    page.run("phasekit.update(null)")
+    assert "no such system" in page.run("document.getElementById('alert').textContent")
+
+
+def test_a_click_in_the_portrait_starts_an_orbit(shown):
+    page = shown(DISK)
+    where = at(page, "#portrait", 0.6, 5.0)
+    page.mouse("mouseMoved", *where)
+    assert "libration, lower well, period " in page.run(
+        "document.getElementById('hover').textContent"
+    )
+    page.click(*where)
+    ((phi, dphi),) = state(page)["orbits"]
+    assert phi == pytest.approx(0.6, abs=0.02)
+    assert dphi == pytest.approx(5.0, abs=0.3)
+    page.settle()
+    cells = page.run("[...document.querySelectorAll('#orbits td')].map((e) => e.textContent)")
+    orbit = pk.orbits(DISK, phi, dphi)
+    assert cells[0] == "libration, lower well"
+    assert float(cells[1]) == pytest.approx(orbit.period.item(), rel=1e-9)
+    assert float(cells[2]) == pytest.approx(orbit.action.item(), rel=1e-9)
+    page.press("#clear")
+    assert state(page)["orbits"] == []
+
+
+def test_a_click_in_map_or_diagram_moves_the_system(shown):
+    page = shown(DISK)
+    page.click(*at(page, "#map", 1.1, -0.03))
+    beta, _, a = state(page)["values"][:3]
+    assert beta == pytest.approx(1.1, abs=0.02)
+    assert a == pytest.approx(-0.03, abs=0.002)
+    page.click(*at(page, "#diagram", 0.5, 0.1))
+    assert state(page)["values"][0] == pytest.approx(0.5, abs=0.02)
+    for select, name in (("#map-x", "omega1"), ("#map-y", "e"), ("#diagram-x", "torque")):
+        page.run(
+            f"(() => {{ const s = document.querySelector('{select}'); s.value = '{name}';"
+            " s.dispatchEvent(new Event('change')); })()"
+        )
+    assert [state(page)[k] for k in ("x", "y", "diagram")] == ["omega1", "e", "torque"]
+
+
+def test_the_keyboard_does_what_the_mouse_does(shown):
+    page = shown(DISK)
+    page.run("document.getElementById('portrait').focus()")
+    for _ in range(3):
+        page.key("ArrowRight", 39)
+        page.key("ArrowUp", 38)
+    page.key("Enter", 13, "\r")
+    ((phi, dphi),) = state(page)["orbits"]
+    assert phi > 0.1
+    assert dphi > 0.5
+    page.settle()
+    assert page.run("document.getElementById('status').textContent").startswith("Orbit started")
+    page.key("Delete", 46)
+    assert state(page)["orbits"] == []
+    page.run("document.getElementById('map').focus()")
+    before = state(page)["values"]
+    page.key("ArrowLeft", 37)
+    page.key("ArrowDown", 40)
+    after = state(page)["values"]
+    assert [a < b for a, b in zip(after, before, strict=True)] == [True, False, True] + 5 * [False]
+
+
+def test_the_fold_curve_of_the_map_is_the_fold(shown):
+    page = shown(DISK)
+    edges = page.run("phasekit.scene.map.edges.flat()")
+    assert len(edges) > 200
+    for beta, a in edges[::17]:
+        margin = pk.equilibria(DISK.replace(beta=beta, a=a)).fold_margin.item()
+        assert abs(margin) < 1e-9
+
+
+def test_a_link_brings_the_state_back(shown):
+    link = "#p.beta=0.31&p.omega1=-12.5&damping=0.2&orbits=0.4_-1.5~1_0&x=e&y=omega1&angles=deg"
+    page = shown(DISK, link)
+    assert page.run("document.getElementById('alert').hidden")
+    made = state(page)
+    assert made["orbits"] == [[0.4, -1.5], [1, 0]]
+    assert (made["values"][0], made["values"][4], made["damping"]) == (0.31, -12.5, 0.2)
+    again = page.run("document.getElementById('link').value")
+    page.open(again)
+    assert state(page) == made
+    page.open(f"{again.split('#')[0]}#p.beta=9&p.nothing=1&orbits=x&damping=-1&x=%3Cb%3E")
+    said = page.run("document.getElementById('alert').textContent")
+    for name in ("beta", "p.nothing", "orbits", "damping", "x"):
+        assert f"{name}: " in said
+    assert state(page)["values"][0] == DISK.beta
+
+
+def test_bearing_forces_are_those_of_the_library(shown):
+    page = shown(DISK, "#orbits=0.5_3~0.4_30")
+    for phi0, dphi0 in ((0.5, 3.0), (0.4, 30.0)):
+        rows = page.run(
+            "phasekit.forceCurves(phasekit.law, phasekit.scene.p, phasekit.orbitCurve("
+            f"phasekit.scene.pot, [{phi0}, {dphi0}], 0, phasekit.scene.view))"
+        )
+        assert len(rows) > 80
+        phi, dphi, *forces = np.array(rows).T
+        wants = pk.bearing_forces(DISK, phi, dphi).force_magnitude
+        np.testing.assert_allclose(np.array(forces), wants.transpose("bearing", "point"), 1e-10)
+    text = page.run("document.getElementById('force-text').textContent")
+    assert text.startswith("Solid: bearing A2, at most ")
+    page = shown(DISK.replace(m=None, half_span=None))
+    text = page.run("document.getElementById('force-text').textContent")
+    assert text == "Give m and half_span for the forces."
+    page = shown(pk.Pendulum(length=1.0))
+    assert page.run("document.getElementById('forces').hidden")
+
+
+def test_shares_of_areas_are_told_as_odds_of_capture(shown):
+    page = shown(DISK)
+    odds = page.run("phasekit.scene.pot.separatrices().find((one) => one.shares).shares")
+    lobes = pk.separatrices(DISK).lobe_area.sel(saddle="lower").values
+    assert odds == pytest.approx(list(lobes / lobes.sum()), rel=1e-9)
+    assert "odds" in page.run("document.getElementById('odds').textContent")
+
+
+def test_damped_motion_and_tilted_potential_are_those_of_scipy(shown):
+    from scipy.integrate import solve_ivp
+
+    page = shown(DISK, "#damping=0.7&torque=30&orbits=0.5_3")
+    A, B, C = DISK.coefficients()
+
+    def force(t, state):
+        phi, dphi = state
+        slope = (B - A * math.cos(phi)) * math.sin(phi) - C * math.cos(phi)
+        return dphi, 30.0 - slope - 0.7 * dphi
+
+    times = [0.2, 1.0, 3.0]
+    found = page.run(f"phasekit.scene.pot.flow(0.5, 3, {times}, 0.7)")
+    wants = solve_ivp(
+        force, (0, 3), (0.5, 3.0), t_eval=times, rtol=1e-12, atol=1e-13, method="DOP853"
+    )
+    np.testing.assert_allclose(found, wants.y.T, rtol=1e-9, atol=1e-9)
+    points = page.run("phasekit.scene.pot.points.map((one) => one.x)")
+    assert len(points) == 4
+    assert max(abs(force(0, (x, 0.0))[1]) for x in points) < 1e-10
+
+
+def test_theme_angles_and_reset(shown):
+    page = shown(DISK)
+    theme = "document.documentElement.dataset.theme"
+    assert page.run(theme) == "light"
+    page.press("#theme")
+    assert page.run(theme) == "dark"
+    page.run(
+        "(() => { const s = document.getElementById('angles'); s.value = 'deg';"
+        " s.dispatchEvent(new Event('change')); })()"
+    )
+    assert page.run("document.getElementById('value-0').value") == "40"
+    type_in(page, 0, "30")
+    assert state(page)["values"][0] == pytest.approx(30 * pk.deg, rel=1e-15)
+    page.press("#reset")
+    assert state(page)["values"][0] == DISK.beta
+
+
+def test_picture_data_and_python_are_taken_away(shown, tmp_path):
+    page = shown(DISK, "#orbits=0.5_3~0.4_30")
+    page.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    for button, name in (
+        ("#save-picture", "phasekit.png"),
+        ("#save-data", "phasekit.json"),
+        ("#save-python", "phasekit.py"),
+    ):
+        page.press(button)
+        wait_for(page, tmp_path / name)
+    assert (tmp_path / "phasekit.png").read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+    data = json.loads((tmp_path / "phasekit.json").read_text())
+    assert len(data["equilibria"]) == 4
+    assert data["parameters"]["beta"] == DISK.beta
+    assert [one["kind"] for one in data["orbits"]] == ["libration", "rotation"]
+    made = run_python((tmp_path / "phasekit.py").read_text())
+    assert made["system"] == DISK
+    found = [one["phi"] for one in data["equilibria"]]
+    np.testing.assert_allclose(found, sorted(made["equilibria"].phi.values), atol=1e-12)
+    for one, period in zip(data["orbits"], made["orbits"].period.values, strict=True):
+        assert one["period"] == pytest.approx(period, rel=1e-9)
+    assert made["forces"].force_magnitude.shape == (401, 2)
+
+
+def run_python(text):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    space = {}
+    exec(text, space)
+    plt.close("all")
+    return space
+
+
+def wait_for(page, path):
+    end = time.monotonic() + 20
+    while not path.exists() or not path.stat().st_size:
+        assert time.monotonic() < end, f"{path} was not written"
+        page.settle()
+
+
+def test_python_of_a_potential_and_of_damped_motion_runs(shown):
+    page = shown(WELL, "#p.mu=0.7&orbits=0.5_0.1")
+    made = run_python(page.run("document.getElementById('python').value"))
+    assert made["system"] == WELL.replace(mu=0.7)
+    page = shown(WELL, "#damping=0.3&torque=0.1&orbits=0.5_0.1")
+    made = run_python(page.run("document.getElementById('python').value"))
+    (path,) = made["paths"]
+    found = page.run(f"phasekit.scene.pot.flow(0.5, 0.1, [{path.t[-1]}], 0.3)")
+    np.testing.assert_allclose(found[0], path.y[:, -1], atol=1e-8)
+
+
+def test_copying_leaves_the_text_selected_or_says_that_it_is_copied(shown):
+    page = shown(DISK)
+    for button in ("#copy-link", "#copy-python"):
+        page.press(button)
+        page.until("document.getElementById('copied').textContent !== ''")
+    said = page.run("document.getElementById('copied').textContent")
+    assert said in ("Copied.", "Selected; copy it with Ctrl+C.")
+
+
+def test_it_works_in_a_frame_as_notebooks_show_it(browser, tmp_path):
+    path = tmp_path / "notebook.html"
+    path.write_text(
+        f"<!doctype html><title>n</title>{pk.explore(DISK)._repr_html_()}", encoding="utf-8"
+    )
+    browser.open(path.as_uri())
+    inside = "document.querySelector('iframe').contentWindow"
+    browser.until(f"Boolean({inside}.phasekit)")
+    assert browser.run(f"{inside}.phasekit.scene.pot.points.length") == 4
+    link = browser.run(f"{inside}.document.getElementById('link').value")
+    assert link == "" or link.startswith("#p.beta=")
+
+
+def test_every_control_has_a_name_for_screen_readers(shown):
+    page = shown(DISK, "#orbits=0.5_3")
+    tree = page.send("Accessibility.getFullAXTree")["nodes"]
+    told = {"button", "slider", "textbox", "combobox", "application", "img", "table", "image"}
+    seen = 0
+    for node in tree:
+        role = node.get("role", {}).get("value", "").lower()
+        if role in told and not node.get("ignored"):
+            seen += 1
+            assert role == "table" or node.get("name", {}).get("value"), node
+    assert seen > 30
+
+
+def test_pictures_follow_the_theme_and_the_width(shown, tmp_path):
+    for width in (1400, 400):
+        for dark in (False, True):
+            page = shown(DISK, "#orbits=0.5_3", width=width, dark=dark)
+            assert page.run("document.documentElement.scrollWidth") <= width
+            path = Path(tmp_path) / "page.png"
+            page.screenshot(path)
+            assert path.stat().st_size > 30_000
