@@ -166,6 +166,16 @@ def test_every_picture_has_a_case():
     assert {name for name in methods if not name.startswith("_")} <= set(CASES)
 
 
+def test_names_under_plot_are_pictures():
+    assert dir(pk.plot) == sorted(pk.plot.__all__)
+    assert {name for name in vars(pk.plot) if not name.startswith("_")} == set(pk.plot.__all__)
+    for name in ("phase_potrait", "parts", "periods"):
+        with pytest.raises(AttributeError, match=f"^picture '{name}' is unknown") as caught:
+            getattr(pk.plot, name)
+        if name != "parts":
+            assert "did you mean 'p" in str(caught.value)
+
+
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize(("name", "case"), EVERY)
 def test_texts_are_inside_and_clear_of_each_other(name, case, width):
