@@ -334,5 +334,8 @@ def _draw_curves(
 def _coefficient_A(ds: xr.Dataset) -> xr.DataArray | None:
     """Return A over the map, or None if the Dataset cannot rebuild its model."""
     model = labels.model_in(ds)
-    A = None if model is None else model.from_dataset(ds).coefficients().A
+    try:
+        A = None if model is None else model.from_dataset(ds).coefficients().A
+    except ParameterError:  # a stored map may hold anything; its values are shown all the same
+        return None
     return A if isinstance(A, xr.DataArray) else None
