@@ -167,7 +167,8 @@ def branch(
             up, across = circle.points(up, across)
         across, up = across * stretch[0], up * stretch[-1]
         for point in zip(across, up, strict=True):
-            named[point] = f"{named[point]}, {label}" if point in named else label
+            before = named.get(point, label)
+            named[point] = before if label in before.split(", ") else f"{before}, {label}"
         axes.plot(across, up, linestyle="none", zorder=3 if kind == "neutral_saddle" else 4, **look)
         handles[kind] = Line2D([], [], linestyle="none", **look)
     if circle is not None:
