@@ -266,3 +266,19 @@ def test_a_noisy_function_says_so():
     assert len(branch.messages) == 1
     assert "points solve f = 0" in branch.messages[0]
     assert branch.messages[0] in repr(branch)
+
+
+@pytest.mark.parametrize(("height", "width"), [(1e-2, 1e-4), (2e-4, 1e-5), (2e-5, 1e-6)])
+def test_a_bend_that_is_narrower_than_steps_is_said(height, width):
+    """Two folds within a width that no point of the path falls into."""
+
+    def f(x, p):
+        return [p - (x[0] - height * np.tanh((x[0] - 0.3) / width))]
+
+    branch = follow(f, "x", {"p": 0.0}, "p", [0.0], (-1.0, 1.0))
+    (message,) = branch.messages
+    assert "special points there may be missed" in message
+    low, high = (float(word.strip(",:")) for word in message.split() if word[0] == "0")
+    assert low < 0.3 - height < 0.3 + height < high
+    smooth = follow(["p - x + x**3/3"], "x", {"p": 0.0}, "p", [0.0], (-1.0, 1.0))
+    assert smooth.messages == ()

@@ -251,10 +251,10 @@ def _power(h: float) -> float:
 
 def _slopes(lines: list[Callable[[float], Array]], middle: Array, sizes: list[float]) -> Array:
     """The slopes of functions at 0 (columns), as `phasekit.numerics.differences` takes them."""
-    short = [
-        [(at(k * FINE * size) - at(-k * FINE * size)) / (2.0 * k * FINE * size) for k in (1.0, 2.0)]
-        for at, size in zip(lines, sizes, strict=True)
-    ]
+    short = []
+    for at, size in zip(lines, sizes, strict=True):
+        h, k = FINE * size, 2.0 * FINE * size
+        short.append(((at(h) - at(-h)) / (2.0 * h), (at(k) - at(-k)) / (2.0 * k)))
     gaps = np.sort(
         [FINE * size * np.abs(a - b) for (a, b), size in zip(short, sizes, strict=True)], axis=0
     )
