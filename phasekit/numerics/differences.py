@@ -28,7 +28,7 @@ MIXED = 2.0**-12  # of mixed second differences
 
 def spare_size(n: int, m: int) -> int:
     """Length of what `jet` and `bend` need for themselves."""
-    return m + 7 * n
+    return m + 10 * n
 
 
 @routine
@@ -71,9 +71,23 @@ def _jet(
     x, value = spare, spare + m
     near, far, fine, wide = value + n, value + 2 * n, value + 3 * n, value + 4 * n
     bend_, least = value + 5 * n, value + 6 * n
+    noise, largest, terms = value + 7 * n, value + 8 * n, value + 9 * n
     for i in range(m):
         w[x + i] = w[u + i]
     plain(first, n, w, x, par, active, out)
+    # What rounding does to f over the shortest steps: as it shows along the unknown where it does
+    # second most (where it does most, f itself may change within less), and that of its terms.
+    for i in range(n):
+        w[noise + i] = w[largest + i] = w[terms + i] = 0.0
+    for j in range(m if mode == SHARP else 0):
+        size = 2.0 ** np.floor(np.log2(max(abs(w[u + j]), w[scale + j])))
+        across(first, n, w, x, j, FINE * size, par, active, value, fine, bend_)
+        across(first, n, w, x, j, 2.0 * FINE * size, par, active, value, wide, bend_)
+        for i in range(n):
+            gap = FINE * size * abs(w[fine + i] - w[wide + i])
+            w[noise + i] = max(w[noise + i], min(gap, w[largest + i]))
+            w[largest + i] = max(w[largest + i], gap)
+            w[terms + i] += EPSILON * size * abs(w[fine + i])
     for j in range(m):
         # Powers of two, so that what is added to a number of its size is exact.
         size = 2.0 ** np.floor(np.log2(max(abs(w[u + j]), w[scale + j])))
@@ -106,8 +120,10 @@ def _jet(
                 # What rounding does to the shortest differences, here in proportion.
                 rounding = FINE * size / step * abs(w[fine + i] - w[wide + i])
                 rounding = min(rounding, KNOWN * (slope + 100.0 * curved))
-                rounding += EPSILON * size / step * slope
-                off = max(0.0, abs(best - w[fine + i]) - 4.0 * abs(w[fine + i] - w[wide + i]))
+                rounding += w[terms + i] / step
+                seen = max(w[noise + i], w[terms + i]) / (FINE * size)
+                seen = max(seen, abs(w[fine + i] - w[wide + i]))
+                off = max(0.0, abs(best - w[fine + i]) - 4.0 * seen)
                 off = 0.0 if off <= 1e-9 * (slope + curved) else off
                 if left + off + rounding < w[least + i]:
                     w[place + i * m] = best

@@ -11,7 +11,6 @@ import pytest
 import sympy
 
 import phasekit as pk
-from phasekit.numerics import differences
 
 FOLD = 2.0 / (3.0 * np.sqrt(3.0))
 
@@ -242,14 +241,12 @@ def test_sizes_of_terms_bound_the_rounding_of_a_formula():
     exact = sympy.lambdify(sympy.symbols("x y p"), [sympy.sympify(t) for t in texts], "mpmath")
     u = rng.uniform(0.9, 1.1, (40, 5))
     u[:, 1] *= 0.3
-    out = np.empty((len(u), 8))
-    places = np.array([0], dtype=np.int64)
-    differences.values(field.terms((0,)), 8, np.array([1.0]), places, u, out)
+    values, terms = field.with_terms(u, np.array([1.0]), (0,))
     with mpmath.workdps(60):
         wanted = [exact(*map(mpmath.mpf, row[[0, 1, 4]].tolist())) for row in u]
         off = [[abs(mpmath.mpf(a) - b) for a, b in zip(*two, strict=True)]
-               for two in zip(out[:, :4].tolist(), wanted, strict=True)]  # fmt: skip
-    ratio = np.array(off, dtype=float) / (2.0**-52 * out[:, 4:])
+               for two in zip(values.tolist(), wanted, strict=True)]  # fmt: skip
+    ratio = np.array(off, dtype=float) / (2.0**-52 * terms)
     assert ratio.shape == (40, 4)
     assert ratio.max() < 4.0
     assert ratio.max(axis=0).min() > 1e-3  # and not by far too much
@@ -269,3 +266,19 @@ def test_a_noisy_function_says_so():
     assert len(branch.messages) == 1
     assert "points solve f = 0" in branch.messages[0]
     assert branch.messages[0] in repr(branch)
+
+
+@pytest.mark.parametrize(("height", "width"), [(1e-2, 1e-4), (2e-4, 1e-5), (2e-5, 1e-6)])
+def test_a_bend_that_is_narrower_than_steps_is_said(height, width):
+    """Two folds within a width that no point of the path falls into."""
+
+    def f(x, p):
+        return [p - (x[0] - height * np.tanh((x[0] - 0.3) / width))]
+
+    branch = follow(f, "x", {"p": 0.0}, "p", [0.0], (-1.0, 1.0))
+    (message,) = branch.messages
+    assert "special points there may be missed" in message
+    low, high = (float(word.strip(",:")) for word in message.split() if word[0] == "0")
+    assert low < 0.3 - height < 0.3 + height < high
+    smooth = follow(["p - x + x**3/3"], "x", {"p": 0.0}, "p", [0.0], (-1.0, 1.0))
+    assert smooth.messages == ()

@@ -47,6 +47,6 @@ def test_brusselator(n):
     hopf, branch_points = pde.brusselator_points(n, *span)
     branch = pde.trivial(pde.brusselator, 2 * n, "B", span)
     np.testing.assert_allclose(found(branch, "H", "B"), hopf, rtol=1e-9)
-    np.testing.assert_allclose(found(branch, "BP", "B"), branch_points, rtol=1e-8)
+    np.testing.assert_allclose(found(branch, "BP", "B"), branch_points, rtol=1e-10)
     assert len(hopf) == 2
     assert len(branch_points) >= 6

@@ -180,21 +180,26 @@ class PythonField(Field):
             if exact is not None:
                 slopes[:, :n] = self.slopes(x.copy(), p)
                 begin = n
-            for j in range(begin, m):
 
-                def at(h: float, j: int = j) -> Array:
+            def along(j: int) -> Callable[[float], Array]:
+                def at(h: float) -> Array:
                     if j >= n:
                         return self.value(x.copy(), p | {free[j - n]: values[j] + h})
                     shifted = x.copy()
                     shifted[j] += h
                     return self.value(shifted, p)
 
-                size = _power(max(abs(values[j]), self.sizes[j]))
-                if sharp:
-                    slopes[:, j] = _slope(at, middle, size)
-                else:
-                    h = COARSE * size
-                    slopes[:, j] = (at(h) - at(-h)) / (2.0 * h)
+                return at
+
+            unit = [_power(max(abs(values[j]), self.sizes[j])) for j in range(m)]
+            if sharp:
+                slopes[:, begin:] = _slopes(
+                    [along(j) for j in range(begin, m)], middle, unit[begin:]
+                )
+                return
+            for j in range(begin, m):
+                at, h = along(j), COARSE * unit[j]
+                slopes[:, j] = (at(h) - at(-h)) / (2.0 * h)
 
         return first
 
@@ -244,10 +249,33 @@ def _power(h: float) -> float:
     return math.ldexp(0.5, math.frexp(h)[1])
 
 
-def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
-    """The slope of a function at 0, as `phasekit.numerics.differences` takes it."""
-    h = FINE * size
-    fine, wide = ((at(k * h) - at(-k * h)) / (2.0 * k * h) for k in (1.0, 2.0))
+def _slopes(lines: list[Callable[[float], Array]], middle: Array, sizes: list[float]) -> Array:
+    """The slopes of functions at 0 (columns), as `phasekit.numerics.differences` takes them."""
+    short = []
+    for at, size in zip(lines, sizes, strict=True):
+        h, k = FINE * size, 2.0 * FINE * size
+        short.append(((at(h) - at(-h)) / (2.0 * h), (at(k) - at(-k)) / (2.0 * k)))
+    gaps = np.sort(
+        [FINE * size * np.abs(a - b) for (a, b), size in zip(short, sizes, strict=True)], axis=0
+    )
+    terms = EPSILON * np.sum(
+        [size * np.abs(a) for (a, _), size in zip(short, sizes, strict=True)], axis=0
+    )
+    noise = np.maximum(gaps[-2], terms) if len(gaps) > 1 else terms
+    return np.column_stack(
+        [
+            _slope(at, middle, size, *two, noise, terms)
+            for at, size, two in zip(lines, sizes, short, strict=True)
+        ]
+    )
+
+
+def _slope(
+    at: Callable[[float], Array], middle: Array, size: float, fine: Array, wide: Array,
+    noise: Array, terms: Array,
+) -> Array:  # fmt: skip
+    """The slope of a function at 0, given those over the shortest steps and the noise of f."""
+    seen = np.maximum(np.abs(fine - wide), noise / (FINE * size))
     slope, least = fine.copy(), np.full_like(middle, np.inf)
     h = STEP * size
     for _ in range(TRIES):
@@ -262,8 +290,8 @@ def _slope(at: Callable[[float], Array], middle: Array, size: float) -> Array:
         rounding = np.minimum(
             FINE * size / h * np.abs(fine - wide), KNOWN * (steep + 100.0 * curved)
         )
-        rounding += EPSILON * size / h * steep
-        off = np.maximum(0.0, np.abs(best - fine) - 4.0 * np.abs(fine - wide))
+        rounding += terms / h
+        off = np.maximum(0.0, np.abs(best - fine) - 4.0 * seen)
         off[off <= 1e-9 * (steep + curved)] = 0.0
         better = left + off + rounding < least
         slope[better], least[better] = best[better], (left + off + rounding)[better]

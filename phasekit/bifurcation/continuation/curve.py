@@ -212,27 +212,22 @@ class Curve:
         """Largest size of an entry of f beside its terms, at many points, the rows of u.
 
         The terms of a formula are those of its sums; of a function, what its derivatives (indexed
-        by points) make of the unknowns.
+        by points) make of the unknowns, in units of their scales at least.
         """
         n, m = self.n, self.m
         points = np.ascontiguousarray(u[:, :m], dtype=float)
         with np.errstate(all="ignore"):
             if isinstance(self.field, SymbolicField):
-                out = np.empty((len(points), 2 * n))
-                differences.values(
-                    self.field.terms(self.active), 2 * n, self.par.copy(),
-                    np.array(self.active, dtype=np.int64), points, out,
-                )  # fmt: skip
-                value, terms = np.abs(out[:, :n]), np.abs(out[:, n:])
+                value, terms = self.field.with_terms(points, self.par.copy(), self.active)
+                value = np.abs(value)
             else:
                 value = np.abs(self.values(points))
                 terms = np.empty_like(value)
+                sizes = np.maximum(np.abs(points), self.scale[:m])
                 chunk = max(1, MOST // (n * m))
                 for k in range(0, len(points), chunk):
                     some = slice(k, k + chunk)
-                    terms[some] = np.einsum(
-                        "kij,kj->ki", np.abs(slopes[some]), np.abs(points[some])
-                    )
+                    terms[some] = np.einsum("kij,kj->ki", np.abs(slopes[some]), sizes[some])
             if isinstance(slopes, np.ndarray):  # what Newton's method takes for zero
                 nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
                 value[value <= nothing] = 0.0

@@ -32,6 +32,7 @@ MORE = 10  # further ones, where the best lie at an end
 FARTHEST = 44
 POOR = 1e-7  # relative error that wider steps might bring down
 CAUTION = 3.0  # errors that are said, over errors that were seen
+SLACK = 6.0  # noise of the worst among hundreds of samples, over its estimate from a few
 WINDOW = 5  # most steps of one extrapolation
 
 
@@ -205,7 +206,7 @@ class Derivatives:
         if given is None and self._noise is not None:
             return self._noise
         tiny = APART * (self.reach if given is None else z)
-        found = self._values(self.u + np.arange(-4.0, 5.0)[:, None] * tiny, given)
+        found = self._values(self.u + np.arange(-8.0, 9.0)[:, None] * tiny, given)
         noise = EPSILON * np.max(np.abs(found), axis=0, initial=0.0)
         for order in (4, 5):
             differences = np.diff(found, n=order, axis=0)
@@ -263,7 +264,7 @@ class _Ladder:
         cut = np.full_like(values, np.inf)
         cut[:, :-1] = np.abs(np.diff(values, axis=1))
         plain = values[least]
-        slack = 2.0 * cut[least] + 3.0 * noises[least]
+        slack = 2.0 * cut[least] + SLACK * noises[least]
         # All shorter steps at once: the range that they all allow.
         low, high = plain - slack, plain + slack
         low[~np.isfinite(low)], high[~np.isfinite(high)] = -np.inf, np.inf

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
+from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
 
 Array = npt.NDArray[np.float64]
@@ -79,9 +80,18 @@ class SymbolicField(Field):
         """Machine code for f, its derivatives and those of f_u z."""
         return _second(self.expressions, self.states, self.parameters, active)
 
-    def terms(self, active: tuple[int, ...]) -> int:
-        """Machine code for f and, after it, the sums of the sizes of its terms."""
-        return _terms(self.expressions, self.states, self.parameters, active)
+    def with_terms(self, u: Array, par: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
+        """F at many points, the rows of u, and the sums of the sizes of its terms there."""
+        n = len(self.states)
+        out = np.empty((len(u), 2 * n))
+        function = _terms(self.expressions, self.states, self.parameters, active)
+        places = np.array(active, dtype=np.int64)
+        differences.values(function, 2 * n, par, places, u, out)
+        return out[:, :n], np.abs(out[:, n:])
+
+    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+        """F at many points, the rows of u."""
+        return self.with_terms(u, par, active)[0]
 
     def third(self, active: tuple[int, ...]) -> int:
         """Machine code for the third derivative along three directions."""

@@ -14,6 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.gaps import narrow
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.path import Path, Sample, join
 from phasekit.bifurcation.continuation.placed import Placed
@@ -269,7 +270,8 @@ def make_branch(
     points, places = points_of(problem, curve, path, specials, eigenvalues, record)
     branch = Branch(
         problem, names, curve.field.states, curve, start, (backward, forward), points, (),
-        path.stops, KINDS[curve.kind], MappingProxyType(dict(record)), path.messages,
+        path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
+        (*path.messages, *narrow(curve, path)),
     )  # fmt: skip
     made = tuple(
         special_point(problem, curve, one.special, place, branch)

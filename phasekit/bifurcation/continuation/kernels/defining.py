@@ -204,7 +204,7 @@ def bend_all(
     m = n + active.size
     base = 3 * m
     bent = base + n + n * m
-    w = np.zeros(bent + n * m + m + 7 * n)
+    w = np.zeros(bent + n * m + m + 10 * n)
     for j in range(m):
         w[m + j] = scale[j]
     for k in range(points.shape[0]):

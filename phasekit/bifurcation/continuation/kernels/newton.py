@@ -22,6 +22,7 @@ ROUNDING = 64.0 * 2.0**-52
 LITTLE = 0.1  # of an unknown
 NOTHING = 1e-30  # of an unknown's scale
 NEIGHBOURS = 8
+LEAST = 2e-3  # of a scale: times ten times ROUNDING, rounding of numbers of that size
 APART = 4.2e-14  # of unknowns; no power of two, which would show the same rounding everywhere
 FEW = 6  # unknowns up to which Python's own numbers are faster than NumPy's arrays
 RAISED = 1e-10  # tolerances from here on are for noisy functions
@@ -145,7 +146,9 @@ def at_noise(
 ) -> bool:  # fmt: skip
     """Whether G is but rounding at u: of its terms, or of whatever f does inside.
 
-    The latter shows in differences of G between neighbours of u, where nothing else remains.
+    The latter shows in differences of G between neighbours of u, where nothing else remains. Few
+    neighbours may show none of it in one of many entries: each is known to rounding of unknowns of
+    their scales at best.
     """
     size, rows, _, _, _, _, _, g, jac, _, _, _, _ = places(kind, n, active.size)
     values = np.zeros((NEIGHBOURS, rows))
@@ -162,7 +165,8 @@ def at_noise(
     for i in range(rows):
         terms = 0.0
         for j in range(size):
-            terms += abs(w[jac + i * size + j] * here[j])
+            unknown = abs(here[j]) + LEAST * w[SCALE * size + j]
+            terms += abs(w[jac + i * size + j]) * unknown
         noise = 0.0
         for k in range(NEIGHBOURS - 4):
             fourth = (

@@ -12,6 +12,7 @@ Array = npt.NDArray[np.float64]
 
 RADII = (8e-3, 4e-3)  # on scaled axes
 ANGLES = 360
+CHORDS = 10
 
 
 def rays_around(curve: Curve, point: Singular) -> list[Array]:
@@ -41,7 +42,8 @@ def rays_around(curve: Curve, point: Singular) -> list[Array]:
 def _crossings(curve: Curve, point: Singular, radius: float) -> Array:
     """Angles at which the reduced function changes its sign, in order."""
     grid = 2.0 * np.pi * (np.arange(ANGLES) + 0.5) / ANGLES
-    values = np.array([_reduced(curve, point, radius, a) for a in grid])
+    back = _inverse(curve, point)
+    values = np.array([_reduced(curve, point, radius, a, back) for a in grid])
     if not np.isfinite(values).all():
         return np.empty(0)
     found = []
@@ -49,7 +51,7 @@ def _crossings(curve: Curve, point: Singular, radius: float) -> Array:
         low, high, at_low = grid[i], grid[i] + 2.0 * np.pi / ANGLES, values[i]
         for _ in range(30):
             middle = 0.5 * (low + high)
-            value = _reduced(curve, point, radius, middle)
+            value = _reduced(curve, point, radius, middle, back)
             if (value > 0.0) == (at_low > 0.0):
                 low = middle
             else:
@@ -58,24 +60,27 @@ def _crossings(curve: Curve, point: Singular, radius: float) -> Array:
     return np.array(found)
 
 
-def _reduced(curve: Curve, point: Singular, radius: float, angle: float) -> float:
-    """What is left of f along the left null vector where all else of it is zero."""
+def _inverse(curve: Curve, point: Singular) -> Array:
+    """From what is left of f, less its part along the left null vector, to a step across."""
     m = curve.m
     scale = curve.scale[:m]
-    w = point.left
-    u = point.u + radius * (point.right @ np.array([np.cos(angle), np.sin(angle)]))
     basis = point.right / scale[:, None]
+    scaled = curve.at(point.u)[1] * scale / point.rows[:, None]
+    scaled = scaled - point.left @ (point.left.T @ scaled)
+    across = np.eye(m) - basis @ basis.T  # of the plane of the circle
+    return np.asarray(scale[:, None] * np.linalg.pinv(scaled @ across, rcond=1e-9))
+
+
+def _reduced(curve: Curve, point: Singular, radius: float, angle: float, back: Array) -> float:
+    """What is left of f along the left null vector where all else of it is zero."""
+    w = point.left[:, 0]
+    u = point.u + radius * (point.right @ np.array([np.cos(angle), np.sin(angle)]))
     value = np.inf
-    for _ in range(6):
-        f, slopes = curve.at(u)
-        f = f / point.rows
-        value = float(w[:, 0] @ f)
-        rest = f - w[:, 0] * value
-        if np.max(np.abs(rest)) <= 1e-15 * radius:
+    for _ in range(CHORDS):  # each with an error smaller by the radius
+        f = curve.values(u[None])[0] / point.rows
+        value = float(w @ f)
+        rest = f - w * value
+        if not np.max(np.abs(rest)) > 1e-15 * radius:
             break
-        scaled = slopes * scale / point.rows[:, None]
-        scaled = scaled - w @ (w.T @ scaled)
-        # Across the plane of the circle only.
-        across = np.eye(m) - basis @ basis.T
-        u = u - scale * (np.linalg.pinv(scaled @ across, rcond=1e-9) @ rest)
+        u = u - back @ rest
     return value

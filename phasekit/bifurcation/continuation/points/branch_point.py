@@ -109,6 +109,8 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
                     forms.Derivatives(curve, u), moving, pitchfork=kind == "pitchfork"
                 )
     note = message or found.message or forms.unknown(form)
+    if kind == "transcritical" and np.isnan(form["a"]):
+        kind, note = "branch_point", f"transcritical or a pitchfork: {note}"
     if len(others) > 1 and corank == 1:
         note = f"{len(others) + 1} branches meet"
     return Special(

@@ -24,7 +24,6 @@ from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
 Array = npt.NDArray[np.float64]
 
 STEPS = 25
-FLOOR = (1e-12, 2e-8)  # steps that are no more than rounding, likewise
 LAST = (1e-9, 1e-7)  # longest last step, with exact derivatives and with differences
 
 
@@ -114,12 +113,13 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
         if not np.isfinite(matrix).all():
             return None
         slope = float(np.max(np.abs(matrix[n:])))
-        step = np.linalg.lstsq(matrix, right_side, rcond=1e-11)[0]
+        step, _, rank, sizes = np.linalg.lstsq(matrix, right_side, rcond=1e-11)
+        floor = 10.0 * accuracy / sizes[rank - 1] if rank else np.inf  # what errors make of steps
         size = float(np.max(np.abs(step[:m])))
         miss = float(np.max(np.abs(right_side)))
         if not np.isfinite(size) or curve.length(u - start[:m]) > 2.0 * reach:
             return None
-        if size > FLOOR[accuracy > 1e-12]:
+        if size > floor:
             fast = size <= 0.1 * last  # where the point is degenerate, steps shrink slowly
         small = fast and size <= LAST[accuracy > 1e-12]
         small &= miss <= max(1e-10 * slope, 1e2 * accuracy)
