@@ -18,7 +18,8 @@ from phasekit.labelled.bifurcation_set import CURVES
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.registry import models
+from phasekit.systems.system import Model
 from phasekit.table.quantities import PASSES, QUANTITIES, variant
 from phasekit.table.row import LAW, Pass, Quantity
 
@@ -166,7 +167,7 @@ def _systems() -> str:
         "# Systems",
         "Every model: its parameters, and its law as it follows from `products`. A function "
         "answers for all systems on the rungs that [](quantities.md) names.",
-        *(part for name, cls in MODELS.items() for part in _system(name, cls)),
+        *(part for name, cls in models().items() for part in _system(name, cls)),
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 
 import phasekit as pk
 from phasekit.laws.ladder import Conservative
+from phasekit.systems.registry import models
 from phasekit.systems.system import MODELS
 from phasekit.table import quantities
 from phasekit.table.row import Pass, Quantity
@@ -26,13 +27,11 @@ SECTIONS = dict(
 @pytest.fixture(autouse=True)
 def registries(monkeypatch):
     """The tables and registries as they were before."""
-    models, rows = dict(MODELS), dict(quantities.ROWS)
+    known, rows = dict(models()), dict(quantities.ROWS)
     monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
     monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
     yield
-    # Models of the package that were imported only now are there to stay.
-    models |= {k: one for k, one in MODELS.items() if one.__module__.startswith("phasekit.")}
-    for registry, before in ((MODELS, models), (quantities.ROWS, rows)):
+    for registry, before in ((MODELS, known), (quantities.ROWS, rows)):
         registry.clear()
         registry.update(before)
     plt.close("all")

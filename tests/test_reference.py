@@ -11,7 +11,7 @@ import pytest
 import phasekit as pk
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 from phasekit.table.quantities import PASSES, QUANTITIES
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -149,8 +149,8 @@ def test_tables_have_as_many_cells_in_each_line(pages):
 
 def test_each_system_has_its_parameters_and_its_law(pages, tables):
     sections = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", pages["systems"], re.M | re.S))
-    assert set(sections) == {name for name in MODELS if hasattr(pk, name)}
-    for name, cls in MODELS.items():
+    assert set(sections) == {name for name in models() if hasattr(pk, name)}
+    for name, cls in models().items():
         for parameter in cls.declared:
             (line,) = re.findall(rf"^\| `{parameter.name}` \|.*$", sections[name], re.MULTILINE)
             assert f"`{parameter.units}`" in line

@@ -14,9 +14,9 @@ from phasekit.bifurcation.exact.normal_forms import (
     normal_form,
     quadratic_coefficient,
 )
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 
-LAWS = {name: model.trigonometric() for name, model in MODELS.items() if model.rung.derived}
+LAWS = {name: model.trigonometric() for name, model in models().items() if model.rung.derived}
 
 A, B, C, PHI = sympy.symbols("A B C phi")
 V = -B * sympy.cos(PHI) + A / 2 * sympy.cos(PHI) ** 2 - C * sympy.sin(PHI)
@@ -78,7 +78,7 @@ def test_a_pitchfork_by_hand():
 @pytest.mark.parametrize("name", sorted(LAWS))
 def test_forms_are_the_coefficients_of_the_models(name):
     rng = np.random.default_rng(7)
-    model = MODELS[name]
+    model = models()[name]
     for _ in range(20):
         values = {}
         for p in model.declared:

@@ -12,7 +12,7 @@ from phasekit.cells.dispatch import pass_from, passes_of
 from phasekit.cells.states import at_states
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 from phasekit.table.quantities import PASSES, ROWS
 
 SYSTEMS = (
@@ -103,6 +103,6 @@ def test_a_quantity_of_a_higher_rung_is_refused_below():
 
 
 def test_rungs_are_the_only_thing_that_systems_are_asked_for():
-    rungs = {model.rung for model in MODELS.values()}
+    rungs = {model.rung for model in models().values()}
     assert rungs <= {Trigonometric, Conservative, Routhian}
     assert isinstance(pk.equilibria(SYSTEMS[1]), xr.Dataset)

@@ -15,7 +15,7 @@ import sympy as sp
 import phasekit as pk
 from phasekit.cli import main
 from phasekit.explorer import javascript
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=31.4)
 SYSTEMS = {
@@ -267,4 +267,4 @@ def test_the_command_line_knows_every_model(capsys):
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "Pendulum" in done.stdout
-    assert {"GyroRotorDisk", "Pendulum", "Potential"} <= set(MODELS)
+    assert {"GyroRotorDisk", "Pendulum", "Potential"} <= set(models())

@@ -11,7 +11,7 @@ import xarray as xr
 import phasekit as pk
 from phasekit.labels.arguments import numeric
 from phasekit.mechanics.disk import disk_coefficients, disk_inertia
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 
 DISK = {"beta": 0.3, "e": 0.0115, "a": 0.02, "r": 0.21, "omega1": 2.5}
 
@@ -46,7 +46,7 @@ def test_copies_are_equal_and_changes_are_not(system):
 @pytest.mark.parametrize("system", SYSTEMS, ids=repr)
 def test_scalar_system_hashes_and_its_representation_evaluates_to_it(system):
     assert hash(system) == hash(system.replace())
-    assert eval(repr(system), dict(MODELS)) == system
+    assert eval(repr(system), dict(models())) == system
 
 
 def test_coefficients_are_a_tuple():

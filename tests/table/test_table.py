@@ -59,9 +59,9 @@ def test_rows_are_complete(row):
 
 def test_names_are_unique_and_distinct_from_dims_and_parameters():
     assert len(ROWS) == len(QUANTITIES)
-    from phasekit.systems.system import MODELS
+    from phasekit.systems.registry import models
 
-    parameters = {p.name for model in MODELS.values() for p in model.declared}
+    parameters = {p.name for model in models().values() for p in model.declared}
     assert not set(ROWS) & (set(LABELS) | parameters | set(table.STATES))
 
 
