@@ -97,6 +97,15 @@ def rest(w: Array) -> float:
     return np.sqrt(slope) if slope > 0.0 else 0.0
 
 
+@inline
+def reduced(angle: float, w: Array) -> float:
+    """Angle of the system itself, where a magnified one is worked with."""
+    if w[ZOOM] == 1.0:
+        return angle
+    turns = TWO_PI * np.rint(angle / TWO_PI)
+    return turns + (angle - turns) * w[ZOOM]
+
+
 @routine
 def finish(w: Array) -> None:
     """Frequency, action and turning points from the shape, in the units that were given."""
@@ -137,9 +146,11 @@ def finish(w: Array) -> None:
     turns = w[TURNS] + np.rint((w[ANGLE] - sigma) / TWO_PI)
     w[OMEGA] = omega / unit
     w[ACTION] = area_ / unit * w[ZOOM] * w[ZOOM]
+    if w[ZOOM] != 1.0 and (mode == TURN or high - low > 1.0):  # round the circle
+        w[ACTION] = area_ / unit / w[ZOOM]
     # The state is on its orbit.
-    w[PHI_MIN] = min(low + turns * TWO_PI, w[START]) * w[ZOOM]
-    w[PHI_MAX] = max(high + turns * TWO_PI, w[START]) * w[ZOOM]
+    w[PHI_MIN] = reduced(min(low + turns * TWO_PI, w[START]), w)
+    w[PHI_MAX] = reduced(max(high + turns * TWO_PI, w[START]), w)
     if low != low:
         w[PHI_MIN] = math.nan
         w[PHI_MAX] = math.nan
