@@ -33,6 +33,7 @@ from phasekit.numerics.agm import STEPS, halve
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.double_double import TWO_PI, TWO_PI_LOW, dd_add, two_sum
 from phasekit.numerics.elementary import angle_half
+from phasekit.phase.exact.kernels.angles import length, tan_half, unit_vector
 from phasekit.phase.exact.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.phase.exact.kernels.levels import (
     AROUND,
@@ -96,27 +97,6 @@ def refer(w: Array) -> None:
     w[SLOPE] = w[CURVATURE + j]
     w[S2] = w[A] * x * y
     w[P] = w[M] * x * x - w[N] * y * y if w[A] >= 0.0 else w[M] * y * y - w[N] * x * x
-
-
-@inline
-def tan_half(y: float, x: float) -> float:
-    """Return tan(angle/2) of the angle atan2(y, x), y > 0."""
-    size = length(y, x)
-    return y / (size + x) if x >= 0.0 else (size - x) / y
-
-
-@inline
-def length(y: float, x: float) -> float:
-    """sqrt(x^2 + y^2) without overflow; y and x are not both 0."""
-    most = max(abs(x), abs(y))
-    return most * np.sqrt(x / most * (x / most) + y / most * (y / most))
-
-
-@inline
-def unit_vector(z: float) -> tuple[float, float]:
-    """Cosine and sine >= 0 of the angle whose cotangent is z."""
-    size = np.sqrt(1.0 + z * z) if abs(z) < 1e150 else abs(z)
-    return (z / size if abs(z) < math.inf else math.copysign(1.0, z)), 1.0 / size
 
 
 @routine
