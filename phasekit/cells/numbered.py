@@ -112,10 +112,12 @@ def _told(one: Pass, text: str, *arrays: Any) -> Any:
     """Call a pass, and say how many results it could not compute, and why."""
     result = one.resolved(*arrays)
     fields = result._asdict()
-    for name in ("period", "motion_phi"):
-        if name in fields:
+    for name in ("period", "action", "motion_phi"):
+        if f"{name}_error" in fields:
             error = fields[f"{name}_error"]
             unknown = np.isnan(fields[name]) & ~np.isnan(error)
+            if name == "action":  # those without period are told with it
+                unknown &= ~np.isnan(fields["period"])
             if unknown.any():
                 worst = np.max(error[unknown])
                 why = f"their error may be as large as {worst:.2g}"

@@ -90,9 +90,8 @@ def read_formula(
 
     def unknown(name: str, called: bool) -> ParameterError:
         valid = list(FUNCTIONS) if called else [*symbols, *CONSTANTS]
-        near = difflib.get_close_matches(name[:NAME], valid, n=1, cutoff=0.5) or [
-            one for one in valid if one.lower() == name.lower()
-        ]
+        near = [one for one in valid if one.lower() == name.lower()]
+        near = near or difflib.get_close_matches(name[:NAME], valid, n=1, cutoff=0.5)
         if near:
             hint = f"; did you mean {near[0]!r}?"
         else:

@@ -54,6 +54,7 @@ FUNCTIONS: dict[str, tuple[Any, int, int]] = {
     **{name: (sp.Max, 1, ARGUMENTS) for name in ("Max", "max")},
     **{name: (sp.Min, 1, ARGUMENTS) for name in ("Min", "min")},
     **{f"arc{n}": (getattr(sp, f"a{n}"), 1, 1) for n in ("sin", "cos", "tan")},
+    **{f"arc{n}": (getattr(sp, f"a{n}"), 1, 1) for n in ("sinh", "cosh", "tanh")},
     "arctan2": (sp.atan2, 2, 2),
     "log": (sp.log, 1, 2),
     "ln": (sp.log, 1, 1),

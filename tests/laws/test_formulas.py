@@ -243,6 +243,7 @@ def test_there_are_many_attacks():
     [
         ("muu*x + q", "did you mean 'mu'"),
         ("sine(x)", "did you mean 'sin'"),
+        ("Sin(x)", "did you mean 'sin'"),
         ("heaviside(x)", "did you mean 'Heaviside'"),
         ("q*x", "unknown symbol q"),
         ("х*2", r"\\u0445"),

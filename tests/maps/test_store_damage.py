@@ -691,6 +691,8 @@ def test_bits_that_flip_in_arrays_of_netcdf_files_are_noticed(tmp_path, capsys):
         assert main(["info", str(path), "--verify"]) == 2
 
 
+# h5netcdf's own, of a file that it could not open.
+@pytest.mark.filterwarnings("ignore:Exception ignored in.*File.close")
 def test_bits_that_flip_beside_the_arrays_of_netcdf_files_are_noticed(tmp_path):
     """Scalars, texts and attributes, for which HDF5 has no checksums."""
     path = tmp_path / "map.nc"

@@ -371,3 +371,9 @@ def test_the_slope_of_a_step_keeps_its_digits_far_from_it():
         np.testing.assert_allclose(got.phi, [np.arccosh(c**-0.5)], rtol=1e-15)
         assert got.kind.tolist() == [SADDLE]
         assert got.complete
+
+
+def test_high_powers_of_a_sine_are_not_multiplied_out():
+    formula = make_formula("sin(x)^500", "x", (), 2.0 * np.pi, None)
+    assert formula.may_be_incomplete
+    assert make_formula("sin(x)^100", "x", (), 2.0 * np.pi, None).may_be_incomplete is False

@@ -243,6 +243,8 @@ def _harmonics(slope: Any, x: Any, period: float) -> list[Any] | None:
     """Coefficients c_0 to c_n of a finite Fourier sum; None for any other function."""
     import sympy as sp
 
+    if any(p.exp.is_Integer and p.exp > _MOST_HARMONICS and p.has(x) for p in slope.atoms(sp.Pow)):
+        return None  # which takes long to multiply out
     z = sp.Symbol("z", positive=True)
     terms = sp.expand(sp.expand(slope.rewrite(sp.exp)), power_exp=True)
     unit = 2.0 * np.pi / period

@@ -136,8 +136,6 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     else:
         above = energy_above(UPPER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if abs(above) <= slack - blur * w[CURVATURE + UPPER_SADDLE]:
-        if slack - blur * w[CURVATURE + UPPER_SADDLE] < LEAST:
-            return NOT_COMPUTED  # all of it underflows
         settle(UPPER_SADDLE, above, SINGLE, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if above > 0.0:
@@ -153,8 +151,6 @@ def classify(phi: float, dphi: float, valid: bool, w: Array) -> int:
     if not level:
         within = energy_above(LOWER_SADDLE, phi, w[ANGLE], v, w[DOUBLE_TO], w)
     if abs(within) <= slack - blur * w[CURVATURE + LOWER_SADDLE]:
-        if slack - blur * w[CURVATURE + LOWER_SADDLE] < LEAST:
-            return NOT_COMPUTED
         settle(LOWER_SADDLE, within, AROUND, ASYMPTOTIC, w)
         return ASYMPTOTIC
     if within > 0.0 or w[PHI + UPPER_CENTER] != w[PHI + UPPER_CENTER]:

@@ -8,8 +8,20 @@ import numpy as np
 
 from phasekit.numerics.agm import amplitude
 from phasekit.numerics.compile import Array, inline
-from phasekit.phase.exact.kernels.levels import MODE, SWING
-from phasekit.phase.exact.kernels.shape import HIGH, LEVELS, LOW, MEANS, RATIO, SIGMA, SKEW, U
+from phasekit.phase.exact.kernels.levels import MODE, SWING, TURN
+from phasekit.phase.exact.kernels.shape import (
+    HIGH,
+    LEVELS,
+    LOW,
+    MEANS,
+    PHI_S,
+    PHI_S_LOW,
+    RATIO,
+    SIGMA,
+    SKEW,
+    SPAN,
+    U,
+)
 
 
 @inline
@@ -41,6 +53,14 @@ def locate(sine: float, cosine: float, w: Array) -> tuple[float, float]:
         top = -top
         rate = 2.0
     u = w[U]
+    if w[MODE] == TURN:  # next to the slow point, from the reference
+        sine = far if sn >= 0.0 else -far
+        reach = 2.0 * u * sine
+        rest = (1.0 + u * u) * ratio * near + (1.0 - u * u) * sine
+        if abs(reach) < 0.1 * rest:
+            rate *= u * ratio * delta / (bottom * bottom + u * top * (u * top))
+            o = w[SPAN] + 2.0 * math.atan2(reach, rest)
+            return w[PHI_S] + (o + w[PHI_S_LOW]), rate
     rate *= u * ratio * delta / (bottom * bottom + u * top * (u * top))
     if w[MODE] == SWING and abs(top) * max(u, 1.0) > 0.5 * bottom:
         if top > 0.0:

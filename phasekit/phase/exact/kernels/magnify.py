@@ -14,7 +14,15 @@ import numpy as np
 
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.elementary import cbrt, power_of_two_scale
-from phasekit.phase.exact.kernels.levels import ENERGY, classify
+from phasekit.phase.exact.kernels.levels import (
+    ASYMPTOTE,
+    ASYMPTOTIC,
+    ENERGY,
+    INVALID,
+    MODE,
+    NOT_COMPUTED,
+    classify,
+)
 from phasekit.phase.exact.kernels.system import (
     CURVATURE,
     LARGEST,
@@ -41,6 +49,9 @@ def enter(phi: float, dphi: float, valid: bool, w: Array) -> int:
         scale = magnify(phi, dphi, w)
     code = classify(phi * scale, dphi * scale, valid, w)
     w[ENERGY] = w[ENERGY] / unit / unit
+    if w[MODE] == INVALID and code != NOT_COMPUTED:
+        w[MODE] = ASYMPTOTE  # a saddle's energy, as far as doubles tell
+        return ASYMPTOTIC
     return code
 
 
@@ -57,8 +68,8 @@ def magnify(phi: float, dphi: float, w: Array) -> float:
         size = max(abs(phi), np.sqrt(rate) * 2.0**-200, cbrt(abs(w[C])))
     else:
         size = max(abs(phi), rate / np.sqrt(bend) * 2.0**-400, abs(w[C]) / bend)
-    # Only centers: what starts at a saddle does not stay there.
-    if not (bend >= 0.0 and (w[A] > 0.0 or not cubic) and 0.0 < size < SMALL):
+    # At a saddle motion grows out of what is magnified; but at a cusp it takes no time elsewhere.
+    if not (bend >= 0.0 and 0.0 < size < SMALL):
         return 1.0
     scale = power_of_two_scale(size) * SIZE
     w[C] *= scale

@@ -27,7 +27,7 @@ from phasekit.numerics.double_double import (
     two_product,
     two_sum,
 )
-from phasekit.numerics.elementary import PI
+from phasekit.numerics.elementary import PI, angle_half
 from phasekit.phase.exact.kernels.action import SIZE
 from phasekit.phase.exact.kernels.levels import (
     ANGLE,
@@ -49,7 +49,9 @@ from phasekit.phase.exact.kernels.levels import (
 from phasekit.phase.exact.kernels.locate import locate
 from phasekit.phase.exact.kernels.shape import (
     FIRST,
+    HIGH,
     LEVELS,
+    LOW,
     MEANS,
     PHI_S,
     PHI_S_LOW,
@@ -81,6 +83,7 @@ from phasekit.phase.exact.kernels.system import (
     A,
     B,
     C,
+    potential_dd,
 )
 
 # Rows after those of an orbit: phase at the start and frequency (high and low parts), whole turns
@@ -142,18 +145,6 @@ def frequency_dd(w: Array) -> tuple[float, float]:
             break
     th, tl = dd_add(ah, al, gh, gl)
     return 0.5 * th, 0.5 * tl
-
-
-@inline
-def potential_dd(
-    a: float, b: float, c: float, ch: float, cl: float, sh: float, sl: float
-) -> tuple[float, float]:
-    """V = (a cos/2 - b) cos - c sin as a double-double."""
-    h, low = dd_multiply(ch, cl, 0.5 * a, 0.0)
-    h, low = dd_add(h, low, -b, 0.0)
-    h, low = dd_multiply(h, low, ch, cl)
-    th, tl = dd_multiply(sh, sl, c, 0.0)
-    return dd_add(h, low, -th, -tl)
 
 
 @inline
@@ -251,9 +242,15 @@ def begin(w: Array) -> None:
         # The lower turning point is at the phase pi, not at the double next to it.
         w[PHASE_LOW] = 0.5 * TWO_PI_LOW * np.sign(w[PHASE]) if abs(w[PHASE]) == PI else 0.0
         turns, local, _ = at_phase(w[PHASE], w[PHASE_LOW], w)
-        w[BASE] = w[TURNS] + np.rint((w[ANGLE] - local) / TWO_PI)
+        back = np.rint((w[ANGLE] - local) / TWO_PI)
+        w[BASE] = w[TURNS] + back
         if mode == TURN:
             w[BASE] -= turns
+        elif back == -1.0 and w[Z_HIGH] < 0.0:  # it starts at the far end, next to the reference
+            w[HIGH] = w[PHI_S] + (w[PHI_S_LOW] - 2.0 * angle_half(1.0, -w[Z_HIGH]))
+            w[LOW] -= TWO_PI
+            w[SIGMA] -= TWO_PI
+            w[BASE] += 1.0
         w[OMEGA_HIGH] = w[MEANS + int(w[LEVELS])]
         w[OMEGA_LOW] = 0.0
         apart = min(w[FIRST], w[SECOND])

@@ -50,9 +50,14 @@ from phasekit.phase.exact.kernels.system import (
     A,
     B,
     C,
+    force,
 )
 
 __all__ = ["ACTION", "OMEGA", "PHI_MAX", "PHI_MIN", "SIZE", "finish", "shape"]
+
+
+# Rounding does not tell the ends of an orbit apart that are this close together on the circle.
+ENDS = 1e-7
 
 
 @inline
@@ -89,12 +94,21 @@ def reach(w: Array) -> tuple[float, float]:
 
 
 @inline
-def rest(w: Array) -> float:
+def small_frequency(w: Array) -> float:
     """Frequency of small oscillations about a state at rest that is a center, else 0."""
     c = np.float64(math.cos(w[ANGLE]))
     s = np.float64(math.sin(w[ANGLE]))
     slope = w[B] * c - w[A] * (c - s) * (c + s) + w[C] * s
     return np.sqrt(slope) if slope > 0.0 else 0.0
+
+
+@inline
+def reduced(angle: float, w: Array) -> float:
+    """Angle of the system itself, where a magnified one is worked with."""
+    if w[ZOOM] == 1.0:
+        return angle
+    turns = TWO_PI * np.rint(angle / TWO_PI)
+    return turns + (angle - turns) * w[ZOOM]
 
 
 @routine
@@ -130,16 +144,24 @@ def finish(w: Array) -> None:
         low, high = reach(w)
         sigma = 0.5 * (low + high)
     elif mode == REST:
-        omega = rest(w)
+        omega = small_frequency(w)
         area_ = 0.0
         low = w[ANGLE]
         high = w[ANGLE]
-    turns = w[TURNS] + np.rint((w[ANGLE] - sigma) / TWO_PI)
+    turns = np.rint((w[ANGLE] - sigma) / TWO_PI)
+    if mode == SWING:
+        rest = (w[ANGLE] - sigma) - turns * TWO_PI
+        if abs(rest) > 0.5 * TWO_PI - ENDS:  # V' tells on which side of the saddle it is
+            slope = force(w[ANGLE], w)
+            turns += 1.0 if rest > 0.0 > slope else (-1.0 if rest < 0.0 < slope else 0.0)
+    turns += w[TURNS]
     w[OMEGA] = omega / unit
     w[ACTION] = area_ / unit * w[ZOOM] * w[ZOOM]
+    if w[ZOOM] != 1.0 and (mode == TURN or high - low > 1.0):  # round the circle
+        w[ACTION] = area_ / unit / w[ZOOM]
     # The state is on its orbit.
-    w[PHI_MIN] = min(low + turns * TWO_PI, w[START]) * w[ZOOM]
-    w[PHI_MAX] = max(high + turns * TWO_PI, w[START]) * w[ZOOM]
+    w[PHI_MIN] = reduced(min(low + turns * TWO_PI, w[START]), w)
+    w[PHI_MAX] = reduced(max(high + turns * TWO_PI, w[START]), w)
     if low != low:
         w[PHI_MIN] = math.nan
         w[PHI_MAX] = math.nan

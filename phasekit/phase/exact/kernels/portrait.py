@@ -41,11 +41,8 @@ def write_orbit(k: int, code: int, energy: float, w: Array, out: Outputs) -> Non
     known = w[lv.MODE] != lv.INVALID
     kind[k] = code if known else lv.NOT_COMPUTED
     orbit_energy[k] = energy if known else math.nan
-    omega = w[ob.OMEGA]
-    period[k] = TWO_PI / omega
-    if omega > 0.0 and not period[k] < math.inf:
-        period[k] = math.nan  # no double holds it
-    frequency[k] = omega
+    period[k] = TWO_PI / w[ob.OMEGA]
+    frequency[k] = w[ob.OMEGA]
     action[k] = w[ob.ACTION]
     phi_min[k] = w[ob.PHI_MIN]
     phi_max[k] = w[ob.PHI_MAX]
@@ -185,7 +182,7 @@ def flow(
             mo.begin(w)
             last = j
         local, rate = mo.after(t[k], w)
-        motion_phi[k] = local * w[sy.ZOOM]
+        motion_phi[k] = ob.reduced(local, w)
         motion_dphi[k] = rate * w[sy.ZOOM]
 
 
@@ -223,7 +220,7 @@ def action_angle(
         family[k] = aa.family(w)
         angle[k] = aa.angle(w)
         twist[k] = aa.twist(w)
-        if w[lv.MODE] == lv.SWING:
+        if w[lv.MODE] == lv.SWING or w[lv.MODE] == lv.TURN:
             twist[k] = twist[k] / w[sy.ZOOM] / w[sy.ZOOM]
 
 

@@ -33,6 +33,7 @@ from phasekit.numerics.agm import STEPS, halve
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.double_double import TWO_PI, TWO_PI_LOW, dd_add, two_sum
 from phasekit.numerics.elementary import angle_half
+from phasekit.phase.exact.kernels.angles import length, tan_half, unit_vector
 from phasekit.phase.exact.kernels.equilibria import LOWER_SADDLE, UPPER_CENTER
 from phasekit.phase.exact.kernels.levels import (
     AROUND,
@@ -64,18 +65,19 @@ from phasekit.phase.exact.kernels.system import (
 # distance, its ratio (libration: sqrt(V'(high)/V'(low)), rotation: sqrt(v(fast)/v(slow))), and
 # 1 - ratio (libration) or ratio - 1 (rotation); turning points. Of the factors of a libration: sum
 # of the zeros of its own, r of the other one, |1 + r + i sqrt(disc)| of its own, and its zeros at
-# both turning points; of a rotation, cosines (Z) and sines (TAU, REST_R) of half the angles from
-# reference to slow and fast point. The number of Gauss steps. What `orbits` makes of all
-# that. What the reference's angle misses, Z_HIGH - Z_LOW,
-# and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes of `action`.
+# both turning points. Of a rotation in their place: sines (TAU, REST_R) and cosines (Z) of half the
+# angles from the reference to the slow and the fast point, and the offset of the slow one (SPAN).
+# The number of Gauss steps. What `orbits` makes of all that. What the reference's angle misses,
+# Z_HIGH - Z_LOW, and what SIGMA misses. Last, the means of the Gauss steps, and room for the nodes
+# of `action`.
 PHI_S, COS, SIN, SLOPE, M, N, S2, P, X0, Y_PRODUCT = range(ORBIT, ORBIT + 10)
 FIRST, SECOND, SIGMA, U, RATIO, SKEW, LOW, HIGH = range(ORBIT + 10, ORBIT + 18)
 TAU, REST_R, SPAN, Z_HIGH, Z_LOW, LEVELS = range(ORBIT + 18, ORBIT + 24)
 OMEGA, ACTION, PHI_MIN, PHI_MAX = range(ORBIT + 24, ORBIT + 28)
 PHI_S_LOW, Z_APART, SIGMA_LOW = range(ORBIT + 28, ORBIT + 31)
 MEANS = ORBIT + 31
-# Below this the last term of the cubic has lost digits.
-UNDERFLOWS = 1e-305
+# Of roots below this all terms of the cubic underflow.
+UNDERFLOWS = 1e-101
 NODES = MEANS + 2 * STEPS
 
 
@@ -95,27 +97,6 @@ def refer(w: Array) -> None:
     w[SLOPE] = w[CURVATURE + j]
     w[S2] = w[A] * x * y
     w[P] = w[M] * x * x - w[N] * y * y if w[A] >= 0.0 else w[M] * y * y - w[N] * x * x
-
-
-@inline
-def tan_half(y: float, x: float) -> float:
-    """Return tan(angle/2) of the angle atan2(y, x), y > 0."""
-    size = length(y, x)
-    return y / (size + x) if x >= 0.0 else (size - x) / y
-
-
-@inline
-def length(y: float, x: float) -> float:
-    """sqrt(x^2 + y^2) without overflow; y and x are not both 0."""
-    most = max(abs(x), abs(y))
-    return most * np.sqrt(x / most * (x / most) + y / most * (y / most))
-
-
-@inline
-def unit_vector(z: float) -> tuple[float, float]:
-    """Cosine and sine >= 0 of the angle whose cotangent is z."""
-    size = np.sqrt(1.0 + z * z) if abs(z) < 1e150 else abs(z)
-    return (z / size if abs(z) < math.inf else math.copysign(1.0, z)), 1.0 / size
 
 
 @routine
@@ -200,6 +181,12 @@ def turn(w: Array) -> None:
         o_fast += TWO_PI
         w[Z_HIGH] = -w[Z_HIGH]
         w[REST_R] = -w[REST_R]
+    if slow < 0.0:  # the slow point is near the reference on its left
+        o_slow = -2.0 * angle_half(1.0, -slow)
+        o_fast -= TWO_PI
+        for i in (Z_LOW, TAU, Z_HIGH, REST_R):
+            w[i] = -w[i]
+    w[SPAN] = o_slow
     w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
     if abs(slow) < math.inf:
         w[U] = tan_half(abs(slow - fast), (1.0 + slow * fast) * (1.0 if slow > fast else -1.0))
@@ -396,8 +383,8 @@ def shape(w: Array) -> None:
     if mode == SWING or mode == TURN or mode == ASYMPTOTE:
         refer(w)
     if mode == SWING or mode == TURN:
-        cubic = w[GAP] * w[M] * w[N]
-        if abs(cubic) < UNDERFLOWS and w[M] != 0.0 and w[N] != 0.0:
+        size = max(abs(w[SLOPE]), np.sqrt(abs(w[GAP])))
+        if size < UNDERFLOWS and w[M] != 0.0 and w[N] != 0.0:
             mode = INVALID
             w[MODE] = INVALID
     if mode == TURN:

@@ -95,6 +95,18 @@ def force(phi: float, w: Array) -> float:
     return (w[B] - a * x) * y - w[C] * x
 
 
+@inline
+def potential_dd(
+    a: float, b: float, c: float, ch: float, cl: float, sh: float, sl: float
+) -> tuple[float, float]:
+    """V = (a cos/2 - b) cos - c sin as a double-double."""
+    h, low = dd_multiply(ch, cl, 0.5 * a, 0.0)
+    h, low = dd_add(h, low, -b, 0.0)
+    h, low = dd_multiply(h, low, ch, cl)
+    th, tl = dd_multiply(sh, sl, c, 0.0)
+    return dd_add(h, low, -th, -tl)
+
+
 @routine
 def slopes_dd(phi: float, low: float, w: Array) -> tuple[float, float, float, float]:
     """V', V'' as a double-double, and its slope, next to an equilibrium; accurate on the axes.
