@@ -11,6 +11,7 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.trace import Point
 from phasekit.systems.problem import Problem
 
@@ -86,7 +87,11 @@ def points_of(
 ) -> xr.Dataset:
     """The points of a branch, special points in their places."""
     dim = "point"
-    rows = [summary(problem, cycles, p, one) for p, one in zip(points, labels, strict=True)]
+    # On a curve of special points one multiplier at least is critical everywhere.
+    on_curve = "curve" if isinstance(cycles, Extended) else ""
+    rows = [
+        summary(problem, cycles, p, one or on_curve) for p, one in zip(points, labels, strict=True)
+    ]
     free = [cycles.field.parameters[i] for i in cycles.active]
     data: dict[str, Any] = {}
     for k, name in enumerate(free):

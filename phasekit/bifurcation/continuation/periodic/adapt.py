@@ -17,7 +17,7 @@ LEAST = 8
 def count_for(cycles: Cycles, orbit: Orbit) -> int:
     """Number of intervals with which the mesh error is a part of its tolerance."""
     m = cycles.m
-    sizes = collocation.highest(orbit.mesh, orbit.x, m, cycles.amplitudes(orbit))
+    sizes = collocation.highest(orbit.mesh, orbit.x, m, cycles.amplitudes(orbit), cycles.closure)
     whole = 1.2 * float(np.sum(sizes ** (1.0 / (m + 1)) * np.diff(orbit.mesh)))
     aim = SPARE * cycles.options.mesh_tolerance / collocation.factor(m)
     count = whole / aim ** (1.0 / (m + 1))
@@ -32,4 +32,6 @@ def fitted(cycles: Cycles, orbit: Orbit) -> Array:
         wanted = min(count_for(cycles, orbit), cycles.options.max_intervals)
         if wanted > count or wanted < 0.75 * count:
             count = wanted
-    return collocation.even(orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count)
+    return collocation.even(
+        orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count, cycles.closure
+    )

@@ -284,6 +284,15 @@ class Cycles:
         n = self.n
         return multipliers(W[:, (self.m - 1) * n :, :n])
 
+    def divergence(self, found: float) -> float:
+        """Integral of the trace of f_x over a period, of what `kernels.condense` found."""
+        return found
+
+    @property
+    def own(self) -> int:
+        """Number of states of the orbit itself."""
+        return self.n
+
     def amplitudes(self, orbit: Orbit) -> Array:
         """Half the range of each state, without its turns; where it hardly moves, a part of all."""
         flat = orbit.x - np.outer(collocation.times(orbit.mesh, self.m), self.turns)
@@ -293,7 +302,7 @@ class Cycles:
 
     def mesh_error(self, orbit: Orbit) -> float:
         """Largest estimated error of a state, beside its amplitude."""
-        return collocation.error(orbit.mesh, orbit.x, self.m, self.amplitudes(orbit))
+        return collocation.error(orbit.mesh, orbit.x, self.m, self.amplitudes(orbit), self.closure)
 
     def on(self, mesh: Array, orbit: Orbit, *more: Array) -> tuple[Orbit, tuple[Array, ...]]:
         """The orbit, and directions, on another mesh."""

@@ -92,9 +92,11 @@ def _through_hopf(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     """Whether the orbit turned inside out between two points, as it does through a Hopf point."""
     if np.any(cycles.turns):
         return False
+    n = cycles.own
     a, _ = cycles.on(b.mesh, a)
     one, two = (shape(cycles, orbit) * cycles.scale for orbit in (a, b))
     nothing = np.zeros(cycles.q)
+    one[:, n:] = 0.0
     return cycles.inner(b.mesh, one, two, nothing, nothing) < 0.0
 
 
@@ -105,6 +107,8 @@ def _at_hopf(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, 
     middle = collocation.mean(a.mesh, a.x, cycles.m)
     said = "the orbits shrink to an equilibrium, a Hopf point"
     near = Stop("hopf", f"{said} near {name} = {made.orbit.y[1]:.9g}")
+    if len(cycles.active) > 1:
+        return None, near
     found = hopf_near(cycles, middle, a.y)
     if found is None:
         return None, near
@@ -166,7 +170,7 @@ def hopf_near(cycles: Cycles, x: Array, y: Array) -> tuple[Array, Array] | None:
 
 def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     """Whether both halves of the orbit changed places, as they do where they become the same."""
-    if cycles.forced and cycles.multiple % 2:
+    if (cycles.forced and cycles.multiple % 2) or len(cycles.active) > 1:
         return False
     at = np.linspace(0.0, 0.5, 65)[:-1]
 

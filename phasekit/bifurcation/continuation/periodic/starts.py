@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -10,6 +11,11 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, Extended
+from phasekit.bifurcation.continuation.periodic.normal_forms import Linear, wave
+
+if TYPE_CHECKING:
+    from phasekit.bifurcation.continuation.periodic.trace import Point
 
 Array = npt.NDArray[np.float64]
 
@@ -17,11 +23,17 @@ FIRST = 40  # intervals of a first mesh
 SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hopf point
 
 
-def settled(cycles: Cycles, guess: Orbit, *, iterations: int = 40) -> Solution:
-    """The orbit that a guess leads to at fixed parameters, on a mesh that suits it."""
+def settled(
+    cycles: Cycles, guess: Orbit, *, second: bool = False, iterations: int = 40
+) -> Solution:
+    """The orbit that a guess leads to at fixed parameters, on a mesh that suits it.
+
+    Of two parameters only the ``second`` is held.
+    """
+    held = 2 if second else len(cycles.active)
     for _ in range(8):
         rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
-        rows_y[-1, -1], target[-1] = 1.0, guess.y[-1]
+        rows_y[-1, held], target[-1] = 1.0, guess.y[held]
         found = cycles.correct(guess, rows, rows_y, target, iterations=iterations, damped=True)
         if not found.converged:
             return found
@@ -45,7 +57,9 @@ def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
         if orbit.intervals >= cycles.options.max_intervals:
             return None
         count = cycles.options.max_intervals
-    return collocation.even(orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count)
+    return collocation.even(
+        orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count, cycles.closure
+    )
 
 
 def from_hopf(
@@ -101,6 +115,27 @@ def _held(
     rows, rows_y, target = cycles.rows(away if guess is None else guess, dx, nothing)
     target[-1] = np.sum(rows[-1] * away.x)
     return cycles.correct(away if guess is None else guess, rows, rows_y, target, iterations=15)
+
+
+def with_function(made: Extended, cycles: Cycles, point: Point, value: float) -> Orbit:
+    """A special orbit with its critical function beside it, for a curve in two parameters."""
+    orbit = point.orbit
+    W = cycles.looked_at(orbit, point.dx, point.dy).W
+    y = np.append(orbit.y, value)
+    if made.kind == DOUBLING:
+        v = null_vector(cycles, orbit, W, -1.0)
+    elif made.kind == FOLD:
+        v = point.dx
+        if made.q == 4:
+            y = np.append(y, point.dy[0] / orbit.y[0])
+    else:
+        mu = cycles.multipliers(W)[0]
+        mu = mu[mu.imag > 0.0]
+        angle = float(np.angle(mu[np.argmin(np.abs(np.abs(mu) - 1.0))]))
+        omega = angle / orbit.y[0]
+        v = wave(Linear(cycles, orbit), omega)
+        y = np.append(y, omega)
+    return Orbit(orbit.mesh, np.hstack([orbit.x, v]), y)
 
 
 def doubled(cycles: Cycles, orbit: Orbit, W: Array) -> tuple[Cycles, Orbit, Array]:

@@ -70,11 +70,12 @@ class Track:
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
     values, log = cycles.multipliers(s.W)
+    divergence = cycles.divergence(s.divergence)
     with np.errstate(all="ignore"):
-        product, exact = np.exp(log), np.exp(s.divergence)
+        product, exact = np.exp(log), np.exp(divergence)
         defect = abs(product - exact) / max(1.0, exact)
         if not np.isfinite(exact):
-            defect = abs(log - s.divergence)
+            defect = abs(log - divergence)
     trivial = 0.0 if cycles.forced else float(np.min(np.abs(values - 1.0)))
     return Point(
         s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
@@ -169,7 +170,12 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
                 f"{cycles.options.max_intervals}"
             )
         mesh = collocation.even(
-            found.orbit.mesh, found.orbit.x, cycles.m, cycles.amplitudes(found.orbit), count
+            found.orbit.mesh,
+            found.orbit.x,
+            cycles.m,
+            cycles.amplitudes(found.orbit),
+            count,
+            cycles.closure,
         )
         orbit, (dx,) = cycles.on(mesh, orbit, dx)
         guess, _ = cycles.on(mesh, found.orbit)
