@@ -25,8 +25,11 @@ from phasekit.labelled.continuation.cycle_points import orbit_dataset
 from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.laws.formulas import symbols_of
 from phasekit.systems.problem import Problem
 
+#: The parameter that unfolds conservative families, and stays zero.
+UNFOLDING = "unfolding"
 #: Special points that have curves in two parameters.
 CURVES = ("fold_of_cycles", "period_doubling", "torus")
 
@@ -116,22 +119,71 @@ def continue_orbit(
     fix: str | None = None,
 ) -> CycleBranch:
     """Follow the family of a periodic orbit along a parameter, or along two at a fixed period."""
+    if problem.conservative:
+        options = _by_period(parameter, span, options)
+        problem, parameter = unfolded(problem), UNFOLDING
     free = _free(problem, parameter, fix)
-    spans = _spans(problem, free, span)
+    family = parameter == UNFOLDING
+    spans = [(-np.inf, np.inf)] if family else _spans(problem, free, span)
     value = problem.parameters[free[0]]
     guess, turns, multiple = given_orbit(problem, orbit, value, options.degree)
     scale = scale_of(guess.x)
     cycles = cycles_of(problem, free[:1], spans[:1], scale, turns, options, multiple)
     found = starts.settled(cycles, guess)
+    if family or not found.converged:
+        # In a conservative family the parameter is no coordinate; it stays when it is free.
+        other = starts.kept(cycles, guess)
+        stays = abs(other.orbit.y[1] - value) <= 1e-9 * max(1.0, abs(value))
+        found = other if other.converged and stays else found
     start = _start(cycles, found, f"from the orbit given at {free[0]} = {value:.9g}")
     if fix is not None:
         cycles = cycles_of(problem, free, spans, scale, turns, options, multiple, fixed=True)
         y = np.append(start.orbit.y, problem.parameters[free[1]])
         found = starts.settled(cycles, Orbit(start.orbit.mesh, start.orbit.x, y), second=True)
         start = _start(cycles, found, f"with the period {y[0]:.9g}")
-    if start.dy[1] < 0.0:
+    lead = start.dy[0] if cycles.vertical(start.dy) else start.dy[1]
+    if lead < 0.0:
         start = start.flipped()
     return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
+
+
+def _by_period(parameter: Any, span: Any, options: ContinuationOptions) -> ContinuationOptions:
+    """Options that bound the period of a conservative family, which is what varies."""
+    if parameter != "period":
+        raise bad(
+            "parameter", parameter, "'period' of a conservative problem, with the span of it",
+            "its orbits form families at fixed parameters",
+        )  # fmt: skip
+    return replace(options, bounds={**options.bounds, "period": check_span(span)})
+
+
+def unfolded(problem: Problem) -> Problem:
+    """A conservative problem with a term that takes energy, times a parameter that stays zero.
+
+    The term is that of a damping: each velocity, in its own equation.
+    """
+    n = len(problem.state)
+    x = np.random.default_rng(3).uniform(0.3, 0.9, n)
+    f = problem(x)
+    velocity = [int(np.argmin(np.abs(x - v))) for v in f]
+    moving = sorted({j for j, v in zip(velocity, f, strict=True) if x[j] == v}) or list(range(n))
+    mask = np.zeros(n)
+    mask[moving] = 1.0
+    values = {**problem.parameters, UNFOLDING: 0.0}
+    periods = dict(problem.periods)
+    if problem.kind == "symbolic":
+        names = symbols_of([*problem.state, UNFOLDING])
+        formulas = [
+            e + names[UNFOLDING] * names[name] if mask[i] else e
+            for i, (e, name) in enumerate(zip(problem.f, problem.state, strict=True))
+        ]
+        return Problem(formulas, problem.state, values, periods=periods)
+
+    def with_damping(x: FloatArray, **parameters: float) -> FloatArray:
+        part = parameters.pop(UNFOLDING)
+        return np.asarray(problem.f(x, **parameters), dtype=float) + part * (mask * x.T).T
+
+    return Problem(with_damping, problem.state, values, periods=periods)
 
 
 def _free(problem: Problem, parameter: Any, fix: Any) -> list[str]:

@@ -160,7 +160,9 @@ def _packed_state(name: str, state: State) -> dict[str, FloatArray]:
         f"{name}_x": state.orbit.x,
         f"{name}_dx": state.dx,
         f"{name}_y": np.stack([state.orbit.y, state.dy]),
-        f"{name}_numbers": np.array([state.step, state.arclength, float(state.since)]),
+        f"{name}_numbers": np.array(
+            [state.step, state.arclength, float(state.since), float(state.since_start)]
+        ),
     }
 
 
@@ -203,5 +205,7 @@ def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
     places = (len(mesh) - 1) * cycles.m + 1
     x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
     y = stored.array(f"{name}_y", (2, cycles.q))
-    step, arclength, since = stored.array(f"{name}_numbers", (3,)).tolist()
-    return State(Orbit(mesh, x, y[0].copy()), dx, y[1].copy(), step, arclength, int(since))
+    step, arclength, since, count = stored.array(f"{name}_numbers", (4,)).tolist()
+    return State(
+        Orbit(mesh, x, y[0].copy()), dx, y[1].copy(), step, arclength, int(since), int(count)
+    )

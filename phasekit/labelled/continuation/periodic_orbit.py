@@ -15,11 +15,13 @@ from phasekit.bifurcation.continuation.periodic import kernels, starts
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.continuation import check_options
 from phasekit.labelled.continuation.cycle_start import (
+    UNFOLDING,
     cycles_of,
     given_orbit,
     orbit_of,
     sampled,
     scale_of,
+    unfolded,
 )
 from phasekit.labels.arguments import bad, number, numeric
 from phasekit.systems.problem import Problem, as_problem
@@ -93,7 +95,9 @@ def periodic_orbit(
         settle = number("settle", settle, "a number >= 0", None)
         if settle < 0.0:
             raise bad("settle", settle, "a number >= 0")
-    value = next(iter(problem.parameters.values()), 0.0)
+    if problem.conservative and n > 1:
+        problem = unfolded(problem)
+    value = problem.parameters.get(UNFOLDING, next(iter(problem.parameters.values()), 0.0))
     if not problem.parameters:
         raise bad("problem", problem, "a problem with at least one parameter")
     if isinstance(x0, xr.Dataset):
@@ -153,7 +157,8 @@ def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
 
 def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr.Dataset:
     """The orbit that the first of some guesses leads to."""
-    name = next(iter(problem.parameters))
+    free = UNFOLDING in problem.parameters
+    name = UNFOLDING if free else next(iter(problem.parameters))
     value = problem.parameters[name]
     width = max(abs(value), 1.0)
     said = ""
@@ -162,7 +167,10 @@ def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr
             problem, [name], [(value - width, value + width)], scale_of(guess.x), turns, options,
             multiple,
         )  # fmt: skip
-        found = starts.settled(cycles, guess)
+        if free:
+            found = starts.kept(cycles, guess, guess.x[0].copy())
+        else:
+            found = starts.settled(cycles, guess)
         if not found.converged:
             said = found.message
             continue
@@ -170,7 +178,11 @@ def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr
         if size < 1e-6 and not cycles.forced:
             said = "it led to an equilibrium"
             continue
-        found.orbit.y[1] = value
+        if not free:
+            found.orbit.y[1] = value
+        elif abs(found.orbit.y[1]) > 1e-8:
+            said = f"energy is not conserved along it: it needs a damping of {found.orbit.y[1]:.2g}"
+            continue
         return orbit_of(cycles, problem, found, where)
     raise ConvergenceError(
         f"x0: no periodic orbit was found {where}: {said}; give another x0 or period, or settle="
@@ -292,7 +304,7 @@ def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
         side = gaps @ normal
         near = np.sqrt(np.mean((gaps / sizes) ** 2, axis=1))
         crossing = np.flatnonzero((side[:-1] < 0.0) & (side[1:] >= 0.0))
-        crossing = crossing[near[crossing] < 0.25]
+        crossing = crossing[(crossing > 0) & (near[crossing] < 0.25)]
         if len(crossing):
             close = near[crossing]
             # The first return that is about as near as any.

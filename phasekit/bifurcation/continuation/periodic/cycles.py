@@ -150,7 +150,8 @@ class Cycles:
     def sizes(self) -> Array:
         """Sizes of states and active parameters, for differences."""
         time = np.ones(1) if self.forced else np.ones(0)
-        return np.concatenate([self.scale, time, self.width])
+        width = np.where(np.isfinite(self.width), self.width, 1.0)
+        return np.concatenate([self.scale, time, width])
 
     def replace(self, **changes: Any) -> Cycles:
         """A copy with some attributes changed."""
@@ -164,6 +165,10 @@ class Cycles:
         par = self.par.copy()
         kernels.evaluate(self.clock, par, w, k)
         return self.multiple * float(w[k]), self.multiple * w[k + 1 :]
+
+    def vertical(self, dy: Array) -> bool:
+        """Whether a tangent has no part along the parameter, as in conservative families."""
+        return bool(np.all(np.abs(dy[1:]) <= 1e-9 * self.width))
 
     def inner(self, mesh: Array, a: Array, b: Array, dy_a: Array, dy_b: Array) -> float:
         """Inner product of two directions: the mean over states and time, and the parameters."""

@@ -46,6 +46,33 @@ def settled(
     return found
 
 
+def kept(cycles: Cycles, guess: Orbit, through: Array | None = None) -> Solution:
+    """The orbit of a conservative family near a guess, the parameter free, which stays.
+
+    It keeps its part along the shape of the guess or, where a state is given that it goes
+    ``through``, that state as far as two equations can hold it.
+    """
+    nothing = np.zeros(cycles.q)
+    for _ in range(8):
+        flat = guess.x - np.outer(collocation.times(guess.mesh, cycles.m), cycles.turns)
+        shape = flat - collocation.mean(guess.mesh, flat, cycles.m)
+        rows, rows_y, target = cycles.rows(guess, shape, nothing)
+        if through is not None:
+            places = np.tile(through, (len(guess.x), 1))
+            jets = cycles.jets(guess.mesh, places, guess.y, cycles.m, cycles.sizes)
+            slope = jets[0, : cycles.n] / cycles.scale**2
+            across = np.array([-slope[1], slope[0]]) if cycles.n == 2 else shape[0]
+            rows[:] = 0.0
+            rows[0, 0], rows[-1, 0] = slope, across
+            target = rows[:, 0] @ through
+        found = cycles.correct(guess, rows, rows_y, target, iterations=40, damped=True)
+        mesh = finer(cycles, found.orbit) if found.converged else None
+        if mesh is None:
+            break
+        guess, _ = cycles.on(mesh, found.orbit)
+    return found
+
+
 def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
     """A mesh that meets the tolerance where that of the orbit does not."""
     if cycles.options.intervals is not None:

@@ -56,6 +56,7 @@ class State:
     step: float
     arclength: float
     since: int  # points since the mesh was last fitted
+    since_start: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +133,7 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
             grow = min(grow, 0.7)
         after = State(
             solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step),
-            state.arclength + step, state.since + 1,
+            state.arclength + step, state.since + 1, state.since_start + 1,
         )  # fmt: skip
         return point, _meshed(cycles, after)
     where = ", ".join(f"{name} = {v:.9g}" for name, v in _named(cycles, state.orbit).items())
