@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.periodic import kernels
+
 Array = npt.NDArray[np.float64]
 
 
@@ -97,10 +99,10 @@ def gathered(parts: Array, m: int) -> Array:
 
 
 def interpolate(mesh: Array, x: Array, m: int, at: Array) -> Array:
-    """Values of a piecewise polynomial at times in [0, 1]."""
-    where = np.clip(np.searchsorted(mesh, at, side="right") - 1, 0, len(mesh) - 2)
-    value, _ = basis(m, (at - mesh[where]) / (mesh[where + 1] - mesh[where]))
-    return np.asarray(np.einsum("ij,ij...->i...", value, pieces(x, m)[where]))
+    """Values of a piecewise polynomial at times in [0, 1], in ascending order."""
+    out = np.empty((len(at), x.shape[1]))
+    kernels.interpolate(mesh, np.ascontiguousarray(x), np.arange(m + 1.0) / m, at, out)
+    return out
 
 
 def at_gauss(x: Array, m: int) -> Array:

@@ -434,6 +434,37 @@ def inner(mesh: Array, weights: Array, value: Array, a: Array, b: Array, scale: 
 
 
 @kernel
+def interpolate(mesh: Array, x: Array, places: Array, at: Array, out: Array) -> None:
+    """Values of a piecewise polynomial at times in ascending order.
+
+    ``places`` are those of an interval's values, on [0, 1].
+    """
+    m, n = places.size - 1, x.shape[1]
+    weight = np.empty(m + 1)
+    basis = np.empty(m + 1)
+    for k in range(m + 1):
+        weight[k] = 1.0
+        for i in range(m + 1):
+            if i != k:
+                weight[k] /= places[k] - places[i]
+    j = 0
+    for row in range(at.size):
+        while j < mesh.size - 2 and at[row] >= mesh[j + 1]:
+            j += 1
+        s = (at[row] - mesh[j]) / (mesh[j + 1] - mesh[j])
+        for k in range(m + 1):
+            basis[k] = weight[k]
+            for i in range(m + 1):
+                if i != k:
+                    basis[k] *= s - places[i]
+        for c in range(n):
+            total = 0.0
+            for k in range(m + 1):
+                total += basis[k] * x[j * m + k, c]
+            out[row, c] = total
+
+
+@kernel
 def evaluate(function: Any, par: Array, w: Array, out: int) -> None:
     """Call a native function of the numbers at the head of w, which fills w from a place on."""
     call(function, w, 0, par, 0, out)
