@@ -124,7 +124,8 @@ def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
         raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
     form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
     made: Cycles = form(
-        problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced, clock=clock_code(problem, active),
+        problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced,
+        clock=clock_code(problem, active),
         multiple=multiple, options=ContinuationOptions(**options), **arrays,
     )  # fmt: skip
     return made

@@ -134,14 +134,9 @@ def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Arra
     The m-th derivative is constant on intervals; its jumps, over the distances of their middles,
     are the next one, with which the error goes. ``closure`` multiplies states after a period.
     """
-    h = np.diff(mesh)
-    constant = np.einsum("k,jkn->jn", scheme(m).high, pieces(x, m)) / h[:, None] ** m
-    gap = 0.5 * (h + np.roll(h, 1))
-    before = np.roll(constant, 1, axis=0)
-    before[0] *= closure
-    jump = np.abs(constant - before) / gap[:, None] / scale
-    both = 0.5 * (jump + np.roll(jump, -1, axis=0))
-    return np.asarray(np.max(both, axis=1))
+    out = np.empty(len(mesh) - 1)
+    kernels.highest(mesh, x, scheme(m).high, scale, closure, out)
+    return out
 
 
 def error(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> float:

@@ -31,9 +31,10 @@ def end_of(
     cycles: Cycles, before: State, made: Point, start: Point
 ) -> tuple[Point | None, Stop] | None:
     """The last point and the reason, if the family ends between two points."""
-    if not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
+    small = np.mean(cycles.amplitudes(made.orbit) / cycles.scale) < 4.0 * made.step
+    if small and not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
         return _at_hopf(cycles, before, made)
-    if _through_doubling(cycles, before.orbit, made.orbit):
+    if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit):
         name = cycles.field.parameters[cycles.active[0]]
         return None, Stop(
             "period_doubling",
@@ -186,9 +187,17 @@ def hopf_near(cycles: Cycles, x: Array, y: Array) -> tuple[Array, Array] | None:
     return x, np.array([2.0 * np.pi / after[1], p])
 
 
+def _near_doubling(cycles: Cycles, made: Point) -> bool:
+    """Whether the orbit can be a doubled one near its birth, with a multiplier near 1."""
+    if cycles.forced and cycles.multiple % 2:
+        return False
+    near = np.sum(np.abs(made.multipliers - 1.0) < 0.7)
+    return bool(near > (0 if cycles.forced else 1))
+
+
 def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     """Whether both halves of the orbit changed places, as they do where they become the same."""
-    if (cycles.forced and cycles.multiple % 2) or len(cycles.active) > 1:
+    if len(cycles.active) > 1:
         return False
     at = np.linspace(0.0, 0.5, 65)[:-1]
 

@@ -112,8 +112,16 @@ class Extended(Cycles):
 class _Both:
     """Derivatives of the right-hand sides of an orbit and its critical function."""
 
+    given, first = True, 0
+
     def __init__(self, cycles: Extended, jets: Jets) -> None:
         self.cycles, self.jets = cycles, jets
+        self.mode, self.par, self.places, self.active = (
+            jets.mode,
+            jets.par,
+            jets.places,
+            jets.active,
+        )
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, sizes: Array) -> Array:
         """Rows of f and its derivatives, at one Gauss point each."""

@@ -28,6 +28,10 @@ class Jets:
         self.active = active
         self.places = np.array(active, dtype=np.int64)
         self.many: bool | None = None  # whether a Python f takes many states at once
+        # Whether kernels are given the derivatives, and what those call that take them themselves.
+        self.given = isinstance(field, PythonField)
+        self.mode = differences.SHARP if field.mode == differences.PLAIN else field.mode
+        self.first = 0 if self.given else field.first(active, sharp=True)
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
         """Rows of f and its derivatives, at one Gauss point each."""
@@ -37,9 +41,8 @@ class Jets:
             at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
             return self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale)
         out = np.empty(((len(mesh) - 1) * m, n * (1 + n + a)))
-        mode = differences.SHARP if self.field.mode == differences.PLAIN else self.field.mode
         kernels.jets(
-            self.field.first(self.active, sharp=True), mode, self.par, self.places, self.forced,
+            self.first, self.mode, self.par, self.places, self.forced,
             mesh, c.nodes, c.value, x, y, scale, out,
         )  # fmt: skip
         return out

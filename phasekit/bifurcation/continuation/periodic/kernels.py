@@ -17,6 +17,12 @@ from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
+FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
+ROUNDING = 1e-11  # of the residual, relative
+
+# How Newton's method ended.
+ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED = range(5)
+
 
 @routine
 def eliminate(a: Array, rows: int, pivots: int, width: int) -> float:
@@ -320,6 +326,80 @@ def solve(
 
 
 @kernel
+def newton(
+    given: bool, first: Any, mode: int, par: Array, active: Any, forced: bool, clock: Any,
+    multiple: int, mesh: Array, nodes: Array, weights: Array, value: Array, slope: Array,
+    side: float, scale: Array, sizes: Array, width: Array, closure: Array, turns: Array,
+    rows: Array, rows_y: Array, target: Array, x: Array, y: Array, W: Array, dx: Array, dy: Array,
+    jet_: Array, tolerance: float, iterations: int, damped: bool, before: float,
+) -> tuple[int, int, float, float, float, float]:  # fmt: skip
+    """Newton's method for an orbit, in its place, with the derivatives of f given or taken here.
+
+    Returns how it ended, steps, sign of the determinant, residual, integral of the trace and the
+    size of the last step.
+    """
+    m, n, q = nodes.size, x.shape[1], y.size
+    places = x.shape[0]
+    right, gap = np.zeros(q), np.zeros(n)
+    border = rows_y.copy()
+    w = np.zeros(2 * q + 2)
+    sign, residual, divergence, size = 0.0, np.inf, np.nan, before
+    for step in range(1, iterations + 1):
+        for r in range(q):
+            right[r] = target[r]
+            for k in range(q):
+                right[r] -= rows_y[r, k] * y[k]
+        for i in range(places):
+            for c in range(n):
+                for r in range(q):
+                    right[r] -= rows[r, i, c] * x[i, c]
+        if forced:
+            own = active.size - 1
+            for k in range(own):
+                w[k] = y[1 + k]
+            call(clock, w, 0, par, 0, own)
+            border[0, 0] = 1.0
+            for k in range(own):
+                border[0, 1 + k] = -multiple * w[own + 1 + k]
+            right[0] = multiple * w[own] - y[0]
+        if not given:
+            jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
+        sign, residual, divergence = condense(
+            jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
+        )
+        if sign == 0.0:
+            return NOT_FINITE, step, sign, residual, divergence, size
+        for c in range(n):
+            gap[c] = closure[c] * x[0, c] + turns[c] - x[places - 1, c]
+        sign *= solve(W, rows, border, right, gap, closure, m, dx, dy)
+        if sign == 0.0:
+            return SINGULAR, step, sign, residual, divergence, size
+        size = abs(dy[0, 0]) / y[0]
+        for k in range(1, q):
+            size = max(size, abs(dy[0, k]) / width[k - 1])
+        for i in range(places):
+            for c in range(n):
+                size = max(size, abs(dx[0, i, c]) / scale[c])
+        if not np.isfinite(size):
+            return DIVERGED, step, sign, residual, divergence, size
+        part = min(1.0, 0.5 / size) if damped and size > 0.0 else 1.0
+        for i in range(places):
+            for c in range(n):
+                x[i, c] += part * dx[0, i, c]
+        for k in range(q):
+            y[k] += part * dy[0, k]
+        if not y[0] > 0.0:
+            return DIVERGED, step, sign, residual, divergence, size
+        flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
+        if part == 1.0 and (size <= tolerance or flat):
+            return FOUND, step, sign, residual, divergence, size
+        if not damped and before < np.inf and size > 2.0 * before:
+            return DIVERGED, step, sign, residual, divergence, size
+        before = size
+    return ON_ITS_WAY, iterations, sign, residual, divergence, size
+
+
+@kernel
 def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Array) -> None:
     """Periodic QR: G_N ... G_1 Q = Q' R after some passes, without ever forming the product.
 
@@ -462,6 +542,45 @@ def interpolate(mesh: Array, x: Array, places: Array, at: Array, out: Array) -> 
             for k in range(m + 1):
                 total += basis[k] * x[j * m + k, c]
             out[row, c] = total
+
+
+@kernel
+def ranges(mesh: Array, x: Array, turns: Array, m: int, half: Array) -> None:
+    """Half the range of each state, less its turns, over all places."""
+    for c in range(x.shape[1]):
+        low, high = np.inf, -np.inf
+        for j in range(mesh.size - 1):
+            h = (mesh[j + 1] - mesh[j]) / m
+            for k in range(m + 1):
+                value = x[j * m + k, c] - turns[c] * (mesh[j] + k * h)
+                low, high = min(low, value), max(high, value)
+        half[c] = 0.5 * (high - low)
+
+
+@kernel
+def highest(
+    mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Array, out: Array
+) -> None:
+    """Size of the derivative of order m + 1 on each interval (see `collocation.highest`)."""
+    m, n, count = coefficients.size - 1, x.shape[1], mesh.size - 1
+    constant = np.zeros((count, n))
+    jump = np.zeros((count, n))
+    for j in range(count):
+        h = (mesh[j + 1] - mesh[j]) ** m
+        for c in range(n):
+            for k in range(m + 1):
+                constant[j, c] += coefficients[k] * x[j * m + k, c] / h
+    for j in range(count):
+        before = j - 1 if j > 0 else count - 1
+        gap = 0.5 * (mesh[j + 1] - mesh[j] + mesh[before + 1] - mesh[before])
+        for c in range(n):
+            value = constant[before, c] * (closure[c] if j == 0 else 1.0)
+            jump[j, c] = abs(constant[j, c] - value) / gap / scale[c]
+    for j in range(count):
+        after = j + 1 if j < count - 1 else 0
+        out[j] = 0.0
+        for c in range(n):
+            out[j] = max(out[j], 0.5 * (jump[j, c] + jump[after, c]))
 
 
 @kernel

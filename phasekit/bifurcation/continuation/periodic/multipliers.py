@@ -12,6 +12,7 @@ Complex = npt.NDArray[np.complex128]
 
 APART = 1e-14  # entries below the diagonal blocks that are rounding
 PASSES = 12
+ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
 
 
 def multipliers(G: Array) -> tuple[Complex, float]:
@@ -26,13 +27,13 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     G = np.ascontiguousarray(G)
     if not np.isfinite(G).all():
         return np.full(n, np.nan, dtype=complex), np.nan
-    passes = 0
-    while True:
+    for _ in range(PASSES // 2):
         kernels.triangular(G, 2, Q, R, log, turn)
-        passes += 2
-        cuts = _cuts(turn)
-        loose = [i for i in range(1, n) if i not in cuts and abs(log[i - 1] - log[i]) > 0.7]
-        if not loose or passes >= PASSES or not np.isfinite(log).all():
+        cuts = [i for i in range(1, n) if np.abs(turn[i:, :i]).max() <= APART]
+        apart = log[:-1] - log[1:]
+        if all(i + 1 in cuts or abs(apart[i]) <= ALIKE for i in range(n - 1)):
+            break
+        if not np.isfinite(log).all():
             break
     values = []
     edges = [0, *cuts, n]
@@ -44,8 +45,3 @@ def multipliers(G: Array) -> tuple[Complex, float]:
         values.append(np.asarray(found, dtype=complex) * np.exp(top))
     whole = np.concatenate(values)
     return whole[np.argsort(-np.abs(whole), kind="stable")], float(np.sum(log))
-
-
-def _cuts(turn: Array) -> list[int]:
-    """Where a nearly block diagonal orthogonal matrix can be cut."""
-    return [i for i in range(1, len(turn)) if np.max(np.abs(turn[i:, :i])) <= APART]

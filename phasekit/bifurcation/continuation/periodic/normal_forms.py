@@ -212,7 +212,7 @@ def at_torus(cycles: Cycles, orbit: Orbit, angle: float) -> dict[str, float]:
 
 
 def wave(line: Linear, omega: float) -> Array:
-    """The periodic v = u + i w with v' + i omega v = A v, of mean square 1: its parts side by side."""
+    """The periodic v = u + i w with v' + i omega v = A v, of mean square 1, parts side by side."""
     n = line.n
     count = len(line.A)
     at = np.random.default_rng(7).standard_normal((count, 2 * n))
