@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -222,7 +223,8 @@ class _Simulation:
         from scipy.integrate import solve_ivp
 
         at = np.linspace(begin, begin + length, samples)
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what LSODA says is said by its status, too
             try:
                 solution = solve_ivp(
                     self.f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,

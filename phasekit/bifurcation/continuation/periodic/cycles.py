@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.jets import Jets
-from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -252,10 +252,25 @@ class Cycles:
             length = 1.0
         return Solution(orbit, dx / length, dy / length, steps, residual, sign, divergence, W)
 
-    def multipliers(self, W: Array) -> tuple[Complex, float]:
-        """Floquet multipliers and the logarithm of the size of their product."""
+    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float]:
+        """Floquet multipliers and the logarithm of the size of their product.
+
+        Of an autonomous system one belongs to f along the orbit. The others are those across it,
+        which stay accurate where the orbit comes near an equilibrium; it is itself a check.
+        """
         n = self.n
-        return multipliers(W[:, (self.m - 1) * n :, :n])
+        G = W[:, (self.m - 1) * n :, :n]
+        values, log = multipliers(G)
+        if self.forced or n == 1:
+            return values, log
+        with np.errstate(all="ignore"):
+            f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        if not np.isfinite(f).all():
+            return values, log
+        trivial = values[np.argmin(np.abs(values - 1.0))]
+        others = multipliers(across(G, f / np.max(np.abs(f), axis=1, keepdims=True)))[0]
+        whole = np.append(others, trivial.real)
+        return whole[np.argsort(-np.abs(whole), kind="stable")], log
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""

@@ -91,7 +91,7 @@ class Extended(Cycles):
             target[2] = 0.0
         return rows, rows_y, target
 
-    def multipliers(self, W: Array) -> tuple[Complex, float]:
+    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float]:
         """Floquet multipliers of the orbit itself."""
         n, last = self.own, (self.m - 1) * self.n
         return multipliers(W[:, last : last + n, :n])

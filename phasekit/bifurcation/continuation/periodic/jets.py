@@ -47,6 +47,19 @@ class Jets:
         )  # fmt: skip
         return out
 
+    def at_mesh(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
+        """F at the beginning of each interval."""
+        n = x.shape[1]
+        points = np.ascontiguousarray(x[::m])
+        if isinstance(self.field, PythonField):
+            return self._python(points[:-1], y, mesh[:-1], scale)[:, :n]
+        out = np.empty((len(mesh) - 1, n * (1 + n + len(self.active))))
+        kernels.jets(
+            self.first, self.mode, self.par, self.places, self.forced, mesh, np.zeros(1),
+            np.array([[1.0, 0.0]]), points, y, scale, out,
+        )  # fmt: skip
+        return out[:, :n]
+
     def _python(self, x: Array, y: Array, s: Array, scale: Array) -> Array:
         field: Any = self.field
         n, a = x.shape[1], len(self.active)

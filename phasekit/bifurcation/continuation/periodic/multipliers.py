@@ -45,3 +45,10 @@ def multipliers(G: Array) -> tuple[Complex, float]:
         values.append(np.asarray(found, dtype=complex) * np.exp(top))
     whole = np.concatenate(values)
     return whole[np.argsort(-np.abs(whole), kind="stable")], float(np.sum(log))
+
+
+def across(G: Array, f: Array) -> Array:
+    """The part of each matrix across a direction that it takes to the next one, as it does f."""
+    frames = np.linalg.qr(f[:, :, None], mode="complete")[0][:, :, 1:]
+    after = np.roll(frames, -1, axis=0)
+    return np.asarray(np.swapaxes(after, 1, 2) @ G @ frames)

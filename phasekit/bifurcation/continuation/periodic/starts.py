@@ -156,7 +156,7 @@ def with_function(made: Extended, cycles: Cycles, point: Point, value: float) ->
         if made.q == 4:
             y = np.append(y, point.dy[0] / orbit.y[0])
     else:
-        mu = cycles.multipliers(W)[0]
+        mu = cycles.multipliers(W, orbit)[0]
         mu = mu[mu.imag > 0.0]
         angle = float(np.angle(mu[np.argmin(np.abs(np.abs(mu) - 1.0))]))
         omega = angle / orbit.y[0]

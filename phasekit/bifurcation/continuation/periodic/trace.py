@@ -70,7 +70,7 @@ class Track:
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
-    values, log = cycles.multipliers(s.W)
+    values, log = cycles.multipliers(s.W, s.orbit)
     divergence = cycles.divergence(s.divergence)
     with np.errstate(all="ignore"):
         product, exact = np.exp(log), np.exp(divergence)
