@@ -42,6 +42,10 @@ _MEANING = {
     "bogdanov_takens": "a double eigenvalue zero: a fold and a Hopf curve meet",
     "generalized_hopf": "the first Lyapunov coefficient of a Hopf point is zero",
     "zero_hopf": "an eigenvalue zero beside a pair on the imaginary axis",
+    "fold_of_cycles": "two periodic orbits merge and vanish: a multiplier passes 1",
+    "period_doubling": "a multiplier passes -1; orbits of twice the period begin",
+    "torus": "a pair of multipliers leaves the unit circle; an invariant torus begins",
+    "cycle_branch_point": "two families of periodic orbits cross",
     "no_force": "A = B = C = 0: every angle is an equilibrium",
     "end": "the end of the branch; its message says why",
 }

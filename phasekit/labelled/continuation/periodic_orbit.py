@@ -24,7 +24,7 @@ from phasekit.labelled.continuation.cycle_start import (
     scale_of,
     unfolded,
 )
-from phasekit.labels.arguments import bad, number, numeric
+from phasekit.labels.arguments import bad, number, reals
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -115,7 +115,7 @@ def periodic_orbit(
             raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
         x0 = [x0[name] for name in problem.state]
     wants = f"{n} numbers ({', '.join(problem.state)}), or samples of shape (samples, {n})"
-    x = np.atleast_1d(np.asarray(numeric("x0", x0, None, wants), dtype=float))
+    x = np.atleast_1d(reals("x0", x0, wants))
     if not np.isfinite(x).all() or x.shape[-1] != n or x.ndim > 2:
         raise bad("x0", x0, wants)
     if problem.time is not None and period is None:
@@ -259,26 +259,19 @@ def _searched(
     waited = 0.0
     unit = 0.0
     for times in TURNS if settle is None else TURNS[:1]:
-        if times:
-            if not unit > 0.0:
-                break
-            more = (times - waited) * unit
-            x = run(x, 0.0, more)[1][-1]
-            waited = times
         try:
-            period = _return(problem, x, run)
-        except ConvergenceError as error:
-            said = error
+            if times:
+                x = run(x, 0.0, (times - waited) * unit)[1][-1]
+                waited = times
             unit = unit or _pace(run, x)
-            continue
-        unit = unit or period
-        at, states = run(x, 0.0, period, SAMPLES)
-        try:
-            guesses = [sampled(problem, at / period, states, period, value, options.degree)]
-            return _found(problem, guesses, options, f"after a return in {period:.6g}")
+            period = _return(problem, x, run)
+            unit = period if waited == 0.0 else unit
+            at, states = run(x, 0.0, period, SAMPLES)
+            guess = sampled(problem, at / period, states, period, value, options.degree)
+            return _found(problem, [guess], options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
-            said = error
-    raise said or ConvergenceError("x0: no periodic orbit was found; give a period")
+            said = said or error
+    raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said
 
 
 def _pace(run: _Simulation, x: FloatArray) -> float:

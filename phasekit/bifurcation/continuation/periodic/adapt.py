@@ -12,6 +12,7 @@ Array = npt.NDArray[np.float64]
 
 SPARE = 0.3  # part of the mesh tolerance that a new mesh aims at
 LEAST = 8
+FLAT, STILL = 1e-3, 60  # amplitude beside the scale of what is at rest, and its intervals
 
 
 def count_for(cycles: Cycles, orbit: Orbit) -> int:
@@ -20,6 +21,8 @@ def count_for(cycles: Cycles, orbit: Orbit) -> int:
     sizes = collocation.highest(orbit.mesh, orbit.x, m, cycles.amplitudes(orbit), cycles.closure)
     whole = 1.2 * float(np.sum(sizes ** (1.0 / (m + 1)) * np.diff(orbit.mesh)))
     aim = SPARE * cycles.options.mesh_tolerance / collocation.factor(m)
+    if cycles.forced and np.all(cycles.amplitudes(orbit) < FLAT * cycles.scale):
+        return max(LEAST, STILL)  # the multipliers of a state at rest still have a mesh to resolve
     count = whole / aim ** (1.0 / (m + 1))
     return max(LEAST, 4 * int(np.ceil(min(count, 1e6) / 4.0)))
 

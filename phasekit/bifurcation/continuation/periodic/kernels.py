@@ -159,7 +159,7 @@ def condense(
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
-    residual = worst / speed if speed > 0.0 else np.inf
+    residual = worst / speed if speed > 0.0 else worst
     return sign, residual, divergence
 
 

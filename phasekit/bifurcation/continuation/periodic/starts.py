@@ -77,9 +77,11 @@ def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
     """A mesh that meets the tolerance where that of the orbit does not."""
     if cycles.options.intervals is not None:
         return None
-    if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance:
+    wanted = count_for(cycles, orbit)
+    rests = cycles.forced and wanted > 2 * orbit.intervals
+    if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance and not rests:
         return None
-    count = max(count_for(cycles, orbit), int(1.1 * orbit.intervals) + 1)
+    count = max(wanted, int(1.1 * orbit.intervals) + 1)
     if count > cycles.options.max_intervals:
         if orbit.intervals >= cycles.options.max_intervals:
             return None
