@@ -16,7 +16,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, go_on, join
-from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import LABELS

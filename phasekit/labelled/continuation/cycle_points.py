@@ -12,7 +12,7 @@ import xarray as xr
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
-from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]

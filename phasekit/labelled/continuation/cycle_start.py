@@ -17,7 +17,7 @@ from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.extended import extended
 from phasekit.bifurcation.continuation.periodic.family import run
-from phasekit.bifurcation.continuation.periodic.trace import Point, point_of
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles

@@ -20,7 +20,8 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.family import Tracks
-from phasekit.bifurcation.continuation.periodic.trace import Point, State, Track
+from phasekit.bifurcation.continuation.periodic.point import Point, State
+from phasekit.bifurcation.continuation.periodic.trace import Track
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
 from phasekit.labelled.continuation.cycle_start import clock_code

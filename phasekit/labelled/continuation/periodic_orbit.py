@@ -83,7 +83,7 @@ def periodic_orbit(
     (6.663286859, 0)
     >>> branch = pk.continuation(oscillator, "mu", orbit=orbit, span=(0.5, 2.0))
     >>> round(float(branch.points.period[-1]), 9)
-    7.629874480
+    7.62987448
     """
     problem = as_problem(problem)
     options = check_options(options)

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, starts, trace
+from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-
-if TYPE_CHECKING:
-    from phasekit.bifurcation.continuation.periodic.trace import Point, State
+from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
 
@@ -139,7 +136,7 @@ def _at_hopf(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, 
     if not last.converged or abs(last.orbit.y[0] / y[0] - 1.0) > 0.01:
         return None, stop
     # `off` leaves it outwards; the family comes inwards.
-    point = trace.point_of(cycles, last, before.arclength + 0.5 * made.step, 0.5 * made.step)
+    point = point_of(cycles, last, before.arclength + 0.5 * made.step, 0.5 * made.step)
     return replace(point, dx=-point.dx, dy=-point.dy, sign=-point.sign), stop
 
 
@@ -231,7 +228,7 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
         return None
     found.orbit.y[1 + k] = value
     side = np.sign(cycles.inner(mesh, dx, found.dx, before.dy, found.dy)) or 1.0
-    point = trace.point_of(cycles, found, before.arclength + part * made.step, part * made.step)
+    point = point_of(cycles, found, before.arclength + part * made.step, part * made.step)
     # Its determinant has the parameter's row, which goes the way of the tangent that it gave.
     return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
 

@@ -18,8 +18,8 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
-from phasekit.bifurcation.continuation.periodic.trace import Point, point_of
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

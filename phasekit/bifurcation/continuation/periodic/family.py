@@ -9,13 +9,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.trace import (
-    Point,
-    State,
-    Track,
-    begin,
-    follow,
-)
+from phasekit.bifurcation.continuation.periodic.point import Point, State
+from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow
 
 Array = npt.NDArray[np.float64]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,9 +12,7 @@ from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, f
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, Extended
 from phasekit.bifurcation.continuation.periodic.normal_forms import Linear, wave
-
-if TYPE_CHECKING:
-    from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.bifurcation.continuation.periodic.point import Point
 
 Array = npt.NDArray[np.float64]
 
