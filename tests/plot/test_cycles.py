@@ -17,8 +17,8 @@ def test_largest_and_least_values_with_stability(ax):
     values = np.concatenate([line.get_ydata() for line in drawn])
     assert np.isclose(np.nanmax(values), float(cycles.points.x_max.max()))
     assert np.isclose(np.nanmin(values), float(cycles.points.x_min.min()))
-    labels = [line.get_label() for line in ax.get_legend().get_lines()]
+    labels = [text.get_text() for text in ax.get_legend().get_texts()]
     assert {"stable", "unstable", "LPC"} <= set(labels)
     ax.clear()
     cycles.plot(ax=ax, y="period")
-    assert ax.get_ylabel() == "period"
+    assert ax.get_ylabel() == "period of the orbit"

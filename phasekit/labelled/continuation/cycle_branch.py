@@ -65,7 +65,7 @@ class CycleBranch(Branch):
     >>> [stop.reason for stop in cycles.stops]
     ['hopf', 'bound']
     >>> round(float(cycles.points.period[-1]), 6)
-    7.157198
+    7.15692
     >>> cycles.orbit(-1).sizes["time"] > 100
     True
     """
