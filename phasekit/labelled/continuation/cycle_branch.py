@@ -153,6 +153,9 @@ class CycleBranch(Branch):
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]
         lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []
+        unknown = int(np.sum(self._points["n_unstable"].values < 0))
+        if unknown:
+            lines.append(f"  multipliers fail their checks at {unknown} points: no detection there")
         lines += [
             f"  {name}: {stop.reason}, {stop.message}"
             for name, stop in zip(("first", "last"), self.stops, strict=True)

@@ -12,7 +12,7 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import kernels, starts
+from phasekit.bifurcation.continuation.periodic import along, starts
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.continuation import check_options
 from phasekit.labelled.continuation.cycle_start import (
@@ -211,7 +211,7 @@ class _Simulation:
                 w[:n] = x
                 if problem.time is not None:
                     par[-1] = t
-                kernels.evaluate(address, par, w, n)
+                along.evaluate(address, par, w, n)
                 return w[n : 2 * n].copy()
 
         self.f: Callable[[float, FloatArray], FloatArray] = f

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import kernels
+from phasekit.bifurcation.continuation.periodic import along
 
 Array = npt.NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def gathered(parts: Array, m: int) -> Array:
 def interpolate(mesh: Array, x: Array, m: int, at: Array) -> Array:
     """Values of a piecewise polynomial at times in [0, 1], in ascending order."""
     out = np.empty((len(at), x.shape[1]))
-    kernels.interpolate(mesh, np.ascontiguousarray(x), np.arange(m + 1.0) / m, at, out)
+    along.interpolate(mesh, np.ascontiguousarray(x), np.arange(m + 1.0) / m, at, out)
     return out
 
 
@@ -135,7 +135,7 @@ def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Arra
     are the next one, with which the error goes. ``closure`` multiplies states after a period.
     """
     out = np.empty(len(mesh) - 1)
-    kernels.highest(mesh, x, scheme(m).high, scale, closure, out)
+    along.highest(mesh, x, scheme(m).high, scale, closure, out)
     return out
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
 from phasekit.bifurcation.continuation.periodic.jets import Jets
 from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
@@ -163,7 +163,7 @@ class Cycles:
         w = np.zeros(2 * k + 1)
         w[:k] = y[1:]
         par = self.par.copy()
-        kernels.evaluate(self.clock, par, w, k)
+        along.evaluate(self.clock, par, w, k)
         return self.multiple * float(w[k]), self.multiple * w[k + 1 :]
 
     def vertical(self, dy: Array) -> bool:
@@ -173,14 +173,14 @@ class Cycles:
     def inner(self, mesh: Array, a: Array, b: Array, dy_a: Array, dy_b: Array) -> float:
         """Inner product of two directions: the mean over states and time, and the parameters."""
         c = collocation.scheme(self.m)
-        states = kernels.inner(mesh, c.weights, c.value, a, b, self.scale)
+        states = along.inner(mesh, c.weights, c.value, a, b, self.scale)
         return float(states + np.sum(dy_a[1:] * dy_b[1:] / self.width**2))
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
         """Bordering rows, phase or period first, direction last; with their values at the orbit."""
         c = collocation.scheme(self.m)
         rows = np.empty((self.q, *orbit.x.shape))
-        kernels.borders(
+        along.borders(
             orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows
         )
         rows_y = np.zeros((self.q, self.q))
@@ -284,7 +284,7 @@ class Cycles:
     def amplitudes(self, orbit: Orbit) -> Array:
         """Half the range of each state, without its turns; where it hardly moves, a part of all."""
         half = np.empty(self.n)
-        kernels.ranges(orbit.mesh, orbit.x, self.turns, self.m, half)
+        along.ranges(orbit.mesh, orbit.x, self.turns, self.m, half)
         whole = half / self.scale
         return np.asarray(self.scale * np.maximum(whole, 1e-3 * float(np.max(whole))))
 

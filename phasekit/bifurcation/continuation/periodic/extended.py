@@ -100,14 +100,6 @@ class Extended(Cycles):
         """Integral of the trace of f_x, of which each part of the function has its own."""
         return found * self.own / self.n
 
-    def base(self) -> Cycles:
-        """The family of the orbits alone."""
-        kept = {f.name: getattr(self, f.name) for f in fields(Cycles)}
-        k, n = len(self.active), self.own
-        kept |= {"scale": self.scale[:n], "turns": self.turns[:n], "period": self.period[:n]}
-        kept |= {name: kept[name][:k] for name in ("width", "low", "high")}
-        return Cycles(**kept)
-
 
 class _Both:
     """Derivatives of the right-hand sides of an orbit and its critical function."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import kernels
+from phasekit.bifurcation.continuation.periodic import along
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -28,7 +28,7 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     if not np.isfinite(G).all():
         return np.full(n, np.nan, dtype=complex), np.nan
     for _ in range(PASSES // 2):
-        kernels.triangular(G, 2, Q, R, log, turn)
+        along.triangular(G, 2, Q, R, log, turn)
         cuts = [i for i in range(1, n) if np.abs(turn[i:, :i]).max() <= APART]
         apart = log[:-1] - log[1:]
         if all(i + 1 in cuts or abs(apart[i]) <= ALIKE for i in range(n - 1)):
