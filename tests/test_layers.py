@@ -21,6 +21,10 @@ BRANCHES = {
         "branch_store",
         "branch_stored",
         "continuation",
+        "cycle_branch",
+        "cycle_special",
+        "cycle_start",
+        "cycle_store",
         "point_curves",
         "special_point",
     )

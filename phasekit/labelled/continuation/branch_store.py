@@ -84,7 +84,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
         else:
             given = stored.problem()
         functions = stored.functions(record or {})
-        if stored.spec["kind"] == "cycle":
+        if stored.spec["kind"] in ("cycle", "fold_of_cycles", "period_doubling", "torus"):
             from phasekit.labelled.continuation.cycle_store import made_again
 
             return made_again(stored, given, functions)

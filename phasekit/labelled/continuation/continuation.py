@@ -28,6 +28,7 @@ def continuation(
     x0: Any = None,
     span: Sequence[float],
     orbit: Any = None,
+    fix: str | None = None,
     record: Mapping[str, Callable[..., Any]] | Sequence[str] | None = None,
     options: ContinuationOptions | None = None,
 ) -> Branch:
@@ -49,6 +50,10 @@ def continuation(
     orbit : xarray.Dataset, optional
         A periodic orbit, of `periodic_orbit` or ``branch.orbit(i)``, in place of x0: the branch is
         one of periodic orbits then (`CycleBranch`).
+    fix : {None, "period"}
+        With "period" the periodic orbits keep their period, and a second parameter is free: give
+        ``parameter=(first, second)`` and the span of the first, or both. Orbits of a long period
+        follow a homoclinic orbit so.
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function
@@ -91,7 +96,11 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
-        return continue_orbit(problem, parameter, orbit, span, _record(problem, record), options)
+        return continue_orbit(
+            problem, parameter, orbit, span, _record(problem, record), options, fix
+        )
+    if fix is not None:
+        raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
     guess = _start(problem, x0)
     curve = equilibrium_curve(problem, parameter, (low, high), options)

@@ -16,7 +16,7 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, go_on, join
-from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch
@@ -51,7 +51,7 @@ class CycleBranch(Branch):
         Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, closed,
         max_points, stuck, start) and ``message``.
     kind : str
-        cycle.
+        cycle, or fold_of_cycles, period_doubling, torus: a curve in two parameters.
 
     Examples
     --------
@@ -65,7 +65,7 @@ class CycleBranch(Branch):
     >>> [stop.reason for stop in cycles.stops]
     ['hopf', 'bound']
     >>> round(float(cycles.points.period[-1]), 6)
-    7.157198
+    7.15692
     >>> cycles.orbit(-1).sizes["time"] > 100
     True
     """
@@ -126,7 +126,7 @@ class CycleBranch(Branch):
         if forward is not None and forward.stop.reason == "closed":
             backward = None
         made = (backward, forward)
-        return make_cycles(problem, cycles, self.start, made, self.record, self.origin)
+        return make_cycles(problem, cycles, self.start, made, self.record, self.origin, self.kind)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""
@@ -139,16 +139,23 @@ class CycleBranch(Branch):
         cycles, problem = self.known()
         skip = ("field", "clock")
         kept = {f.name: getattr(cycles, f.name) for f in fields(cycles) if f.name not in skip}
-        return _again, (problem, kept, self.start, self.tracks, dict(self.record), self.origin)
+        return _again, (
+            type(cycles), problem, kept, self.start, self.tracks, dict(self.record), self.origin,
+            self.kind,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""
         u = {name: self._points[name].values for name in (*self.free, "period")}
         ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        lines = [f"<Branch of periodic orbits: {len(self.path)} points, {ranges}"]
+        of = "periodic orbits" if self.kind == "cycle" else f"{self.kind} points"
+        lines = [f"<Branch of {of}: {len(self.path)} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]
         lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []
+        unknown = int(np.sum(self._points["n_unstable"].values < 0))
+        if unknown:
+            lines.append(f"  multipliers fail their checks at {unknown} points: no detection there")
         lines += [
             f"  {name}: {stop.reason}, {stop.message}"
             for name, stop in zip(("first", "last"), self.stops, strict=True)
@@ -163,6 +170,7 @@ def make_cycles(
     tracks: Tracks,
     record: Mapping[str, Any],
     origin: Stop = NO_START,
+    kind: str = "cycle",
 ) -> CycleBranch:
     """A branch of what was traced: special points are looked for, quantities recorded."""
     path = join(start, tracks, origin)
@@ -187,7 +195,7 @@ def make_cycles(
     names = tuple(cycles.field.parameters[i] for i in cycles.active)
     branch = CycleBranch(
         problem, names, cycles.field.states, cycles, start, tracks,
-        points_of(problem, cycles, points, labels, record), (), path.stops, "cycle",
+        points_of(problem, cycles, points, labels, record), (), path.stops, kind,
         MappingProxyType(dict(record)), path=tuple(points), origin=origin,
     )  # fmt: skip
     made: tuple[CyclePoint, ...] = tuple(
@@ -212,14 +220,10 @@ def _ends(path: Any) -> list[Found]:
 
 
 def _again(
-    problem: Problem,
-    kept: Mapping[str, Any],
-    start: Point,
-    tracks: Tracks,
-    record: Any,
-    origin: Stop,
-) -> CycleBranch:
+    form: type[Cycles], problem: Problem, kept: Mapping[str, Any], start: Point, tracks: Tracks,
+    record: Any, origin: Stop, kind: str,
+) -> CycleBranch:  # fmt: skip
     from phasekit.labelled.continuation.cycle_start import clock_code
 
-    cycles = Cycles(problem.field, clock=clock_code(problem, kept["active"]), **kept)
-    return make_cycles(problem, cycles, start, tracks, record, origin)
+    cycles = form(field=problem.field, clock=clock_code(problem, kept["active"]), **kept)
+    return make_cycles(problem, cycles, start, tracks, record, origin, kind)

@@ -11,7 +11,8 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.trace import Point
+from phasekit.bifurcation.continuation.periodic.extended import Extended
+from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -25,14 +26,16 @@ _CHECKS = {
 ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
 
 
-def critical_count(point: Point, forced: bool, label: str = "") -> int:
+def critical_count(point: Point, forced: bool, label: str = "", vertical: bool = False) -> int:
     """Number of multipliers outside the unit circle; -1 where they are not known."""
     values = point.multipliers
     if not np.isfinite(values).all() or not point.trusted:
         return -1
     if not forced:
-        values = np.delete(values, int(np.argmin(np.abs(values - 1.0))))
-    return int(np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label else 0.0)))
+        # Where energy is conserved, two are always 1.
+        trivial = np.argsort(np.abs(values - 1.0), kind="stable")[: 2 if vertical else 1]
+        values = np.delete(values, trivial)
+    return int(np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label or vertical else 0.0)))
 
 
 def extremes(mesh: FloatArray, x: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
@@ -64,7 +67,7 @@ def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> 
     for i, name in enumerate(problem.state):
         found[f"{name}_min"], found[f"{name}_max"] = float(low[i]), float(high[i])
         found[f"{name}_mean"] = float(middle[i])
-    found["n_unstable"] = critical_count(point, cycles.forced, label)
+    found["n_unstable"] = critical_count(point, cycles.forced, label, cycles.vertical(point.dy))
     for name in _CHECKS:
         found[name] = float(getattr(point, name))
     found["n_intervals"] = orbit.intervals
@@ -86,7 +89,11 @@ def points_of(
 ) -> xr.Dataset:
     """The points of a branch, special points in their places."""
     dim = "point"
-    rows = [summary(problem, cycles, p, one) for p, one in zip(points, labels, strict=True)]
+    # On a curve of special points one multiplier at least is critical everywhere.
+    on_curve = "curve" if isinstance(cycles, Extended) else ""
+    rows = [
+        summary(problem, cycles, p, one or on_curve) for p, one in zip(points, labels, strict=True)
+    ]
     free = [cycles.field.parameters[i] for i in cycles.active]
     data: dict[str, Any] = {}
     for k, name in enumerate(free):

@@ -15,8 +15,9 @@ from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.extended import extended
 from phasekit.bifurcation.continuation.periodic.family import run
-from phasekit.bifurcation.continuation.periodic.trace import Point, point_of
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
@@ -24,7 +25,13 @@ from phasekit.labelled.continuation.cycle_points import orbit_dataset
 from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.laws.formulas import symbols_of
 from phasekit.systems.problem import Problem
+
+#: The parameter that unfolds conservative families, and stays zero.
+UNFOLDING = "unfolding"
+#: Special points that have curves in two parameters.
+CURVES = ("fold_of_cycles", "period_doubling", "torus")
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -45,6 +52,7 @@ def cycles_of(
     turns: FloatArray,
     options: ContinuationOptions,
     multiple: int = 1,
+    fixed: bool = False,
 ) -> Cycles:
     """The periodic orbits of a problem over some of its parameters."""
     names = list(problem.parameters)
@@ -59,7 +67,7 @@ def cycles_of(
     return Cycles(
         problem.field, np.append(par, 0.0) if forced else par, active, forced,
         clock_code(problem, active), multiple, turns, scale, high - low, low, high, period,
-        options,
+        options, fixed,
     )  # fmt: skip
 
 
@@ -103,28 +111,116 @@ def _start(cycles: Cycles, found: Solution, where: str) -> Point:
 
 def continue_orbit(
     problem: Problem,
-    parameter: str,
+    parameter: str | Sequence[str],
     orbit: Any,
-    span: Sequence[float],
+    span: Any,
     record: Mapping[str, Callable[..., Any]],
     options: ContinuationOptions,
+    fix: str | None = None,
 ) -> CycleBranch:
-    """Follow the family of a periodic orbit along a parameter."""
-    low, high = check_span(span)
-    value = problem.parameters[check_parameter(problem, parameter)]
-    if not low <= value <= high:
-        raise bad(
-            "span", (low, high), f"a span that holds the problem's own {parameter} = {value:.9g}"
-        )
+    """Follow the family of a periodic orbit along a parameter, or along two at a fixed period."""
+    if problem.conservative:
+        options = _by_period(parameter, span, options)
+        problem, parameter = unfolded(problem), UNFOLDING
+    free = _free(problem, parameter, fix)
+    family = parameter == UNFOLDING
+    spans = [(-np.inf, np.inf)] if family else _spans(problem, free, span)
+    value = problem.parameters[free[0]]
     guess, turns, multiple = given_orbit(problem, orbit, value, options.degree)
-    cycles = cycles_of(
-        problem, [parameter], [(low, high)], scale_of(guess.x), turns, options, multiple
-    )
+    scale = scale_of(guess.x)
+    cycles = cycles_of(problem, free[:1], spans[:1], scale, turns, options, multiple)
     found = starts.settled(cycles, guess)
-    start = _start(cycles, found, f"from the orbit given at {parameter} = {value:.9g}")
-    if start.dy[1] < 0.0:
+    if family or not found.converged:
+        # In a conservative family the parameter is no coordinate; it stays when it is free.
+        other = starts.kept(cycles, guess)
+        stays = abs(other.orbit.y[1] - value) <= 1e-9 * max(1.0, abs(value))
+        found = other if other.converged and stays else found
+    start = _start(cycles, found, f"from the orbit given at {free[0]} = {value:.9g}")
+    if fix is not None:
+        cycles = cycles_of(problem, free, spans, scale, turns, options, multiple, fixed=True)
+        y = np.append(start.orbit.y, problem.parameters[free[1]])
+        found = starts.settled(cycles, Orbit(start.orbit.mesh, start.orbit.x, y), second=True)
+        start = _start(cycles, found, f"with the period {y[0]:.9g}")
+    lead = start.dy[0] if cycles.vertical(start.dy) else start.dy[1]
+    if lead < 0.0:
         start = start.flipped()
     return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
+
+
+def _by_period(parameter: Any, span: Any, options: ContinuationOptions) -> ContinuationOptions:
+    """Options that bound the period of a conservative family, which is what varies."""
+    if parameter != "period":
+        raise bad(
+            "parameter", parameter, "'period' of a conservative problem, with the span of it",
+            "its orbits form families at fixed parameters",
+        )  # fmt: skip
+    return replace(options, bounds={**options.bounds, "period": check_span(span)})
+
+
+def unfolded(problem: Problem) -> Problem:
+    """A conservative problem with a term that takes energy, times a parameter that stays zero.
+
+    The term is that of a damping: each velocity, in its own equation.
+    """
+    n = len(problem.state)
+    x = np.random.default_rng(3).uniform(0.3, 0.9, n)
+    f = problem(x)
+    velocity = [int(np.argmin(np.abs(x - v))) for v in f]
+    moving = sorted({j for j, v in zip(velocity, f, strict=True) if x[j] == v}) or list(range(n))
+    mask = np.zeros(n)
+    mask[moving] = 1.0
+    values = {**problem.parameters, UNFOLDING: 0.0}
+    periods = dict(problem.periods)
+    if problem.kind == "symbolic":
+        names = symbols_of([*problem.state, UNFOLDING])
+        formulas = [
+            e + names[UNFOLDING] * names[name] if mask[i] else e
+            for i, (e, name) in enumerate(zip(problem.f, problem.state, strict=True))
+        ]
+        return Problem(formulas, problem.state, values, periods=periods)
+
+    def with_damping(x: FloatArray, **parameters: float) -> FloatArray:
+        part = parameters.pop(UNFOLDING)
+        return np.asarray(problem.f(x, **parameters), dtype=float) + part * (mask * x.T).T
+
+    return Problem(with_damping, problem.state, values, periods=periods)
+
+
+def _free(problem: Problem, parameter: Any, fix: Any) -> list[str]:
+    """The names of the free parameters: one, or two at a fixed period."""
+    if fix not in (None, "period"):
+        raise bad("fix", fix, "None or 'period'")
+    given = [parameter] if isinstance(parameter, str) else list(parameter)
+    names = [check_parameter(problem, name) for name in given]
+    if fix is None and len(names) != 1:
+        raise bad("parameter", parameter, "one parameter, or two with fix='period'")
+    if fix is not None and problem.time is not None:
+        raise bad("fix", fix, "None of a forced system, whose period is that of the forcing")
+    if fix is not None and len(names) == 1:
+        others = [name for name in problem.parameters if name != names[0]]
+        if len(others) != 1:
+            raise bad("parameter", parameter, f"two parameters: {names[0]} and one of {others}")
+        names += others
+    if len(set(names)) != len(names) or len(names) > 2:
+        raise bad("parameter", parameter, "two different parameters")
+    return names
+
+
+def _spans(problem: Problem, free: list[str], span: Any) -> list[tuple[float, float]]:
+    """The span of each free parameter; that of a second one is as wide as the first by default."""
+    pairs = span if np.ndim(span) == 2 else [span]
+    spans = [check_span(one) for one in pairs]
+    for name, (low, high) in zip(free, spans, strict=False):
+        value = problem.parameters[name]
+        if not low <= value <= high:
+            raise bad(
+                "span", (low, high), f"a span that holds the problem's own {name} = {value:.9g}"
+            )
+    if len(spans) < len(free):
+        value = problem.parameters[free[1]]
+        reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])
+        spans.append((value - reach, value + reach))
+    return spans
 
 
 def given_orbit(
@@ -190,7 +286,7 @@ def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     cycles, problem = point.branch.known()
-    options = cycles.options if options is None else check_options(options)
+    options = _options(cycles, options)
     if isinstance(direction, bool) or direction != 0:
         raise bad("direction", direction, "0: there is one other branch")
     cycles = cycles.replace(options=options)
@@ -217,6 +313,44 @@ def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
     return make_cycles(problem, cycles, start, tracks, point.branch.record)
 
 
-def point_curve(point: CyclePoint, parameter: str, span: Any, options: Any) -> Any:
-    """The curve of such points in two parameters."""
-    raise bad("point", point.kind, "a fold, period doubling or torus point of cycles")
+def point_curve(point: CyclePoint, parameter: str, span: Any, options: Any) -> CycleBranch:
+    """The curve of folds, period doublings or tori of cycles through one, in two parameters."""
+    if point.kind not in CURVES:
+        raise bad("point", point.kind, f"one of {', '.join(CURVES)}")
+    if point.branch.kind != "cycle" or len(point.branch.free) != 1:
+        raise bad("point", point.branch.kind, "a point of a branch of periodic orbits")
+    if point.status != "converged":
+        raise bad("point", point.status, "a point that has converged", point.message)
+    cycles, problem = point.branch.known()
+    check_parameter(problem, parameter)
+    if parameter == point.branch.parameter:
+        raise bad("parameter", parameter, "another one than that of the branch")
+    low, high = check_span(span)
+    value = problem.parameters[parameter]
+    if not low <= value <= high:
+        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
+    options = _options(cycles, options)
+    first = float(cycles.low[0]), float(cycles.high[0])
+    reach = 10.0 * (first[1] - first[0])
+    first = options.bounds.get(point.branch.parameter, (first[0] - reach, first[1] + reach))
+    place = list(problem.parameters).index(parameter)
+    clock = clock_code(problem, (cycles.active[0], place))
+    made = extended(cycles.replace(options=options), point.kind, place, (low, high), clock, first)
+    here = point.special.point
+    guess = starts.with_function(made, cycles, here, value)
+    found = starts.settled(made, guess, second=True)
+    start = _start(made, found, f"of the curve of {point.kind} points at {parameter} = {value:.9g}")
+    if start.dy[2] < 0.0:
+        start = start.flipped()
+    tracks = run(made, start, options.directions)
+    return make_cycles(problem, made, start, tracks, point.branch.record, kind=point.kind)
+
+
+def _options(cycles: Cycles, options: Any) -> ContinuationOptions:
+    """Options of a branch that goes on from another one: its own, or others of the same degree."""
+    if options is None:
+        return cycles.options
+    options = check_options(options)
+    if options.degree != cycles.m:
+        raise bad("options", options.degree, f"the degree of the branch, {cycles.m}")
+    return options  # type: ignore[no-any-return]

@@ -6,6 +6,7 @@ with the number of mesh intervals of each beside them.
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
@@ -17,8 +18,10 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.family import Tracks
-from phasekit.bifurcation.continuation.periodic.trace import Point, State, Track
+from phasekit.bifurcation.continuation.periodic.point import Point, State
+from phasekit.bifurcation.continuation.periodic.trace import Track
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
 from phasekit.labelled.continuation.cycle_start import clock_code
@@ -37,6 +40,7 @@ _NUMBERS = (
     "arclength", "step", "newton_steps", "residual", "sign", "trivial_error", "liouville_error",
     "mesh_error",
 )  # fmt: skip
+_FINITE = ("par", "turns", "scale", "period")
 _SIDES = ("backward", "forward")
 
 
@@ -79,8 +83,9 @@ def save(branch: CycleBranch, path: str | PathLike[str], overwrite: bool) -> Non
 
 def made_again(stored: Stored, problem: Problem, functions: Mapping[str, Any]) -> CycleBranch:
     """The branch of periodic orbits that a file holds."""
+    kind = stored.spec["kind"]
     with damaged(stored.name, "its periodic orbits"):
-        cycles = _cycles(stored, problem)
+        cycles = _cycles(stored, problem, kind)
         (start,) = _unpacked(stored, "start", cycles)
         tracks: list[Track | None] = []
         for side, stop in zip(_SIDES, stored.spec["stops"], strict=True):
@@ -92,10 +97,10 @@ def made_again(stored: Stored, problem: Problem, functions: Mapping[str, Any]) -
             tracks.append(Track(tuple(points), state, Stop(str(stop[0]), str(stop[1]))))
         both: Tracks = (tracks[0], tracks[1])
         origin = Stop(*map(str, stored.spec["origin"]))
-    return make_cycles(problem, cycles, start, both, functions, origin)
+    return make_cycles(problem, cycles, start, both, functions, origin, kind)
 
 
-def _cycles(stored: Stored, problem: Problem) -> Cycles:
+def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
     options = dict(stored.spec["options"])
     options["detect"] = tuple(options["detect"])
     options["bounds"] = {k: tuple(v) for k, v in options["bounds"].items()}
@@ -103,29 +108,37 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
     active = tuple(names.index(name) for name in free)
     if not 1 <= len(set(active)) == len(active) <= 2:
         raise ValueError(f"free: got {free}, wants one or two different parameters")
-    n, k, forced = len(problem.state), len(active), problem.time is not None
+    forced = problem.time is not None
+    parts = {"cycle": 1, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}[kind]
+    n, k = parts * len(problem.state), len(active)
+    k += kind == "torus" or (kind == "fold_of_cycles" and not forced)
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
     shapes.update({name: (k,) for name in ("width", "low", "high")}, par=(len(names) + forced,))
     arrays: dict[str, Any] = {
-        name: stored.array(f"cycles_{name}", shapes[name]) for name in _ARRAYS
+        name: stored.array(f"cycles_{name}", shapes[name], finite=name in _FINITE)
+        for name in _ARRAYS
     }
     multiple = stored.spec["multiple"]
     if not isinstance(multiple, int) or multiple < 1:
         raise ValueError(f"multiple: got {multiple!r:.80}, wants a whole number >= 1")
     if not ((arrays["scale"] > 0.0).all() and (arrays["width"] > 0.0).all()):
         raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
-    return Cycles(
-        problem.field, active=active, forced=forced, clock=clock_code(problem, active),
+    form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
+    made: Cycles = form(
+        problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced,
+        clock=clock_code(problem, active),
         multiple=multiple, options=ContinuationOptions(**options), **arrays,
     )  # fmt: skip
+    return made
 
 
 def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
     """Points as flat arrays."""
     n = points[0].orbit.x.shape[1] if points else 0
+    own = len(points[0].multipliers) if points else 0
     q = len(points[0].dy) if points else 0
     table = [[float(getattr(p, one)) for one in _NUMBERS] for p in points]
-    values = np.array([p.multipliers for p in points]).reshape(len(points), n)
+    values = np.array([p.multipliers for p in points]).reshape(len(points), own)
 
     def flat(arrays: list[FloatArray], *shape: int) -> FloatArray:
         return np.concatenate(arrays) if arrays else np.empty((0, *shape))
@@ -149,7 +162,9 @@ def _packed_state(name: str, state: State) -> dict[str, FloatArray]:
         f"{name}_x": state.orbit.x,
         f"{name}_dx": state.dx,
         f"{name}_y": np.stack([state.orbit.y, state.dy]),
-        f"{name}_numbers": np.array([state.step, state.arclength, float(state.since)]),
+        f"{name}_numbers": np.array(
+            [state.step, state.arclength, float(state.since), float(state.since_start)]
+        ),
     }
 
 
@@ -168,7 +183,8 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
     x, dx = (stored.array(f"{name}_{one}", (places, width)) for one in ("x", "dx"))
     y, dy = (stored.array(f"{name}_{one}", (total, columns)) for one in ("y", "dy"))
     real, imag = (
-        stored.array(f"{name}_{one}", (total, width), finite=False) for one in ("real", "imag")
+        stored.array(f"{name}_{one}", (total, cycles.own if total else 0), finite=False)
+        for one in ("real", "imag")
     )
     points, at, node = [], 0, 0
     for i, count in enumerate(intervals):
@@ -176,7 +192,7 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
         at, node = here.stop, nodes.stop
         numbers: dict[str, Any] = dict(zip(_NUMBERS, table[i].tolist(), strict=True))
         numbers["newton_steps"] = int(numbers["newton_steps"])
-        values = np.empty(n, dtype=complex)
+        values = np.empty(cycles.own, dtype=complex)
         values.real, values.imag = real[i], imag[i]
         points.append(
             Point(
@@ -191,5 +207,7 @@ def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
     places = (len(mesh) - 1) * cycles.m + 1
     x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
     y = stored.array(f"{name}_y", (2, cycles.q))
-    step, arclength, since = stored.array(f"{name}_numbers", (3,)).tolist()
-    return State(Orbit(mesh, x, y[0].copy()), dx, y[1].copy(), step, arclength, int(since))
+    step, arclength, since, count = stored.array(f"{name}_numbers", (4,)).tolist()
+    return State(
+        Orbit(mesh, x, y[0].copy()), dx, y[1].copy(), step, arclength, int(since), int(count)
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -11,17 +12,19 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import kernels, starts
+from phasekit.bifurcation.continuation.periodic import along, starts
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.continuation import check_options
 from phasekit.labelled.continuation.cycle_start import (
+    UNFOLDING,
     cycles_of,
     given_orbit,
     orbit_of,
     sampled,
     scale_of,
+    unfolded,
 )
-from phasekit.labels.arguments import bad, number, numeric
+from phasekit.labels.arguments import bad, number, reals
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -80,7 +83,7 @@ def periodic_orbit(
     (6.663286859, 0)
     >>> branch = pk.continuation(oscillator, "mu", orbit=orbit, span=(0.5, 2.0))
     >>> round(float(branch.points.period[-1]), 9)
-    7.629874480
+    7.62987448
     """
     problem = as_problem(problem)
     options = check_options(options)
@@ -93,7 +96,9 @@ def periodic_orbit(
         settle = number("settle", settle, "a number >= 0", None)
         if settle < 0.0:
             raise bad("settle", settle, "a number >= 0")
-    value = next(iter(problem.parameters.values()), 0.0)
+    if problem.conservative and n > 1:
+        problem = unfolded(problem)
+    value = problem.parameters.get(UNFOLDING, next(iter(problem.parameters.values()), 0.0))
     if not problem.parameters:
         raise bad("problem", problem, "a problem with at least one parameter")
     if isinstance(x0, xr.Dataset):
@@ -110,7 +115,7 @@ def periodic_orbit(
             raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
         x0 = [x0[name] for name in problem.state]
     wants = f"{n} numbers ({', '.join(problem.state)}), or samples of shape (samples, {n})"
-    x = np.atleast_1d(np.asarray(numeric("x0", x0, None, wants), dtype=float))
+    x = np.atleast_1d(reals("x0", x0, wants))
     if not np.isfinite(x).all() or x.shape[-1] != n or x.ndim > 2:
         raise bad("x0", x0, wants)
     if problem.time is not None and period is None:
@@ -153,7 +158,8 @@ def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
 
 def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr.Dataset:
     """The orbit that the first of some guesses leads to."""
-    name = next(iter(problem.parameters))
+    free = UNFOLDING in problem.parameters
+    name = UNFOLDING if free else next(iter(problem.parameters))
     value = problem.parameters[name]
     width = max(abs(value), 1.0)
     said = ""
@@ -162,7 +168,10 @@ def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr
             problem, [name], [(value - width, value + width)], scale_of(guess.x), turns, options,
             multiple,
         )  # fmt: skip
-        found = starts.settled(cycles, guess)
+        if free:
+            found = starts.kept(cycles, guess, guess.x[0].copy())
+        else:
+            found = starts.settled(cycles, guess)
         if not found.converged:
             said = found.message
             continue
@@ -170,7 +179,11 @@ def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr
         if size < 1e-6 and not cycles.forced:
             said = "it led to an equilibrium"
             continue
-        found.orbit.y[1] = value
+        if not free:
+            found.orbit.y[1] = value
+        elif abs(found.orbit.y[1]) > 1e-8:
+            said = f"energy is not conserved along it: it needs a damping of {found.orbit.y[1]:.2g}"
+            continue
         return orbit_of(cycles, problem, found, where)
     raise ConvergenceError(
         f"x0: no periodic orbit was found {where}: {said}; give another x0 or period, or settle="
@@ -198,7 +211,7 @@ class _Simulation:
                 w[:n] = x
                 if problem.time is not None:
                     par[-1] = t
-                kernels.evaluate(address, par, w, n)
+                along.evaluate(address, par, w, n)
                 return w[n : 2 * n].copy()
 
         self.f: Callable[[float, FloatArray], FloatArray] = f
@@ -210,7 +223,8 @@ class _Simulation:
         from scipy.integrate import solve_ivp
 
         at = np.linspace(begin, begin + length, samples)
-        with np.errstate(all="ignore"):
+        with np.errstate(all="ignore"), warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what LSODA says is said by its status, too
             try:
                 solution = solve_ivp(
                     self.f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
@@ -245,26 +259,19 @@ def _searched(
     waited = 0.0
     unit = 0.0
     for times in TURNS if settle is None else TURNS[:1]:
-        if times:
-            if not unit > 0.0:
-                break
-            more = (times - waited) * unit
-            x = run(x, 0.0, more)[1][-1]
-            waited = times
         try:
-            period = _return(problem, x, run)
-        except ConvergenceError as error:
-            said = error
+            if times:
+                x = run(x, 0.0, (times - waited) * unit)[1][-1]
+                waited = times
             unit = unit or _pace(run, x)
-            continue
-        unit = unit or period
-        at, states = run(x, 0.0, period, SAMPLES)
-        try:
-            guesses = [sampled(problem, at / period, states, period, value, options.degree)]
-            return _found(problem, guesses, options, f"after a return in {period:.6g}")
+            period = _return(problem, x, run)
+            unit = period if waited == 0.0 else unit
+            at, states = run(x, 0.0, period, SAMPLES)
+            guess = sampled(problem, at / period, states, period, value, options.degree)
+            return _found(problem, [guess], options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
-            said = error
-    raise said or ConvergenceError("x0: no periodic orbit was found; give a period")
+            said = said or error
+    raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said
 
 
 def _pace(run: _Simulation, x: FloatArray) -> float:
@@ -292,7 +299,7 @@ def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
         side = gaps @ normal
         near = np.sqrt(np.mean((gaps / sizes) ** 2, axis=1))
         crossing = np.flatnonzero((side[:-1] < 0.0) & (side[1:] >= 0.0))
-        crossing = crossing[near[crossing] < 0.25]
+        crossing = crossing[(crossing > 0) & (near[crossing] < 0.25)]
         if len(crossing):
             close = near[crossing]
             # The first return that is about as near as any.

@@ -14,6 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.periodic import along
+
 Array = npt.NDArray[np.float64]
 
 
@@ -97,10 +99,10 @@ def gathered(parts: Array, m: int) -> Array:
 
 
 def interpolate(mesh: Array, x: Array, m: int, at: Array) -> Array:
-    """Values of a piecewise polynomial at times in [0, 1]."""
-    where = np.clip(np.searchsorted(mesh, at, side="right") - 1, 0, len(mesh) - 2)
-    value, _ = basis(m, (at - mesh[where]) / (mesh[where + 1] - mesh[where]))
-    return np.asarray(np.einsum("ij,ij...->i...", value, pieces(x, m)[where]))
+    """Values of a piecewise polynomial at times in [0, 1], in ascending order."""
+    out = np.empty((len(at), x.shape[1]))
+    along.interpolate(mesh, np.ascontiguousarray(x), np.arange(m + 1.0) / m, at, out)
+    return out
 
 
 def at_gauss(x: Array, m: int) -> Array:
@@ -126,23 +128,20 @@ def mean(mesh: Array, x: Array, m: int) -> Array:
     return np.asarray(np.einsum("j,i,jin->n", np.diff(mesh), c.weights, at_gauss(x, m)))
 
 
-def highest(mesh: Array, x: Array, m: int, scale: Array) -> Array:
+def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Array:
     """Size of the derivative of order m + 1 on each interval, on scaled axes.
 
     The m-th derivative is constant on intervals; its jumps, over the distances of their middles,
-    are the next one, with which the error goes.
+    are the next one, with which the error goes. ``closure`` multiplies states after a period.
     """
-    h = np.diff(mesh)
-    constant = np.einsum("k,jkn->jn", scheme(m).high, pieces(x, m)) / h[:, None] ** m
-    gap = 0.5 * (h + np.roll(h, 1))
-    jump = np.abs(constant - np.roll(constant, 1, axis=0)) / gap[:, None] / scale
-    both = 0.5 * (jump + np.roll(jump, -1, axis=0))
-    return np.asarray(np.max(both, axis=1))
+    out = np.empty(len(mesh) - 1)
+    along.highest(mesh, x, scheme(m).high, scale, closure, out)
+    return out
 
 
-def error(mesh: Array, x: Array, m: int, scale: Array) -> float:
+def error(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> float:
     """Largest estimated error of the polynomials between the ends of intervals, on scaled axes."""
-    return float(np.max(highest(mesh, x, m, scale) * np.diff(mesh) ** (m + 1))) * factor(m)
+    return float(np.max(highest(mesh, x, m, scale, closure) * np.diff(mesh) ** (m + 1))) * factor(m)
 
 
 @functools.cache
@@ -158,9 +157,9 @@ def factor(m: int) -> float:
     return float(np.max(sizes)) / factorial
 
 
-def even(mesh: Array, x: Array, m: int, scale: Array, count: int) -> Array:
+def even(mesh: Array, x: Array, m: int, scale: Array, count: int, closure: Array) -> Array:
     """A mesh of so many intervals over which the error is spread evenly."""
-    density = highest(mesh, x, m, scale) ** (1.0 / (m + 1))
+    density = highest(mesh, x, m, scale, closure) ** (1.0 / (m + 1))
     # A part of it everywhere, so that no interval grows where nothing seems to happen.
     whole = float(np.sum(density * np.diff(mesh)))
     if not whole > 0.0 or not np.isfinite(whole):

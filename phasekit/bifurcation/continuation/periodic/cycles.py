@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
 from phasekit.bifurcation.continuation.periodic.jets import Jets
-from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -150,7 +150,8 @@ class Cycles:
     def sizes(self) -> Array:
         """Sizes of states and active parameters, for differences."""
         time = np.ones(1) if self.forced else np.ones(0)
-        return np.concatenate([self.scale, time, self.width])
+        width = np.where(np.isfinite(self.width), self.width, 1.0)
+        return np.concatenate([self.scale, time, width])
 
     def replace(self, **changes: Any) -> Cycles:
         """A copy with some attributes changed."""
@@ -162,20 +163,24 @@ class Cycles:
         w = np.zeros(2 * k + 1)
         w[:k] = y[1:]
         par = self.par.copy()
-        kernels.evaluate(self.clock, par, w, k)
+        along.evaluate(self.clock, par, w, k)
         return self.multiple * float(w[k]), self.multiple * w[k + 1 :]
+
+    def vertical(self, dy: Array) -> bool:
+        """Whether a tangent has no part along the parameter, as in conservative families."""
+        return bool(np.all(np.abs(dy[1:]) <= 1e-9 * self.width))
 
     def inner(self, mesh: Array, a: Array, b: Array, dy_a: Array, dy_b: Array) -> float:
         """Inner product of two directions: the mean over states and time, and the parameters."""
         c = collocation.scheme(self.m)
-        states = kernels.inner(mesh, c.weights, c.value, a, b, self.scale)
+        states = along.inner(mesh, c.weights, c.value, a, b, self.scale)
         return float(states + np.sum(dy_a[1:] * dy_b[1:] / self.width**2))
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
         """Bordering rows, phase or period first, direction last; with their values at the orbit."""
         c = collocation.scheme(self.m)
         rows = np.empty((self.q, *orbit.x.shape))
-        kernels.borders(
+        along.borders(
             orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows
         )
         rows_y = np.zeros((self.q, self.q))
@@ -197,67 +202,35 @@ class Cycles:
         """Newton's method in the plane rows . x + rows_y . y = target."""
         c = collocation.scheme(self.m)
         mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
-        o = self.options
-        n, q = self.n, self.q
+        n, q, jets = self.n, self.q, self.jets
         if x.shape != ((len(mesh) - 1) * self.m + 1, n) or y.shape != (q,):
             raise ValueError(f"an orbit of shape {x.shape} with {y.shape} on {len(mesh)} points")
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
-        rows_y = rows_y.copy()
-        before = np.inf
-        sign = residual = divergence = np.nan
-        message = "Newton's method did not converge"
-        for step in range(1, (iterations or o.max_iterations) + 1):
-            right = target - (rows.reshape(q, -1) @ x.ravel() + rows_y @ y)
-            if self.forced:
-                period, slope = self.own_period(y)
-                rows_y[0, 0], rows_y[0, 1:] = 1.0, -slope
-                right[0] = period - y[0]
-            with np.errstate(all="ignore"):
-                jets = self.jets(mesh, x, y, self.m, self.sizes)
-                sign, residual, divergence = kernels.condense(
-                    jets,
-                    self.forced,
-                    mesh,
-                    c.nodes,
-                    c.weights,
-                    c.value,
-                    c.slope,
-                    c.side,
-                    self.scale,
-                    x,
-                    y,
-                    W,
-                )
-                if sign == 0.0:
-                    message = "f or its derivatives are not finite"
-                    break
-                gap = self.closure * x[0] + self.turns - x[-1]
-                sign *= kernels.solve(W, rows, rows_y, right, gap, self.closure, self.m, dx, dy)
-            if sign == 0.0:
-                message = "the equations are singular"
+        most = iterations or self.options.max_iterations
+        values, size, step = np.empty((0, 0)), np.inf, 0
+        if not jets.given:
+            values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
+        while True:
+            if jets.given:
+                values = jets(mesh, x, y, self.m, self.sizes)
+            end, steps, sign, residual, divergence, size = kernels.newton(
+                jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
+                self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale,
+                self.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
+                dx, dy, values, self.options.tolerance, 1 if jets.given else most, damped, size,
+            )  # fmt: skip
+            step += steps
+            if end != kernels.ON_ITS_WAY or step >= most:
                 break
-            size = float(np.max(np.max(np.abs(dx[0]), axis=0) / self.scale))
-            size = max(size, abs(float(dy[0, 0])) / y[0])
-            size = max(size, float(np.max(np.abs(dy[0, 1:]) / self.width, initial=0.0)))
-            if not np.isfinite(size):
-                break
-            part = 1.0
-            if damped:
-                part = min(1.0, 0.5 / size)
-            x += part * dx[0]
-            y += part * dy[0]
-            if not y[0] > 0.0:
-                break
-            flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
-            if part == 1.0 and (size <= o.tolerance or flat):
-                return self._found(
-                    Orbit(mesh, x, y), dx[1], dy[1], step, residual, sign, divergence, W
-                )
-            if not damped and step > 2 and size > 2.0 * before:
-                break
-            before = size
-        return Solution(Orbit(mesh, x, y), dx[1], dy[1], 0, residual, sign, divergence, W, message)
+        orbit = Orbit(mesh, x, y)
+        if end == kernels.FOUND:
+            return self._found(orbit, dx[1], dy[1], step, residual, sign, divergence, W)
+        message = {
+            kernels.NOT_FINITE: "f or its derivatives are not finite",
+            kernels.SINGULAR: "the equations are singular",
+        }.get(end, "Newton's method did not converge")
+        return Solution(orbit, dx[1], dy[1], 0, residual, sign, divergence, W, message)
 
     def looked_at(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
         """An orbit that was found otherwise, with its residual and condensed equations."""
@@ -274,26 +247,50 @@ class Cycles:
         self, orbit: Orbit, dx: Array, dy: Array, steps: int, residual: float, sign: float,
         divergence: float, W: Array,
     ) -> Solution:  # fmt: skip
-        length = np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy))
+        length = float(np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy)))
         if not length > 0.0:
             length = 1.0
         return Solution(orbit, dx / length, dy / length, steps, residual, sign, divergence, W)
 
-    def multipliers(self, W: Array) -> tuple[Complex, float]:
-        """Floquet multipliers and the logarithm of the size of their product."""
+    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float]:
+        """Floquet multipliers and the logarithm of the size of their product.
+
+        Of an autonomous system one belongs to f along the orbit. The others are those across it,
+        which stay accurate where the orbit comes near an equilibrium; it is itself a check.
+        """
         n = self.n
-        return multipliers(W[:, (self.m - 1) * n :, :n])
+        G = W[:, (self.m - 1) * n :, :n]
+        values, log = multipliers(G)
+        if self.forced or n == 1:
+            return values, log
+        with np.errstate(all="ignore"):
+            f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        if not np.isfinite(f).all():
+            return values, log
+        trivial = values[np.argmin(np.abs(values - 1.0))]
+        others = multipliers(across(G, f / np.max(np.abs(f), axis=1, keepdims=True)))[0]
+        whole = np.append(others, trivial.real)
+        return whole[np.argsort(-np.abs(whole), kind="stable")], log
+
+    def divergence(self, found: float) -> float:
+        """Integral of the trace of f_x over a period, of what `kernels.condense` found."""
+        return found
+
+    @property
+    def own(self) -> int:
+        """Number of states of the orbit itself."""
+        return self.n
 
     def amplitudes(self, orbit: Orbit) -> Array:
         """Half the range of each state, without its turns; where it hardly moves, a part of all."""
-        flat = orbit.x - np.outer(collocation.times(orbit.mesh, self.m), self.turns)
-        half = 0.5 * (np.max(flat, axis=0) - np.min(flat, axis=0))
+        half = np.empty(self.n)
+        along.ranges(orbit.mesh, orbit.x, self.turns, self.m, half)
         whole = half / self.scale
         return np.asarray(self.scale * np.maximum(whole, 1e-3 * float(np.max(whole))))
 
     def mesh_error(self, orbit: Orbit) -> float:
         """Largest estimated error of a state, beside its amplitude."""
-        return collocation.error(orbit.mesh, orbit.x, self.m, self.amplitudes(orbit))
+        return collocation.error(orbit.mesh, orbit.x, self.m, self.amplitudes(orbit), self.closure)
 
     def on(self, mesh: Array, orbit: Orbit, *more: Array) -> tuple[Orbit, tuple[Array, ...]]:
         """The orbit, and directions, on another mesh."""

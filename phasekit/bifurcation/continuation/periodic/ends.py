@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, starts, trace
+from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-
-if TYPE_CHECKING:
-    from phasekit.bifurcation.continuation.periodic.trace import Point, State
+from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
 
 STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
 SLOW = 1e-4  # the same, where no step succeeds
+FEW = 5  # points before which a family is not asked whether it closes
+NEAR = 0.2  # how near its start it has to come by, beside its step
+SAME = 1e-6
 INFINITE = "stands still: an orbit that takes infinite time is near"
+FAR = 30.0  # times the period of the start, where the parameter stands still throughout
 LONG = 3.0  # times the period of the start, from where on it can be that of a homoclinic orbit
 
 
@@ -27,9 +28,10 @@ def end_of(
     cycles: Cycles, before: State, made: Point, start: Point
 ) -> tuple[Point | None, Stop] | None:
     """The last point and the reason, if the family ends between two points."""
-    if not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
+    small = np.mean(cycles.amplitudes(made.orbit) / cycles.scale) < 4.0 * made.step
+    if small and not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
         return _at_hopf(cycles, before, made)
-    if _through_doubling(cycles, before.orbit, made.orbit):
+    if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit):
         name = cycles.field.parameters[cycles.active[0]]
         return None, Stop(
             "period_doubling",
@@ -45,6 +47,10 @@ def end_of(
         name, side = cycles.field.parameters[place], "upper" if upper else "lower"
         last = at_value(cycles, before, made, k, bound)
         return last, Stop("bound", f"{name} met its {side} bound {bound:.9g}")
+    for value, side, out in _period_bounds(cycles, made.orbit.y[0]):
+        if out:
+            last = at_value(cycles, before, made, -1, value)
+            return last, Stop("bound", f"period met its {side} bound {value:.9g}")
     if not cycles.forced and len(cycles.active) == 1 and _homoclinic(cycles, made, start):
         name = cycles.field.parameters[cycles.active[0]]
         return made, Stop(
@@ -53,8 +59,15 @@ def end_of(
             f"{INFINITE}",
         )
     if _closes(cycles, before, made, start):
-        return start, Stop("closed", "the family closed on its start")
+        last = replace(start, arclength=made.arclength, step=made.step)
+        return last, Stop("closed", "the family closed on its start")
     return None
+
+
+def _period_bounds(cycles: Cycles, period: float) -> list[tuple[float, str, bool]]:
+    """Bounds of the period: their values, their sides, and whether it is out of them."""
+    low, high = cycles.options.bounds.get("period", (-np.inf, np.inf))
+    return [(low, "lower", period <= low), (high, "upper", period >= high)]
 
 
 def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
@@ -63,6 +76,9 @@ def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
     if not rate > 0.0:
         return False
     still = abs(made.dy[1]) / cycles.width[0] / rate
+    if cycles.vertical(start.dy) and cycles.vertical(made.dy):
+        # A conservative family: the parameter always stands still.
+        return bool(made.orbit.y[0] > FAR * start.orbit.y[0])
     return bool(still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0])
 
 
@@ -92,9 +108,11 @@ def _through_hopf(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     """Whether the orbit turned inside out between two points, as it does through a Hopf point."""
     if np.any(cycles.turns):
         return False
+    n = cycles.own
     a, _ = cycles.on(b.mesh, a)
     one, two = (shape(cycles, orbit) * cycles.scale for orbit in (a, b))
     nothing = np.zeros(cycles.q)
+    one[:, n:] = 0.0
     return cycles.inner(b.mesh, one, two, nothing, nothing) < 0.0
 
 
@@ -105,6 +123,8 @@ def _at_hopf(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, 
     middle = collocation.mean(a.mesh, a.x, cycles.m)
     said = "the orbits shrink to an equilibrium, a Hopf point"
     near = Stop("hopf", f"{said} near {name} = {made.orbit.y[1]:.9g}")
+    if len(cycles.active) > 1:
+        return None, near
     found = hopf_near(cycles, middle, a.y)
     if found is None:
         return None, near
@@ -116,7 +136,7 @@ def _at_hopf(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, 
     if not last.converged or abs(last.orbit.y[0] / y[0] - 1.0) > 0.01:
         return None, stop
     # `off` leaves it outwards; the family comes inwards.
-    point = trace.point_of(cycles, last, before.arclength + 0.5 * made.step, 0.5 * made.step)
+    point = point_of(cycles, last, before.arclength + 0.5 * made.step, 0.5 * made.step)
     return replace(point, dx=-point.dx, dy=-point.dy, sign=-point.sign), stop
 
 
@@ -164,9 +184,17 @@ def hopf_near(cycles: Cycles, x: Array, y: Array) -> tuple[Array, Array] | None:
     return x, np.array([2.0 * np.pi / after[1], p])
 
 
+def _near_doubling(cycles: Cycles, made: Point) -> bool:
+    """Whether the orbit can be a doubled one near its birth, with a multiplier near 1."""
+    if cycles.forced and cycles.multiple % 2:
+        return False
+    near = np.sum(np.abs(made.multipliers - 1.0) < 0.7)
+    return bool(near > (0 if cycles.forced else 1))
+
+
 def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
     """Whether both halves of the orbit changed places, as they do where they become the same."""
-    if cycles.forced and cycles.multiple % 2:
+    if len(cycles.active) > 1:
         return False
     at = np.linspace(0.0, 0.5, 65)[:-1]
 
@@ -200,10 +228,46 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
         return None
     found.orbit.y[1 + k] = value
     side = np.sign(cycles.inner(mesh, dx, found.dx, before.dy, found.dy)) or 1.0
-    point = trace.point_of(cycles, found, before.arclength + part * made.step, part * made.step)
+    point = point_of(cycles, found, before.arclength + part * made.step, part * made.step)
     # Its determinant has the parameter's row, which goes the way of the tangent that it gave.
     return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
 
 
+def place(cycles: Cycles, orbit: Orbit) -> Array:
+    """Numbers that tell orbits apart, whatever their phase."""
+    n, m = cycles.own, cycles.m
+    flat = orbit.x - np.outer(collocation.times(orbit.mesh, m), cycles.turns)
+    middle = collocation.mean(orbit.mesh, flat, m)
+    square = collocation.mean(orbit.mesh, (flat - middle) ** 2, m)
+    width = cycles.width[: len(cycles.active)]
+    return np.concatenate([
+        orbit.y[1 : 1 + len(width)] / width, [np.log(orbit.y[0])],
+        (middle / cycles.scale)[:n], (np.sqrt(np.abs(square)) / cycles.scale)[:n],
+    ])  # fmt: skip
+
+
 def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:
+    """Whether the family comes by its start again, between two points."""
+    p = start.orbit.y[1]
+    a, b = before.orbit.y[1], made.orbit.y[1]
+    near = abs(b - a) + made.step * cycles.width[0]
+    if before.since_start < FEW or not min(a, b) - near <= p <= max(a, b) + near:
+        return False
+    one, two = (place(cycles, o) - place(cycles, start.orbit) for o in (before.orbit, made.orbit))
+    along = two - one
+    length = float(along @ along)
+    if not length > 0.0:
+        return False
+    part = -float(one @ along) / length
+    passed = 0.0 <= part <= 1.0
+    gap = one + part * along
+    if not passed or float(gap @ gap) > NEAR**2 * length:
+        return False
+    # It comes by: whether it meets it, the orbit in the plane of the start says.
+    k = 0 if len(cycles.active) == 1 else int(np.argmax(np.abs(start.dy[1:3] / cycles.width[:2])))
+    if abs(b - a) if k == 0 else abs(made.orbit.y[2] - before.orbit.y[2]):
+        met = at_value(cycles, before, made, k, float(start.orbit.y[1 + k]))
+        if met is not None:
+            apart = place(cycles, met.orbit) - place(cycles, start.orbit)
+            return bool(np.max(np.abs(apart)) < SAME)
     return False

@@ -18,8 +18,8 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
-from phasekit.bifurcation.continuation.periodic.trace import Point, point_of
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -153,6 +153,10 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     changed = [
         kind for kind, test in TESTS.items() if (test(a, forced) >= 0.0) != (test(b, forced) >= 0.0)
     ]
+    if cycles.vertical(a.dy) and cycles.vertical(b.dy):
+        # Conservative: a second multiplier is always 1, and the parameter never moves.
+        changed = [kind for kind in changed if kind == DOUBLING]
+        return [one for one in (refined(Stretch(cycles, a, b), kind) for kind in changed) if one]
     gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
     if not changed and gap == 0:
         return []

@@ -9,13 +9,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.trace import (
-    Point,
-    State,
-    Track,
-    begin,
-    follow,
-)
+from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow
 
 Array = npt.NDArray[np.float64]
 
@@ -94,6 +89,3 @@ def go_on(cycles: Cycles, track: Track | None, points: int, start: Point) -> Tra
         return track
     more = follow(cycles, track.state, points, start)
     return Track((*track.points, *more.points), more.state, more.stop)
-
-
-__all__ = ["Found", "Path", "State", "Tracks", "go_on", "join", "run"]

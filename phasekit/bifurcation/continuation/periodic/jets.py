@@ -28,6 +28,10 @@ class Jets:
         self.active = active
         self.places = np.array(active, dtype=np.int64)
         self.many: bool | None = None  # whether a Python f takes many states at once
+        # Whether kernels are given the derivatives, and what those call that take them themselves.
+        self.given = isinstance(field, PythonField)
+        self.mode = differences.SHARP if field.mode == differences.PLAIN else field.mode
+        self.first = 0 if self.given else field.first(active, sharp=True)
 
     def __call__(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
         """Rows of f and its derivatives, at one Gauss point each."""
@@ -37,12 +41,24 @@ class Jets:
             at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
             return self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale)
         out = np.empty(((len(mesh) - 1) * m, n * (1 + n + a)))
-        mode = differences.SHARP if self.field.mode == differences.PLAIN else self.field.mode
         kernels.jets(
-            self.field.first(self.active, sharp=True), mode, self.par, self.places, self.forced,
+            self.first, self.mode, self.par, self.places, self.forced,
             mesh, c.nodes, c.value, x, y, scale, out,
         )  # fmt: skip
         return out
+
+    def at_mesh(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
+        """F at the beginning of each interval."""
+        n = x.shape[1]
+        points = np.ascontiguousarray(x[::m])
+        if isinstance(self.field, PythonField):
+            return self._python(points[:-1], y, mesh[:-1], scale)[:, :n]
+        out = np.empty((len(mesh) - 1, n * (1 + n + len(self.active))))
+        kernels.jets(
+            self.first, self.mode, self.par, self.places, self.forced, mesh, np.zeros(1),
+            np.array([[1.0, 0.0]]), points, y, scale, out,
+        )  # fmt: skip
+        return out[:, :n]
 
     def _python(self, x: Array, y: Array, s: Array, scale: Array) -> Array:
         field: Any = self.field

@@ -17,6 +17,12 @@ from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
+FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
+ROUNDING = 1e-11  # of the residual, relative
+
+# How Newton's method ended.
+ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED = range(5)
+
 
 @routine
 def eliminate(a: Array, rows: int, pivots: int, width: int) -> float:
@@ -153,7 +159,7 @@ def condense(
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
-    residual = worst / speed if speed > 0.0 else np.inf
+    residual = worst / speed if speed > 0.0 else worst
     return sign, residual, divergence
 
 
@@ -320,120 +326,74 @@ def solve(
 
 
 @kernel
-def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Array) -> None:
-    """Periodic QR: G_N ... G_1 Q = Q' R after some passes, without ever forming the product.
+def newton(
+    given: bool, first: Any, mode: int, par: Array, active: Any, forced: bool, clock: Any,
+    multiple: int, mesh: Array, nodes: Array, weights: Array, value: Array, slope: Array,
+    side: float, scale: Array, sizes: Array, width: Array, closure: Array, turns: Array,
+    rows: Array, rows_y: Array, target: Array, x: Array, y: Array, W: Array, dx: Array, dy: Array,
+    jet_: Array, tolerance: float, iterations: int, damped: bool, before: float,
+) -> tuple[int, int, float, float, float, float]:  # fmt: skip
+    """Newton's method for an orbit, in its place, with the derivatives of f given or taken here.
 
-    The triangle is diag(exp(log)) R. Q is any orthogonal matrix and becomes Q'; with the turn
-    Q^T Q' the product is similar to the turn times the triangle ([Lust2001]).
+    Returns how it ended, steps, sign of the determinant, residual, integral of the trace and the
+    size of the last step.
     """
-    count, n = G.shape[0], G.shape[1]
-    Z = np.empty((n, n))
-    start = np.empty((n, n))
-    step = np.empty((n, n))
-    for turn in range(passes):
-        for i in range(n):
-            log[i] = 0.0
-            for k in range(n):
-                R[i, k] = 1.0 if i == k else 0.0
-                start[i, k] = Q[i, k]
-        for j in range(count):
-            for i in range(n):
-                for k in range(n):
-                    total = 0.0
-                    for d in range(n):
-                        total += G[j, i, d] * Q[d, k]
-                    Z[i, k] = total
-            # Gram-Schmidt, twice, which is as good as reflections.
-            for k in range(n):
-                for d in range(n):
-                    step[d, k] = 0.0
-                for _ in range(2):
-                    for d in range(k):
-                        total = 0.0
-                        for i in range(n):
-                            total += Z[i, d] * Z[i, k]
-                        step[d, k] += total
-                        for i in range(n):
-                            Z[i, k] -= total * Z[i, d]
-                size = 0.0
-                for i in range(n):
-                    size += Z[i, k] * Z[i, k]
-                size = np.sqrt(size)
-                step[k, k] = size
-                for i in range(n):
-                    Z[i, k] /= size
-            for i in range(n):
-                for k in range(n):
-                    Q[i, k] = Z[i, k]
-            if turn < passes - 1:
-                continue
-            # D_new U_new D U = (D_new D) (D^-1 U_new D) U with unit triangles U.
-            for i in range(n):
-                for k in range(i + 1, n):
-                    step[i, k] *= np.exp(log[k] - log[i]) / step[i, i]
-            for i in range(n):
-                for k in range(i + 1, n):
-                    total = R[i, k] + step[i, k]
-                    for d in range(i + 1, k):
-                        total += step[i, d] * R[d, k]
-                    # Upwards from row i: entries of rows below are not needed again.
-                    Z[i, k] = total
-            for i in range(n):
-                for k in range(i + 1, n):
-                    R[i, k] = Z[i, k]
-                log[i] += np.log(step[i, i])
-    for i in range(n):
-        for k in range(n):
-            turn_[i, k] = 0.0
-            for d in range(n):
-                turn_[i, k] += start[d, i] * Q[d, k]
-
-
-@kernel
-def borders(
-    mesh: Array, weights: Array, value: Array, slope: Array, reference: Array, tangent: Array,
-    scale: Array, forced: bool, rows: Array,
-) -> None:  # fmt: skip
-    """Fill the row of the phase condition (the first) and that of the arclength (the last).
-
-    They are the integrals of x . x_ref' and of x . tangent, on scaled axes.
-    """
-    m, n = weights.size, scale.size
-    end = rows.shape[0] - 1
-    rows[:] = 0.0
-    for j in range(mesh.size - 1):
-        h = mesh[j + 1] - mesh[j]
-        for i in range(m):
+    m, n, q = nodes.size, x.shape[1], y.size
+    places = x.shape[0]
+    right, gap = np.zeros(q), np.zeros(n)
+    border = rows_y.copy()
+    w = np.zeros(2 * q + 2)
+    sign, residual, divergence, size = 0.0, np.inf, np.nan, before
+    for step in range(1, iterations + 1):
+        for r in range(q):
+            right[r] = target[r]
+            for k in range(q):
+                right[r] -= rows_y[r, k] * y[k]
+        for i in range(places):
             for c in range(n):
-                along, across = 0.0, 0.0
-                for k in range(m + 1):
-                    along += slope[i, k] * reference[j * m + k, c]
-                    across += value[i, k] * tangent[j * m + k, c]
-                part = weights[i] / scale[c] ** 2
-                for k in range(m + 1):
-                    if not forced:
-                        rows[0, j * m + k, c] += part * along * value[i, k]
-                    rows[end, j * m + k, c] += h * part / n * across * value[i, k]
-
-
-@kernel
-def inner(mesh: Array, weights: Array, value: Array, a: Array, b: Array, scale: Array) -> float:
-    """Integral of the mean over states of a . b, on scaled axes."""
-    m, n = weights.size, scale.size
-    total = 0.0
-    for j in range(mesh.size - 1):
-        h = mesh[j + 1] - mesh[j]
-        for i in range(m):
+                for r in range(q):
+                    right[r] -= rows[r, i, c] * x[i, c]
+        if forced:
+            own = active.size - 1
+            for k in range(own):
+                w[k] = y[1 + k]
+            call(clock, w, 0, par, 0, own)
+            border[0, 0] = 1.0
+            for k in range(own):
+                border[0, 1 + k] = -multiple * w[own + 1 + k]
+            right[0] = multiple * w[own] - y[0]
+        if not given:
+            jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
+        sign, residual, divergence = condense(
+            jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
+        )
+        if sign == 0.0:
+            return NOT_FINITE, step, sign, residual, divergence, size
+        for c in range(n):
+            gap[c] = closure[c] * x[0, c] + turns[c] - x[places - 1, c]
+        sign *= solve(W, rows, border, right, gap, closure, m, dx, dy)
+        if sign == 0.0:
+            return SINGULAR, step, sign, residual, divergence, size
+        size = abs(dy[0, 0]) / y[0]
+        for k in range(1, q):
+            size = max(size, abs(dy[0, k]) / width[k - 1])
+        for i in range(places):
             for c in range(n):
-                left, right = 0.0, 0.0
-                for k in range(m + 1):
-                    left += value[i, k] * a[j * m + k, c]
-                    right += value[i, k] * b[j * m + k, c]
-                total += h * weights[i] * left * right / scale[c] ** 2
-    return total / n
-
-
-@kernel
-def evaluate(function: Any, par: Array, w: Array, out: int) -> None:
-    """Call a native function of the numbers at the head of w, which fills w from a place on."""
-    call(function, w, 0, par, 0, out)
+                size = max(size, abs(dx[0, i, c]) / scale[c])
+        if not np.isfinite(size):
+            return DIVERGED, step, sign, residual, divergence, size
+        part = min(1.0, 0.5 / size) if damped and size > 0.0 else 1.0
+        for i in range(places):
+            for c in range(n):
+                x[i, c] += part * dx[0, i, c]
+        for k in range(q):
+            y[k] += part * dy[0, k]
+        if not y[0] > 0.0:
+            return DIVERGED, step, sign, residual, divergence, size
+        flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
+        if part == 1.0 and (size <= tolerance or flat):
+            return FOUND, step, sign, residual, divergence, size
+        if not damped and before < np.inf and size > 2.0 * before:
+            return DIVERGED, step, sign, residual, divergence, size
+        before = size
+    return ON_ITS_WAY, iterations, sign, residual, divergence, size

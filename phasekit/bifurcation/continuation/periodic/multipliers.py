@@ -5,13 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import kernels
+from phasekit.bifurcation.continuation.periodic import along
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 APART = 1e-14  # entries below the diagonal blocks that are rounding
 PASSES = 12
+ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
 
 
 def multipliers(G: Array) -> tuple[Complex, float]:
@@ -26,13 +27,13 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     G = np.ascontiguousarray(G)
     if not np.isfinite(G).all():
         return np.full(n, np.nan, dtype=complex), np.nan
-    passes = 0
-    while True:
-        kernels.triangular(G, 2, Q, R, log, turn)
-        passes += 2
-        cuts = _cuts(turn)
-        loose = [i for i in range(1, n) if i not in cuts and abs(log[i - 1] - log[i]) > 0.7]
-        if not loose or passes >= PASSES or not np.isfinite(log).all():
+    for _ in range(PASSES // 2):
+        along.triangular(G, 2, Q, R, log, turn)
+        cuts = [i for i in range(1, n) if np.abs(turn[i:, :i]).max() <= APART]
+        apart = log[:-1] - log[1:]
+        if all(i + 1 in cuts or abs(apart[i]) <= ALIKE for i in range(n - 1)):
+            break
+        if not np.isfinite(log).all():
             break
     values = []
     edges = [0, *cuts, n]
@@ -46,6 +47,8 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     return whole[np.argsort(-np.abs(whole), kind="stable")], float(np.sum(log))
 
 
-def _cuts(turn: Array) -> list[int]:
-    """Where a nearly block diagonal orthogonal matrix can be cut."""
-    return [i for i in range(1, len(turn)) if np.max(np.abs(turn[i:, :i])) <= APART]
+def across(G: Array, f: Array) -> Array:
+    """The part of each matrix across a direction that it takes to the next one, as it does f."""
+    frames = np.linalg.qr(f[:, :, None], mode="complete")[0][:, :, 1:]
+    after = np.roll(frames, -1, axis=0)
+    return np.asarray(np.swapaxes(after, 1, 2) @ G @ frames)

@@ -187,7 +187,7 @@ def at_torus(cycles: Cycles, orbit: Orbit, angle: float) -> dict[str, float]:
     """
     line = Linear(cycles, orbit)
     n, omega = line.n, angle / orbit.y[0]
-    v = _wave(line, omega)
+    v = wave(line, omega)
     u, w = np.ascontiguousarray(v[:, :n]), np.ascontiguousarray(v[:, n:])
     second = line.second
     g = second(u, u) + second(w, w)
@@ -211,8 +211,8 @@ def at_torus(cycles: Cycles, orbit: Orbit, angle: float) -> dict[str, float]:
     return {"d": 0.5 * float(d[0]), "d_imag": 0.5 * float(d[1]), "angle": angle}
 
 
-def _wave(line: Linear, omega: float) -> Array:
-    """The periodic v = u + i w with v' + i omega v = A v, of mean square 1: its parts side by side."""
+def wave(line: Linear, omega: float) -> Array:
+    """The periodic v = u + i w with v' + i omega v = A v, of mean square 1, parts side by side."""
     n = line.n
     count = len(line.A)
     at = np.random.default_rng(7).standard_normal((count, 2 * n))

@@ -10,6 +10,9 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, Extended
+from phasekit.bifurcation.continuation.periodic.normal_forms import Linear, wave
+from phasekit.bifurcation.continuation.periodic.point import Point
 
 Array = npt.NDArray[np.float64]
 
@@ -17,11 +20,17 @@ FIRST = 40  # intervals of a first mesh
 SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hopf point
 
 
-def settled(cycles: Cycles, guess: Orbit, *, iterations: int = 40) -> Solution:
-    """The orbit that a guess leads to at fixed parameters, on a mesh that suits it."""
+def settled(
+    cycles: Cycles, guess: Orbit, *, second: bool = False, iterations: int = 40
+) -> Solution:
+    """The orbit that a guess leads to at fixed parameters, on a mesh that suits it.
+
+    Of two parameters only the ``second`` is held.
+    """
+    held = 2 if second else len(cycles.active)
     for _ in range(8):
         rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
-        rows_y[-1, -1], target[-1] = 1.0, guess.y[-1]
+        rows_y[-1, held], target[-1] = 1.0, guess.y[held]
         found = cycles.correct(guess, rows, rows_y, target, iterations=iterations, damped=True)
         if not found.converged:
             return found
@@ -34,18 +43,49 @@ def settled(cycles: Cycles, guess: Orbit, *, iterations: int = 40) -> Solution:
     return found
 
 
+def kept(cycles: Cycles, guess: Orbit, through: Array | None = None) -> Solution:
+    """The orbit of a conservative family near a guess, the parameter free, which stays.
+
+    It keeps its part along the shape of the guess or, where a state is given that it goes
+    ``through``, that state as far as two equations can hold it.
+    """
+    nothing = np.zeros(cycles.q)
+    for _ in range(8):
+        flat = guess.x - np.outer(collocation.times(guess.mesh, cycles.m), cycles.turns)
+        shape = flat - collocation.mean(guess.mesh, flat, cycles.m)
+        rows, rows_y, target = cycles.rows(guess, shape, nothing)
+        if through is not None:
+            places = np.tile(through, (len(guess.x), 1))
+            jets = cycles.jets(guess.mesh, places, guess.y, cycles.m, cycles.sizes)
+            slope = jets[0, : cycles.n] / cycles.scale**2
+            across = np.array([-slope[1], slope[0]]) if cycles.n == 2 else shape[0]
+            rows[:] = 0.0
+            rows[0, 0], rows[-1, 0] = slope, across
+            target = rows[:, 0] @ through
+        found = cycles.correct(guess, rows, rows_y, target, iterations=40, damped=True)
+        mesh = finer(cycles, found.orbit) if found.converged else None
+        if mesh is None:
+            break
+        guess, _ = cycles.on(mesh, found.orbit)
+    return found
+
+
 def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
     """A mesh that meets the tolerance where that of the orbit does not."""
     if cycles.options.intervals is not None:
         return None
-    if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance:
+    wanted = count_for(cycles, orbit)
+    rests = cycles.forced and wanted > 2 * orbit.intervals
+    if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance and not rests:
         return None
-    count = max(count_for(cycles, orbit), int(1.1 * orbit.intervals) + 1)
+    count = max(wanted, int(1.1 * orbit.intervals) + 1)
     if count > cycles.options.max_intervals:
         if orbit.intervals >= cycles.options.max_intervals:
             return None
         count = cycles.options.max_intervals
-    return collocation.even(orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count)
+    return collocation.even(
+        orbit.mesh, orbit.x, cycles.m, cycles.amplitudes(orbit), count, cycles.closure
+    )
 
 
 def from_hopf(
@@ -101,6 +141,27 @@ def _held(
     rows, rows_y, target = cycles.rows(away if guess is None else guess, dx, nothing)
     target[-1] = np.sum(rows[-1] * away.x)
     return cycles.correct(away if guess is None else guess, rows, rows_y, target, iterations=15)
+
+
+def with_function(made: Extended, cycles: Cycles, point: Point, value: float) -> Orbit:
+    """A special orbit with its critical function beside it, for a curve in two parameters."""
+    orbit = point.orbit
+    W = cycles.looked_at(orbit, point.dx, point.dy).W
+    y = np.append(orbit.y, value)
+    if made.kind == DOUBLING:
+        v = null_vector(cycles, orbit, W, -1.0)
+    elif made.kind == FOLD:
+        v = point.dx
+        if made.q == 4:
+            y = np.append(y, point.dy[0] / orbit.y[0])
+    else:
+        mu = cycles.multipliers(W, orbit)[0]
+        mu = mu[mu.imag > 0.0]
+        angle = float(np.angle(mu[np.argmin(np.abs(np.abs(mu) - 1.0))]))
+        omega = angle / orbit.y[0]
+        v = wave(Linear(cycles, orbit), omega)
+        y = np.append(y, omega)
+    return Orbit(orbit.mesh, np.hstack([orbit.x, v]), y)
 
 
 def doubled(cycles: Cycles, orbit: Orbit, W: Array) -> tuple[Cycles, Orbit, Array]:

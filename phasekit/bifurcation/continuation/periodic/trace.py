@@ -11,51 +11,12 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic import collocation, ends
 from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 REMESH = 3  # points after which the mesh follows the orbit
-TRUSTED = 1e-5  # error of the trivial multiplier, or by Liouville's formula, above which no tests
-
-
-@dataclass(frozen=True, eq=False)
-class Point:
-    """A point of a family: the orbit, the unit tangent, multipliers and checks."""
-
-    orbit: Orbit
-    dx: Array
-    dy: Array
-    multipliers: Complex
-    arclength: float
-    step: float
-    newton_steps: int
-    residual: float
-    sign: float
-    trivial_error: float
-    liouville_error: float
-    mesh_error: float
-
-    def flipped(self) -> Point:
-        """The same point of a family that is followed the other way round."""
-        return replace(self, dx=-self.dx, dy=-self.dy, sign=-self.sign, arclength=-self.arclength)
-
-    @property
-    def trusted(self) -> bool:
-        """Whether the multipliers pass their checks."""
-        return bool(max(self.trivial_error, self.liouville_error) <= TRUSTED)
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """All that it takes to go on as if the trace had never stopped."""
-
-    orbit: Orbit
-    dx: Array
-    dy: Array
-    step: float
-    arclength: float
-    since: int  # points since the mesh was last fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,21 +26,6 @@ class Track:
     points: tuple[Point, ...]
     state: State
     stop: Stop
-
-
-def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
-    """A point of what Newton's method found."""
-    values, log = cycles.multipliers(s.W)
-    with np.errstate(all="ignore"):
-        product, exact = np.exp(log), np.exp(s.divergence)
-        defect = abs(product - exact) / max(1.0, exact)
-        if not np.isfinite(exact):
-            defect = abs(log - s.divergence)
-    trivial = 0.0 if cycles.forced else float(np.min(np.abs(values - 1.0)))
-    return Point(
-        s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
-        float(defect), cycles.mesh_error(s.orbit),
-    )  # fmt: skip
 
 
 def begin(cycles: Cycles, start: Point, forward: bool) -> State:
@@ -131,7 +77,7 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
             grow = min(grow, 0.7)
         after = State(
             solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step),
-            state.arclength + step, state.since + 1,
+            state.arclength + step, state.since + 1, state.since_start + 1,
         )  # fmt: skip
         return point, _meshed(cycles, after)
     where = ", ".join(f"{name} = {v:.9g}" for name, v in _named(cycles, state.orbit).items())
@@ -169,7 +115,12 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
                 f"{cycles.options.max_intervals}"
             )
         mesh = collocation.even(
-            found.orbit.mesh, found.orbit.x, cycles.m, cycles.amplitudes(found.orbit), count
+            found.orbit.mesh,
+            found.orbit.x,
+            cycles.m,
+            cycles.amplitudes(found.orbit),
+            count,
+            cycles.closure,
         )
         orbit, (dx,) = cycles.on(mesh, orbit, dx)
         guess, _ = cycles.on(mesh, found.orbit)

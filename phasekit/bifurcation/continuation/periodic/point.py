@@ -1,0 +1,71 @@
+"""A point of a family of periodic orbits, with its checks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+TRUSTED = 1e-5  # error of the trivial multiplier, or by Liouville's formula, above which no tests
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a family: the orbit, the unit tangent, multipliers and checks."""
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    multipliers: Complex
+    arclength: float
+    step: float
+    newton_steps: int
+    residual: float
+    sign: float
+    trivial_error: float
+    liouville_error: float
+    mesh_error: float
+
+    def flipped(self) -> Point:
+        """The same point of a family that is followed the other way round."""
+        return replace(self, dx=-self.dx, dy=-self.dy, sign=-self.sign, arclength=-self.arclength)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the multipliers pass their checks."""
+        return bool(max(self.trivial_error, self.liouville_error) <= TRUSTED)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that it takes to go on as if the trace had never stopped."""
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    step: float
+    arclength: float
+    since: int  # points since the mesh was last fitted
+    since_start: int = 0
+
+
+def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
+    """A point of what Newton's method found."""
+    values, log = cycles.multipliers(s.W, s.orbit)
+    divergence = cycles.divergence(s.divergence)
+    with np.errstate(all="ignore"):
+        product, exact = np.exp(log), np.exp(divergence)
+        defect = abs(product - exact) / max(1.0, exact)
+        if not np.isfinite(exact):
+            defect = abs(log - divergence)
+    trivial = 0.0 if cycles.forced else float(np.min(np.abs(values - 1.0)))
+    return Point(
+        s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
+        float(defect), cycles.mesh_error(s.orbit),
+    )  # fmt: skip

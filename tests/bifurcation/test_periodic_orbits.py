@@ -1,0 +1,102 @@
+"""Parts of the collocation of periodic orbits, beside dense algebra and exact values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.polynomial import Polynomial
+
+from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
+
+
+@pytest.mark.parametrize("m", [2, 4, 7])
+def test_scheme_is_exact_for_polynomials(m):
+    c = collocation.scheme(m)
+    p = Polynomial(np.arange(1.0, m + 2.0))
+    at = p(np.arange(m + 1.0) / m)
+    assert np.allclose(c.value @ at, p(c.nodes), rtol=1e-12)
+    assert np.allclose(c.slope @ at, p.deriv()(c.nodes), rtol=1e-11)
+    assert np.isclose(c.high @ at, p.deriv(m)(0.0), rtol=1e-9)
+    assert np.isclose(c.weights @ c.nodes ** (2 * m - 1), 1.0 / (2 * m), rtol=1e-13)
+
+
+def test_interpolation_and_functional():
+    mesh = np.array([0.0, 0.1, 0.35, 0.7, 1.0])
+    at = collocation.times(mesh, 4)
+    x = np.stack([at**4 - at, at**3], axis=1)
+    fine = np.linspace(0.0, 1.0, 50)
+    expected = np.stack([fine**4 - fine, fine**3], axis=1)
+    assert np.allclose(collocation.interpolate(mesh, x, 4, fine), expected, atol=1e-14)
+    row = collocation.functional(mesh, collocation.at_gauss(x, 4), 4)
+    # The integral of |x|^2, which Gauss points have exactly up to degree 7; x.x has degree 8.
+    exact = (1 / 9 - 2 / 6 + 1 / 3) + 1 / 7
+    assert np.isclose(np.sum(row * x), exact, rtol=1e-5)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("sigma", [1.0, -1.0])
+def test_elimination_beside_dense_algebra(seed, sigma):
+    rng = np.random.default_rng(seed)
+    count, n, m, q = int(rng.integers(1, 7)), int(rng.integers(1, 4)), 3, int(rng.integers(1, 4))
+    W = rng.standard_normal((count, m * n, n + q + 1))
+    places = count * m + 1
+    rows, rows_y = rng.standard_normal((q, places, n)), rng.standard_normal((q, q))
+    right, gap = rng.standard_normal(q), rng.standard_normal(n)
+    # All places and y as unknowns of one matrix.
+    size = places * n + q
+    A, b = np.zeros((size, size)), np.zeros(size)
+    r = 0
+    for j in range(count):
+        for k in range(m * n):
+            A[r, (j * m + 1) * n + k] = 1.0
+            A[r, j * m * n : (j * m + 1) * n] -= W[j, k, :n]
+            A[r, places * n :] -= W[j, k, n : n + q]
+            b[r] = W[j, k, -1]
+            r += 1
+    for c in range(n):
+        A[r, (places - 1) * n + c] += 1.0
+        A[r, c] -= sigma
+        b[r] = gap[c]
+        r += 1
+    A[r:, : places * n], A[r:, places * n :], b[r:] = rows.reshape(q, -1), rows_y, right
+    expected = np.linalg.solve(A, b)
+    unit = np.linalg.solve(A, np.eye(size)[-1])
+    dx, dy = np.empty((2, places, n)), np.empty((2, q))
+    sign = kernels.solve(W, rows, rows_y, right, gap, np.full(n, sigma), m, dx, dy)
+    assert np.allclose(dx[0].ravel(), expected[:-q])
+    assert np.allclose(dy[0], expected[-q:])
+    assert np.allclose(dx[1].ravel(), unit[:-q])
+    assert np.allclose(dy[1], unit[-q:])
+    # One more interval as good as none does not change the sign of the determinant.
+    if m == 3:
+        more = np.zeros((1, m * n, n + q + 1))
+        more[0, :, :n] = np.tile(np.eye(n), (m, 1))
+        wide = np.concatenate([rows, np.zeros((q, m, n))], axis=1)
+        wide[:, -1], wide[:, -1 - m] = rows[:, -1], 0.0
+        dx = np.empty((2, places + m, n))
+        again = kernels.solve(
+            np.concatenate([W, more]), wide, rows_y, right, gap, np.full(n, sigma), m, dx, dy
+        )
+        assert sign == again != 0.0
+
+
+def test_multipliers_of_many_scales():
+    rng = np.random.default_rng(1)
+    rates = np.array([3.0, 0.2, -1.0, -9.0])
+    turn = [np.linalg.qr(rng.standard_normal((4, 4)))[0] for _ in range(40)]
+    # A chain of changes of coordinates: the product is similar to exp(40 rates).
+    G = np.array([turn[(j + 1) % 40] @ np.diag(np.exp(rates)) @ turn[j].T for j in range(40)])
+    values, log = multipliers(G)
+    assert np.allclose(np.log(values.real), 40 * rates, rtol=1e-12, atol=1e-12)
+    assert np.all(values.imag == 0.0)
+    assert np.isclose(log, 40 * rates.sum(), rtol=1e-13)
+
+
+def test_multipliers_of_a_pair():
+    angle = 0.3
+    step = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    values, _ = multipliers(np.array([0.9 * step] * 10))
+    expected = 0.9**10 * np.exp(1j * angle * 10)
+    assert np.min(np.abs(values - expected)) < 1e-14
+    assert np.isclose(values[0], np.conj(values[1]))
