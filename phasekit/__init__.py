@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
+    from phasekit.labelled.quasi_static import quasi_static as quasi_static
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
@@ -112,6 +113,7 @@ _MODULES = {
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
+    "phasekit.labelled.quasi_static": ("quasi_static",),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.problem": ("Problem",),
     "phasekit.table.quantities": ("quantities",),

@@ -67,6 +67,20 @@ def test_type_checkers_see_the_same_names():
     assert seen == set(pk.__all__) - {"__version__", "deg", "rpm"}
 
 
+@pytest.mark.parametrize(
+    "call",
+    [
+        "pk.branches(pk.Reduced(0.0, 0.0), 'lam', (0, 1.5)).phi",
+        "pk.critical(pk.Reduced(0.4, 0.1), 'lam').critical_fold",
+        "pk.quasi_static(pk.Reduced(0.4, 0.1), lam=[0.0, 0.1]).phi",
+    ],
+)
+def test_each_function_works_alone(call):
+    code = f"import phasekit as pk; print({call}.size > 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("True\n", "")
+
+
 def test_unknown_name():
     with pytest.raises(AttributeError, match="module 'phasekit' has no attribute 'equilibrio'"):
         pk.equilibrio  # noqa: B018
