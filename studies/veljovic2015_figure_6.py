@@ -20,11 +20,18 @@ SHARES = (0.35, 0.75, 1.1)
 def main() -> None:
     """Draw the four portraits with starts below and above the threshold; print the thresholds."""
     figure, axes = plt.subplots(2, 2, figsize=(11, 8.5), sharex=True, layout="constrained")
+    common = {}
     for (letter, (name, share)), ax in zip(PANELS.items(), axes.flat, strict=True):
         disk = DISK.replace(beta=share * np.pi)
         limit = threshold(disk, 0.0)
         starts = [(0.0, factor * limit) for factor in SHARES]
-        phase_portrait(disk, energies=[], orbits=starts, legend=letter == "d", ax=ax)
+        phase_portrait(disk, energies=[], orbits=starts, ax=ax)
+        legend = ax.get_legend()
+        keys = {key.get_label(): key for key in legend.legend_handles}
+        legend.remove()
+        own = [key for name, key in keys.items() if name.startswith("from")]
+        ax.legend(handles=own, loc="lower center", ncols=3, frameon=False, fontsize="small")
+        common |= {name: key for name, key in keys.items() if not name.startswith("from")}
         ax.set_title(
             rf"({letter}) $\beta$ = {name} $\pi$: turns over above {limit:.4f} 1/s",
             fontsize="medium",
@@ -34,6 +41,7 @@ def main() -> None:
         )
     for ax in axes[0]:
         ax.set_xlabel("")
+    figure.legend(handles=common.values(), loc="outside upper center", ncols=4, frameon=False)
     save(figure, r"$\beta$ of each panel; starts at $\varphi_0 = 0$ are chosen here")
 
 

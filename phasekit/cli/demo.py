@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -81,16 +81,14 @@ def draw(ds: xr.Dataset) -> Figure:
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=(13.0, 6.4), layout="constrained")
-    grid = figure.add_gridspec(1, 2, width_ratios=(1.05, 1.0))
-    left = figure.add_subfigure(grid[0])
-    right = figure.add_subfigure(grid[1])
-    ax = pk.plot.parameter_map(ds, "topology", angles="deg", ax=left.subplots())
+    halves: Any = figure.subfigures(1, 2, width_ratios=(1.05, 1.0), wspace=0.02)
+    left, right = halves
+    units = {"beta": "deg", "a": "mm"}
+    ax = pk.plot.parameter_map(ds, "topology", units=units, ax=left.subplots())
     panels: list[Axes] = list(right.subplots(2, 2, sharex=True).flat)
     for letter, (beta, a), panel in zip("abcd", CELLS, panels, strict=True):
-        ax.plot(
-            [beta], [a * 1e-3], marker="o", markersize=15, color="white", markeredgecolor="black"
-        )
-        ax.annotate(letter, (beta, a * 1e-3), ha="center", va="center")
+        ax.plot([beta], [a], marker="o", markersize=15, color="white", markeredgecolor="black")
+        ax.annotate(letter, (beta, a), ha="center", va="center", color="black")
         cell = ds.sel(beta=beta * pk.deg, a=a * 1e-3, method="nearest")
         pk.plot.phase_portrait(cell.phasekit.system(), angles="deg", ax=panel, legend=False)
         panel.set_title(f"({letter})  β = {beta:g}°, a = {a:g} mm", fontsize="medium")

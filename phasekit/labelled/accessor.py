@@ -293,11 +293,11 @@ class MapPlots:
 
     def bifurcation_diagram(self, **options: Any) -> Any:
         """Draw the equilibria against a swept parameter; returns the Axes."""
-        return picture("bifurcation_diagram")(in_si(self._ds), **options)
+        return picture("bifurcation_diagram")(self._ds, **options)
 
     def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
-        return picture("parameter_map")(in_si(self._ds), variable, **options)
+        return picture("parameter_map")(self._ds, variable, **options)
 
     def hodograph(self, rotator: str = "R022", **options: Any) -> Any:
         """Draw a rotator's hodograph for the one selected cell, or of motions; returns the Axes."""
@@ -313,11 +313,11 @@ class MapPlots:
 
     def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
         """Draw the load on the separatrices over two swept parameters; returns the Axes."""
-        return picture("bearing_load_map")(in_si(self._ds), variable, **options)
+        return picture("bearing_load_map")(self._ds, variable, **options)
 
     def _cell_or_motion(self) -> Model | xr.Dataset:
         along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
-        return in_si(self._ds) if along and "time" in self._ds.dims else self._cell()
+        return self._ds if along and "time" in self._ds.dims else self._cell()
 
     def _cell(self) -> Model:
         system = PhasekitAccessor(self._ds).system()

@@ -32,7 +32,7 @@ UNITS: Mapping[str, Mapping[str, Decimal]] = {
     "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "min": Decimal(60)},
     "kg m2": {"kg m2": Decimal(1)},
     "kg m2 s-1": {"kg m2 s-1": Decimal(1)},
-    "N": {"N": Decimal(1)},
+    "N": {"N": Decimal(1), "kN": Decimal(1000), "mN": Decimal("1e-3")},
     "N m": {"N m": Decimal(1)},
     "J": {"J": Decimal(1)},
     "1": {},

@@ -45,9 +45,12 @@ class LevelCurves:
     ----------
     answers : Answers
         What is known of the system.
+    cut : float or None
+        Where a circle is cut open; None: where the answers cut it.
     """
 
     answers: Answers
+    cut: float | None = None
 
     # ---------------------------------------------------------------- where V is what
 
@@ -55,6 +58,8 @@ class LevelCurves:
     def window(self) -> Arc:
         """What is seen of the coordinate: all of it, or of a line what has a structure."""
         known = self.answers
+        if self.cut is not None and known.period is not None:
+            return self.cut, self.cut + known.period
         if np.isfinite(known.ends).all():
             return known.ends
         turning = known.saddle_phi[:, np.newaxis] + known.turning_offset

@@ -1,5 +1,10 @@
 """Pictures of systems and of Datasets: every function takes ``ax=`` and returns the Axes."""
 
+from types import ModuleType as _ModuleType
+from typing import TYPE_CHECKING as _TYPE_CHECKING
+from typing import Any as _Any
+
+from phasekit.labels.arguments import unknown as _unknown
 from phasekit.plot.bearing_forces import bearing_forces
 from phasekit.plot.bearing_load_map import bearing_load_map
 from phasekit.plot.bifurcation_diagram import bifurcation_diagram
@@ -30,3 +35,17 @@ __all__ = [
     "potential_well",
     "time_history",
 ]
+
+# What pictures are made of is imported by its own name, and is no picture.
+for _name in [name for name, value in globals().items() if isinstance(value, _ModuleType)]:
+    del globals()[_name]
+
+if not _TYPE_CHECKING:
+
+    def __getattr__(name: str) -> _Any:
+        # The import system asks for names such as __path__.
+        raise AttributeError(str(_unknown("picture", name, __all__)))
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

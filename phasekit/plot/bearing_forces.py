@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -21,6 +21,8 @@ from phasekit.labelled.orbits import orbits
 from phasekit.labels.arguments import bad, named
 from phasekit.phase.level_curves import LevelCurves
 from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import curves_of, starts_of
 from phasekit.plot.time_history import TIME
 
@@ -31,9 +33,9 @@ BEARINGS = ("A2", "B2")
 AXES = {"disk": ("u2", "v2", "n2"), "carrier": ("u01", "v01", "n1")}
 SYMBOLS = {"u2": "u_2", "v2": "v_2", "n2": "n_2", "u01": "u_{01}", "v01": "v_{01}", "n1": "n_1"}
 PARTS = {
-    "force": "force of the bearing on the rotor (N)",
-    "force_kinetic": "kinetic part of the force on the rotor (N)",
-    "force_weight": "weight part of the force on the rotor (N)",
+    "force": ("force of the bearing on the rotor", "force"),
+    "force_kinetic": ("kinetic part of the force on the rotor", "kinetic force"),
+    "force_weight": ("weight part of the force on the rotor", "weight force"),
 }
 STATE = ("state_phi", "state_dphi")
 
@@ -48,6 +50,8 @@ def bearing_forces(
     part: str = "force",
     frame: Frame = "disk",
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -77,6 +81,11 @@ def bearing_forces(
         Axes of the components, which turn with the disk or with the carrier only.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain the lines under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -108,32 +117,39 @@ def bearing_forces(
     >>> ax.get_ylabel()
     'force of the bearing on the rotor (N)'
     """
-    factor = style.angle_factor(angles)
+    if isinstance(disk, xr.Dataset):
+        disk, shown = Units.of_dataset(disk, angles, units)
+    else:
+        shown = Units.of(angles, units)
     over_time = _choice("x", x, ("phi", "time")) == "time"
+    if over_time and cut is not None:
+        raise bad("cut", cut, "None, for the time is not on a circle")
+    circle = Circle.cut_at(cut, shown.scale("phi", "rad"))
     _choice("part", part, PARTS)
     loads, phi, runs = _loads(disk, orbit, over_time, _choice("frame", frame, FRAMES))
-    lines = _lines(loads[part], bearing, components)
+    lines = _lines(loads[part], bearing, components, shown.scale(part, "N"))
     axes = style.axes_for(ax, legend=legend)
 
+    factor, pace = shown.scale("phi", "rad"), shown.scale(TIME, "s")
     handles: list[Artist] = []
     for line in lines:
         handles.append(Line2D([], [], label=line.name, **line.look))
         if over_time:
-            axes.plot(loads[TIME].values, line.values, **line.look)
+            axes.plot(loads[TIME].values * pace, line.values, **line.look)
         else:
             for run in runs:
-                _draw_run(axes, phi[run], line.values[run], line.look, factor)
+                _draw_run(axes, phi[run], line.values[run], line.look, factor, circle)
     if over_time:
-        times = loads[TIME].values
+        times = loads[TIME].values * pace
         axes.set_xlim(float(np.min(times)), float(np.max(times)))
-        axes.set_xlabel("$t$ (s)")
+        axes.set_xlabel(f"$t$ ({shown.text(TIME, 's')})")
     else:
         handles += _directions(runs, phi)
-        style.circle_axis(axes, "x", angles)
-        axes.set_xlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
-    axes.set_ylabel(PARTS[part])
-    if not any(axis in line.name for line in lines for axis in ("u_", "v_", "n_")):
-        axes.set_ylim(bottom=0.0)
+        style.circle_axis(axes, "x", shown, circle)
+        axes.set_xlabel(rf"$\varphi$ ({shown.text('phi', 'rad')})")
+    unit, room = shown.text(part, "N"), style.letters(axes, "y")
+    axes.set_ylabel(labels.fitting(room, unit, *PARTS[part]))
+    _reach(axes, lines)
     if legend:
         style.legend_below(axes, handles)
     return axes
@@ -218,12 +234,13 @@ def _along_motion(dataset: xr.Dataset, frame: str) -> tuple[xr.Dataset, FloatArr
 @dataclass(frozen=True)
 class _Line:
     name: str
+    positive: bool
     values: FloatArray
     look: style.Look
 
 
 def _lines(
-    force: xr.DataArray, bearing: str | None, components: str | Sequence[str] | None
+    force: xr.DataArray, bearing: str | None, components: str | Sequence[str] | None, scale: float
 ) -> list[_Line]:
     """Return the lines to draw: names, values along the curve, looks."""
     frame = next(name for name in FRAMES if f"{name}_axis" in force.dims)
@@ -251,21 +268,38 @@ def _lines(
             color = style.LOAD_COLORS[i if len(bearings) > 1 else k]
             dash = style.ORBIT_DASHES[k if len(names) > 1 else i]
             look = {"color": color, "linestyle": dash, "linewidth": 1.8}
-            lines.append(_Line(text, np.asarray(values.values, dtype=float), look))
+            lines.append(_Line(text, size, np.asarray(values.values, dtype=float) * scale, look))
     return lines
+
+
+def _reach(ax: Axes, lines: list[_Line]) -> None:
+    """Show magnitudes from 0 on, and all lines clear of the frame."""
+    values = np.concatenate([line.values[np.isfinite(line.values)] for line in lines])
+    if values.size and all(line.positive for line in lines):
+        ax.set_ylim(0.0, 1.08 * float(values.max()) or 1.0)
+    elif values.size:
+        middle, half = 0.5 * (values.max() + values.min()), 0.54 * float(np.ptp(values))
+        half = half or abs(float(middle)) or 1.0
+        ax.set_ylim(middle - half, middle + half)
 
 
 # ------------------------------------------------------------------------------ strokes
 
 
 def _draw_run(
-    ax: Axes, phi: FloatArray, values: FloatArray, look: style.Look, factor: float
+    ax: Axes,
+    phi: FloatArray,
+    values: FloatArray,
+    look: style.Look,
+    factor: float,
+    circle: Circle,
 ) -> None:
     """Draw one way over the circle, with triangles that point along it."""
     if float(np.ptp(phi)) == 0.0:  # at rest
-        ax.plot(_wrapped(phi[:1]) * factor, values[:1], "o", color=look["color"])
+        x, y = circle.points(phi[:1], values[:1])
+        ax.plot(x * factor, y, "o", color=look["color"], clip_on=False)
         return
-    x, y = _on_circle(phi, values)
+    x, y = _on_circle(phi, values, circle)
     ax.plot(x * factor, y, **look)
     marker = ">" if phi[-1] > phi[0] else "<"
     there = np.linspace(0.0, 1.0, 8)[1:-1:2] if marker == ">" else np.linspace(0.0, 1.0, 8)[2:-1:2]
@@ -276,16 +310,14 @@ def _draw_run(
     places = low + (high - low) * there
     heights = np.interp(places, phi[order], values[order])
     color = look["color"]
-    ax.plot(_wrapped(places) * factor, heights, marker, color=color, markersize=5.5)
+    ax.plot(circle.home(places) * factor, heights, marker, color=color, markersize=5.5)
 
 
-def _wrapped(phi: FloatArray) -> FloatArray:
-    return np.asarray(np.pi - (np.pi - phi) % (2.0 * np.pi))
-
-
-def _on_circle(phi: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a curve in [-pi, pi], broken where it passes the seam."""
-    turn = np.round(phi / (2.0 * np.pi))
+def _on_circle(
+    phi: FloatArray, values: FloatArray, circle: Circle
+) -> tuple[FloatArray, FloatArray]:
+    """Return a curve on the circle, broken where it passes the cut."""
+    turn = np.round((phi - circle.low) / (2.0 * np.pi) - 0.5)
     pieces: list[tuple[FloatArray, FloatArray]] = []
     for k in np.arange(turn.min(), turn.max() + 1.0):
         near = np.flatnonzero(turn == k)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -37,6 +38,7 @@ def bearing_load_map(
     x: str | None = None,
     y: str | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
     **sel: Any,
@@ -63,7 +65,7 @@ def bearing_load_map(
     log : bool, optional
         Whether the scale of colors is logarithmic; left out, where the values differ by more than a
         factor of 30.
-    x, y, angles, legend, ax
+    x, y, angles, units, legend, ax
         As in :func:`parameter_map`.
     **sel
         As in :func:`parameter_map`.
@@ -111,7 +113,16 @@ def bearing_load_map(
     if log is None:
         log = _spans_decades(load)
     return parameter_map(
-        ds, variable, x=x, y=y, angles=angles, log=log, legend=legend, ax=ax, **sel
+        ds,
+        variable,
+        x=x,
+        y=y,
+        angles=angles,
+        units=units,
+        log=log,
+        legend=legend,
+        ax=ax,
+        **sel,
     )
 
 

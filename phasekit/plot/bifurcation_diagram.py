@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,10 @@ from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labels.arguments import named
-from phasekit.plot import branch
-from phasekit.plot.parts import atlas, labels, strands, strokes, style
+from phasekit.plot.branch import branch, holds_branches
+from phasekit.plot.parts import atlas, labels, strands, style
+from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
@@ -28,6 +31,8 @@ def bifurcation_diagram(
     y: str | None = None,
     *,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -50,6 +55,11 @@ def bifurcation_diagram(
         any along its points, its first state if left out.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -82,32 +92,33 @@ def bifurcation_diagram(
     >>> ax.get_ylabel()
     '$\\varphi$, angle of the equilibrium (°)'
     """
-    factor = style.angle_factor(angles)
-    if branch.holds_branches(dataset):
-        return branch.branch(dataset, x, y, angles=angles, legend=legend, ax=ax)
+    if holds_branches(dataset):
+        return branch(dataset, x, y, angles=angles, units=units, cut=cut, legend=legend, ax=ax)
     y = "phi" if y is None else y
     ds = labels.dataset(dataset, "dataset", ("phi", "kind"))
+    ds, shown = Units.of_dataset(ds, angles, units)
     if ds["phi"].dims == atlas.DIMS:
-        return atlas.draw(ds, x, y, angles=angles, legend=legend, ax=ax)
+        return atlas.draw(ds, x, y, units=shown, cut=cut, legend=legend, ax=ax)
     offered = _drawable(ds)
     named("y", y, offered)
     columns, along = _columns(ds, x, y)
     # The numbers of a Potential's equilibria are no branches.
     numbered = ds["equilibrium"].dtype.kind in "iu"
     curves, mergers = ([], []) if numbered else strands.trace(columns)
+    circle = Circle.of_axis(ds[y], shown, cut)
     axes = style.axes_for(ax, legend=legend)
 
-    values, _ = labels.shown(along, angles)
-    stretch = (_stretch(along, factor), _stretch(ds[y], factor))
-    handles = _draw_curves(axes, curves, y == "phi", stretch)
-    handles |= _draw_mergers(axes, mergers, y == "phi", stretch)
+    values, _ = labels.shown(along, shown)
+    stretch = (_stretch(along, shown), _stretch(ds[y], shown))
+    handles = _draw_curves(axes, curves, circle, stretch)
+    handles |= _draw_mergers(axes, mergers, circle, stretch)
     if numbered:
-        handles |= _draw_points(axes, columns, stretch)
-    if y == "phi" and ds["phi"].attrs.get("units") == "rad":
-        style.circle_axis(axes, "y", angles)
+        handles |= _draw_points(axes, columns, circle, stretch)
+    if circle is not None:
+        style.circle_axis(axes, "y", shown, circle)
     axes.set_xlim(float(np.min(values)), float(np.max(values)))
-    axes.set_xlabel(labels.label(along, angles, style.letters(axes, "x")))
-    axes.set_ylabel(labels.label(ds[y], angles, style.letters(axes, "y")))
+    axes.set_xlabel(labels.label(along, shown, style.letters(axes, "x")))
+    axes.set_ylabel(labels.label(ds[y], shown, style.letters(axes, "y")))
     if legend:
         order = ("center", "saddle", "degenerate", "fold", "pitchfork")
         style.legend_below(axes, [handles[name] for name in order if name in handles])
@@ -123,19 +134,19 @@ def _drawable(ds: xr.Dataset) -> list[str]:
     ]
 
 
-def _stretch(values: xr.DataArray, factor: float) -> float:
-    return factor if values.attrs.get("units") == "rad" else 1.0
+def _stretch(values: xr.DataArray, units: Units) -> float:
+    return units.scale(str(values.name), str(values.attrs.get("units", "")))
 
 
 def _draw_curves(
-    ax: Axes, curves: list[strands.Strand], on_circle: bool, stretch: tuple[float, float]
+    ax: Axes, curves: list[strands.Strand], circle: Circle | None, stretch: tuple[float, float]
 ) -> dict[str, Artist]:
     handles: dict[str, Artist] = {}
     for curve in curves:
         look = style.BRANCHES[curve.kind]
-        across, up = np.asarray(curve.x), np.asarray(curve.phi if on_circle else curve.y)
-        if on_circle:
-            up, across = strokes.round_the_cylinder(up, across)
+        across, up = np.asarray(curve.x), np.asarray(curve.y if circle is None else curve.phi)
+        if circle is not None:
+            up, across = circle.unrolled(up, across)
         if np.isfinite(up).any():
             (line,) = ax.plot(across * stretch[0], up * stretch[1], **look)
             handles.setdefault(str(look["label"]), line)
@@ -143,7 +154,7 @@ def _draw_curves(
 
 
 def _draw_points(
-    ax: Axes, columns: strands.Columns, stretch: tuple[float, float]
+    ax: Axes, columns: strands.Columns, circle: Circle | None, stretch: tuple[float, float]
 ) -> dict[str, Artist]:
     """Draw the equilibria of each column as points, by kind."""
     handles: dict[str, Artist] = {}
@@ -151,9 +162,12 @@ def _draw_points(
     for kind, look in style.POINTS.items():
         there = (columns.kind == kind) & np.isfinite(columns.y)
         if there.any():
+            x, y = across[there], columns.y[there]
+            if circle is not None:
+                y, x = circle.points(y, x)
             (handles[kind.name.lower()],) = ax.plot(
-                across[there] * stretch[0],
-                columns.y[there] * stretch[1],
+                x * stretch[0],
+                y * stretch[1],
                 linestyle="none",
                 **{**look, "markersize": 3.0, "markeredgewidth": 0.8},
             )
@@ -161,14 +175,18 @@ def _draw_points(
 
 
 def _draw_mergers(
-    ax: Axes, mergers: list[strands.Merger], on_circle: bool, stretch: tuple[float, float]
+    ax: Axes, mergers: list[strands.Merger], circle: Circle | None, stretch: tuple[float, float]
 ) -> dict[str, Artist]:
     handles: dict[str, Artist] = {}
     for name, look in style.MERGERS.items():
-        points = [(p.x, p.phi if on_circle else p.y) for p in mergers if p.name == name]
+        points = [(p.x, p.y if circle is None else p.phi) for p in mergers if p.name == name]
         if points:
-            x, y = (np.array(points) * stretch).T
-            ax.plot(x, y, linestyle="none", zorder=4, clip_on=False, **look)
+            x, y = np.array(points).T
+            if circle is not None:
+                y, x = circle.points(y, x)
+            ax.plot(
+                x * stretch[0], y * stretch[1], linestyle="none", zorder=4, clip_on=False, **look
+            )
             handles[name] = Line2D([], [], linestyle="none", **look)
     return handles
 

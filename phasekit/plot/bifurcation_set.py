@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from matplotlib.patheffects import withStroke
 
 from phasekit.labels.arguments import flag
 from phasekit.plot.parts import labels, style
-from phasekit.plot.parts.atlas import label_point
+from phasekit.plot.parts.points import label_points
+from phasekit.plot.parts.units import Units
 
 # Regions thinner than this part of the plane are not annotated.
 READABLE = 0.035
@@ -21,6 +24,7 @@ def bifurcation_set(
     dataset: xr.Dataset,
     *,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
     counts: bool = True,
     legend: bool = True,
     ax: Axes | None = None,
@@ -36,6 +40,8 @@ def bifurcation_set(
         What `phasekit.bifurcation_set` returns.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
     counts : bool
         Whether to write the number of equilibria into each region.
     legend : bool
@@ -63,43 +69,42 @@ def bifurcation_set(
     >>> ax.get_xlabel()
     '$\\lambda$, lambda = B/A'
     """
-    style.angle_factor(angles)
     flag("counts", counts)
     needs = ("curve_kind", "sign_of_A", "region_count")
     ds = labels.dataset(dataset, "dataset", needs, "pk.bifurcation_set")
+    ds, shown = Units.of_dataset(ds, angles, units)
     axes = style.axes_for(ax, legend=legend)
     names = (str(ds.attrs["x"]), str(ds.attrs["y"]))
     handles: dict[str, Artist] = {}
     for row in range(ds.sizes["curve"]):
         kind, sign = str(ds["curve_kind"].values[row]), int(ds["sign_of_A"].values[row])
-        look = style.LOCI.get((kind, sign)) or style.LOCI[kind, 0]
-        x, y = (labels.shown(ds[name].isel(curve=row), angles)[0] for name in names)
+        look = style.inked(style.LOCI.get((kind, sign)) or style.LOCI[kind, 0])
+        x, y = (labels.shown(ds[name].isel(curve=row), shown)[0] for name in names)
         (line,) = axes.plot(x, y, zorder=2.5 if kind == "fold" else 2.0, clip_on=True, **look)
         handles.setdefault(str(look["label"]), line)
     for i, which in enumerate("xy"):
         low, high = (
-            float(labels.shown(xr.DataArray(end, attrs=ds[names[i]].attrs), angles)[0])
+            end * shown.scale(names[i], ds[names[i]].attrs.get("units", ""))
             for end in ds.attrs[f"{which}lim"]
         )
         axes.set(**{f"{which}lim": (low, high)})
-    x, y = (labels.shown(ds[f"cusp_{name}"], angles)[0] for name in names)
+    x, y = (labels.shown(ds[f"cusp_{name}"].rename(name), shown)[0] for name in names)
     if x.size:
         look = style.MERGERS["cusp"]
         axes.plot(x, y, linestyle="none", zorder=4, clip_on=False, **look)
         handles["cusp"] = Line2D([], [], linestyle="none", **look)
-        for point in zip(x, y, strict=True):
-            label_point(axes, point, "CP")
+        label_points(axes, dict.fromkeys(zip(x, y, strict=True), "CP"))
     if counts:
-        _write_counts(axes, ds, names, angles)
-    axes.set_xlabel(labels.label(ds[names[0]], angles, style.letters(axes, "x")))
-    axes.set_ylabel(labels.label(ds[names[1]], angles, style.letters(axes, "y")))
+        _write_counts(axes, ds, names, shown)
+    axes.set_xlabel(labels.label(ds[names[0]], shown, style.letters(axes, "x")))
+    axes.set_ylabel(labels.label(ds[names[1]], shown, style.letters(axes, "y")))
     if legend:
         style.legend_below(axes, list(handles.values()))
     return axes
 
 
-def _write_counts(ax: Axes, ds: xr.Dataset, names: tuple[str, str], angles: style.Angles) -> None:
-    x, y = (labels.shown(ds[f"region_{name}"], angles)[0] for name in names)
+def _write_counts(ax: Axes, ds: xr.Dataset, names: tuple[str, str], shown: Units) -> None:
+    x, y = (labels.shown(ds[f"region_{name}"].rename(name), shown)[0] for name in names)
     wide = ds["region_reach"].values > READABLE
     for i in np.flatnonzero(wide):
         text = ax.text(
@@ -113,4 +118,4 @@ def _write_counts(ax: Axes, ds: xr.Dataset, names: tuple[str, str], angles: styl
             zorder=5,
         )
         # A line may run through the number.
-        text.set_path_effects([withStroke(linewidth=4.0, foreground="white")])
+        text.set_path_effects(style.halo(plt.rcParams["axes.facecolor"], 4.0))

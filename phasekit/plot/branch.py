@@ -10,12 +10,19 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labels.arguments import bad, flag, named, unknown
 from phasekit.plot.parts import labels as words
 from phasekit.plot.parts import style
+from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.points import label_points
+from phasekit.plot.parts.smooth import smooth
+from phasekit.plot.parts.units import Units
+
+FloatArray = NDArray[np.float64]
 
 _STABLE: style.Look = {
     "color": style.BLUE,
@@ -45,9 +52,6 @@ _CURVES: dict[str, style.Look] = {
         "label": "branch points",
     },
 }
-#: Distance in pixels within which the labels of special points would cover each other.
-_TOUCHING = 8.0
-
 _MARKS = {
     "LP": ("s", style.YELLOW),
     "BP": ("^", style.PURPLE),
@@ -67,6 +71,8 @@ def branch(
     *,
     sel: Mapping[str, Any] | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     labels: bool = True,
     legend: bool = True,
     ax: Axes | None = None,
@@ -87,6 +93,11 @@ def branch(
         Of a recorded quantity with more dims which one: ``sel={"bearing": "A2"}``.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     labels : bool
         Whether to write LP, BP, H, ... beside special points.
     legend : bool
@@ -120,25 +131,36 @@ def branch(
     x = first.free[0] if x is None else x
     if y is None:
         y = first.free[1] if len(first.free) > 1 else first.problem_state[0]
-    style.angle_factor(angles)
     columns = [(_column(one, "x", x, sel), _column(one, "y", y, sel)) for one in several]
+    held = {str(c.name): str(c.attrs.get("units", "")) for c in columns[0]}
+    shown = Units.of(angles, units, held)
+    circle = Circle.of_axis(columns[0][1], shown, cut)
+    stretch = [shown.scale(*item) for item in held.items()]
     axes = style.axes_for(ax, legend=legend)
     handles: dict[str, Artist] = {}
     for one, pair in zip(several, columns, strict=True):
-        for look, across, up in _pieces(one, pair, angles):
-            (line,) = axes.plot(across, up, **look)
+        for look, across, up in _pieces(one, pair, circle):
+            if circle is not None:
+                up, across = circle.unrolled(up, across)
+            (line,) = axes.plot(across * stretch[0], up * stretch[-1], **style.inked(look))
             handles.setdefault(str(look["label"]), line)
     marks: dict[str, list[tuple[float, float]]] = {}
     for one, pair in zip(several, columns, strict=True):
-        across, up = (words.shown(column, angles)[0] for column in pair)
+        across, up = (column.values for column in pair)
         for special in one.special_points:
             if special.kind == "end":
                 continue
             place = (float(across[special.index]), float(up[special.index]))
             marks.setdefault(special.label, []).append(place)
+    named: dict[tuple[float, float], str] = {}
     for label, places in marks.items():
         marker, color = _MARKS[label]
         across, up = np.array(places).T
+        if circle is not None:
+            up, across = circle.points(up, across)
+        across, up = across * stretch[0], up * stretch[-1]
+        for point in zip(across, up, strict=True):
+            named[point] = f"{named[point]}, {label}" if point in named else label
         axes.plot(
             across, up, linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
             markeredgecolor=style.BLACK, zorder=3 if label == "NS" else 4,
@@ -147,14 +169,12 @@ def branch(
             [], [], linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
             markeredgecolor=style.BLACK, label=label,
         )  # fmt: skip
-    if columns[0][1].name == "phi" and columns[0][1].attrs.get("units") == "rad":
-        style.circle_axis(axes, "y", angles)
-    for text, spot in _texts(axes, marks) if labels else []:
-        axes.annotate(
-            text, spot, xytext=(6, 6), textcoords="offset points", fontsize="small", zorder=5
-        )
-    axes.set_xlabel(words.label(columns[0][0], angles, style.letters(axes, "x")))
-    axes.set_ylabel(words.label(columns[0][1], angles, style.letters(axes, "y")))
+    if circle is not None:
+        style.circle_axis(axes, "y", shown, circle)
+    if labels:
+        label_points(axes, named)
+    axes.set_xlabel(words.label(columns[0][0], shown, style.letters(axes, "x")))
+    axes.set_ylabel(words.label(columns[0][1], shown, style.letters(axes, "y")))
     if legend:
         style.legend_below(axes, list(handles.values()))
     return axes
@@ -197,23 +217,41 @@ def _column(one: Branch, argument: str, name: str, sel: Mapping[str, Any] | None
 
 
 def _pieces(
-    one: Branch, pair: tuple[xr.DataArray, xr.DataArray], angles: style.Angles
+    one: Branch, pair: tuple[xr.DataArray, xr.DataArray], circle: Circle | None
 ) -> list[tuple[style.Look, Any, Any]]:
     """Runs of points of one look; each begins where the one before ends, and angles may wrap."""
-    cuts = _cuts(one, pair)
-    across, up = (words.shown(column, angles)[0].astype(float) for column in pair)
+    cuts = _cuts(one, pair if circle is None else pair[:1])
     looks = _looks(one)
+    x, y, *slopes = _bends(one, pair)
+    bends = (x, y if circle is None else np.unwrap(y), *slopes)
     pieces = []
     begin = 0
-    for i in range(1, len(across) + 1):
-        if i < len(across) and looks[i] is looks[begin]:
+    for i in range(1, len(looks) + 1):
+        if i < len(looks) and looks[i] is looks[begin]:
             continue
-        stop = min(i + 1, len(across))
-        places = cuts[(cuts > begin) & (cuts < stop)] - begin
-        xs, ys = (np.insert(values[begin:stop], places, np.nan) for values in (across, up))
+        parts = np.split(
+            np.arange(begin, min(i + 1, len(looks))), cuts[(cuts > begin) & (cuts <= i)] - begin
+        )
+        curves = [smooth(*(values[part] for values in bends)) for part in parts]
+        xs, ys = (
+            np.concatenate([piece for curve in curves for piece in (curve[k], [np.nan])])[:-1]
+            for k in (0, 1)
+        )
         pieces.append((looks[begin], xs, ys))
         begin = i
     return pieces
+
+
+def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[FloatArray, ...]:
+    """Return x, y, arclength, and the slopes of x and y over it, NaN where they are not known."""
+    points = one.points
+    unknowns = points["unknown"].values.tolist()
+    x, y = (column.values.astype(float) for column in pair)
+    if all(column.dims == ("point",) and column.name in unknowns for column in pair):
+        slopes = [points.tangent.sel(unknown=column.name).values for column in pair]
+    else:
+        slopes = [np.full(x.shape, np.nan)] * 2
+    return x, y, points.arclength.values, *slopes
 
 
 def _looks(one: Branch) -> list[style.Look]:
@@ -238,7 +276,7 @@ def _looks(one: Branch) -> list[style.Look]:
     return [_STABLE if k == 0 else _UNSTABLE for k in points.n_unstable.values]
 
 
-def _cuts(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> Any:
+def _cuts(one: Branch, pair: Sequence[xr.DataArray]) -> Any:
     """The points before which a line has a gap: an angle jumps by about its period."""
     periods = dict(one.problem.periods) if one.problem is not None else {}
     jump = np.zeros(max(pair[0].size - 1, 0), dtype=bool)
@@ -246,19 +284,3 @@ def _cuts(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> Any:
         if column.name in periods:
             jump |= np.abs(np.diff(column.values)) > 0.5 * periods[column.name]
     return np.flatnonzero(jump) + 1
-
-
-def _texts(
-    axes: Axes, marks: Mapping[str, list[tuple[float, float]]]
-) -> list[tuple[str, tuple[float, float]]]:
-    """Labels and their places; those of points that touch on the page are one text."""
-    kept: list[tuple[list[str], tuple[float, float], Any]] = []
-    for label, places in marks.items():
-        for place in places:
-            at = axes.transData.transform(place)
-            near = [one for one in kept if np.hypot(*(at - one[2])) < _TOUCHING]
-            if not near:
-                kept.append(([label], place, at))
-            elif label not in near[0][0]:
-                near[0][0].append(label)
-    return [(", ".join(names), place) for names, place, _ in kept]

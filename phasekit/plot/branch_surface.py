@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,8 @@ from phasekit.labelled.atlas import single
 from phasekit.labelled.bifurcation_set import bifurcation_set
 from phasekit.labels.arguments import bad, flag, pair, whole
 from phasekit.plot.parts import labels, style
+from phasekit.plot.parts.circle import Circle, multiple_of_pi, quarters
+from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
@@ -39,6 +42,8 @@ def branch_surface(
     ylim: tuple[float, float],
     cells: int = 36,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     view: tuple[float, float] = (28.0, -58.0),
     ax: Axes3D | None = None,
@@ -57,6 +62,11 @@ def branch_surface(
         Number of cells of the surface along each parameter, 4 to 200.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain colors, lines and markers.
     view : (float, float)
@@ -89,7 +99,6 @@ def branch_surface(
     >>> ax.get_zlabel()
     '$\\varphi$ (rad)'
     """
-    factor = style.angle_factor(angles)
     flag("legend", legend)
     wants = f"a whole number from {LEAST} to {MOST}"
     cells = whole("cells", cells, wants, LEAST)
@@ -106,33 +115,41 @@ def branch_surface(
         full = {name: np.full(at_x.shape, value) for name, value in values.items()}
         return type(kind).valid_coefficients({**full, x: at_x, y: at_y})
 
+    held = {name: str(folds[name].attrs.get("units", "")) for name in (x, y)}
+    shown = Units.of(angles, units, held)
+    stretch = np.array([shown.scale(*item) for item in [*held.items(), ("phi", "rad")]])
+    circle = Circle.cut_at(cut, stretch[2])
     box = [folds.attrs[ends] for ends in ("xlim", "ylim")]
     grids = [np.linspace(low, high, cells + 1) for low, high in box]
-    phi = np.linspace(-np.pi, np.pi, 2 * cells + 1)
+    phi = np.linspace(*circle.ends, 2 * cells + 1)
     surface = equilibrium_surface(coefficients, grids[0], grids[1], phi)
 
     axes: Any = ax
     if axes is None:
-        axes = style.new_figure(7.2, 5.8).add_subplot(projection="3d")
-    scales = [factor if folds[name].attrs.get("units") == "rad" else 1.0 for name in (x, y)]
-    stretch = np.array([*scales, factor])
-    ends = np.array([[*grids[0][[0, -1]]], [*grids[1][[0, -1]]], [-np.pi, np.pi]])
+        axes = style.new_figure(1.1).add_subplot(projection="3d")
+    ends = np.array([[*grids[0][[0, -1]]], [*grids[1][[0, -1]]], circle.ends])
     handles: list[Artist] = []
     for code, triangles in zip(FACES, surface, strict=True):
         if triangles.size:
             _add_faces(axes, triangles, stretch, FACES[code])
             name = style.BRANCHES[code]["label"]
             handles.append(Patch(facecolor=FACES[code], edgecolor=style.GRAY, label=name))
-    handles += _draw_folds(axes, folds, (x, y), stretch)
+    handles += _draw_folds(axes, folds, (x, y), stretch, circle)
     for which, limits, scale in zip("xyz", ends, stretch, strict=True):
         getattr(axes, f"set_{which}lim")(*(limits * scale))
-    axes.set_xlabel(_short(folds[x], angles))
-    axes.set_ylabel(_short(folds[y], angles))
-    axes.set_zlabel(rf"$\varphi$ ({style.angle_unit(angles)})")
-    quarters = np.arange(-2, 3) * (np.pi / 2)
-    axes.set_zticks(quarters * factor)
-    if angles == "rad":
-        axes.set_zticklabels([style.multiple_of_pi(q) for q in quarters])
+    axes.set_xlabel(_short(folds[x], shown))
+    axes.set_ylabel(_short(folds[y], shown))
+    axes.set_zlabel(rf"$\varphi$ ({shown.text('phi', 'rad')})")
+    ticks = quarters(*circle.ends)
+    axes.set_zticks([tick * stretch[2] for tick in ticks])
+    if stretch[2] == 1.0:
+        axes.set_zticklabels([multiple_of_pi(tick) for tick in ticks])
+    axes.yaxis.labelpad = 8.0
+    if style.narrow(axes):
+        axes.locator_params(axis="x", nbins=4)
+        axes.locator_params(axis="y", nbins=4)
+    # The label along phi stands outside the box.
+    axes.set_box_aspect(None, zoom=0.85)
     axes.view_init(elevation, azimuth)
     axes.computed_zorder = False  # folds stay in sight
     if legend and handles:
@@ -140,11 +157,10 @@ def branch_surface(
     return axes
 
 
-def _short(values: Any, angles: style.Angles) -> str:
+def _short(values: Any, units: Units) -> str:
     """Return symbol and unit: there is no room for more along a slanted axis."""
     symbol = labels.SYMBOLS.get(str(values.name), str(values.name).replace("_", " "))
-    unit = labels.shown(values, angles)[1]
-    return f"{symbol} ({unit})" if unit else symbol
+    return labels.with_unit(symbol, units.text(str(values.name), values.attrs.get("units", "")))
 
 
 def _add_faces(ax: Any, triangles: FloatArray, stretch: FloatArray, color: str) -> None:
@@ -160,7 +176,9 @@ def _add_faces(ax: Any, triangles: FloatArray, stretch: FloatArray, color: str) 
     ax.add_collection3d(faces)
 
 
-def _draw_folds(ax: Any, ds: Any, names: tuple[str, str], stretch: FloatArray) -> list[Artist]:
+def _draw_folds(
+    ax: Any, ds: Any, names: tuple[str, str], stretch: FloatArray, circle: Circle
+) -> list[Artist]:
     """Draw the fold curves on the surface, and the cusps."""
     handles: dict[str, Artist] = {}
     for row in range(ds.sizes["curve"]):
@@ -168,14 +186,15 @@ def _draw_folds(ax: Any, ds: Any, names: tuple[str, str], stretch: FloatArray) -
         if kind not in ("fold", "pitchfork"):
             continue
         x, y, phi = (ds[name].values[row] for name in (*names, "phi"))
-        phi = np.where(phi == np.pi, np.pi, (phi + np.pi) % (2.0 * np.pi) - np.pi)
+        phi = circle.home(phi)
         seam = np.flatnonzero(np.abs(np.diff(phi)) > np.pi) + 1
         points = np.insert(np.stack([x, y, phi]) * stretch[:, None], seam, np.nan, axis=1)
-        look = style.FOLD_CURVE if kind == "fold" else style.PITCHFORK_CURVE
+        look = style.inked(style.FOLD_CURVE if kind == "fold" else style.PITCHFORK_CURVE)
         (line,) = ax.plot(*points, zorder=10, **look)
         handles.setdefault(kind, line)
     if ds.sizes["cusp"]:
         points = np.stack([ds[f"cusp_{name}"].values for name in (*names, "phi")])
+        points[2] = circle.home(points[2])
         look = {**style.MERGERS["cusp"], "markerfacecolor": "white"}
         ax.plot(*(points * stretch[:, None]), linestyle="none", zorder=11, **look)
         for point in (points * stretch[:, None]).T:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Literal
 
+import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -14,7 +16,8 @@ from numpy.typing import NDArray
 from phasekit.errors import ParameterError
 from phasekit.labelled.loads import bearing_forces
 from phasekit.labels.arguments import bad
-from phasekit.plot.parts import style
+from phasekit.plot.parts import labels, style
+from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
@@ -27,8 +30,12 @@ SIDES = {
     "F24": "along $R_{022}$",
     "weight": "weight",
 }
-# An arrow this short, in shares of the polygon, is named in the legend only.
-SHORT = 0.05
+AXES: dict[Literal["x", "y"], tuple[str, str]] = {
+    "x": ("along $u_2$, tangential", "$u_2$"),
+    "y": ("along $v_2$, radial, inward", "$v_2$"),
+}
+# An arrow this short (inches) is named in the legend only.
+SHORT = 0.4
 
 
 def force_polygon(
@@ -37,6 +44,7 @@ def force_polygon(
     dphi: float,
     *,
     bearing: str = "A2",
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -56,6 +64,8 @@ def force_polygon(
         The state: angle in rad, angular velocity in s^-1. The shaft turns freely in its bearings.
     bearing : {"A2", "B2"}
         The bearing.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"force": "kN"}``.
     legend : bool
         Whether to name the parts and their sizes under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -87,6 +97,8 @@ def force_polygon(
     """
     if not isinstance(bearing, str) or bearing not in BEARINGS:
         raise bad("bearing", bearing, f"one of {', '.join(BEARINGS)}")
+    shown = Units.of("rad", units)
+    scale, unit = shown.scale("force", "N"), shown.text("force", "N")
     loads = bearing_forces(disk, phi, dphi).sel(bearing=bearing)
     if loads.sizes.keys() - {"disk_axis", "component"}:
         raise ParameterError(
@@ -101,23 +113,33 @@ def force_polygon(
     parts = _parts(loads.force_component.values, weight, angle, speed, disk)
     axes = style.axes_for(ax, legend=legend)
 
+    parts = {name: side * scale for name, side in parts.items()}
+    total = total * scale
     corners = np.concatenate([[np.zeros(2)], np.cumsum(list(parts.values()), axis=0)])
     span = float(np.ptp(corners, axis=0).max()) or 1.0
+    sizes = [float(np.hypot(*side)) for side in (*parts.values(), total)]
     handles: list[Artist] = []
     for (name, side), look in zip(parts.items(), style.POLYGON, strict=True):
         start = corners[len(handles)]
         handles.append(_arrow(axes, start, start + side, name, SIDES[name], look, span))
-    handles.append(_arrow(axes, np.zeros(2), total, "F", "sum", style.RESULTANT, span))
+    handles.append(_arrow(axes, np.zeros(2), total, "F", "sum", style.inked(style.RESULTANT), span))
 
     axes.update_datalim(corners)
     axes.margins(0.1)
     axes.autoscale_view()
     axes.set_aspect("equal", adjustable="datalim")
-    axes.set_xlabel("along $u_2$, tangential (N)")
-    axes.set_ylabel("along $v_2$, radial, inward (N)")
+    style.few_ticks(axes)
+    for which, texts in AXES.items():
+        axes.set(**{f"{which}label": labels.fitting(style.letters(axes, which), unit, *texts)})
     axes.set_title(f"bearing {bearing[0]}$_2$", fontsize="medium")
     if legend:
-        style.legend_below(axes, handles)
+        names: dict[str, str] = {}
+        for handle, size in zip(handles, sizes, strict=True):
+            name = str(handle.get_label())
+            value = f": {size:.4g} {unit}"
+            handle.set_label(name + value)
+            names[name + value] = name.split(",")[0] + value
+        style.legend_below(axes, handles, names)
     return axes
 
 
@@ -165,11 +187,20 @@ def _arrow(
     )
     ax.add_patch(arrow)
     symbol = f"$F_{{{name[1:]}}}$" if name[1:].isdigit() else {"F": "$F$"}.get(name, name)
-    if size > SHORT * span:
-        normal = np.array([start[1] - end[1], end[0] - start[0]]) / size
-        x, y = 0.5 * (start + end) + 0.04 * span * normal
-        ax.text(x, y, symbol, color=look["color"], ha="center", va="center", fontsize="small")
+    if size * min(style.inches(ax)) > SHORT * span:
+        across, up = (start[1] - end[1]) / size, (end[0] - start[0]) / size
+        x, y = 0.5 * (start + end)
+        ax.annotate(
+            symbol,
+            (x, y),
+            xytext=(4.0 * across, 4.0 * up),
+            textcoords="offset points",
+            color=look["color"],
+            ha="center" if abs(across) < 0.3 else "left" if across > 0.0 else "right",
+            va="center" if abs(up) < 0.3 else "bottom" if up > 0.0 else "top",
+            fontsize="small",
+            path_effects=style.halo(plt.rcParams["axes.facecolor"], 2.5),
+        )
     meaning = "" if name == "weight" else f", {along}"
-    label = f"{symbol}{meaning}: {size:.4g} N"
-    style_of_line = {"color": look["color"], "linestyle": look["linestyle"]}
-    return Line2D([], [], label=label, linewidth=look["linewidth"], **style_of_line)
+    key = {name: look[name] for name in ("color", "linestyle", "linewidth")}
+    return Line2D([], [], label=f"{symbol}{meaning}", **key)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,7 @@ from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.rotators import ROTATORS
 from phasekit.phase.exact.potential import gradient as slope
 from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import curves_of, levels_of, starts_of
 from phasekit.plot.time_history import TIME, motions_of
 from phasekit.systems.as_system import as_system
@@ -45,6 +46,7 @@ def hodograph(
     orbits: ArrayLike | None = None,
     plane: Sequence[str] | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -74,6 +76,8 @@ def hodograph(
         turns.
     angles : {"rad", "deg"}
         Unit in which angles are shown in the legend.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"rotator": "deg/s2"}``.
     legend : bool
         Whether to explain the curves under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -104,23 +108,25 @@ def hodograph(
     if not isinstance(rotator, str) or rotator not in ROTATORS:
         raise unknown("rotator", rotator, ROTATORS)
     flag("legend", legend)
-    factor = style.angle_factor(angles)
+    shown = Units.of(angles, units)
     pair = _plane_of(rotator, plane)
     if isinstance(system, xr.Dataset):
+        system, shown = Units.of_dataset(system, angles, units)
         if energies is not None or orbits is not None:
             name = "energies" if energies is not None else "orbits"
             raise ParameterError(f"{name}: got one beside motions, wants None: motions are orbits")
-        curves = _along_motions(system, rotator, pair, angles)
+        curves = _along_motions(system, rotator, pair, shown)
         axes = style.axes_for(ax, legend=legend and len(curves) > 1)
         handles = _draw_motions(axes, curves)
     else:
-        tip = _Tip(system, rotator, pair)
+        tip = _Tip(system, rotator, pair, shown)
         axes = style.axes_for(ax, legend=legend)
-        handles = _draw_levels(axes, tip, energies, orbits, factor)
+        handles = _draw_levels(axes, tip, energies, orbits)
     axes.set_aspect("equal", adjustable="datalim")
-    across, up = _words(rotator, pair)
-    axes.set_xlabel(across)
-    axes.set_ylabel(up)
+    style.few_ticks(axes)
+    for which, texts in _words(rotator, pair).items():
+        room, unit = style.letters(axes, which), shown.text("rotator", "s-2")
+        axes.set(**{f"{which}label": labels.fitting(room, unit, *texts)})
     if legend:
         style.legend_below(axes, handles)
     return axes
@@ -144,27 +150,31 @@ def _plane_of(rotator: str, plane: Sequence[str] | None) -> Plane | None:
     return names[0], names[1]
 
 
-def _words(rotator: str, plane: Plane | None) -> tuple[str, str]:
+def _words(rotator: str, plane: Plane | None) -> dict[Literal["x", "y"], tuple[str, str]]:
+    """Return what stands at both axes, at length and in short."""
     if plane is None:
-        return r"$\ddot\varphi$, tangential (s$^{-2}$)", r"$\dot\varphi^2$, radial (s$^{-2}$)"
-    first, second = (f"{rotator} along {AXIS_SYMBOLS[name]} (s$^{{-2}}$)" for name in plane)
-    return first, second
+        across, up = r"$\ddot\varphi$", r"$\dot\varphi^2$"
+        return {"x": (f"{across}, tangential", across), "y": (f"{up}, radial", up)}
+    across, up = (AXIS_SYMBOLS[name] for name in plane)
+    return {"x": (f"{rotator} along {across}", across), "y": (f"{rotator} along {up}", up)}
 
 
 class _Tip:
     """Where the tip of a rotator of one system lies at given states."""
 
-    def __init__(self, system: Any, rotator: str, plane: Plane | None) -> None:
+    def __init__(self, system: Any, rotator: str, plane: Plane | None, shown: Units) -> None:
         self.system = as_system(system, rung=Trigonometric, what="a hodograph")
         self.land = curves_of(self.system)
         self.rotator, self.plane = rotator, plane
+        self.units, self.scale = shown, shown.scale("rotator", "s-2")
         self.disk = None if plane is None else _disk(system)
 
     def __call__(self, phi: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
         if self.plane is None or self.disk is None:
-            return -slope(*self.system.coefficients(), phi), speed**2
+            pull = slope(*self.system.coefficients(), phi)
+            return -self.scale * pull, self.scale * speed**2
         tips = rotators(self.disk, phi, speed).rotator.sel(rotator_name=self.rotator)
-        first, second = (tips.sel(carrier_axis=name).values for name in self.plane)
+        first, second = (tips.sel(carrier_axis=n).values * self.scale for n in self.plane)
         return first, second
 
     def branches(self, phi: FloatArray, speed: FloatArray, turning: bool) -> list[Any]:
@@ -177,7 +187,7 @@ class _Tip:
 
 
 def _draw_levels(
-    ax: Axes, tip: _Tip, energies: ArrayLike | None, orbits: ArrayLike | None, factor: float
+    ax: Axes, tip: _Tip, energies: ArrayLike | None, orbits: ArrayLike | None
 ) -> list[Artist]:
     """Draw the hodographs of levels, of separatrices where nothing is asked for, of orbits."""
     land = tip.land
@@ -190,7 +200,7 @@ def _draw_levels(
                 _stroke(ax, u, v, zorder=1, **look)
     handles = _draw_separatrices(ax, tip) if energies is None and orbits is None else []
     for number, start in enumerate(starts):
-        handles += _draw_orbit(ax, tip, start, number, factor)
+        handles += _draw_orbit(ax, tip, start, number)
     if tip.plane is None and land.answers.phi.size:
         handles += ax.plot(0.0, 0.0, zorder=5, **style.ORIGIN)
     return handles
@@ -200,13 +210,11 @@ def _draw_separatrices(ax: Axes, tip: _Tip) -> list[Artist]:
     handles: dict[Loop, Artist] = {}
     for energy, arc, loop in tip.land.separatrices:
         for u, v in tip.branches(*tip.land.curve(arc, energy), loop == Loop.WINDING):
-            (handles[loop],) = _stroke(ax, u, v, zorder=3, **strokes.LOOPS[loop])
+            (handles[loop],) = _stroke(ax, u, v, zorder=3, **style.inked(strokes.LOOPS[loop]))
     return list(handles.values())
 
 
-def _draw_orbit(
-    ax: Axes, tip: _Tip, start: tuple[float, float], number: int, factor: float
-) -> list[Artist]:
+def _draw_orbit(ax: Axes, tip: _Tip, start: tuple[float, float], number: int) -> list[Artist]:
     land, look = tip.land, strokes.orbit_look(number)
     energy = land.energy(*start)
     for arc in strokes.orbit_arcs(land, start):
@@ -218,13 +226,14 @@ def _draw_orbit(
         for u, v in curves:
             _stroke(ax, u, v, zorder=4, **look)
     u, v = tip(np.array([start[0]]), np.array([start[1]]))
-    name = strokes.start_name(land, start, factor)
+    scale = (tip.units.scale("phi", "rad"), tip.units.scale("dphi", "s-1"))
+    name = strokes.start_name(land, start, scale)
     (handle,) = ax.plot(u, v, zorder=6, label=name, **strokes.START, **look)
     return [handle]
 
 
 def _along_motions(
-    dataset: xr.Dataset, rotator: str, plane: Plane | None, angles: style.Angles
+    dataset: xr.Dataset, rotator: str, plane: Plane | None, shown: Units
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return the curves of one motion or several, under what tells each from the others."""
     telling = "motion_phi" if "motion_phi" in dataset else "hodograph_u"
@@ -233,10 +242,12 @@ def _along_motions(
             "system: got a Dataset without motions along the dim 'time', wants a system, motions "
             "over time, such as pk.flow returns, or their rotators (pk.rotators)"
         )
-    names = motions_of(dataset[telling], TIME, angles)
+    names = motions_of(dataset[telling], TIME, shown)
     pair = _components(dataset, rotator, plane)
     others = [dim for dim in dataset[telling].dims if dim != TIME]
+    scale = shown.scale("rotator", "s-2")
     flat = [array.transpose(*others, TIME).values.reshape(len(names), -1) for array in pair]
+    flat = [scale * values for values in flat]
     return dict(zip(names, zip(*flat, strict=True), strict=True))
 
 

@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, flag, number, unknown
-from phasekit.plot.parts import labels, style
+from phasekit.plot.parts import color_bar, labels, style
 from phasekit.plot.parts.strands import relative_gap
-from phasekit.systems.identity import model_name
-from phasekit.systems.registry import model_named
+from phasekit.plot.parts.units import Units
 
+# In Axes with less room than for so many letters, codes are keys of the legend.
+ROOM_FOR_BAR = 45
 # The values along x and along y, as shown.
 Grid = tuple[NDArray[Any], NDArray[Any]]
 
@@ -34,6 +35,7 @@ def parameter_map(
     x: str | None = None,
     y: str | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
     log: bool = False,
     legend: bool = True,
     ax: Axes | None = None,
@@ -54,6 +56,8 @@ def parameter_map(
         The parameters on the axes; left out, the first two that are swept, in their order.
     angles : {"rad", "deg"}
         Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
     log : bool
         Whether numbers have a logarithmic scale of colors; those that are not positive are absent.
     legend : bool
@@ -89,22 +93,23 @@ def parameter_map(
     >>> ax.get_xlabel()
     '$\\lambda$, lambda = B/A'
     """
-    style.angle_factor(angles)
     flag("log", log)
     ds = labels.dataset(dataset, "dataset", ())
+    ds, shown = Units.of_dataset(ds, angles, units)
     if not isinstance(variable, str) or variable not in ds.data_vars:
         raise unknown("variable", variable, map(str, ds.data_vars))
     chosen = _select(ds, variable, sel)
     field = chosen[variable]
     across, up = _axes_of(field, x, y)
     field = field.transpose(up.dims[0], across.dims[0])
-    axes = style.axes_for(ax, legend=legend, width=6.8)
+    axes = style.axes_for(ax, legend=legend)
 
-    grid = labels.shown(across, angles)[0], labels.shown(up, angles)[0]
-    handles = _draw_field(axes, grid, field, angles, _named(ds[variable], sel), log)
+    grid = labels.shown(across, shown)[0], labels.shown(up, shown)[0]
+    keys = legend and style.letters(axes, "x") < ROOM_FOR_BAR
+    handles = _draw_field(axes, grid, field, shown, _named(ds[variable], sel), log, keys)
     handles += _draw_curves(axes, grid, chosen, across, up)
-    axes.set_xlabel(labels.label(across, angles, style.letters(axes, "x")))
-    axes.set_ylabel(labels.label(up, angles, style.letters(axes, "y")))
+    axes.set_xlabel(labels.label(across, shown, style.letters(axes, "x")))
+    axes.set_ylabel(labels.label(up, shown, style.letters(axes, "y")))
     if legend:
         style.legend_below(axes, handles)
     return axes
@@ -171,29 +176,54 @@ def _axes_of(
 
 
 def _draw_field(
-    ax: Axes, grid: Grid, field: xr.DataArray, angles: style.Angles, selected: str, log: bool
+    ax: Axes,
+    grid: Grid,
+    field: xr.DataArray,
+    units: Units,
+    selected: str,
+    log: bool,
+    keys: bool,
 ) -> list[Artist]:
-    """Draw the cells and the color bar: codes by name, numbers on a scale."""
-    text = labels.label(field, angles, style.letters(ax, "y"), selected)
+    """Draw the cells and what tells their colors: codes by name, numbers on a scale."""
+    text = labels.label(field, units, style.letters(ax, "y"), selected)
     if field.dtype.kind in "iub":
-        return _draw_codes(ax, grid, field, text)
-    return _draw_values(ax, grid, labels.shown(field, angles)[0], text, log)
+        if keys:
+            ax.set_title(
+                labels.label(field, units, style.letters(ax, "x"), selected), size="medium"
+            )
+        return _draw_codes(ax, grid, field, None if keys else text)
+    if selected not in text.replace("\n", " "):
+        ax.set_title(selected, size="medium")
+    return _draw_values(ax, grid, labels.shown(field, units)[0], text, log)
 
 
-def _draw_codes(ax: Axes, grid: Grid, field: xr.DataArray, text: str) -> list[Artist]:
-    """Draw integers and booleans, one color each; the colors of a code never change."""
+def _draw_codes(ax: Axes, grid: Grid, field: xr.DataArray, text: str | None) -> list[Artist]:
+    """Draw integers and booleans, one color each; the colors of a code never change.
+
+    Their names stand at a color bar with the text, or are returned as keys of a legend.
+    """
     names, colors = _code_book(field)
     present = [int(code) for code in np.unique(field.values.astype(int))]
     index = np.searchsorted(present, field.values.astype(int))
     palette = ListedColormap([colors.get(code, style.GRAY) for code in present])
     norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, len(present))
     mesh = ax.pcolormesh(*grid, index, cmap=palette, norm=norm, shading="nearest", rasterized=True)
-    bar = ax.figure.colorbar(mesh, ax=ax, ticks=range(len(present)), label=text)
     words = [names.get(code, str(code)) for code in present]
+    if text is None:
+        edge: style.Look = {"edgecolor": style.GRAY, "linewidth": 0.6}
+        return [Patch(facecolor=palette(i), label=word, **edge) for i, word in enumerate(words)]
+    bar = ax.figure.colorbar(mesh, ax=ax, ticks=range(len(present)))
+    bar.set_label(text, labelpad=8.0)
     upright = max(map(len, words)) <= 3
-    bar.ax.set_yticklabels(words, rotation=0 if upright else 90, va="center")
+    bar.ax.set_yticklabels(words, rotation=0 if upright else 90, va="center", size=_size(ax, words))
     bar.ax.tick_params(which="both", length=0)
     return []
+
+
+def _size(ax: Axes, words: list[str]) -> str:
+    """Return the size in which turned words do not run into each other along a color bar."""
+    room = style.letters(ax, "y") / (len(words) * max(map(len, words)))
+    return "medium" if room > 1.0 else "small" if room > 0.83 else "x-small"
 
 
 def _code_book(field: xr.DataArray) -> tuple[Mapping[int, str], Mapping[int, str]]:
@@ -226,16 +256,28 @@ def _draw_values(ax: Axes, grid: Grid, numbers: NDArray[Any], text: str, log: bo
     values = np.ma.masked_invalid(shown)
     norm = Normalize(low, high)
     if log and low is not None and high is not None:
-        norm = LogNorm(*(style.log_limits([10.0**low, 10.0**high]) or (None, None)))
+        norm = LogNorm(*(color_bar.log_limits([10.0**low, 10.0**high]) or (None, None)))
     ax.set_facecolor(style.NOTHING)
+    absent = [Patch(facecolor=style.NOTHING, edgecolor=style.GRAY, label="absent")]
+    if not finite.size:  # a bar would show numbers that nothing has
+        ax.set_title(text, size="medium")
+        ax.set(xlim=_edges(grid[0]), ylim=_edges(grid[1]))
+        return list(absent)
     mesh = ax.pcolormesh(
         *grid, values, cmap=style.SEQUENTIAL, norm=norm, shading="nearest", rasterized=True
     )
-    bar = ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend)
+    # Numbers at the ends of a bar stand over it, which the layout does not see.
+    slim: style.Look = {"shrink": 0.93, "fraction": 0.08, "pad": 0.03} if style.narrow(ax) else {}
+    bar = ax.figure.colorbar(mesh, ax=ax, label=text, extend=extend, **slim)
     if isinstance(norm, LogNorm):
-        style.log_ticks(bar)
-    absent = np.ma.getmaskarray(values).any()
-    return [Patch(facecolor=style.NOTHING, edgecolor=style.GRAY, label="absent")] if absent else []
+        color_bar.log_ticks(bar)
+    return list(absent) if np.ma.getmaskarray(values).any() else []
+
+
+def _edges(along: NDArray[Any]) -> tuple[float, float]:
+    """Return where the outer cells of a map end."""
+    ends = 1.5 * along[[0, -1]] - 0.5 * along[[1, -2]]
+    return float(ends.min()), float(ends.max())
 
 
 def _limits(values: NDArray[Any]) -> tuple[float | None, float | None, str]:
@@ -272,7 +314,7 @@ def _draw_curves(
     for values, look in curves:
         if not (np.nanmin(values, initial=1.0) < 0.0 < np.nanmax(values, initial=-1.0)):
             continue
-        ax.contour(
+        contour = ax.contour(
             *grid,
             np.ma.masked_invalid(values),
             levels=[0.0],
@@ -280,14 +322,15 @@ def _draw_curves(
             linestyles=[look["linestyle"]],
             linewidths=[look["linewidth"]],
         )
-        handles.append(Line2D([], [], **look))
+        contour.set_path_effects(style.halo(width=look["linewidth"] + 1.6))
+        handles.append(
+            Line2D([], [], path_effects=style.halo(width=look["linewidth"] + 1.6), **look)
+        )
     return handles
 
 
 def _coefficient_A(ds: xr.Dataset) -> xr.DataArray | None:
     """Return A over the map, or None if the Dataset cannot rebuild its model."""
-    try:
-        A = model_named("ds", model_name(ds)).from_dataset(ds).coefficients().A
-    except ParameterError:
-        return None
+    model = labels.model_in(ds)
+    A = None if model is None else model.from_dataset(ds).coefficients().A
     return A if isinstance(A, xr.DataArray) else None

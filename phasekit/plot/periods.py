@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from phasekit.labelled.families import orbit_families
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.plot.parts import style
+from phasekit.plot.parts import labels, style
+from phasekit.plot.parts.units import Units
 from phasekit.systems.as_system import as_system, single
 
 # Where a family begins: the row of its center among the equilibria.
@@ -27,6 +29,7 @@ def period_energy(
     n: int = 200,
     *,
     energy_max: float | None = None,
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -45,6 +48,8 @@ def period_energy(
         Number of orbits in each family.
     energy_max : float, optional
         Greatest energy (s^-2); left out, rotations are followed some way above the saddles.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"period": "ms"}``.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -73,12 +78,13 @@ def period_energy(
     >>> ax.get_xlabel()
     'energy $h$ (s$^{-2}$)'
     """
-    families, points, loops = _families(system, n, energy_max)
+    shown = Units.of("rad", units)
+    families, points, loops = _families(system, n, energy_max, shown)
     axes = style.axes_for(ax, legend=legend)
 
     natural, bottom = points.natural_frequency.values, points.energy.values
     with np.errstate(all="ignore"):  # of frequencies below the smallest double
-        periods = 2.0 * np.pi / natural
+        periods = shown.scale("period", "s") * 2.0 * np.pi / natural
     ends = (bottom, periods)
     handles = _draw_families(axes, families, points, "energy_level", "period", ends)
     handles += _draw_walls(axes, points, loops)
@@ -93,8 +99,8 @@ def period_energy(
     middle = families.period.median("level").where(seen).values
     heights = np.array([*(1.8 * middle), *(2.0 * periods)])
     axes.set_ylim(0.0, float(np.max(heights, where=np.isfinite(heights), initial=0.0)) or None)
-    axes.set_xlabel("energy $h$ (s$^{-2}$)")
-    axes.set_ylabel("period $T$ (s)")
+    axes.set_xlabel(labels.with_unit("energy $h$", shown.text("energy", "s-2")))
+    axes.set_ylabel(labels.with_unit("period $T$", shown.text("period", "s")))
     if legend:
         style.legend_below(axes, handles)
     return axes
@@ -105,6 +111,7 @@ def frequency_action(
     n: int = 200,
     *,
     energy_max: float | None = None,
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -122,6 +129,8 @@ def frequency_action(
         Number of orbits in each family.
     energy_max : float, optional
         Greatest energy (s^-2); left out, rotations are followed some way above the saddles.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"period": "ms"}``.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -149,8 +158,9 @@ def frequency_action(
     >>> ax.get_ylabel()
     'frequency $\\omega$ (rad/s)'
     """
-    families, points, _ = _families(system, n, energy_max)
-    natural = points.natural_frequency.values
+    shown = Units.of("rad", units)
+    families, points, _ = _families(system, n, energy_max, shown)
+    natural = points.natural_frequency.values * shown.scale("frequency", "rad/s")
     axes = style.axes_for(ax, legend=legend)
 
     rest = np.zeros(natural.shape)
@@ -159,21 +169,29 @@ def frequency_action(
     axes.set_xlim(0.0, 1.03 * float(families.action.max()))
     axes.set_ylim(0.0, 1.05 * float(np.nanmax([float(families.frequency.max()), *natural])))
     axes.set_xlabel("action $J$ (rad$^2$/s)")
-    axes.set_ylabel(r"frequency $\omega$ (rad/s)")
+    axes.set_ylabel(labels.with_unit(r"frequency $\omega$", shown.text("frequency", "rad/s")))
     if legend:
         style.legend_below(axes, handles)
     return axes
 
 
 def _families(
-    system: Any, n: int, energy_max: float | None
+    system: Any, n: int, energy_max: float | None, shown: Units
 ) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
     """Return the families of orbits of one system, its equilibria and its separatrices."""
     single(system)
     if not any(as_system(system, rung=Trigonometric, what="a family of orbits").coefficients()):
         raise bad("system", system, "a system with a force, for without one nothing oscillates")
     families = orbit_families(system, n, energy_max=energy_max)
-    return families, equilibria(system), separatrices(system)
+    points, loops = equilibria(system), separatrices(system)
+    families = families.assign(
+        energy_level=families.energy_level * shown.scale("energy", "s-2"),
+        period=families.period * shown.scale("period", "s"),
+        frequency=families.frequency * shown.scale("frequency", "rad/s"),
+    )
+    points = points.assign(energy=points.energy * shown.scale("energy", "s-2"))
+    loops = loops.assign(saddle_energy=loops.saddle_energy * shown.scale("energy", "s-2"))
+    return families, points, loops
 
 
 def _draw_families(
@@ -227,7 +245,7 @@ def _draw_walls(ax: Axes, points: xr.Dataset, loops: xr.Dataset) -> list[Artist]
     ]
     walls = [wall for wall in walls if np.isfinite(wall[1])]
     handles: list[Artist] = [
-        ax.axvline(energy, zorder=1, **style.WALLS[name])
+        ax.axvline(energy, zorder=1, **style.inked(style.WALLS[name]))
         for name, energy in [*walls, *(("degenerate", energy) for energy in _degenerate(points))]
     ]
     if len(walls) == 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,18 +12,20 @@ from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.labels.arguments import bad, one_of, reals
-from phasekit.phase.answers import answers
+from phasekit.phase.answers import Answers, answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
-from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts import color_bar, labels, strokes, style
+from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.units import Units, printed
 from phasekit.systems.as_system import single
 
 FloatArray = NDArray[np.float64]
 
-# What level curves can be colored by, and the words at the color bar, by the unit of V.
+# What level curves can be colored by, with its unit by that of V.
 COLORED = {
-    "period": dict.fromkeys(("s-2", "J", ""), "period (s)"),
-    "frequency": dict.fromkeys(("s-2", "J", ""), "frequency (rad/s)"),
-    "action": {"s-2": "action (rad$^2$/s)", "J": "action (J s)", "": "action"},
+    "period": dict.fromkeys(("s-2", "J", ""), "s"),
+    "frequency": dict.fromkeys(("s-2", "J", ""), "rad/s"),
+    "action": {"s-2": "rad2/s", "J": "J s", "": ""},
 }
 
 
@@ -33,6 +36,8 @@ def phase_portrait(
     orbits: ArrayLike | None = None,
     color_by: str | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -63,6 +68,11 @@ def phase_portrait(
         given lie twice as close.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"phi": "deg", "a": "mm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -92,29 +102,40 @@ def phase_portrait(
     """
     if color_by is not None:
         one_of("color_by", color_by, tuple(COLORED))
-    picture = Picture.of(system, energies, orbits, angles, 2.0 if color_by is not None else 1.0)
-    axes = style.axes_for(ax, legend=legend, width=6.4 if color_by is None else 6.8)
-    land, factor = picture.land, picture.factor
+    shown = Shown(angles, units, cut)
+    picture = Picture.of(system, energies, orbits, shown, 2.0 if color_by is not None else 1.0)
+    axes = style.axes_for(ax, legend=legend)
+    land, scale = picture.land, picture.scale
     curves = [(level[0], arc) for level in picture.levels for arc in land.arcs_of(level)]
-    for (energy, arc), color in zip(curves, _colors(axes, land, curves, color_by), strict=True):
+    colors = _colors(axes, picture, curves, color_by)
+    for (energy, arc), color in zip(curves, colors, strict=True):
         look = strokes.level_look(land, arc, color)
-        strokes.draw_level(axes, land, energy, arc, factor, zorder=1, **look)
-    handles = strokes.draw_separatrices(axes, land, factor)
-    handles += strokes.draw_points(axes, land, factor, on_potential=False)
+        strokes.draw_level(axes, land, energy, arc, scale, zorder=1, **look)
+    handles = strokes.draw_separatrices(axes, land, scale)
+    handles += strokes.draw_points(axes, land, scale, on_potential=False)
     handles += [
-        strokes.draw_orbit(axes, land, start, number, factor)
+        strokes.draw_orbit(axes, land, start, number, scale)
         for number, start in enumerate(picture.starts)
     ]
-    reach = factor * picture.reach(given=energies is not None)
+    reach = scale[1] * picture.reach(given=energies is not None)
     axes.set_ylim(-reach, reach)
     picture.coordinate_axis(axes)
-    unit = f" ({style.angle_unit(angles)}/s)" if land.answers.is_angle else ""
     name = picture.symbol
     name = name if name[1:].isalpha() else f"{{{name}}}"  # \varphi needs no braces
-    axes.set_ylabel(rf"$\dot{name}$" + unit)
+    unit = picture.units.text(picture.rate, picture.held[picture.rate])
+    axes.set_ylabel(rf"$\dot{name}$" + (f" ({unit})" if unit else ""))
     if legend:
         style.legend_below(axes, handles)
     return axes
+
+
+@dataclass(frozen=True)
+class Shown:
+    """How a picture is asked to show its coordinate: the arguments of these names."""
+
+    angles: style.Angles
+    units: Mapping[str, str] | None
+    cut: float | None
 
 
 @dataclass(frozen=True)
@@ -124,7 +145,7 @@ class Picture:
     land: LevelCurves
     levels: list[Level]
     starts: list[strokes.State]
-    angles: style.Angles
+    units: Units
 
     @classmethod
     def of(
@@ -132,20 +153,38 @@ class Picture:
         system: Any,
         energies: ArrayLike | None,
         orbits: ArrayLike | None,
-        angles: style.Angles,
+        shown: Shown,
         density: float = 1.0,
     ) -> Picture:
         """Check the arguments of a picture."""
         land = curves_of(system)
-        if style.angle_factor(angles) != 1.0 and not land.answers.is_angle:
+        known = land.answers
+        if style.angle_factor(shown.angles) != 1.0 and not known.is_angle:
             wants = "'rad' for a coordinate that is not an angle of period 2 pi"
-            raise bad("angles", angles, wants)
-        return cls(land, levels_of(land, energies, density), starts_of(land, orbits), angles)
+            raise bad("angles", shown.angles, wants)
+        units = Units.of(shown.angles, shown.units, _held(known))
+        if shown.cut is not None:
+            if known.period is None:
+                raise bad("cut", shown.cut, "None, for the coordinate is not on a circle")
+            scale = units.scale(known.coordinate, _held(known)[known.coordinate])
+            land = LevelCurves(known, Circle.cut_at(shown.cut, scale, known.period).low)
+        return cls(land, levels_of(land, energies, density), starts_of(land, orbits), units)
 
     @property
-    def factor(self) -> float:
-        """What the coordinate is multiplied by to be shown."""
-        return style.angle_factor(self.angles)
+    def rate(self) -> str:
+        """The name of the coordinate's rate."""
+        return f"d{self.land.answers.coordinate}"
+
+    @property
+    def held(self) -> dict[str, str]:
+        """The units in which the coordinate and its rate are held."""
+        return _held(self.land.answers)
+
+    @property
+    def scale(self) -> strokes.Scale:
+        """What the coordinate and its rate are multiplied by to be shown."""
+        first, second = (self.units.scale(*item) for item in self.held.items())
+        return first, second
 
     @property
     def symbol(self) -> str:
@@ -172,15 +211,22 @@ class Picture:
         known = self.land.answers
         text = f"${self.symbol}$"
         if known.is_angle:
-            style.circle_axis(ax, "x", self.angles)
-            text += f" ({style.angle_unit(self.angles)})"
+            name = known.coordinate
+            style.circle_axis(ax, "x", self.units, strokes.circle_of(self.land), name)
+            text += f" ({self.units.text(name, 'rad')})"
         else:
-            ax.set_xlim(*self.land.window)
+            ax.set_xlim(*(self.scale[0] * end for end in self.land.window))
         if known.momentum is not None:
             name, value, unit = known.momentum
             number = f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
-            text += f", at ${name}$ = {number} {labels.unit_text(unit)}"
-        ax.set_xlabel(text)
+            text += f", at ${name}$ = {number} {printed(unit)}"
+        ax.set_xlabel(labels.wrap(text, style.letters(ax, "x")))
+
+
+def _held(known: Answers) -> dict[str, str]:
+    """Return the units in which a coordinate and its rate are held, in this order."""
+    held = ("rad", "s-1") if known.is_angle else ("", "")
+    return dict(zip((known.coordinate, f"d{known.coordinate}"), held, strict=True))
 
 
 def curves_of(system: Any) -> LevelCurves:
@@ -189,16 +235,20 @@ def curves_of(system: Any) -> LevelCurves:
 
 
 def _colors(
-    ax: Axes, land: LevelCurves, curves: list[tuple[float, Arc]], color_by: str | None
+    ax: Axes, picture: Picture, curves: list[tuple[float, Arc]], color_by: str | None
 ) -> list[str | None]:
     """Return the color of each level curve, and draw the color bar."""
+    land = picture.land
     values = np.array([land.orbit(arc, energy, color_by) for energy, arc in curves if color_by])
-    limits = style.log_limits(values)
+    held = "" if color_by is None else COLORED[color_by][land.answers.units]
+    values = values * picture.units.scale(str(color_by), held)
+    limits = color_bar.log_limits(values)
     if color_by is None or limits is None:
         return [None] * len(curves)
-    mappable = style.log_bar(ax, limits, COLORED[color_by][land.answers.units])
-    shown = mappable.to_rgba(np.minimum(values, limits[1]))
-    return [None if np.isnan(v) else to_hex(c) for v, c in zip(values, shown, strict=True)]
+    text = labels.with_unit(color_by, picture.units.text(color_by, held))
+    mappable = color_bar.log_bar(ax, limits, text)
+    colors = mappable.to_rgba(np.minimum(values, limits[1]))
+    return [None if np.isnan(v) else to_hex(c) for v, c in zip(values, colors, strict=True)]
 
 
 def levels_of(land: LevelCurves, energies: ArrayLike | None, density: float = 1.0) -> list[Level]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from phasekit.errors import Loop
 from phasekit.phase.level_curves import Arc
 from phasekit.plot.parts import labels, strokes, style
-from phasekit.plot.phase_portrait import Picture, phase_portrait
+from phasekit.plot.phase_portrait import Picture, Shown, phase_portrait
 
 
 def potential_well(
@@ -21,6 +21,8 @@ def potential_well(
     energies: ArrayLike | None = None,
     orbits: ArrayLike | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Axes | tuple[Axes, Axes]:
@@ -33,7 +35,7 @@ def potential_well(
     ----------
     system
         As in :func:`phase_portrait`.
-    energies, orbits, angles, legend
+    energies, orbits, angles, units, cut, legend
         As in :func:`phase_portrait`.
     ax : Axes or pair of Axes, optional
         One Axes takes the well alone, a pair takes the well and the portrait; a new figure with two
@@ -62,7 +64,8 @@ def potential_well(
     >>> well.get_xlim() == portrait.get_xlim()
     True
     """
-    picture = Picture.of(system, energies, orbits, angles)
+    shown = Shown(angles, units, cut)
+    picture = Picture.of(system, energies, orbits, shown)
     well, *others = _panels(ax)
     _draw_well(well, picture)
     if not others:
@@ -70,19 +73,27 @@ def potential_well(
     well.set_xlabel("")
     well.tick_params(labelbottom=False)
     portrait = phase_portrait(
-        system, energies=energies, orbits=orbits, angles=angles, legend=legend, ax=others[0]
+        system,
+        energies=energies,
+        orbits=orbits,
+        angles=angles,
+        units=units,
+        cut=cut,
+        legend=legend,
+        ax=others[0],
     )
     return well, portrait
 
 
 def _draw_well(well: Axes, picture: Picture) -> None:
-    land, factor = picture.land, picture.factor
+    land, scale = picture.land, picture.scale
+    rise = picture.units.scale("potential", land.answers.units)
     x = np.linspace(*land.window, 1201)
     height = land.answers.potential(x)
     _draw_chords(well, picture)
     curve = style.inked({"color": style.BLACK, "linewidth": 1.8})
-    well.plot(x * factor, height, zorder=3, **curve)
-    strokes.draw_points(well, land, factor, on_potential=True)
+    well.plot(x * scale[0], height * rise, zorder=3, **curve)
+    strokes.draw_points(well, land, (scale[0], rise), on_potential=True)
     # Where V falls without bound, or is steep at the window's ends, show what has a structure.
     marks = np.append(land.answers.energy, land.summit)
     span = float(np.ptp(marks)) or float(np.ptp(height)) or 1.0
@@ -90,16 +101,17 @@ def _draw_well(well: Axes, picture: Picture) -> None:
     high = min(float(height.max()), float(marks.max()) + 0.8 * span)
     # A fast rotation lies far above the well; following it would flatten what is to be seen.
     reached = max([high, *(land.energy(*start) for start in picture.starts)])
-    well.set_ylim(low - 0.1 * span, min(reached, high + 1.5 * span) + 0.2 * span)
+    top = min(reached, high + 1.5 * span) + 0.2 * span
+    well.set_ylim((low - 0.1 * span) * rise, top * rise)
     picture.coordinate_axis(well)
     known = land.answers
     symbol = "V" if known.momentum is None else f"V_{{{known.momentum[0]}}}"
-    well.set_ylabel(f"${symbol}$" + (f" ({labels.unit_text(known.units)})" if known.units else ""))
+    well.set_ylabel(labels.with_unit(f"${symbol}$", picture.units.text("potential", known.units)))
 
 
 def _panels(ax: Any) -> list[Axes]:
     if ax is None:
-        figure = style.new_figure(6.4, 7.2)
+        figure = style.new_figure(1.5)
         return list(figure.subplots(2, 1, sharex=True, height_ratios=(1.0, 1.5)))
     if isinstance(ax, np.ndarray) and ax.ndim == 1:
         ax = ax.tolist()
@@ -110,12 +122,13 @@ def _panels(ax: Any) -> list[Axes]:
 
 def _draw_chords(ax: Axes, picture: Picture) -> None:
     """Draw every energy over the arcs where it is reached: levels, saddles, orbits."""
-    land, factor = picture.land, picture.factor
-    period = land.answers.period
+    land, (stretch, _) = picture.land, picture.scale
+    rise = picture.units.scale("potential", land.answers.units)
+    circle = strokes.circle_of(land)
 
     def chord(energy: float, arc: Arc, zorder: float, look: style.Look) -> None:
-        x, y = strokes.round_the_cylinder(np.array(arc), np.full(2, energy), period)
-        ax.plot(x * factor, y, zorder=zorder, **look)
+        x, y = circle.unrolled(np.array(arc), np.full(2, energy * rise))
+        ax.plot(x * stretch, y, zorder=zorder, **look)
 
     for level in picture.levels:
         for arc in land.arcs_of(level):
@@ -124,11 +137,10 @@ def _draw_chords(ax: Axes, picture: Picture) -> None:
         chord(energy, arc, 2.5 if loop == Loop.WINDING else 2.0, style.inked(strokes.LOOPS[loop]))
         if loop == Loop.LOBES:
             phi, _ = land.curve(arc, energy)
-            for turn in strokes.turns_in_sight(phi, period):
-                x = (phi + turn) * factor
-                ax.fill_between(
-                    x, land.answers.potential(phi), energy, zorder=0.5, **style.EIGHT_FILL
-                )
+            height = land.answers.potential(phi) * rise
+            for turn in circle.turns(phi):
+                x = (phi + turn) * stretch
+                ax.fill_between(x, height, energy * rise, zorder=0.5, **style.EIGHT_FILL)
     for number, start in enumerate(picture.starts):
         for arc in strokes.orbit_arcs(land, start):
             chord(land.energy(*start), arc, 4, strokes.orbit_look(number))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
@@ -10,6 +12,7 @@ from matplotlib.axes import Axes
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import flag, named
 from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts.units import Units
 
 TIME = "time"
 SYMBOLS = {"motion_phi": r"$\varphi$", "motion_dphi": r"$\dot\varphi$"}
@@ -22,6 +25,7 @@ def time_history(
     variable: str = "motion_phi",
     *,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -38,6 +42,8 @@ def time_history(
         The quantity to draw: motion_phi, motion_dphi, or any other number along ``time``.
     angles : {"rad", "deg"}
         Unit in which angles and angular velocities are shown.
+    units : mapping of str to str, optional
+        Units in which quantities and parameters are shown, by name: ``{"time": "ms"}``.
     legend : bool
         Whether to name the motions under the axes, if there are several.
     ax : matplotlib.axes.Axes, optional
@@ -72,8 +78,8 @@ def time_history(
     >>> ax.get_ylabel()
     '$\\dot\\varphi$ (rad/s)'
     """
-    factor = style.angle_factor(angles)
     ds = labels.dataset(dataset, "dataset", (), "pk.flow")
+    ds, shown = Units.of_dataset(ds, angles, units)
     offered = _drawable(ds)
     if not offered:
         raise ParameterError(
@@ -84,19 +90,20 @@ def time_history(
     flag("legend", legend)
     times = ds[TIME]
     labels.monotone(times, "time")
-    motions = motions_of(ds[variable], str(times.dims[0]), angles)
+    motions = motions_of(ds[variable], str(times.dims[0]), shown)
     axes = style.axes_for(ax, legend=legend and len(motions) > 1)
 
-    stretch = factor if variable in SYMBOLS or ds[variable].attrs.get("units") == "rad" else 1.0
+    held = str(ds[variable].attrs.get("units", ""))
+    stretch, pace = shown.scale(variable, held), shown.scale(TIME, "s")
     handles: list[Artist] = []
     for number, (name, motion) in enumerate(motions.items()):
         look = strokes.orbit_look(number) if len(motions) > 1 else style.MOTION
-        handles += axes.plot(times.values, motion.values * stretch, label=name, **look)
-    if ds[variable].attrs.get("units") == "rad":
-        style.unwrapped_axis(axes, "y", angles)
-    axes.set_xlim(*sorted((float(times[0]), float(times[-1]))))
-    axes.set_xlabel("$t$ (s)")
-    axes.set_ylabel(_label(ds[variable], angles, style.letters(axes, "y")))
+        handles += axes.plot(times.values * pace, motion.values * stretch, label=name, **look)
+    if held == "rad":
+        style.unwrapped_axis(axes, "y", shown, variable)
+    axes.set_xlim(*sorted((float(times[0]) * pace, float(times[-1]) * pace)))
+    axes.set_xlabel(f"$t$ ({shown.text(TIME, 's')})")
+    axes.set_ylabel(_label(ds[variable], shown, style.letters(axes, "y")))
     if legend and len(motions) > 1:
         style.legend_below(axes, handles)
     return axes
@@ -111,7 +118,7 @@ def _drawable(ds: xr.Dataset) -> list[str]:
     ]
 
 
-def motions_of(values: xr.DataArray, along: str, angles: style.Angles) -> dict[str, xr.DataArray]:
+def motions_of(values: xr.DataArray, along: str, units: Units) -> dict[str, xr.DataArray]:
     """Return the motions one by one, under what tells each from the others."""
     dims = [str(dim) for dim in values.dims if dim != along]
     count = int(np.prod([values.sizes[dim] for dim in dims], dtype=int))
@@ -133,7 +140,7 @@ def motions_of(values: xr.DataArray, along: str, angles: style.Angles) -> dict[s
     ]
     names = [
         ", ".join(
-            labels.value(coord.isel({dim: cell[str(dim)] for dim in coord.dims}), angles)
+            labels.value(coord.isel({dim: cell[str(dim)] for dim in coord.dims}), units)
             for coord in telling
         )
         for cell in cells
@@ -143,9 +150,8 @@ def motions_of(values: xr.DataArray, along: str, angles: style.Angles) -> dict[s
     return {name: values.isel(cell) for name, cell in zip(names, cells, strict=True)}
 
 
-def _label(values: xr.DataArray, angles: style.Angles, width: int) -> str:
-    name = str(values.name)
+def _label(values: xr.DataArray, units: Units, width: int) -> str:
+    name, held = str(values.name), str(values.attrs.get("units", ""))
     if name not in SYMBOLS:
-        return labels.label(values, angles, width)
-    unit = style.angle_unit(angles)
-    return f"{SYMBOLS[name]} ({unit if name == 'motion_phi' else unit + '/s'})"
+        return labels.label(values, units, width)
+    return labels.with_unit(SYMBOLS[name], units.text(name, held))

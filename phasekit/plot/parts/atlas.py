@@ -13,7 +13,10 @@ from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind
 from phasekit.labels.arguments import bad, named
-from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts import labels, style
+from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.points import label_points
+from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
@@ -25,12 +28,12 @@ def draw(
     x: str | None,
     y: str,
     *,
-    angles: style.Angles,
+    units: Units,
+    cut: float | None,
     legend: bool,
     ax: Axes | None,
 ) -> Axes:
     """Draw an atlas; `bifurcation_diagram` says what the arguments are."""
-    factor = style.angle_factor(angles)
     parameter = str(ds.attrs.get("parameter", ""))
     if parameter not in ds.coords or ds[parameter].dims != DIMS:
         raise bad("dataset", ds, "what branches returns, with its attribute 'parameter'")
@@ -42,10 +45,8 @@ def draw(
     named("y", y, offered)
     axes = style.axes_for(ax, legend=legend)
     along, up = ds[parameter], ds[y]
-    stretch = (
-        factor if along.attrs.get("units") == "rad" else 1.0,
-        factor if up.attrs.get("units") == "rad" else 1.0,
-    )
+    stretch = tuple(units.scale(str(v.name), v.attrs.get("units", "")) for v in (along, up))
+    circle = Circle.of_axis(up, units, cut)
     handles: dict[str, Artist] = {}
     for row in range(ds.sizes["branch"]):
         cells = {"branch": row}
@@ -54,17 +55,17 @@ def draw(
         for kind, part in _runs(kinds):
             look = style.BRANCHES.get(kind, style.MERGED)
             across, height = (v[part] for v in values)
-            if y == "phi":
-                height, across = strokes.round_the_cylinder(height, across)
+            if circle is not None:
+                height, across = circle.unrolled(height, across)
             (line,) = axes.plot(across * stretch[0], height * stretch[1], **look)
             handles.setdefault(str(look["label"]), line)
-    if y == "phi":
-        style.circle_axis(axes, "y", angles)
+    if circle is not None:
+        style.circle_axis(axes, "y", units, circle)
     low, high = float(along.min()) * stretch[0], float(along.max()) * stretch[0]
     axes.set_xlim(low, high)
-    handles |= _mark(axes, ds, y, stretch)
-    axes.set_xlabel(labels.label(along, angles, style.letters(axes, "x")))
-    axes.set_ylabel(labels.label(up, angles, style.letters(axes, "y")))
+    handles |= _mark(axes, ds, y, stretch, circle)
+    axes.set_xlabel(labels.label(along, units, style.letters(axes, "x")))
+    axes.set_ylabel(labels.label(up, units, style.letters(axes, "y")))
     if legend:
         style.legend_below(axes, list(handles.values()))
     return axes
@@ -82,25 +83,28 @@ def _runs(kinds: NDArray[np.int8]) -> Iterator[tuple[EquilibriumKind, slice]]:
             yield EquilibriumKind(int(chords[start])), slice(int(start), int(stop) + 1)
 
 
-def _mark(ax: Axes, ds: xr.Dataset, y: str, stretch: tuple[float, float]) -> dict[str, Artist]:
+def _mark(
+    ax: Axes, ds: xr.Dataset, y: str, stretch: tuple[float, ...], circle: Circle | None
+) -> dict[str, Artist]:
     """Mark and label the special points, but for the ends of branches."""
     handles: dict[str, Artist] = {}
     kinds = ds["special_kind"].values
     texts = ds["special_label"].values
     x = ds["special_value"].values
     heights = ds["special_phi"].values if y == "phi" else _heights(ds, y)
-    placed: list[tuple[float, float]] = []
+    named: dict[tuple[float, float], str] = {}
     for name, look in style.MERGERS.items():
         chosen = np.flatnonzero(kinds == name)
         if not chosen.size:
             continue
-        across, up = x[chosen] * stretch[0], heights[chosen] * stretch[1]
+        across, up = x[chosen], heights[chosen]
+        if circle is not None:
+            up, across = circle.points(up, across)
+        across, up = across * stretch[0], up * stretch[1]
         ax.plot(across, up, linestyle="none", zorder=4, clip_on=False, **look)
         handles[name] = Line2D([], [], linestyle="none", **look)
-        for i, point in zip(chosen, zip(across, up, strict=True), strict=True):
-            if point not in placed:
-                placed.append(point)
-                label_point(ax, point, str(texts[i]))
+        named |= {point: str(texts[chosen[0]]) for point in zip(across, up, strict=True)}
+    label_points(ax, named)
     return handles
 
 
@@ -116,20 +120,3 @@ def _heights(ds: xr.Dataset, y: str) -> FloatArray:
             off = np.abs(np.sin(0.5 * (phi.flat[near] - angle)))
             found[i] = up.flat[near[int(np.nanargmin(off))]]
     return found
-
-
-def label_point(ax: Axes, point: tuple[float, float], text: str) -> None:
-    """Write the name of a point next to it, on the side where there is room."""
-    u, v = ax.transAxes.inverted().transform(ax.transData.transform(point))
-    right, above = u < 0.9, v < 0.9
-    ax.annotate(
-        text,
-        point,
-        xytext=(6 if right else -6, 6 if above else -6),
-        textcoords="offset points",
-        ha="left" if right else "right",
-        va="bottom" if above else "top",
-        fontsize="small",
-        zorder=6,
-        annotation_clip=False,
-    )

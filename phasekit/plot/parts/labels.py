@@ -11,9 +11,9 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
-from phasekit.plot.parts.style import Angles, angle_factor, angle_unit
-from phasekit.systems.identity import model_name
-from phasekit.systems.registry import model_named
+from phasekit.plot.parts.units import Angles, Units, as_units
+from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION
+from phasekit.systems.registry import models
 from phasekit.systems.system import Model
 
 SYMBOLS = {
@@ -28,35 +28,48 @@ SYMBOLS = {
     **{name: f"${name}$" for name in ("A", "B", "C", "a", "e", "g", "m", "r")},
 }
 
+#: Names of quantities where there is no room for their meaning, if they are not plain words.
+BRIEF = {"n_equilibria": "number of equilibria"}
+
 GLUE = "\N{NO-BREAK SPACE}"
+#: From this number of letters on, labels may have two lines.
+ROOMY = 36
 
 
-def unit_text(units: str) -> str:
-    """Return CF units for print: ``m s-2`` becomes m s with a raised -2.
-
-    >>> unit_text("m s-2")
-    'm s$^{-2}$'
-    """
-    return re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", units)
-
-
-def shown(values: xr.DataArray, angles: Angles) -> tuple[np.ndarray[Any, Any], str]:
+def shown(values: xr.DataArray, units: Angles | Units) -> tuple[np.ndarray[Any, Any], str]:
     """Return the values in the unit in which they are shown, and that unit for print."""
-    units = str(values.attrs.get("units", ""))
-    if units == "rad":
-        return values.values * angle_factor(angles), angle_unit(angles)
-    return values.values, "" if units in ("", "1") else unit_text(units)
+    return as_units(units).shown(values)
 
 
-def label(values: xr.DataArray, angles: Angles, width: int, extra: str = "") -> str:
-    """Return what a quantity or parameter is called on an axis: symbol, meaning, unit."""
+def label(values: xr.DataArray, units: Angles | Units, width: int, extra: str = "") -> str:
+    """Return what a quantity or parameter is called on an axis: symbol, meaning, unit.
+
+    Where that does not fit into two lines of `width` letters, or into one if these are few, it is
+    the symbol or the name, with the unit.
+    """
     name = str(values.name)
     meaning = str(values.attrs.get("long_name", ""))
     symbol = SYMBOLS.get(name, "" if meaning else name)
-    text = ", ".join(part for part in (symbol, meaning, extra) if part)
-    unit = shown(values, angles)[1]
+    unit = as_units(units).text(name, str(values.attrs.get("units", "")))
+    brief = SYMBOLS.get(name) or BRIEF.get(name, name.replace("_", " "))
+    long, short = (
+        ", ".join(filter(None, one)) for one in ((symbol, meaning, extra), (brief, extra))
+    )
+    return fitting(width, unit, long, short, brief)
+
+
+def with_unit(text: str, unit: str) -> str:
+    """Return a text with its unit, if it has one."""
+    return f"{text} ({unit})" if unit else text
+
+
+def fitting(width: int, unit: str, *texts: str) -> str:
+    """Return the first of the texts that fits with its unit: in one line where few letters do."""
+    lines = 2 if width >= ROOMY else 1
     # The unit stays with the last word.
-    return wrap(f"{text}{GLUE}({unit.replace(' ', GLUE)})" if unit else text, width)
+    end = f"{GLUE}({unit.replace(' ', GLUE)})" if unit else ""
+    wrapped = [wrap(text + end, width) for text in texts]
+    return next((text for text in wrapped if text.count("\n") < lines), wrapped[-1])
 
 
 def wrap(text: str, width: int) -> str:
@@ -76,7 +89,7 @@ def wrap(text: str, width: int) -> str:
     return "\n".join(lines).replace(GLUE, " ")
 
 
-def value(number: xr.DataArray, angles: Angles) -> str:
+def value(number: xr.DataArray, units: Angles | Units) -> str:
     r"""Return one value of a coordinate for print.
 
     >>> value(xr.DataArray(0.5, name="beta", attrs={"units": "rad"}), "rad")
@@ -86,9 +99,7 @@ def value(number: xr.DataArray, angles: Angles) -> str:
     symbol = SYMBOLS.get(name, name.replace("_", " "))
     if number.dtype.kind not in "iuf":
         return f"{symbol} {number.item()}".replace("_", " ")
-    shown_value, unit = shown(number, angles)
-    if name == "state_dphi":
-        shown_value, unit = number.values * angle_factor(angles), f"{angle_unit(angles)}/s"
+    shown_value, unit = shown(number, units)
     text = f"{float(shown_value):.4g}".replace("-", "\N{MINUS SIGN}")
     between = "" if unit.startswith("°") or not unit else GLUE
     return f"{symbol} = {text}{between}{unit}"
@@ -107,15 +118,26 @@ def dataset(
     return value
 
 
+def model_in(ds: xr.Dataset) -> type[Model] | None:
+    """Return the model that a Dataset names, if all that it needs is there."""
+    model = models().get(str(ds.attrs.get(MODEL)))
+    if model is None or ds.attrs.get(SCHEMA) != SCHEMA_VERSION:
+        return None
+    needed = (parameter.name for parameter in model.declared if not parameter.optional)
+    return model if all(name in ds.variables for name in needed) else None
+
+
 def system_of(motion: xr.Dataset, argument: str, instead: str) -> Model:
     """Return the system whose motion a Dataset holds."""
-    try:
-        return model_named("ds", model_name(motion)).from_dataset(motion)
-    except ParameterError as error:
+    model = model_in(motion)
+    if model is None:
+        named = motion.attrs.get(MODEL)
+        without = f"of {named}, without its parameters" if named else f"no attribute {MODEL!r}"
         raise ParameterError(
-            f"{argument}: got a motion that does not tell its system ({error}); "
+            f"{argument}: got a motion that does not tell its system ({without}); "
             f"give {instead}(disk, motion)"
-        ) from None
+        )
+    return model.from_dataset(motion)
 
 
 def swept(values: xr.DataArray, labels: Iterable[Hashable] = ()) -> list[str]:

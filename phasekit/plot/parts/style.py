@@ -6,25 +6,29 @@ color alone: each also has its own line style or marker, so that a picture survi
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
-from matplotlib.colors import ListedColormap, LogNorm, to_rgba
-from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, MultipleLocator, NullLocator
-from matplotlib.transforms import ScaledTranslation
+from matplotlib.colors import ListedColormap, to_rgba
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from phasekit.errors import EquilibriumKind, Topology
-from phasekit.labels.arguments import bad, flag
+from phasekit.plot.parts.circle import circle_axis as circle_axis
+from phasekit.plot.parts.circle import unwrapped_axis as unwrapped_axis
+from phasekit.plot.parts.frame import axes_for as axes_for
+from phasekit.plot.parts.frame import check_axes as check_axes
+from phasekit.plot.parts.frame import few_ticks as few_ticks
+from phasekit.plot.parts.frame import inches as inches
+from phasekit.plot.parts.frame import legend_below as legend_below
+from phasekit.plot.parts.frame import letters as letters
+from phasekit.plot.parts.frame import narrow as narrow
+from phasekit.plot.parts.frame import new_figure as new_figure
+from phasekit.plot.parts.units import Angles as Angles
+from phasekit.plot.parts.units import angle_factor as angle_factor
+from phasekit.plot.parts.units import angle_unit as angle_unit
 
-Angles = Literal["rad", "deg"]
 Look = dict[str, Any]
 
 BLACK, GRAY = "#000000", "#6E6E6E"
@@ -284,90 +288,9 @@ KIND_COLORS: Mapping[int, str] = {
     EquilibriumKind.DEGENERATE: BLACK,
 }
 SEQUENTIAL = "cividis"
-# Colors of lines stay clear of the light end, which is lost on white.
+# Colors of lines stay clear of the light end, which is lost on white, or of the dark one on black.
 LINES = ListedColormap(plt.colormaps["viridis"](np.linspace(0.0, 0.9, 256)))
-
-
-def new_figure(width: float = 6.4, height: float = 4.8) -> Figure:
-    """Return an empty pyplot figure that keeps labels and legends inside."""
-    return plt.figure(figsize=(width, height), layout="constrained")
-
-
-def axes_for(ax: object, *, legend: bool, width: float = 6.4) -> Axes:
-    """Return the Axes to draw in: the given one, or that of a new figure."""
-    flag("legend", legend)
-    if ax is None:
-        return new_figure(width).add_subplot()
-    return check_axes(ax, legend=legend)
-
-
-def check_axes(ax: object, argument: str = "ax", *, legend: bool = False) -> Axes:
-    """Return `ax` if it is a matplotlib Axes, with room for a legend under it if it gets one.
-
-    Without a layout engine a figure would cut the legend off; this has to be settled before a
-    color bar is made.
-    """
-    if not isinstance(ax, Axes):
-        raise bad(argument, ax, "a matplotlib Axes", "figure, ax = plt.subplots() makes one")
-    figure = ax.get_figure(root=True)
-    if legend and figure is not None and figure.get_layout_engine() is None:
-        # Refused where a color bar of the old layout stands already.
-        with contextlib.suppress(RuntimeError):
-            figure.set_layout_engine("constrained")
-    return ax
-
-
-def angle_factor(angles: object) -> float:
-    """Return what radians are multiplied by to be shown in `angles`."""
-    factors = {"rad": 1.0, "deg": 180.0 / np.pi}
-    if not isinstance(angles, str) or angles not in factors:
-        raise bad("angles", angles, "'rad' or 'deg'")
-    return factors[angles]
-
-
-def multiple_of_pi(value: float, _position: object = None) -> str:
-    """Write an angle as a multiple of pi/2."""
-    halves = round(value / (np.pi / 2))
-    if halves == 0:
-        return "0"
-    sign = "-" if halves < 0 else ""
-    whole, odd = divmod(abs(halves), 2)
-    if odd:
-        top = "" if abs(halves) == 1 else f"{abs(halves)}"
-        return rf"${sign}{top}\pi/2$"
-    return rf"${sign}{'' if whole == 1 else whole}\pi$"
-
-
-def angle_unit(angles: Angles) -> str:
-    """Return the symbol of the unit in which angles are shown."""
-    return "rad" if angles == "rad" else "°"
-
-
-def circle_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
-    """Show the whole circle on one axis, with ticks at multiples of a quarter turn."""
-    factor = angle_factor(angles)
-    axis = ax.xaxis if which == "x" else ax.yaxis
-    quarters = np.arange(-2, 3) * (np.pi / 2)
-    axis.set_major_locator(FixedLocator(list(quarters * factor)))
-    axis.set_minor_locator(MultipleLocator(np.pi / 8 * factor))
-    if angles == "rad":
-        axis.set_major_formatter(FuncFormatter(multiple_of_pi))
-    ax.set(**{f"{which}lim": (-np.pi * factor, np.pi * factor)})
-
-
-def unwrapped_axis(ax: Axes, which: Literal["x", "y"], angles: Angles) -> None:
-    """Put ticks at quarter turns or multiples of them, where an axis spans half a turn or more."""
-    factor = angle_factor(angles)
-    axis = ax.xaxis if which == "x" else ax.yaxis
-    low, high = sorted(ax.get_xlim() if which == "x" else ax.get_ylim())
-    quarters = (high - low) / factor / (np.pi / 2)
-    if quarters < 2.0 or not np.isfinite(quarters):
-        return
-    steps = [1.0, 2.0, *(float(f"{digit}e{power}") for power in range(16) for digit in (4, 8, 20))]
-    step = next((step for step in steps if quarters <= 8.0 * step), quarters / 8.0)
-    axis.set_major_locator(MultipleLocator(step * np.pi / 2 * factor))
-    if angles == "rad":
-        axis.set_major_formatter(FuncFormatter(multiple_of_pi))
+LINES_ON_DARK = ListedColormap(plt.colormaps["viridis"](np.linspace(0.25, 1.0, 256)))
 
 
 def inked(look: Look) -> Look:
@@ -375,73 +298,12 @@ def inked(look: Look) -> Look:
     return {**look, "color": plt.rcParams["text.color"]} if look["color"] == BLACK else look
 
 
-def log_limits(values: Any) -> tuple[float, float] | None:
-    """Return the least and the greatest of the finite values > 0, None where there are none."""
-    finite = np.asarray(values)[np.isfinite(values) & (np.asarray(values) > 0.0)]
-    if not finite.size:
-        return None
-    low, high = float(finite.min()), float(finite.max())
-    return (low, high) if high > 1.02 * low else (low / 1.1, high * 1.1)
+def lines() -> ListedColormap:
+    """Return the colors of lines on the background that is set."""
+    dark = sum(to_rgba(plt.rcParams["axes.facecolor"])[:3]) < 1.5
+    return LINES_ON_DARK if dark else LINES
 
 
-def log_bar(ax: Axes, limits: tuple[float, float], text: str) -> ScalarMappable:
-    """Draw a color bar with round numbers, also where a logarithmic scale spans little."""
-    mappable = ScalarMappable(LogNorm(*limits), LINES)
-    log_ticks(ax.figure.colorbar(mappable, ax=ax, label=text))
-    return mappable
-
-
-def log_ticks(bar: Colorbar) -> None:
-    """Put round numbers along a color bar with a logarithmic scale."""
-    bar.ax.yaxis.set_major_locator(FixedLocator(round_numbers(*bar.mappable.get_clim())))
-    bar.ax.yaxis.set_minor_locator(NullLocator())
-    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:.4g}"))
-
-
-def round_numbers(low: float, high: float) -> list[float]:
-    """Return round numbers from `low` to `high` for a logarithmic scale.
-
-    >>> round_numbers(1.8, 33.0), round_numbers(1.8, 3.3)
-    ([2.0, 5.0, 10.0, 20.0], [2.0, 2.5, 3.0])
-    """
-    if high < 5.0 * low:
-        ticks = list(MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(low, high))
-    else:
-        digits = (1, 2, 5) if high < 5e3 * low else (1,)
-        powers = range(int(np.floor(np.log10(low))), int(np.floor(np.log10(high))) + 1)
-        ticks = [float(f"{digit}e{power}") for power in powers for digit in digits]
-    inside = [float(tick) for tick in ticks if low <= tick <= high]
-    return inside[:: -(-len(inside) // 9)] if inside else [low, high]
-
-
-def letters(ax: Axes, which: Literal["x", "y"]) -> int:
-    """Return about how many letters of a label fit along one axis."""
-    axis = ax.xaxis if which == "x" else ax.yaxis
-    box = ax.get_window_extent().transformed(ax.figure.dpi_scale_trans.inverted())
-    inches = box.width if which == "x" else box.height
-    return max(20, int(72.0 * inches / (0.6 * float(axis.label.get_fontsize()))))
-
-
-def legend_below(ax: Axes, handles: list[Artist]) -> None:
-    """Put a legend under the axis label, where it cannot cover what is drawn."""
-    if not handles:
-        return
-    text = ax.xaxis.label
-    lines = text.get_text().count("\n") + 1
-    points = 22.0 + 1.35 * lines * float(text.get_fontsize())
-    offset = ScaledTranslation(0.0, -points / 72.0, ax.figure.dpi_scale_trans)
-    for columns in range(min(3, len(handles)), 0, -1):
-        legend = ax.legend(
-            handles=handles,
-            loc="upper center",
-            bbox_to_anchor=(0.5, 0.0),
-            bbox_transform=ax.transAxes + offset,
-            ncols=columns,
-            frameon=False,
-            borderaxespad=0.0,
-            fontsize="small",
-            handlelength=2.6,
-        )
-        # A wider one would be cut, or leave no room for the axes.
-        if legend.get_window_extent().width <= 1.25 * ax.get_window_extent().width:
-            break
+def halo(color: str = "white", width: float = 1.6) -> list[AbstractPathEffect]:
+    """Return what sets a line or a text off from what lies under it."""
+    return [withStroke(linewidth=width, foreground=color)]

@@ -1,0 +1,157 @@
+"""Figures, Axes and legends: how much room there is, and what fits into it."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from typing import Literal
+
+import matplotlib.pyplot as plt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.legend import Legend
+from matplotlib.transforms import ScaledTranslation
+
+from phasekit.labels.arguments import bad, flag
+
+#: Axes that are narrower than this (inches) have short names in their legends.
+NARROW = 4.0
+#: Part of the height of a panel that a legend may take before names become short.
+TALL = 0.25
+#: What names become where there is little room.
+SHORT: Mapping[str, str] = {
+    "winding separatrix": "winding",
+    "unbounded separatrix": "unbounded",
+    "heteroclinic cycle": "heteroclinic",
+    "homoclinic loop": "homoclinic",
+    "level of the degenerate point": "degenerate level",
+    "rest, at every angle": "rest",
+    "saddles of equal energy": "equal saddles",
+    "centers of equal energy": "equal centers",
+    "energy of the saddle": "saddle",
+    "energy of the lower saddle": "lower saddle",
+    "energy of the upper saddle": "upper saddle",
+    "energy of the degenerate point": "degenerate",
+    "round both wells": "both wells",
+    "small oscillations": "centers",
+    "transcritical point": "transcritical",
+}
+
+
+def new_figure(tall: float = 1.0) -> Figure:
+    """Return an empty pyplot figure that keeps labels and legends inside.
+
+    It has the size that matplotlib is set to, but for its height, which is `tall` times that.
+    """
+    width, height = plt.rcParams["figure.figsize"]
+    return plt.figure(figsize=(width, tall * height), layout="constrained")
+
+
+def axes_for(ax: object, *, legend: bool) -> Axes:
+    """Return the Axes to draw in: the given one, or that of a new figure."""
+    flag("legend", legend)
+    return new_figure().add_subplot() if ax is None else check_axes(ax, legend=legend)
+
+
+def check_axes(ax: object, argument: str = "ax", *, legend: bool = False) -> Axes:
+    """Return `ax` if it is a matplotlib Axes, with room for a legend under it if it gets one.
+
+    Without a layout engine a figure would cut the legend off; this has to be settled before a
+    color bar is made.
+    """
+    if not isinstance(ax, Axes):
+        raise bad(argument, ax, "a matplotlib Axes", "figure, ax = plt.subplots() makes one")
+    figure = ax.get_figure(root=True)
+    if legend and figure is not None and figure.get_layout_engine() is None:
+        # Refused where a color bar of the old layout stands already.
+        with contextlib.suppress(RuntimeError):
+            figure.set_layout_engine("constrained")
+    return ax
+
+
+def inches(ax: Axes) -> tuple[float, float]:
+    """Return width and height of Axes."""
+    box = ax.get_window_extent().transformed(ax.figure.dpi_scale_trans.inverted())
+    return float(box.width), float(box.height)
+
+
+def narrow(ax: Axes) -> bool:
+    """Whether Axes have room for short names only."""
+    return inches(ax)[0] < NARROW
+
+
+def few_ticks(ax: Axes) -> None:
+    """Put no more ticks with long numbers along a narrow axis than have room."""
+    if narrow(ax):
+        ax.locator_params(axis="x", nbins=4)
+
+
+def letters(ax: Axes, which: Literal["x", "y"]) -> int:
+    """Return about how many letters of a label fit along one axis."""
+    axis = ax.xaxis if which == "x" else ax.yaxis
+    length = inches(ax)["xy".index(which)]
+    return max(12, int(72.0 * length / (0.55 * float(axis.label.get_fontsize()))))
+
+
+def legend_below(
+    ax: Axes, handles: list[Artist], short: Mapping[str, str] | None = None
+) -> Legend | None:
+    """Put a legend under the axis label, where it cannot cover what is drawn.
+
+    It has as many columns as fit; in narrow Axes it has the names of `SHORT` and `short`, if
+    those that the handles have would take too much.
+    """
+    if not handles:
+        return None
+    names = [str(handle.get_label()) for handle in handles]
+    brief = [{**SHORT, **(short or {})}.get(name, name) for name in names]
+    tried: dict[float, tuple[list[str], int]] = {}
+    width, height = _room(ax)
+    for texts in [names, brief] if brief != names else [names]:
+        for columns in range(min(3, len(handles)), 0, -1):
+            box = _legend(ax, handles, texts, columns).get_window_extent()
+            if box.width <= width or columns == 1:
+                tried.setdefault(float(box.height), (texts, columns))
+                break
+        if box.height <= TALL * height and box.width <= width:
+            break
+    texts, columns = tried[min(tried)]
+    return _legend(ax, handles, texts, columns)
+
+
+def _legend(ax: Axes, handles: list[Artist], texts: list[str], columns: int) -> Legend:
+    label = ax.xaxis.label
+    lines = label.get_text().count("\n") + 1
+    points = 22.0 + 1.35 * lines * float(label.get_fontsize())
+    offset = ScaledTranslation(0.0, -points / 72.0, ax.figure.dpi_scale_trans)
+    small = narrow(ax)
+    return ax.legend(
+        handles=handles,
+        labels=texts,
+        loc="upper center",
+        bbox_to_anchor=(0.5, 0.0),
+        bbox_transform=ax.transAxes + offset,
+        ncols=columns,
+        frameon=False,
+        borderaxespad=0.0,
+        fontsize="small",
+        handlelength=2.2 if small else 2.6,
+        columnspacing=1.0 if small else 2.0,
+        handletextpad=0.5 if small else 0.8,
+        labelspacing=0.3 if small else 0.5,
+    )
+
+
+def _room(ax: Axes) -> tuple[float, float]:
+    """Return the width that a legend may have, in pixels, and the height of the panel.
+
+    Before the layout Axes in a figure of their own are narrower than after it, if they have no
+    color bar beside them.
+    """
+    box, figure = ax.get_window_extent(), ax.figure
+    if [*figure.axes] != [ax]:
+        return float(box.width), float(box.height)
+    tight = ax.get_tightbbox()
+    beside = 0.0 if tight is None else max(box.x0 - tight.x0, 0.0) + max(tight.x1 - box.x1, 0.0)
+    return float(figure.bbox.width - beside) * 0.98, float(figure.bbox.height)

@@ -1,0 +1,136 @@
+"""The units in which a picture shows its quantities, by their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from phasekit.labels.arguments import bad, unknown
+from phasekit.labels.conversion import in_si
+from phasekit.labels.coordinates import STATES
+from phasekit.labels.units import UNITS, UNITS_OF, converted, factor, usual
+from phasekit.systems.registry import models
+from phasekit.table.quantities import quantities
+
+Angles = Literal["rad", "deg"]
+
+PRINTED = {"deg": "°", "deg/s": "°/s", "deg/s2": "°/s$^2$", "um": "\N{MICRO SIGN}m", "1": ""}
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units of a picture.
+
+    Attributes
+    ----------
+    angles : {"rad", "deg"}
+        Unit of the angles that `chosen` does not name.
+    chosen : mapping of str to str
+        Units by the names of quantities and parameters; that of ``phi`` is also that of
+        ``motion_phi`` and ``state_phi``.
+    """
+
+    angles: Angles = "rad"
+    chosen: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, angles: Any, units: Any = None, own: Mapping[str, str] | None = None) -> Units:
+        """Check what a picture got for `angles` and `units`; `own` are units of its own names."""
+        angle_factor(angles)
+        if units is None:
+            return cls(angles)
+        if not isinstance(units, Mapping):
+            raise bad("units", units, "a mapping from names to units, such as {'beta': 'deg'}")
+        known = {**_known(), **(own or {})}
+        for name, unit in units.items():
+            if not isinstance(name, str) or name not in known:
+                raise unknown("name in units", name, known)
+            converted(f"units: {name}", 1.0, _base(known[name]), unit)
+        return cls(angles, {name: usual(unit) for name, unit in units.items()})
+
+    @classmethod
+    def of_dataset(cls, ds: xr.Dataset, angles: Any, units: Any) -> tuple[xr.Dataset, Units]:
+        """Return a Dataset in SI units and radians, and the units in which it is shown.
+
+        What it holds in another unit is shown in that one, if nothing else is asked for.
+        """
+        held = {str(name): str(one.attrs.get("units", "")) for name, one in ds.variables.items()}
+        asked = cls.of(angles, units, {name: _base(unit) for name, unit in held.items()})
+        others = {name: unit for name, unit in held.items() if _base(unit) != unit}
+        ds = in_si(ds)
+        return ds, cls(asked.angles, {**others, **asked.chosen})
+
+    def unit(self, name: str, held: str) -> str:
+        """Return the unit in which values are shown that are held in the unit `held`."""
+        bare = name.removeprefix("motion_").removeprefix("state_")
+        chosen = self.chosen.get(name, self.chosen.get(bare))
+        if chosen is not None:
+            return chosen
+        if held == "s-1" and bare == "dphi":
+            return f"{self.angles}/s"
+        return self.angles if held == "rad" else held
+
+    def scale(self, name: str, held: str) -> float:
+        """Return what values that are held in the unit `held` are multiplied by to be shown."""
+        unit, base = self.unit(name, held), _base(held)
+        if unit == held:
+            return 1.0
+        si = float(factor(name, held, base)) if held != base else 1.0
+        return float(converted(f"units: {name}", si, base, unit))
+
+    def text(self, name: str, held: str) -> str:
+        """Return the unit for print."""
+        return printed(self.unit(name, held))
+
+    def shown(self, values: xr.DataArray) -> tuple[NDArray[Any], str]:
+        """Return the values in the unit in which they are shown, and that unit for print."""
+        name, held = str(values.name), str(values.attrs.get("units", ""))
+        times = self.scale(name, held)
+        return (values.values if times == 1.0 else values.values * times), self.text(name, held)
+
+
+def as_units(angles: Angles | Units) -> Units:
+    """Return `Units`, where the unit of angles may stand for them."""
+    return angles if isinstance(angles, Units) else Units.of(angles)
+
+
+def printed(unit: str) -> str:
+    """Return a unit for print: ``m s-2`` becomes m s with a raised -2.
+
+    >>> printed("m s-2"), printed("deg/s"), printed("1")
+    ('m s$^{-2}$', '°/s', '')
+    """
+    return PRINTED.get(unit, re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", unit))
+
+
+def angle_factor(angles: object) -> float:
+    """Return what radians are multiplied by to be shown in `angles`."""
+    factors = {"rad": 1.0, "deg": 180.0 / np.pi}
+    if not isinstance(angles, str) or angles not in factors:
+        raise bad("angles", angles, "'rad' or 'deg'")
+    return factors[angles]
+
+
+def angle_unit(angles: Angles) -> str:
+    """Return the symbol of the unit in which angles are shown."""
+    return printed(angles)
+
+
+def _base(held: str) -> str:
+    """Return the SI unit of the values of a unit; the unit itself where it is not known."""
+    fitting = (base for base, units in UNITS.items() if held == base or usual(held) in units)
+    return next(fitting, held)
+
+
+def _known() -> dict[str, str]:
+    """Return the names that quantities, parameters and states have anywhere, with their units."""
+    parameters = {p.name: p.units for model in models().values() for p in model.declared}
+    states = {name: units for name, (units, _) in STATES.items()}
+    rows = {name: row.units for name, row in quantities().items()}
+    return {**UNITS_OF, **parameters, **states, **rows}

@@ -1,0 +1,221 @@
+"""Every public picture, narrow and wide, light and dark, on ordinary and on degenerate input.
+
+A picture is laid out as it would be saved; its texts must lie inside the figure and clear of each
+other, and what is drawn must have at least half of the width.
+"""
+
+import functools
+import inspect
+import warnings
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from matplotlib.colors import to_rgb
+from witnesses.text_boxes import drawn_texts, faults
+
+import phasekit as pk
+from phasekit.labelled.accessor import MapPlots
+
+WIDTHS = (3.4, 6.4)
+EIGHT = pk.Reduced(lam=0.4, psi=0.1)
+CUSP = pk.Reduced(lam=1.0, psi=0.0)
+FORCELESS = pk.Coefficients(0.0, 0.0, 0.0)
+DISK = pk.GyroRotorDisk(beta=1.4, e=0.05, a=0.012, r=0.2, omega1=31.4, m=2.0, half_span=0.2, g=9.81)
+#: As it swings, turns over, and rests.
+STARTS = {"swing": (0.5, 3.0), "turn": (0.0, -60.0)}
+
+
+@functools.cache
+def plane():
+    beta, a = np.linspace(0.0, np.pi / 2, 15), np.arange(-5, 6) * 12e-3
+    return pk.sweep(DISK, beta=beta, a=a, of=("equilibria", "separatrices", "separatrix_forces"))
+
+
+@functools.cache
+def motions():
+    return pk.flow(DISK, [0.5, 1.0, 2.0], [3.0, 0.0, -60.0], np.linspace(0.0, 2.0, 101))
+
+
+@functools.cache
+def loci(kind):
+    if kind == "disk":
+        return pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
+    ends = {"astroid": (-1.5, 1.5), "empty": (3.0, 4.0)}[kind]
+    return pk.bifurcation_set(pk.Reduced(0.0, 0.0), "lam", "psi", xlim=ends, ylim=ends)
+
+
+@functools.cache
+def atlas():
+    return pk.branches(DISK, "beta", (0.0, np.pi / 2))
+
+
+@functools.cache
+def cubic():
+    problem = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+    return pk.continuation(problem, "mu", x0=[-1.3], span=(-1.0, 1.0))
+
+
+@functools.cache
+def diagram():
+    return pk.diagram(DISK, "beta", span=(0.05, 1.5))
+
+
+@functools.cache
+def column():
+    return pk.equilibria(pk.Reduced(lam=np.linspace(0.0, 1.5, 31), psi=0.1))
+
+
+def without_values(ds):
+    """A Dataset all of whose numbers are missing."""
+    return ds.map(lambda one: one * np.nan if one.dtype.kind == "f" else one, keep_attrs=True)
+
+
+P = pk.plot
+PLANE = (pk.Reduced(0.0, 0.0), "lam", "psi")
+#: Cases of every picture: what it shows, and how it is drawn.
+CASES = {
+    "phase_portrait": {
+        "eight": lambda: P.phase_portrait(EIGHT, orbits=[(0.3, 0.0), (2.0, 2.0)]),
+        "disk": lambda: P.phase_portrait(DISK, angles="deg", cut=0.0),
+        "colored": lambda: P.phase_portrait(EIGHT, color_by="period"),
+        "cusp": lambda: P.phase_portrait(CUSP),
+        "no force": lambda: P.phase_portrait(FORCELESS),
+        "support": lambda: P.phase_portrait(pk.FreeGyroRotor(DISK, 0.3)),
+    },
+    "potential_well": {
+        "eight": lambda: P.potential_well(EIGHT, orbits=(0.3, 0.0))[0],
+        "no force": lambda: P.potential_well(FORCELESS)[0],
+    },
+    "bifurcation_diagram": {
+        "atlas": lambda: P.bifurcation_diagram(atlas(), angles="deg"),
+        "columns": lambda: P.bifurcation_diagram(column()),
+        "frequency": lambda: P.bifurcation_diagram(column(), y="natural_frequency"),
+        "all NaN": lambda: P.bifurcation_diagram(without_values(column())),
+    },
+    "branch": {
+        "cubic": lambda: cubic().plot(),
+        "disk": lambda: P.branch(diagram(), units={"phi": "deg", "beta": "deg"}, cut=-90.0),
+    },
+    "bifurcation_set": {
+        "astroid": lambda: P.bifurcation_set(loci("astroid")),
+        "disk": lambda: P.bifurcation_set(loci("disk"), units={"beta": "deg", "a": "mm"}),
+        "no curves": lambda: P.bifurcation_set(loci("empty")),
+    },
+    "branch_surface": {
+        "folds": lambda: P.branch_surface(*PLANE, xlim=(0.0, 1.5), ylim=(-0.6, 0.6), cells=8),
+    },
+    "force_polygon": {
+        "swing": lambda: P.force_polygon(DISK, *STARTS["swing"]),
+        "turn": lambda: P.force_polygon(DISK, *STARTS["turn"], bearing="B2"),
+        "no force": lambda: P.force_polygon(DISK.replace(g=0.0, omega1=0.0), 0.5, 0.0),
+    },
+    "bearing_forces": {
+        "swing": lambda: P.bearing_forces(DISK, orbit=STARTS["swing"], angles="deg"),
+        "turn": lambda: P.bearing_forces(DISK, orbit=STARTS["turn"], bearing="A2"),
+        "time": lambda: P.bearing_forces(motions().isel(point=0), x="time", bearing="B2"),
+        "rest": lambda: P.bearing_forces(DISK.replace(a=0.0), orbit=(0.0, 0.0)),
+    },
+    "bearing_load_map": {
+        "disk": lambda: P.bearing_load_map(plane(), units={"a": "mm", "peak_force": "kN"}),
+        "all NaN": lambda: P.bearing_load_map(without_values(plane())),
+    },
+    "hodograph": {
+        "levels": lambda: P.hodograph(EIGHT),
+        "point": lambda: P.hodograph(DISK, "R01"),
+        "motions": lambda: P.hodograph(motions(), "R2"),
+        "cusp": lambda: P.hodograph(CUSP),
+        "no force": lambda: P.hodograph(FORCELESS, orbits=(0.0, 1.0)),
+    },
+    "parameter_map": {
+        "topology": lambda: P.parameter_map(plane(), angles="deg"),
+        "count": lambda: P.parameter_map(plane(), "n_equilibria"),
+        "exponent": lambda: P.parameter_map(plane(), "exponent", equilibrium="lower_saddle"),
+        "margin": lambda: P.parameter_map(plane(), "fold_margin"),
+        "four cells": lambda: P.parameter_map(plane().isel(beta=[3, 9], a=[4, 5]), legend=False),
+        "all NaN": lambda: P.parameter_map(without_values(plane()), "fold_margin"),
+    },
+    "period_energy": {
+        "eight": lambda: P.period_energy(EIGHT, 40),
+        "cusp": lambda: P.period_energy(CUSP, 40),
+    },
+    "frequency_action": {
+        "eight": lambda: P.frequency_action(EIGHT, 40),
+        "cusp": lambda: P.frequency_action(CUSP, 40),
+    },
+    "time_history": {
+        "angles": lambda: P.time_history(motions(), angles="deg"),
+        "rates": lambda: P.time_history(motions(), "motion_dphi"),
+        "all NaN": lambda: P.time_history(without_values(motions()).isel(point=0)),
+    },
+}
+EVERY = [(name, case) for name, cases in CASES.items() for case in cases]
+
+
+def drawn(name, case, width, style="default"):
+    """Return the figure of a case."""
+    with plt.style.context(style), plt.rc_context({"figure.figsize": (width, 0.75 * width)}):
+        figure = CASES[name][case]().get_figure(root=True)
+    assert figure.get_size_inches()[0] == pytest.approx(width)
+    return figure
+
+
+def test_every_picture_has_a_case():
+    assert set(CASES) == set(pk.plot.__all__)
+    methods = {name for name, _ in inspect.getmembers(MapPlots, inspect.isfunction)}
+    assert {name for name in methods if not name.startswith("_")} <= set(CASES)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(("name", "case"), EVERY)
+def test_texts_are_inside_and_clear_of_each_other(name, case, width):
+    figure = drawn(name, case, width)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of a layout that does not fit
+        texts = drawn_texts(figure)
+        assert len(texts) > 4
+        assert faults(figure, texts) == []
+    widest = max(axes.get_window_extent().width for axes in figure.axes)
+    assert widest >= 0.5 * figure.bbox.width
+
+
+def contrast(one, other):
+    """Ratio of two lightnesses, from 1 to 21."""
+
+    def light(color):
+        linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in color]
+        return float(np.dot(linear, (0.2126, 0.7152, 0.0722)))
+
+    low, high = sorted([light(to_rgb(one)), light(to_rgb(other))])
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("style", ["default", "dark_background"])
+@pytest.mark.parametrize("name", CASES)
+def test_lines_and_texts_stand_out(name, style):
+    figure = drawn(name, next(iter(CASES[name])), 6.4, style)
+    ground = figure.get_facecolor()
+    checked = 0
+    for axes in figure.axes:
+        legend = axes.get_legend()
+        lines = [*axes.lines, *(legend.get_lines() if legend else [])]
+        for line in lines:
+            if line.get_linestyle() != "None" and not line.get_path_effects():
+                checked += 1
+                assert contrast(line.get_color(), ground) > 1.5, (line.get_label(), axes)
+        for text in [axes.xaxis.label, axes.yaxis.label, *axes.texts, *axes.get_xticklabels()]:
+            checked += 1
+            assert contrast(text.get_color(), ground) > 1.8, text
+    assert checked > 3
+
+
+def test_texts_that_run_out_or_over_each_other_are_found():
+    figure = plt.figure(figsize=(2.0, 2.0))
+    figure.text(0.9, 0.5, "long enough to run out")
+    figure.text(0.2, 0.2, "one")
+    figure.text(0.2, 0.21, "other")
+    figure.text(0.2, 0.8, "alone")
+    found = faults(figure, drawn_texts(figure))
+    assert len(found) == 2
+    assert "run out' is outside" in found[0]
+    assert found[1] == "'one' covers 'other'"

@@ -1,0 +1,223 @@
+"""Quantities are shown in the units that are asked for by their names."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+DEG, MM, RPM = 180.0 / np.pi, 1000.0, 30.0 / np.pi
+EIGHT = pk.Coefficients(1.0, 0.4, 0.1)
+DISK = pk.GyroRotorDisk(beta=1.4, e=0.05, a=0.012, r=0.2, omega1=31.4, m=2.0, half_span=0.2, g=9.81)
+MOTION = pk.flow(DISK, 0.5, 3.0, np.linspace(0.0, 2.0, 51))
+MAP = pk.sweep(
+    DISK,
+    beta=np.linspace(0.2, 1.5, 9),
+    a=np.linspace(-0.06, 0.06, 7),
+    of=("equilibria", "separatrices", "separatrix_forces"),
+)
+ATLAS = pk.branches(DISK, "beta", (0.2, 1.5))
+SET = pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
+DIAGRAM = pk.diagram(DISK, "beta", span=(0.05, 1.5))
+P = pk.plot
+SPAN = {"xlim": (0.2, 1.5), "ylim": (-0.05, 0.05), "cells": 4, "legend": False}
+
+#: A picture, the units asked for, what both axes are multiplied by, and words at them.
+CASES = {
+    "phase_portrait": (
+        lambda **o: P.phase_portrait(EIGHT, orbits=(0.3, 0.2), **o),
+        {"phi": "deg", "dphi": "rpm"},
+        (DEG, RPM),
+        ("(°)", "(rpm)"),
+    ),
+    "potential_well": (
+        lambda **o: P.potential_well(EIGHT, **o)[0],
+        {"phi": "deg", "potential": "deg/s2"},
+        (DEG, DEG),
+        ("", r"(°/s$^2$)"),
+    ),
+    "bifurcation_diagram": (
+        lambda **o: P.bifurcation_diagram(ATLAS, **o),
+        {"beta": "deg"},
+        (DEG, 1.0),
+        ("(°)", "(rad)"),
+    ),
+    "branch": (
+        lambda **o: P.branch(DIAGRAM, **o),
+        {"beta": "deg", "phi": "degrees"},
+        (DEG, DEG),
+        ("(°)", "(°)"),
+    ),
+    "bifurcation_set": (
+        lambda **o: P.bifurcation_set(SET, **o),
+        {"beta": "deg", "a": "mm"},
+        (DEG, MM),
+        ("(°)", "(mm)"),
+    ),
+    "branch_surface": (
+        lambda **o: P.branch_surface(DISK, "beta", "a", **SPAN, **o),
+        {"beta": "deg", "a": "mm", "phi": "deg"},
+        (DEG, MM),
+        ("(°)", "(mm)"),
+    ),
+    "force_polygon": (
+        lambda **o: P.force_polygon(DISK, 0.5, 2.0, **o),
+        {"force": "kN"},
+        (1e-3, 1e-3),
+        ("(kN)", "(kN)"),
+    ),
+    "bearing_forces": (
+        lambda **o: P.bearing_forces(MOTION, x="time", **o),
+        {"time": "ms", "force": "kN"},
+        (1e3, 1e-3),
+        ("(ms)", "(kN)"),
+    ),
+    "bearing_load_map": (
+        lambda **o: P.bearing_load_map(MAP, **o),
+        {"beta": "deg", "a": "mm"},
+        (DEG, MM),
+        ("(°)", "(mm)"),
+    ),
+    "hodograph": (
+        lambda **o: P.hodograph(EIGHT, orbits=(0.3, 0.2), **o),
+        {"rotator": "deg/s2"},
+        (DEG, DEG),
+        (r"(°/s$^2$)", r"(°/s$^2$)"),
+    ),
+    "parameter_map": (
+        lambda **o: P.parameter_map(MAP, "exponent", equilibrium="lower_saddle", **o),
+        {"beta": "deg", "a": "mm"},
+        (DEG, MM),
+        ("(°)", "(mm)"),
+    ),
+    "period_energy": (
+        lambda **o: P.period_energy(EIGHT, 9, **o),
+        {"period": "ms"},
+        (1.0, 1e3),
+        ("(s$^{-2}$)", "(ms)"),
+    ),
+    "frequency_action": (
+        lambda **o: P.frequency_action(EIGHT, 9, **o),
+        {"frequency": "rpm"},
+        (1.0, RPM),
+        ("(rad$^2$/s)", "(rpm)"),
+    ),
+    "time_history": (
+        lambda **o: P.time_history(MOTION, "motion_dphi", **o),
+        {"time": "ms", "dphi": "rpm"},
+        (1e3, RPM),
+        ("(ms)", "(rpm)"),
+    ),
+}
+
+
+def drawn(ax):
+    """All that has a place on the axes: lines, names of points and arrows, cells, contours."""
+    solid = ax.name == "3d"
+    data = [line.get_data_3d()[:2] if solid else line.get_data() for line in ax.lines]
+    found = [np.array(one, dtype=float) for one in data]
+    if solid:
+        return [*found, np.array([ax.get_xlim(), ax.get_ylim()])]
+    found += [np.array([text.xy]).T for text in ax.texts if hasattr(text, "xy")]
+    for one in ax.collections:
+        if hasattr(one, "get_coordinates"):
+            found.append(one.get_coordinates().reshape(-1, 2).T)
+        elif hasattr(one, "levels"):
+            found += [path.vertices.T for path in one.get_paths()]
+    return [points for points in found if points.size]
+
+
+def test_every_picture_takes_units():
+    names = set(pk.plot.__all__)
+    assert set(CASES) == names
+    for name in names:
+        assert "units" in inspect.signature(getattr(pk.plot, name)).parameters, name
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_what_is_drawn_is_multiplied(name):
+    draw, units, factors, words = CASES[name]
+    plain, ax = draw(), draw(units=units)
+    pairs = list(zip(drawn(plain), drawn(ax), strict=True))
+    assert len(pairs) > 0
+    whole = np.concatenate([one.T for one, _ in pairs])
+    size = np.nanmax(np.abs(whole[np.isfinite(whole).all(axis=1)]), axis=0)
+    for one, other in pairs:
+        if np.ptp(one[1][np.isfinite(one[1])]) == 1.0 and (one[1] >= 0.0).all():
+            continue  # a line from edge to edge, in shares of the axes
+        for which, factor in enumerate(factors):
+            np.testing.assert_allclose(
+                other[which], factor * one[which], rtol=1e-9, atol=1e-9 * factor * size[which]
+            )
+    for text, word in zip((ax.get_xlabel(), ax.get_ylabel()), words, strict=True):
+        assert text.replace("\n", " ").endswith(word)
+
+
+def test_degrees_by_name_are_degrees_of_all():
+    one = P.phase_portrait(EIGHT, angles="deg")
+    other = P.phase_portrait(EIGHT, units={"phi": "deg", "dphi": "deg/s"})
+    for line, same in zip(one.lines, other.lines, strict=True):
+        np.testing.assert_allclose(line.get_data(), same.get_data(), rtol=1e-14)
+    assert one.get_ylabel() == other.get_ylabel() == r"$\dot\varphi$ (°/s)"
+    mixed = P.parameter_map(MAP, angles="deg", units={"beta": "rad"})
+    assert mixed.get_xlabel().endswith("(rad)")
+
+
+def test_colors_have_units_too():
+    bar = P.bearing_load_map(MAP, units={"peak_force": "kN"}).collections[0]
+    plain = P.bearing_load_map(MAP).collections[0]
+    np.testing.assert_allclose(bar.get_array(), plain.get_array() / 1000.0)
+    assert bar.colorbar.ax.get_ylabel().endswith("(kN)")
+    colored = P.phase_portrait(EIGHT, color_by="period", units={"period": "ms"})
+    assert colored.figure.axes[1].get_ylabel() == "period (ms)"
+
+
+@pytest.mark.parametrize("draw", [P.bifurcation_diagram, P.parameter_map, P.time_history])
+def test_a_dataset_in_other_units_is_drawn_in_them(draw):
+    ds = {
+        P.bifurcation_diagram: MAP.isel(a=3, drop=False),
+        P.parameter_map: MAP,
+        P.time_history: MOTION,
+    }[draw]
+    options = {"variable": "fold_margin"} if draw is P.parameter_map else {}
+    other = ds.copy()
+    units = {"beta": ("deg", DEG), "a": ("mm", MM), "phi": ("deg", DEG), "motion_phi": ("deg", DEG)}
+    units = {name: unit for name, unit in units.items() if name in ds.variables}
+    for name, (unit, factor) in units.items():
+        values = (ds[name].dims, ds[name].values * factor, {**ds[name].attrs, "units": unit})
+        assign = other.assign_coords if name in ds.coords else other.assign
+        other = assign({name: values})
+    one = draw(other, **options)
+    same = draw(ds, units={name: unit for name, (unit, _) in units.items()}, **options)
+    assert one.get_xlabel() == same.get_xlabel()
+    assert one.get_ylabel() == same.get_ylabel()
+    pairs = list(zip(drawn(one), drawn(same), strict=True))
+    assert pairs
+    for got, want in pairs:
+        np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("units", "message"),
+    [
+        ({"bata": "deg"}, "^name in units 'bata' is unknown; did you mean 'beta'"),
+        ({"beta": "mm"}, "^units: beta: got 'mm', wants rad or deg"),
+        ({"beta": None}, "^units: beta: got None, wants rad or deg"),
+        ({"a": "deg"}, "^units: a: got 'deg', wants m or cm or mm"),
+        ({"topology": "deg"}, "^units: topology: got 'deg', wants '1'"),
+        ({3: "deg"}, "^name in units 3 is unknown"),
+        ("deg", "^units: got 'deg', wants a mapping"),
+        (["deg"], "^units: got .*wants a mapping"),
+    ],
+)
+def test_wrong_units_are_named(units, message):
+    for draw in (P.parameter_map, P.bearing_load_map):
+        with pytest.raises(pk.ParameterError, match=message):
+            draw(MAP, units=units)
+    with pytest.raises(pk.ParameterError, match=message):
+        P.phase_portrait(DISK, units=units)
+
+
+def test_names_of_other_pictures_are_understood():
+    assert P.phase_portrait(EIGHT, units={"beta": "deg", "omega1": "rpm", "a": "mm"}).lines
