@@ -311,6 +311,10 @@ class MapPlots:
         """Draw the force polygon of the one selected cell in a state; returns the Axes."""
         return picture("force_polygon")(self._cell(), phi, dphi, **options)
 
+    def hysteresis_loop(self, **options: Any) -> Any:
+        """Draw what `quasi_static` followed, with its jumps; returns the Axes."""
+        return picture("hysteresis_loop")(self._ds, **options)
+
     def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
         """Draw the load on the separatrices over two swept parameters; returns the Axes."""
         return picture("bearing_load_map")(self._ds, variable, **options)
