@@ -56,6 +56,27 @@ def test_every_public_name_is_there(name):
     assert name in dir(pk)
 
 
+@pytest.mark.parametrize("name", sorted(set(pk.__all__) - {"plot", "deg", "rpm", "__version__"}))
+def test_help_has_an_example_that_runs(name):
+    """The doctests of the suite run it."""
+    thing = getattr(pk, name)
+    assert ">>> " in inspect.getdoc(thing)
+    assert thing.__module__.startswith("phasekit.")
+
+
+def test_pictures_and_what_maps_can_do_have_examples():
+    from phasekit.labelled.accessor import MapPlots, PhasekitAccessor
+
+    for name in pk.plot.__all__:
+        assert ">>> " in inspect.getdoc(getattr(pk.plot, name)), name
+    methods = [m for n, m in inspect.getmembers(PhasekitAccessor) if not n.startswith("_")]
+    assert len(methods) > 4
+    for method in methods:
+        if inspect.isfunction(method):
+            assert ">>> " in inspect.getdoc(method), method
+    assert ">>> " in inspect.getdoc(MapPlots)
+
+
 def test_type_checkers_see_the_same_names():
     tree = ast.parse(inspect.getsource(pk))
     block = next(
