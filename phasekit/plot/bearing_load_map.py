@@ -13,7 +13,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.loads import is_disk, on_map
 from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import one_of
-from phasekit.plot.parameter_map import parameter_map
+from phasekit.plot.parameter_map import SELECTION, parameter_map
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.units import Units
 
@@ -110,8 +110,7 @@ def bearing_load_map(
             continue  # selected already
         load = load.max(name, keep_attrs=True) if value == "larger" else load.sel({name: value})
         words.append(_words(name, value))
-    meaning = ", ".join([str(load.attrs.get("long_name", variable)), *filter(None, words)])
-    ds = ds.assign({variable: load.assign_attrs(long_name=meaning)})
+    ds = ds.assign({variable: load.assign_attrs({SELECTION: ", ".join(filter(None, words))})})
     if log is None:
         log = _spans_decades(load)
     return parameter_map(
@@ -149,7 +148,11 @@ def _with_loads(ds: xr.Dataset, variable: str) -> xr.Dataset:
         found[variable] = on_map(ds, system, "forces", "separatrix", None, None)[variable]
     if "fold_margin" not in ds:
         found["fold_margin"] = equilibria(system).fold_margin
-    return ds.assign(found)
+    # Axes of the map stay as they are: they may be in other units.
+    own = {
+        name: load.drop_vars(load.coords.keys() & ds.coords.keys()) for name, load in found.items()
+    }
+    return ds.assign(own)
 
 
 def _spans_decades(load: xr.DataArray) -> bool:

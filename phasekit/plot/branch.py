@@ -160,7 +160,8 @@ def branch(
             up, across = circle.points(up, across)
         across, up = across * stretch[0], up * stretch[-1]
         for point in zip(across, up, strict=True):
-            named[point] = f"{named[point]}, {label}" if point in named else label
+            before = named.get(point, label)
+            named[point] = before if label in before.split(", ") else f"{before}, {label}"
         axes.plot(
             across, up, linestyle="none", marker=marker, markersize=7, markerfacecolor=color,
             markeredgecolor=style.BLACK, zorder=3 if label == "NS" else 4,

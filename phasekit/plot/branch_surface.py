@@ -27,9 +27,12 @@ FloatArray = NDArray[np.float64]
 
 LEAST, MOST = 4, 200
 LIGHT = LightSource(azdeg=225.0, altdeg=50.0).direction
+# What is left of the light on faces that turn away from it.
+SHADE = 0.72
+# Light and dark under any light, so that they differ in gray, too.
 FACES = {
-    EquilibriumKind.CENTER: style.SKY,
-    EquilibriumKind.SADDLE: style.ORANGE,
+    EquilibriumKind.CENTER: "#8FD0F5",
+    EquilibriumKind.SADDLE: style.VERMILLION,
 }
 
 
@@ -168,7 +171,7 @@ def _add_faces(ax: Any, triangles: FloatArray, stretch: FloatArray, color: str) 
     normal = triangles[..., 3:].mean(axis=1)
     length = np.linalg.norm(normal, axis=1)
     glance = np.abs(normal @ LIGHT) / np.where(length > 0.0, length, 1.0)
-    colors = np.array(to_rgb(color)) * (0.55 + 0.45 * glance)[:, None]
+    colors = np.array(to_rgb(color)) * (SHADE + (1.0 - SHADE) * glance)[:, None]
     corners = triangles[..., :3] * stretch
     faces = Poly3DCollection(
         corners, facecolors=colors, edgecolors=colors, linewidths=0.2, zorder=1

@@ -20,6 +20,8 @@ from phasekit.plot.parts import color_bar, labels, style
 from phasekit.plot.parts.strands import relative_gap
 from phasekit.plot.parts.units import Units
 
+# The attribute that says what has been selected before.
+SELECTION = "selection"
 # In Axes with less room than for so many letters, codes are keys of the legend.
 ROOM_FOR_BAR = 45
 # The values along x and along y, as shown.
@@ -95,10 +97,9 @@ def parameter_map(
     """
     flag("log", log)
     ds = labels.dataset(dataset, "dataset", ())
-    ds, shown = Units.of_dataset(ds, angles, units)
     if not isinstance(variable, str) or variable not in ds.data_vars:
         raise unknown("variable", variable, map(str, ds.data_vars))
-    chosen = _select(ds, variable, sel)
+    chosen, shown = Units.of_dataset(_select(ds, variable, sel), angles, units)
     field = chosen[variable]
     across, up = _axes_of(field, x, y)
     field = field.transpose(up.dims[0], across.dims[0])
@@ -139,7 +140,8 @@ def _select(ds: xr.Dataset, variable: str, sel: Mapping[str, Any]) -> xr.Dataset
 def _named(values: xr.DataArray, sel: Mapping[str, Any]) -> str:
     """Return the selected labels for print; selected numbers stand in the coordinates."""
     names = [str(sel[name]) for name in sel if values[name].dtype.kind not in "iuf"]
-    return ", ".join(names).replace("_", " ")
+    before = str(values.attrs.get(SELECTION, ""))
+    return ", ".join(filter(None, [before, *(name.replace("_", " ") for name in names)]))
 
 
 def _axes_of(

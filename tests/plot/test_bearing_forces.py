@@ -159,6 +159,22 @@ def test_lines_differ_by_more_than_color():
         assert len(looks) == len(ax.lines)
 
 
+@pytest.mark.parametrize("components", ["magnitude", ["u2", "v2"], "n2"])
+@pytest.mark.parametrize("x", ["phi", "time"])
+def test_lines_do_not_touch_the_frame(x, components):
+    # A fast turn: what changes is small beside what stays.
+    light = DISK.replace(e=1e-5, a=1.0)
+    ax = pk.plot.bearing_forces(light, orbit=(0.0, 5.0), x=x, components=components)
+    heights = np.concatenate([line.get_ydata() for line in ax.lines])
+    low, high = ax.get_ylim()
+    assert heights.size > 100
+    assert high - np.nanmax(heights) > 0.03 * (high - low)
+    if components == "magnitude":
+        assert low == 0.0
+    else:
+        assert np.nanmin(heights) - low > 0.03 * (high - low)
+
+
 @pytest.mark.parametrize(
     ("disk", "options", "message"),
     [

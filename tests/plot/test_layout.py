@@ -5,6 +5,7 @@ other, and what is drawn must have at least half of the width.
 """
 
 import functools
+import importlib
 import inspect
 import warnings
 
@@ -16,6 +17,7 @@ from witnesses.text_boxes import drawn_texts, faults
 
 import phasekit as pk
 from phasekit.labelled.accessor import MapPlots
+from phasekit.plot.parts import style as parts
 
 WIDTHS = (3.4, 6.4)
 EIGHT = pk.Reduced(lam=0.4, psi=0.1)
@@ -178,6 +180,16 @@ def test_every_picture_has_a_case():
     assert {name for name in methods if not name.startswith("_")} <= set(CASES)
 
 
+def test_names_under_plot_are_pictures():
+    assert dir(pk.plot) == sorted(pk.plot.__all__)
+    assert {name for name in vars(pk.plot) if not name.startswith("_")} == set(pk.plot.__all__)
+    for name in ("phase_potrait", "parts", "periods"):
+        with pytest.raises(AttributeError, match=f"^picture '{name}' is unknown") as caught:
+            getattr(pk.plot, name)
+        if name != "parts":
+            assert "did you mean 'p" in str(caught.value)
+
+
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize(("name", "case"), EVERY)
 def test_texts_are_inside_and_clear_of_each_other(name, case, width):
@@ -219,6 +231,16 @@ def test_lines_and_texts_stand_out(name, style):
             checked += 1
             assert contrast(text.get_color(), ground) > 1.8, text
     assert checked > 3
+
+
+def test_faces_and_arrows_differ_in_gray():
+    faces = importlib.import_module("phasekit.plot.branch_surface")
+    center, saddle = (
+        np.dot(to_rgb(color), (0.2126, 0.7152, 0.0722)) for color in faces.FACES.values()
+    )
+    assert faces.SHADE * center > saddle + 0.05  # whatever way they face
+    dashes = [str(look["linestyle"]) for look in parts.POLYGON]
+    assert len(dashes) == len(set(dashes)) == 5
 
 
 def test_texts_that_run_out_or_over_each_other_are_found():

@@ -205,6 +205,23 @@ def test_a_dataset_in_other_units_is_drawn_in_them(draw):
         np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-9)
 
 
+def test_a_map_in_other_units_is_selected_in_them():
+    three = pk.sweep(
+        DISK, beta=MAP.beta.values[::2], a=MAP.a.values[::2], omega1=[10.0, 20.0, 30.0]
+    )
+    speeds = three.omega1
+    other = three.assign_coords(omega1=("omega1", speeds.values * RPM, {"units": "rpm"}))
+    other = other.assign_coords(a=("a", three.a.values * MM, {**three.a.attrs, "units": "mm"}))
+    for draw, options in ((P.bearing_load_map, {}), (P.parameter_map, {"variable": "fold_margin"})):
+        one = draw(other, omega1=20.0 * RPM, **options)
+        same = draw(three, omega1=20.0, units={"a": "mm"}, **options)
+        assert np.isfinite(same.collections[0].get_array()).any()
+        for got, want in zip(drawn(one), drawn(same), strict=True):
+            np.testing.assert_allclose(got, want, rtol=1e-9, atol=1e-12)
+        values = (ax.collections[0].get_array() for ax in (one, same))
+        np.testing.assert_allclose(*values, rtol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("units", "message"),
     [

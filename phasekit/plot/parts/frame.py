@@ -17,6 +17,8 @@ from phasekit.labels.arguments import bad, flag
 
 #: Axes that are narrower than this (inches) have short names in their legends.
 NARROW = 4.0
+#: Axes that are lower than this (inches) lose a good part of their height to a legend.
+LOW = 3.0
 #: Part of the height of a panel that a legend may take before names become short.
 TALL = 0.25
 #: What names become where there is little room.
@@ -91,6 +93,8 @@ def letters(ax: Axes, which: Literal["x", "y"]) -> int:
     """Return about how many letters of a label fit along one axis."""
     axis = ax.xaxis if which == "x" else ax.yaxis
     length = inches(ax)["xy".index(which)]
+    if which == "y" and length < LOW:
+        length *= 0.75  # a legend is yet to take its part
     return max(12, int(72.0 * length / (0.55 * float(axis.label.get_fontsize()))))
 
 

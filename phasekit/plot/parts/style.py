@@ -256,8 +256,14 @@ ORBIT_DASHES: tuple[Any, ...] = ("-", (0, (6, 2)), (0, (6, 2, 1.5, 2)), (0, (1.5
 LOAD_COLORS = (BLUE, VERMILLION, GREEN, PURPLE)
 # Sides of a force polygon: the four components, the weight; and what they sum to.
 POLYGON: tuple[Look, ...] = tuple(
-    {"color": color, "linestyle": "-", "linewidth": 2.0}
-    for color in (BLUE, SKY, GREEN, PURPLE, GRAY)
+    {"color": color, "linestyle": dash, "linewidth": 2.0}
+    for color, dash in (
+        (BLUE, "-"),
+        (SKY, (0, (4, 1))),
+        (GREEN, (0, (6, 1.5, 1.5, 1.5))),
+        (PURPLE, (0, (1.5, 0.8))),
+        (GRAY, (0, (2.5, 1))),
+    )
 )
 RESULTANT: Look = {"color": BLACK, "linestyle": "-", "linewidth": 2.6}
 

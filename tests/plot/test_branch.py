@@ -1,0 +1,81 @@
+"""Branches of a continuation are drawn as the smooth curves that they are."""
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.plot.parts.smooth import smooth
+
+CUBIC = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+CIRCLE = pk.Problem("x**2 + mu**2 - 1", state="x", parameters={"mu": 0.0})
+COARSE = pk.ContinuationOptions(max_step=0.3)
+
+
+def corners(ax):
+    """The angles (degrees) by which lines turn from one segment to the next, on the page."""
+    found = []
+    for line in ax.lines:
+        x, y = ax.transData.transform(np.column_stack(line.get_data())).T
+        if line.get_linestyle() != "None":
+            way = np.diff(x) + 1j * np.diff(y)
+            way = way[np.abs(way) > 0.5]  # what is shorter than a pixel is no corner
+            found.append(np.degrees(np.angle(way[1:] / way[:-1])))
+    return np.abs(np.concatenate(found))
+
+
+@pytest.mark.parametrize(
+    ("problem", "start", "residual"),
+    [
+        (CUBIC, -1.3, lambda mu, x: mu + x - x**3),
+        (CIRCLE, 1.0, lambda mu, x: x**2 + mu**2 - 1.0),
+    ],
+)
+def test_a_coarse_branch_is_smooth_at_its_folds(problem, start, residual):
+    branch = pk.continuation(problem, "mu", x0=[start], span=(-2.0, 2.0), options=COARSE)
+    assert len(branch.special("LP")) == 2
+    ax = branch.plot()
+    known = branch.points.sizes["point"]
+    drawn = [line.get_data() for line in ax.lines if line.get_linestyle() != "None"]
+    mu, x = np.concatenate([np.array(one) for one in drawn], axis=1)
+    assert mu.size > 2 * known
+    turned = corners(ax)
+    assert turned.size > 50
+    assert turned.max() < 8.0
+    assert np.abs(residual(mu, x)).max() < 5e-3
+
+
+def test_points_of_the_branch_are_kept():
+    branch = pk.continuation(CUBIC, "mu", x0=[-1.3], span=(-2.0, 2.0), options=COARSE)
+    drawn = np.concatenate([np.array(line.get_data()) for line in branch.plot().lines], axis=1).T
+    known = np.column_stack([branch.points.mu.values, branch.points.x.values])
+    assert len(known) > 10
+    for point in known:
+        assert np.abs(drawn - point).sum(axis=1).min() < 1e-14
+
+
+def test_what_has_no_tangent_stays_as_it_is():
+    branch = pk.continuation(
+        CUBIC, "mu", x0=[-1.3], span=(-2.0, 2.0), record={"twice": lambda x, mu: 2.0 * x[0]}
+    )
+    ax = branch.plot(y="twice")
+    drawn = [line.get_ydata().size for line in ax.lines if line.get_linestyle() != "None"]
+    # Lines share the points where they change their look.
+    assert sum(drawn) == branch.points.sizes["point"] + len(drawn) - 1
+
+
+def test_slopes_that_contradict_the_points_are_left_out():
+    x, s = np.array([0.0, 1.0]), np.array([0.0, 1.0])
+    wild = np.array([50.0, -50.0])
+    np.testing.assert_array_equal(smooth(x, x, s, wild, wild), (x, x))
+    across, up = smooth(x, x**2, s, np.ones(2), np.array([0.0, 2.0]))
+    assert across.size > 5
+    np.testing.assert_allclose(up, across**2, atol=1e-14)
+    np.testing.assert_array_equal(smooth(x[:0], x[:0], s[:0], x[:0], x[:0]), (x[:0], x[:0]))
+
+
+def test_names_of_points_that_touch_are_one():
+    system = pk.Coefficients(1.0, 0.5, 0.0)
+    ax = pk.plot.branch(pk.diagram(system, "B", span=(0.1, 2.0)))
+    texts = [text.get_text() for text in ax.texts]
+    assert "BP" in texts
+    assert len(texts) == len(set(texts))
