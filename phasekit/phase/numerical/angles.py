@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.motion import flow
+from phasekit.phase.numerical.motion import MotionWithErrors, flow
 from phasekit.phase.numerical.orbits import Orbits, orbits
 
 Array = npt.NDArray[np.float64]
@@ -58,9 +58,8 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
     whole = np.where(turns, orbit.period, 0.5 * orbit.period)
     size, rows = x.size, np.arange(x.size)
 
-    def at(owner: Index, times: Array) -> tuple[Array, Array, Array]:
-        found = flow(ground, start, speed, owner, times)
-        return found.motion_phi, found.motion_dphi, found.motion_phi_error
+    def at(owner: Index, times: Array) -> MotionWithErrors:
+        return flow(ground, start, speed, owner, times)
 
     grid = np.linspace(0.0, 1.0, _GRID + 1)
     owner = np.repeat(rows, grid.size)
@@ -74,7 +73,7 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
         time = low + share * (high - low)
         pace = 2.0 * np.pi / orbit.period
         for _ in range(_STEPS):
-            here, rate, _ = at(rows, time)
+            here, rate, *_ = at(rows, time)
             push = -ground.systems.slope(here)
             off = (pace * (x - here), target - rate)
             step = (off[0] * pace * rate + off[1] * push) / ((pace * rate) ** 2 + push**2)
@@ -82,14 +81,26 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
             time = np.clip(time + step, low, high)
             if np.max(np.abs(pace * step)) <= 4e-15:
                 break
-        here, rate, blur = at(rows, time)
+        here, rate, *blurs = at(rows, time)
         left = pace * np.abs(x - here) + np.abs(target - rate)
         size_of = np.hypot(pace * rate, ground.systems.slope(here))
-        error = pace * (left + pace * blur) / size_of + np.abs(pace * step)
+        left = left + pace * blurs[0] + blurs[1]
+        # What rounding does to the energy of the state changes the time from its origin.
+        gap = _gap(ground, orbit)
+        spread = np.finfo(float).eps * (v * v + np.abs(orbit.orbit_energy)) / gap
+        late = (orbit.period_error + spread / pace) / orbit.period
+        error = pace * left / size_of + np.abs(pace * step) + 2.0 * np.pi * late
     angle = pace * time
     back = ~turns & (v > 0.0)
     angle = np.where(back, 2.0 * np.pi - angle, angle) % (2.0 * np.pi)
     return np.where(error <= WORST, angle, np.nan), error
+
+
+def _gap(ground: Ground, orbit: Orbits) -> Array:
+    """How far the energy of an orbit is from that of the nearest saddle; infinite without one."""
+    flat = ground.points.kind != EquilibriumKind.CENTER
+    off = np.abs(orbit.orbit_energy[:, None] - ground.points.energy)
+    return np.asarray(np.min(np.where(flat & (off > 0.0), off, np.inf), axis=1, initial=np.inf))
 
 
 def _origins(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, Array]:
