@@ -30,6 +30,8 @@ def registries(monkeypatch):
     monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
     monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
     yield
+    # Models of the package that were imported only now are there to stay.
+    models |= {k: one for k, one in MODELS.items() if one.__module__.startswith("phasekit.")}
     for registry, before in ((MODELS, models), (quantities.ROWS, rows)):
         registry.clear()
         registry.update(before)
