@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, flag, number, unknown
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot.parts import color_bar, labels, style
 from phasekit.plot.parts.strands import relative_gap
 from phasekit.plot.parts.units import Units
@@ -334,5 +335,7 @@ def _draw_curves(
 def _coefficient_A(ds: xr.Dataset) -> xr.DataArray | None:
     """Return A over the map, or None if the Dataset cannot rebuild its model."""
     model = labels.model_in(ds)
-    A = None if model is None else model.from_dataset(ds).coefficients().A
+    if model is None or not issubclass(model.rung, Trigonometric):
+        return None
+    A = model.from_dataset(ds).coefficients().A
     return A if isinstance(A, xr.DataArray) else None

@@ -105,3 +105,21 @@ def test_families_that_cannot_be():
         pk.orbit_families(pk.Potential("-x^2", "x"))
     with pytest.raises(pk.ParameterError, match="wants a single system"):
         pk.orbit_families(pk.Potential("a*x^2", "x", {"a": [1.0, 2.0]}))
+
+
+def test_results_have_the_coordinate_by_its_own_name():
+    eq = pk.equilibria(WELL)
+    np.testing.assert_array_equal(eq.x, eq.phi)
+    assert eq.x.dims == ("equilibrium",)
+    assert eq.sel(equilibrium=0).x.item() == eq.phi.values[0]
+    orbit = pk.orbits(WELL, x=[0.9, 1.0], dx=0.1)
+    for name in ("phi_min", "phi_max", "state_phi", "state_dphi"):
+        np.testing.assert_array_equal(orbit[name.replace("phi", "x")], orbit[name])
+    motion = pk.flow(WELL, 0.9, 0.1, [0.0, 1.0])
+    np.testing.assert_array_equal(motion.motion_dx, motion.motion_dphi)
+    np.testing.assert_array_equal(pk.separatrices(WELL).saddle_x, [eq.phi.values[1]])
+    ds = pk.sweep(WELL, h=[0.0, 0.1])
+    np.testing.assert_array_equal(ds.x, ds.phi)
+    assert ds.isel(h=1).phasekit.system() == WELL
+    named = pk.equilibria(pk.Potential("phi^4/4 - phi^2/2", "phi"))
+    assert set(named.coords) == {"equilibrium"}
