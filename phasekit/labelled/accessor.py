@@ -257,6 +257,12 @@ class MapPlots:
     >>> ax = ds.isel(a=1).phasekit.plot.bifurcation_diagram(ax=axes[2])
     >>> plt.close(figure)
 
+    Of what follows slow parameters:
+
+    >>> loop = pk.quasi_static(disk, omega1=[10.0, 20.0, 31.4])
+    >>> ax = loop.phasekit.plot.hysteresis_loop(units={"omega1": "rpm"})
+    >>> plt.close(ax.figure)
+
     Pictures of one of its cells:
 
     >>> cell = ds.isel(beta=1, a=1).phasekit.plot
