@@ -46,10 +46,10 @@ def invalid_cells(system: Model) -> str:
         dims = value.dims if isinstance(value, xr.DataArray) else (parameter.name,)
         valid.append(xr.Variable(dims, inside))
         reasons.append(_reason(parameter, np.asarray(value), inside))
-    share = _share_outside(valid)
-    if share < MANY:
+    share = _share_inside(valid)
+    if share > 1.0 - MANY:
         return ""
-    return f"{100.0 * share:.3g} % of the cells are empty: {'; '.join(reasons)}"
+    return f"{100.0 * (1.0 - share):.3g} % of the cells are empty: {'; '.join(reasons)}"
 
 
 def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) -> str:
@@ -62,8 +62,8 @@ def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) 
     return f"{text}; if they are in degrees: {parameter.name} * pk.deg" if in_degrees else text
 
 
-def _share_outside(valid: list[xr.Variable]) -> float:
-    """Return the share of cells that are not valid in all; dims that are shared count once."""
+def _share_inside(valid: list[xr.Variable]) -> float:
+    """Return the share of cells that are valid in all; dims that are shared count once."""
     share = 1.0
     while valid:
         joint = valid.pop()
@@ -72,4 +72,4 @@ def _share_outside(valid: list[xr.Variable]) -> float:
             for other in near:
                 joint = joint & other
         share *= float(joint.mean())
-    return 1.0 - share
+    return share
