@@ -15,7 +15,6 @@ from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import one_of
 from phasekit.plot.parameter_map import SELECTION, parameter_map
 from phasekit.plot.parts import labels, style
-from phasekit.plot.parts.units import Units
 
 # What each label may be, and what the greater of them is called.
 CHOICES = {
@@ -102,7 +101,6 @@ def bearing_load_map(
     chosen = {"saddle": saddle, "side": side, "bearing": bearing}
     for name, value in chosen.items():
         one_of(name, value, ("larger", *CHOICES[name]))
-    ds, shown = Units.of_dataset(ds, angles, units)
     ds = _with_loads(ds, variable)
     load, words = ds[variable], []
     for name, value in chosen.items():
@@ -119,7 +117,7 @@ def bearing_load_map(
         x=x,
         y=y,
         angles=angles,
-        units=shown.chosen,
+        units=units,
         log=log,
         legend=legend,
         ax=ax,
