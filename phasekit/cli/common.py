@@ -156,8 +156,9 @@ def save(drawn: Figure | Axes, path: Path, *, dpi: int = 150) -> None:
     dated = {"svg": "Date", "pdf": "CreationDate"}.get(kind)
     metadata = {dated: None} if dated else None
     # Texts of vector files stay texts, which can be edited.
-    fonts: Any = {"svg.fonttype": "none", "pdf.fonttype": 42}
-    with matplotlib.rc_context({"svg.hashsalt": "phasekit", **fonts}):
+    with matplotlib.rc_context(
+        {"svg.hashsalt": "phasekit", "svg.fonttype": "none", "pdf.fonttype": 42}
+    ):
         figure.savefig(buffer, format=kind, dpi=dpi, metadata=metadata)
     # A link stays a link.
     target = path.resolve()

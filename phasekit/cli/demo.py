@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -81,8 +81,9 @@ def draw(ds: xr.Dataset) -> Figure:
     import matplotlib.pyplot as plt
 
     figure = plt.figure(figsize=(13.0, 6.4), layout="constrained")
-    halves: Any = figure.subfigures(1, 2, width_ratios=(1.05, 1.0), wspace=0.02)
-    left, right = halves
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.05, 1.0))
+    left = figure.add_subfigure(grid[0])
+    right = figure.add_subfigure(grid[1])
     units = {"beta": "deg", "a": "mm"}
     ax = pk.plot.parameter_map(ds, "topology", units=units, ax=left.subplots())
     panels: list[Axes] = list(right.subplots(2, 2, sharex=True).flat)

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, flag, number, unknown
-from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot.parts import color_bar, labels, style
 from phasekit.plot.parts.strands import relative_gap
 from phasekit.plot.parts.units import Units
@@ -335,7 +334,8 @@ def _draw_curves(
 def _coefficient_A(ds: xr.Dataset) -> xr.DataArray | None:
     """Return A over the map, or None if the Dataset cannot rebuild its model."""
     model = labels.model_in(ds)
-    if model is None or not issubclass(model.rung, Trigonometric):
+    try:
+        A = None if model is None else model.from_dataset(ds).coefficients().A
+    except ParameterError:  # a stored map may hold anything; its values are shown all the same
         return None
-    A = model.from_dataset(ds).coefficients().A
     return A if isinstance(A, xr.DataArray) else None
