@@ -68,6 +68,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
+    from phasekit.labelled.quasi_static import quasi_static as quasi_static
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
@@ -134,6 +135,7 @@ _MODULES = {
         "retrapping_torque",
     ),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
+    "phasekit.labelled.quasi_static": ("quasi_static",),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.problem": ("Problem",),
     "phasekit.table.quantities": ("quantities",),

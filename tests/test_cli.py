@@ -287,6 +287,10 @@ def test_sweep_never_overwrites_unasked(tmp_path, capsys):
         (["demo", "--output", "x"], "unrecognized arguments"),
         (["portrait", *DISK, "--bta", "3"], "unrecognized arguments: --bta 3; see"),
         (["portrait", *DISK, "--beta", "40"], "beta: got 40.0, wants a number from 0 to 3.14159"),
+        (["portrait", *DISK, "--beta", "40"], "; if it is in degrees: 40deg"),
+        (["portrait", *DISK, "--units", "phi"], "--units: got 'phi', wants NAME=UNIT, such as"),
+        (["portrait", *DISK, "--units", "phy=deg"], "name in units 'phy' is unknown; did you mean"),
+        (["portrait", *DISK, "--units", "phi=mm"], "units: phi: got 'mm', wants rad or deg"),
         (["portrait", *DISK, "--beta", "40mm"], "beta: got '40mm', wants a number in rad or deg"),
         (["portrait", *DISK, "--beta", "steep"], "beta: got 'steep', wants a number in rad"),
         (["portrait", *DISK, "--beta", "nan"], "beta: got 'nan', wants a number"),
@@ -446,3 +450,30 @@ def test_a_fresh_process_knows_every_model():
     done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert "wrote a.png" in done.stdout
+
+
+def test_pictures_take_units(monkeypatch):
+    asked = []
+    from phasekit import plot
+
+    for name in ("phase_portrait", "bifurcation_diagram"):
+        draw = getattr(plot, name)
+
+        def spy(*args, draw=draw, **options):
+            asked.append(options["units"])
+            return draw(*args, **options)
+
+        monkeypatch.setattr(plot, name, spy)
+    assert main(["portrait", *DISK, "--units", "phi=deg,dphi=rpm", "--out", "a.png"]) == 0
+    swept = ["--beta", "0:90deg:5", *DISK[2:]]
+    units = ["--units", "beta=deg", "--units", "phi=deg"]
+    assert main(["diagram", *swept, *units, "--out", "b.png"]) == 0
+    assert asked == [{"phi": "deg", "dphi": "rpm"}, {"beta": "deg", "phi": "deg"}]
+
+
+def test_help_tells_the_units(capsys):
+    with pytest.raises(SystemExit):
+        main(["portrait", "--help"])
+    words = " ".join(capsys.readouterr().out.split())
+    assert "a number with a unit, such as 40deg, 5mm or 300rpm" in words
+    assert "radius of the disk, m or cm or mm or um" in words

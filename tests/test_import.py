@@ -56,6 +56,27 @@ def test_every_public_name_is_there(name):
     assert name in dir(pk)
 
 
+@pytest.mark.parametrize("name", sorted(set(pk.__all__) - {"plot", "deg", "rpm", "__version__"}))
+def test_help_has_an_example_that_runs(name):
+    """The doctests of the suite run it."""
+    thing = getattr(pk, name)
+    assert ">>> " in inspect.getdoc(thing)
+    assert thing.__module__.startswith("phasekit.")
+
+
+def test_pictures_and_what_maps_can_do_have_examples():
+    from phasekit.labelled.accessor import MapPlots, PhasekitAccessor
+
+    for name in pk.plot.__all__:
+        assert ">>> " in inspect.getdoc(getattr(pk.plot, name)), name
+    methods = [m for n, m in inspect.getmembers(PhasekitAccessor) if not n.startswith("_")]
+    assert len(methods) > 4
+    for method in methods:
+        if inspect.isfunction(method):
+            assert ">>> " in inspect.getdoc(method), method
+    assert ">>> " in inspect.getdoc(MapPlots)
+
+
 def test_type_checkers_see_the_same_names():
     tree = ast.parse(inspect.getsource(pk))
     block = next(
@@ -65,6 +86,20 @@ def test_type_checkers_see_the_same_names():
     )
     seen = {alias.asname for node in block.body for alias in node.names}
     assert seen == set(pk.__all__) - {"__version__", "deg", "rpm"}
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "pk.branches(pk.Reduced(0.0, 0.0), 'lam', (0, 1.5)).phi",
+        "pk.critical(pk.Reduced(0.4, 0.1), 'lam').critical_fold",
+        "pk.quasi_static(pk.Reduced(0.4, 0.1), lam=[0.0, 0.1]).phi",
+    ],
+)
+def test_each_function_works_alone(call):
+    code = f"import phasekit as pk; print({call}.size > 0)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.stdout, done.stderr) == ("True\n", "")
 
 
 def test_unknown_name():

@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.dispatch import fitted
-from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords
+from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords, own_names
 from phasekit.cells.tiling import cut, run_tasks, tiles
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, Value
@@ -325,6 +325,7 @@ def assemble(layout: Layout, data: Mapping[str, xr.Variable]) -> xr.Dataset:
     for name, given in layout.grid.inputs.items():
         if name not in coords:
             coords[name] = _with_attrs(layout.system, name, given)
+    coords.update(own_names(layout.system, {**coords, **data}))
     return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(layout.system))
 
 

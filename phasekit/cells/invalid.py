@@ -13,9 +13,12 @@ from phasekit.labels.arguments import FloatArray, describe
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import Model
 
+#: Share of the cells from which on it is said: maps may touch what is not legal at their edges.
+MANY = 0.1
+
 
 def warn_of_invalid(system: Model, stacklevel: int = 2) -> None:
-    """Warn of cells that stay empty, once a call; those of lazy parameters are not looked at.
+    """Warn of many cells that stay empty, once a call; of lazy parameters none are looked at.
 
     Parameters
     ----------
@@ -30,7 +33,7 @@ def warn_of_invalid(system: Model, stacklevel: int = 2) -> None:
 
 
 def invalid_cells(system: Model) -> str:
-    """Say which share of the cells has parameters that are not legal, and why; empty if none."""
+    """Say which share of the cells has parameters that are not legal, and why; empty if few."""
     valid: list[xr.Variable] = []
     reasons = []
     for parameter in system.declared:
@@ -43,9 +46,10 @@ def invalid_cells(system: Model) -> str:
         dims = value.dims if isinstance(value, xr.DataArray) else (parameter.name,)
         valid.append(xr.Variable(dims, inside))
         reasons.append(_reason(parameter, np.asarray(value), inside))
-    if not reasons:
+    share = _share_inside(valid)
+    if share > 1.0 - MANY:
         return ""
-    return f"{_share_outside(valid):.3g} % of the cells are empty: {'; '.join(reasons)}"
+    return f"{100.0 * (1.0 - share):.3g} % of the cells are empty: {'; '.join(reasons)}"
 
 
 def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) -> str:
@@ -58,8 +62,8 @@ def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) 
     return f"{text}; if they are in degrees: {parameter.name} * pk.deg" if in_degrees else text
 
 
-def _share_outside(valid: list[xr.Variable]) -> float:
-    """Return the percentage of cells that are not valid in all; dims that are shared count once."""
+def _share_inside(valid: list[xr.Variable]) -> float:
+    """Return the share of cells that are valid in all; dims that are shared count once."""
     share = 1.0
     while valid:
         joint = valid.pop()
@@ -68,4 +72,4 @@ def _share_outside(valid: list[xr.Variable]) -> float:
             for other in near:
                 joint = joint & other
         share *= float(joint.mean())
-    return 100.0 * (1.0 - share)
+    return share

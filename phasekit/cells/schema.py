@@ -6,7 +6,7 @@ run: two identical computations make identical Datasets.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -49,6 +49,28 @@ def input_attrs(system: Model, name: str) -> dict[str, str]:
     if name in STATES:
         return {"long_name": STATES[name][1], "units": STATES[name][0]}
     return {}
+
+
+#: Places and rates, which a system that names its coordinate calls by that name.
+_PLACES = (
+    *("phi", "phi_min", "phi_max", "saddle_phi", "turning_phi", "motion_phi", "motion_dphi"),
+    *("state_phi", "state_dphi"),
+)
+
+
+def own_names(system: Model, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+    """Return places under the name that a system's coordinate has, where that is not phi.
+
+    The same numbers, as coordinates: ``x`` beside ``phi``, ``motion_dx`` beside ``motion_dphi``.
+    """
+    coordinate = getattr(system, "coordinate", "phi")
+    if coordinate == "phi":
+        return {}
+    named = {
+        name.replace("phi", coordinate): variables[name] for name in _PLACES if name in variables
+    }
+    taken = {dim for one in variables.values() for dim in one.dims} | variables.keys()
+    return {name: one.copy(deep=False) for name, one in named.items() if name not in taken}
 
 
 def restore(ds: xr.Dataset) -> xr.Dataset:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import signal
 import sys
 import warnings
@@ -84,7 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             warnings.simplefilter("ignore", InvalidCellsWarning)  # commands say it in their words
             command.run(options.rest)
     except (PhasekitError, OSError) as error:
-        return _complain(str(error))
+        # In a shell degrees are written another way.
+        return _complain(re.sub(r"(if .* in degrees: )(\S+) \* pk\.deg", r"\1\2deg", str(error)))
     except KeyboardInterrupt as interrupt:
         if argv is None:  # what is left is to end the process: another Ctrl-C does so at once
             signal.signal(signal.SIGINT, signal.SIG_DFL)

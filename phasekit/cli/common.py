@@ -14,6 +14,7 @@ from phasekit.cli import Parser
 from phasekit.cli.values import glue_negative_values, is_range, number, span
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
+from phasekit.labels.units import UNITS
 from phasekit.systems.registry import models
 from phasekit.systems.system import Model
 
@@ -55,14 +56,15 @@ def read_model(
         "--model", default="GyroRotorDisk", help=f"one of {', '.join(models())} (%(default)s)"
     )
     group = parser.add_argument_group(
-        f"parameters of {model.__name__}", "a number in SI units and radians, or with a unit"
+        f"parameters of {model.__name__}",
+        "a number with a unit, such as 40deg, 5mm or 300rpm, or in SI units and radians",
     )
     for parameter in model.declared:
         group.add_argument(
             f"--{parameter.name}",
             dest=f"parameter_{parameter.name}",
             metavar="VALUE",
-            help=f"{parameter.long_name}, {parameter.units}",
+            help=f"{parameter.long_name}, {_fitting(parameter.units)}",
         )
     more(parser)
     options = parser.parse_args(words)
@@ -83,6 +85,38 @@ def build(model: type[Model], given: Mapping[str, str]) -> tuple[Model, list[str
         for name, text in given.items()
     }
     return model(**values), swept
+
+
+def _fitting(units: str) -> str:
+    return " or ".join(UNITS.get(units) or ["a number"])
+
+
+def add_units(parser: Parser) -> None:
+    """Add the options that say in which units a picture shows things."""
+    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+    parser.add_argument(
+        "--units",
+        action="append",
+        default=[],
+        metavar="NAME=UNIT,...",
+        help="units in which quantities and parameters are shown, such as beta=deg,a=mm; may be "
+        "given several times",
+    )
+
+
+def units_of(texts: Sequence[str]) -> dict[str, str]:
+    """Return units by name, from texts like ``beta=deg,a=mm``.
+
+    >>> units_of(["beta=deg, a=mm", "omega1=rpm"])
+    {'beta': 'deg', 'a': 'mm', 'omega1': 'rpm'}
+    """
+    units: dict[str, str] = {}
+    for part in (part.strip() for text in texts for part in text.split(",")):
+        name, equals, unit = (piece.strip() for piece in part.partition("="))
+        if not (name and equals and unit):
+            raise ParameterError(f"--units: got {part!r}, wants NAME=UNIT, such as beta=deg,a=mm")
+        units[name] = unit
+    return units
 
 
 def path_called(argument: str, name: str) -> Path:

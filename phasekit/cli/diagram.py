@@ -17,6 +17,7 @@ def run(argv: Sequence[str]) -> None:
         argv,
         _options,
     )
+    units = common.units_of(options.units)
     path = common.output_file(options.out, overwrite=options.overwrite)
     system, swept = common.build(model, given)
     if len(swept) != 1:
@@ -33,7 +34,7 @@ def run(argv: Sequence[str]) -> None:
             f"--{swept[0]}: got a range, but {swept[0]} does not enter the equilibria; "
             "wants a range of a parameter that does"
         )
-    axes = plot.bifurcation_diagram(ds, y=options.y, angles=options.angles)
+    axes = plot.bifurcation_diagram(ds, y=options.y, angles=options.angles, units=units)
     common.save(axes, path)
     common.say(str(system))
     common.say_invalid(ds)
@@ -42,6 +43,6 @@ def run(argv: Sequence[str]) -> None:
 
 def _options(parser: Parser) -> None:
     parser.add_argument("--y", default="phi", help="quantity to draw (%(default)s)")
-    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+    common.add_units(parser)
     parser.add_argument("--out", default="diagram.png", help="picture file (%(default)s)")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")

@@ -14,6 +14,7 @@ def run(argv: Sequence[str]) -> None:
     options, model, given = common.read_model(
         "portrait", "Draw the phase portrait of one system.", argv, _options
     )
+    units = common.units_of(options.units)
     path = common.output_file(options.out, overwrite=options.overwrite)
     system, swept = common.build(model, given)
     if swept:
@@ -25,7 +26,7 @@ def run(argv: Sequence[str]) -> None:
     from phasekit import plot
 
     draw = plot.potential_well if options.well else plot.phase_portrait
-    drawn = draw(system, orbits=orbits, angles=options.angles)
+    drawn = draw(system, orbits=orbits, angles=options.angles, units=units)
     common.save(drawn[0] if isinstance(drawn, tuple) else drawn, path)
     common.say(f"{system}\nwrote {path}")
 
@@ -40,7 +41,7 @@ def _options(parser: Parser) -> None:
         "given several times",
     )
     parser.add_argument("--well", action="store_true", help="draw the potential over the portrait")
-    parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+    common.add_units(parser)
     parser.add_argument("--out", default="portrait.png", help="picture file (%(default)s)")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
 

@@ -257,6 +257,12 @@ class MapPlots:
     >>> ax = ds.isel(a=1).phasekit.plot.bifurcation_diagram(ax=axes[2])
     >>> plt.close(figure)
 
+    Of what follows slow parameters:
+
+    >>> loop = pk.quasi_static(disk, omega1=[10.0, 20.0, 31.4])
+    >>> ax = loop.phasekit.plot.hysteresis_loop(units={"omega1": "rpm"})
+    >>> plt.close(ax.figure)
+
     Pictures of one of its cells:
 
     >>> cell = ds.isel(beta=1, a=1).phasekit.plot
@@ -293,11 +299,11 @@ class MapPlots:
 
     def bifurcation_diagram(self, **options: Any) -> Any:
         """Draw the equilibria against a swept parameter; returns the Axes."""
-        return picture("bifurcation_diagram")(in_si(self._ds), **options)
+        return picture("bifurcation_diagram")(self._ds, **options)
 
     def parameter_map(self, variable: str = "topology", **options: Any) -> Any:
         """Draw a variable over two swept parameters; returns the Axes."""
-        return picture("parameter_map")(in_si(self._ds), variable, **options)
+        return picture("parameter_map")(self._ds, variable, **options)
 
     def hodograph(self, rotator: str = "R022", **options: Any) -> Any:
         """Draw a rotator's hodograph for the one selected cell, or of motions; returns the Axes."""
@@ -311,13 +317,17 @@ class MapPlots:
         """Draw the force polygon of the one selected cell in a state; returns the Axes."""
         return picture("force_polygon")(self._cell(), phi, dphi, **options)
 
+    def hysteresis_loop(self, **options: Any) -> Any:
+        """Draw what `quasi_static` followed, with its jumps; returns the Axes."""
+        return picture("hysteresis_loop")(self._ds, **options)
+
     def bearing_load_map(self, variable: str = "peak_force", **options: Any) -> Any:
         """Draw the load on the separatrices over two swept parameters; returns the Axes."""
-        return picture("bearing_load_map")(in_si(self._ds), variable, **options)
+        return picture("bearing_load_map")(self._ds, variable, **options)
 
     def _cell_or_motion(self) -> Model | xr.Dataset:
         along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
-        return in_si(self._ds) if along and "time" in self._ds.dims else self._cell()
+        return self._ds if along and "time" in self._ds.dims else self._cell()
 
     def _cell(self) -> Model:
         system = PhasekitAccessor(self._ds).system()

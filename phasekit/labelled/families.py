@@ -11,7 +11,9 @@ import xarray as xr
 
 from phasekit.cells.states import at_states
 from phasekit.errors import EquilibriumKind, ParameterError, Topology
+from phasekit.labelled.numerical_families import families_of_any
 from phasekit.labels.arguments import FloatArray, number, whole
+from phasekit.laws.ladder import Conservative
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
 from phasekit.phase.exact.separatrices import phase_space
@@ -63,6 +65,10 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     -----
     From the energy integral [Veljovic2015] (14); `orbits` explains the quantities.
 
+    The families of a `Potential` of scalar parameters are found from its equilibria: ``well_0``,
+    ``well_2``, ... by the number of the center; ``wells_0_2``, round several; ``rotation``. Where
+    no saddle is above them, orbits have no end, so that `energy_max` has to be given.
+
     Examples
     --------
     >>> import phasekit as pk
@@ -72,10 +78,12 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     >>> ds.energy_level.sel(family="outer").diff("level").min().item() > 0
     True
     """
-    system = as_system(system, rung=Trigonometric, what="orbit_families")
+    system = as_system(system, rung=Conservative, what="orbit_families")
     n = whole("n", n, "a number of orbits >= 1")
     wants = "one number, finite, in s^-2"
     top = None if energy_max is None else number("energy_max", energy_max, wants, "s-2")
+    if not issubclass(system.rung, Trigonometric):
+        return families_of_any(system, n, top)
     for name, value in system.parameters.items():
         if isinstance(value, xr.DataArray) and "level" in value.dims:
             raise ParameterError(

@@ -163,7 +163,8 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
         ``orbit_family`` (`OrbitFamily`), ``action`` and ``frequency`` in s^-1, ``angle`` in rad,
         in [0, 2 pi), and ``twist``: d(frequency)/d(action). The angle grows evenly in time, at
         ``frequency``; it is 0 where a libration is at its greatest phi, or a rotation at the lower
-        center.
+        center. Those of a `Potential` have estimates of their errors, and neither family nor twist;
+        an angle whose error may exceed 1e-7 is NaN.
 
     Raises
     ------

@@ -95,7 +95,7 @@ def sweep(
         coordinates, fixed ones scalar coordinates; ``ds.phasekit.system()`` rebuilds the system
         of any selection. Cells whose parameters are not valid hold NaN, and -1 in n_equilibria.
         With a Zarr store it is opened from there, as `open_map` does. An `InvalidCellsWarning` says
-        how many cells are empty because their parameters are not legal.
+        how many cells are empty because their parameters are not legal, if a tenth of them is.
 
     Raises
     ------

@@ -13,6 +13,7 @@ from phasekit.plot.branch import branch
 from phasekit.plot.branch_surface import branch_surface
 from phasekit.plot.force_polygon import force_polygon
 from phasekit.plot.hodograph import hodograph
+from phasekit.plot.hysteresis_loop import hysteresis_loop
 from phasekit.plot.parameter_map import parameter_map
 from phasekit.plot.periods import frequency_action, period_energy
 from phasekit.plot.phase_portrait import phase_portrait
@@ -29,6 +30,7 @@ __all__ = [
     "force_polygon",
     "frequency_action",
     "hodograph",
+    "hysteresis_loop",
     "parameter_map",
     "period_energy",
     "phase_portrait",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import xarray as xr
@@ -15,10 +15,14 @@ from phasekit.errors import EquilibriumKind
 from phasekit.labelled.families import orbit_families
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad
+from phasekit.laws.ladder import Conservative
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.plot.parts import labels, style
+from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.parts.units import Units
 from phasekit.systems.as_system import as_system, single
+
+#: Energies of saddles, with the names of their looks.
+Walls: TypeAlias = list[tuple[str, float]]
 
 # Where a family begins: the row of its center among the equilibria.
 CENTERS = {"lower_well": 0, "upper_well": 2}
@@ -86,8 +90,9 @@ def period_energy(
     with np.errstate(all="ignore"):  # of frequencies below the smallest double
         periods = shown.scale("period", "s") * 2.0 * np.pi / natural
     ends = (bottom, periods)
-    handles = _draw_families(axes, families, points, "energy_level", "period", ends)
-    handles += _draw_walls(axes, points, loops)
+    walls = _saddles(loops)
+    handles = _draw_families(axes, families, points, walls, ("energy_level", "period"), ends)
+    handles += _draw_walls(axes, points, walls)
     handles += _draw_centers(axes, bottom, periods)
 
     energies = families.energy_level
@@ -159,12 +164,13 @@ def frequency_action(
     'frequency $\\omega$ (rad/s)'
     """
     shown = Units.of("rad", units)
-    families, points, _ = _families(system, n, energy_max, shown)
+    families, points, loops = _families(system, n, energy_max, shown)
     natural = points.natural_frequency.values * shown.scale("frequency", "rad/s")
     axes = style.axes_for(ax, legend=legend)
 
     rest = np.zeros(natural.shape)
-    handles = _draw_families(axes, families, points, "action", "frequency", (rest, natural))
+    ends = (rest, natural)
+    handles = _draw_families(axes, families, points, _saddles(loops), ("action", "frequency"), ends)
     handles += _draw_centers(axes, rest, natural)
     axes.set_xlim(0.0, 1.03 * float(families.action.max()))
     axes.set_ylim(0.0, 1.05 * float(np.nanmax([float(families.frequency.max()), *natural])))
@@ -180,7 +186,8 @@ def _families(
 ) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
     """Return the families of orbits of one system, its equilibria and its separatrices."""
     single(system)
-    if not any(as_system(system, rung=Trigonometric, what="a family of orbits").coefficients()):
+    model = as_system(system, rung=Conservative, what="a family of orbits")
+    if issubclass(model.rung, Trigonometric) and not any(model.coefficients()):
         raise bad("system", system, "a system with a force, for without one nothing oscillates")
     families = orbit_families(system, n, energy_max=energy_max)
     points, loops = equilibria(system), separatrices(system)
@@ -198,36 +205,40 @@ def _draw_families(
     ax: Axes,
     families: xr.Dataset,
     points: xr.Dataset,
-    x: str,
-    y: str,
+    walls: Walls,
+    names: tuple[str, str],
     ends: tuple[FloatArray, FloatArray],
 ) -> list[Artist]:
     """Draw the curves of the families that there are, from the centers (x, y) on."""
     handles: list[Artist] = []
-    for family, look in style.FAMILIES.items():
+    for number, family in enumerate(map(str, families.family.values)):
         one = families.sel(family=family).dropna("level")
         if not one.level.size:
             continue
-        energy, across, up = (one[name].values for name in ("energy_level", x, y))
+        look = style.FAMILIES.get(family) or _look(number, family)
+        energy, across, up = (one[name].values for name in ("energy_level", *names))
         # At a separatrix: infinitely long, so higher than anything shown.
-        limit = 0.0 if y == "frequency" else 100.0 * float(up.max())
+        limit = 0.0 if names[1] == "frequency" else 100.0 * float(up.max())
         for level in _degenerate(points):
             if energy[0] < level < energy[-1]:
                 place = int(np.searchsorted(energy, level))
                 across = np.insert(across, place, np.interp(level, energy, across))
                 up = np.insert(up, place, limit)
         # The last orbits are so close to it that nothing can be seen between.
-        before, after = family not in CENTERS, family != "rotation"
+        center = _center(family)
+        before, after = center is None, family != "rotation"
+        if family not in style.FAMILIES:  # nothing may end the last one
+            after = any(wall > energy[-1] for _, wall in walls)
         across = np.concatenate([across[:before], across, across[len(across) - after :]])
         up = np.concatenate([[limit] * before, up, [limit] * after])
-        if family in CENTERS:
+        if center is not None:
             across, up = (
-                np.append(end[CENTERS[family]], values)
+                np.append(end[center], values)
                 for end, values in zip(ends, (across, up), strict=True)
             )
         (line,) = ax.plot(across, up, zorder=2, **look)
         handles.append(line)
-    if len(handles) == 2:  # a well and the rotations
+    if len(handles) == 2 and families.family.values[-1] == "rotation":  # and one well
         handles[0].set_label("oscillation")
     return handles
 
@@ -238,19 +249,42 @@ def _degenerate(points: xr.Dataset) -> list[float]:
     return [float(energy) for energy in points.energy.values[merged]]
 
 
-def _draw_walls(ax: Axes, points: xr.Dataset, loops: xr.Dataset) -> list[Artist]:
+def _look(number: int, family: str) -> style.Look:
+    """Look and words of a family that is called by the numbers of its centers."""
+    kind, *numbers = family.split("_")
+    return {**strokes.orbit_look(number), "label": f"{kind} {', '.join(numbers)}"}
+
+
+def _center(family: str) -> int | None:
+    """The row of the center at which a family begins; None if it begins at a separatrix."""
+    if family.startswith("well_"):
+        return int(family.removeprefix("well_"))
+    return CENTERS.get(family)
+
+
+def _saddles(loops: xr.Dataset) -> Walls:
+    """Energies of the saddles, each with the name of its look."""
+    energies = loops.saddle_energy
+    if energies.saddle.dtype.kind in "iu":
+        found = np.unique(energies.values[np.isfinite(energies.values)]).tolist()
+        return [("upper", energy) for energy in found]
+    walls = [(name, float(energies.sel(saddle=name))) for name in ("lower", "upper")]
+    return [wall for wall in walls if np.isfinite(wall[1])]
+
+
+def _draw_walls(ax: Axes, points: xr.Dataset, walls: Walls) -> list[Artist]:
     """Draw the energies at which periods are infinite."""
-    walls = [
-        (saddle, float(loops.saddle_energy.sel(saddle=saddle))) for saddle in ("lower", "upper")
-    ]
-    walls = [wall for wall in walls if np.isfinite(wall[1])]
+    looks = {name: {**style.WALLS[name]} for name in ("lower", "upper", "degenerate")}
+    numbered = [name for name, _ in walls] == ["upper"] * len(walls) and len(walls) > 1
+    if numbered:
+        looks["upper"]["label"] = "energies of saddles"
     handles: list[Artist] = [
-        ax.axvline(energy, zorder=1, **style.inked(style.WALLS[name]))
+        ax.axvline(energy, zorder=1, **style.inked(looks[name]))
         for name, energy in [*walls, *(("degenerate", energy) for energy in _degenerate(points))]
     ]
     if len(walls) == 1:
         handles[0].set_label("energy of the saddle")
-    return handles
+    return handles[:1] + handles[len(walls) :] if numbered else handles
 
 
 def _draw_centers(ax: Axes, x: FloatArray, y: FloatArray) -> list[Artist]:

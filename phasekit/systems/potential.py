@@ -45,7 +45,9 @@ class Potential(Model):
 
     Goes wherever a `GyroRotorDisk` goes but for what is in closed form: potential and energy,
     equilibria, separatrices, orbits, flow, portraits and sweeps, by numerical methods. Where
-    results call the coordinate phi, it is the coordinate of this system.
+    results call the coordinate phi, it is the coordinate of this system; they have it by its own
+    name as well (``x`` beside ``phi``, ``motion_dx`` beside ``motion_dphi``), and so do calls:
+    ``pk.orbits(well, x=1.2, dx=0.0)``.
 
     Parameters
     ----------

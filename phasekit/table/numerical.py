@@ -28,6 +28,11 @@ NUMERICAL_ROWS: dict[str, tuple[Quantity, ...]] = {
         Quantity("action_error", "orbits", (), "float64", "s-1",
                  "estimated error of the action", "of its quadrature", FROM_ENERGY),
     ),
+    "action_angle": (
+        Quantity("angle_error", "action_angle", (), "float64", "rad",
+                 "estimated error of the angle variable", "distance from the orbit found back",
+                 FROM_ENERGY),
+    ),
     "motion": (
         Quantity("motion_phi_error", "motion", (), "float64", "rad",
                  "estimated error of the angle", "change of the energy, error of the period",
@@ -52,6 +57,7 @@ PASSES: tuple[Pass, ...] = (
             ("energy", STATE, ("energy_integral",), ()),
             ("phase_velocity", ("state_phi", "state_energy"), ("phase_velocity",), ()),
             ("orbits", STATE, ("orbits",), ()),
+            ("angles", STATE, ("action_angle",), ()),
             ("flow_with_errors", (*STATE, "time"), ("motion",), ()),
             ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
             ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from phasekit.errors import OrbitFamily, OrbitKind
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.table.row import (
     ABC,
     BRANCHES,
@@ -42,12 +43,13 @@ QUANTITIES: tuple[Quantity, ...] = (
              "(phi_max - phi_min)/2", FROM_ENERGY),
     Quantity("orbit_family", "action_angle", (), "int8", "1", "family of the orbit",
              "by the centers that a libration goes round, or the sign of phi' of a rotation",
-             FROM_ENERGY, OrbitFamily),
+             FROM_ENERGY, OrbitFamily, of=Trigonometric),
     Quantity("angle", "action_angle", (), "float64", "rad",
              "angle variable: 0 at phi_max, of a rotation at the lower center",
              "theta' = 2 pi/T, in [0, 2 pi)", ACTION_ANGLE),
     Quantity("twist", "action_angle", (), "float64", "1",
-             "change of the frequency with the action", "d(2 pi/T)/dJ", ACTION_ANGLE),
+             "change of the frequency with the action", "d(2 pi/T)/dJ", ACTION_ANGLE,
+             of=Trigonometric),
     Quantity("phi_of_angle", "state_of", (), "float64", "rad",
              "angle at given action and angle variable",
              "phi after the time theta T/(2 pi) from theta = 0", ACTION_ANGLE),

@@ -77,3 +77,9 @@ def test_an_error_where_the_user_wants_one():
         with pytest.raises(pk.ParameterError, match="beta: 87 of 91 values"):
             pk.sweep(DISK, beta=DEGREES)
         pk.sweep(DISK, beta=[0.1, 0.2])
+
+
+def test_few_cells_at_the_edge_of_a_map_are_not_worth_a_word():
+    few, many = ([-0.1] * n + [0.1] * (20 - n) for n in (1, 2))
+    assert said(pk.sweep, DISK, e=few)[1] == []
+    assert said(pk.sweep, DISK, e=many)[1] != []

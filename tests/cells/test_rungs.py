@@ -98,7 +98,7 @@ def in_order(ds):
 def test_a_quantity_of_a_higher_rung_is_refused_below():
     potential = as_potential(SYSTEMS[0])
     with pytest.raises(pk.ParameterError, match=r"wants a system with coefficients \(A, B, C\)"):
-        pk.action_angle(potential, 0.1, 0.2)
+        pk.state_of(potential, 0.1, 0.2, "outer")
     assert "fold_margin" not in pk.equilibria(potential)
 
 

@@ -1,11 +1,14 @@
 """Datasets in other units, and what phasekit makes of them when it gets them back."""
 
+import matplotlib
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
 
 import phasekit as pk
 
+matplotlib.use("Agg")
 DISK = pk.GyroRotorDisk(
     beta=0.7, e=0.05, a=0.024, r=0.2, omega1=300 * pk.rpm, m=2.0, half_span=0.15
 )
@@ -96,6 +99,25 @@ def test_motions_are_the_same_in_all_units():
     np.testing.assert_allclose(found.time, motion.time, rtol=4e-16)
     along = pk.rotators(DISK, shown.motion_phi, shown.motion_dphi)
     np.testing.assert_allclose(along.time, motion.time, rtol=4e-16)
+
+
+PICTURES = {
+    "parameter_map": lambda ds, **o: ds.phasekit.plot.parameter_map("fold_margin", **o),
+    "bearing_load_map": lambda ds, **o: ds.phasekit.plot.bearing_load_map(**o),
+    "bifurcation_diagram": lambda ds, **o: ds.isel(a=1).phasekit.plot.bifurcation_diagram(**o),
+}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_show_what_a_dataset_holds(name):
+    """Degrees are never drawn under the name of radians."""
+    asked = PICTURES[name](MAP, units={"beta": "deg", "a": "mm", "phi": "deg", "omega1": "rpm"})
+    held = PICTURES[name](SHOWN)
+    assert held.get_xlabel() == asked.get_xlabel()
+    assert "(°)" in held.get_xlabel()
+    np.testing.assert_allclose(held.get_xlim(), asked.get_xlim())
+    np.testing.assert_allclose(held.get_ylim(), asked.get_ylim())
+    plt.close("all")
 
 
 def test_critical_values_in_degrees():

@@ -40,6 +40,12 @@ def motions():
 
 
 @functools.cache
+def loop():
+    field = np.concatenate([np.linspace(3, -3, 60), np.linspace(-3, 3, 60)])
+    return pk.quasi_static(pk.StonerWohlfarth(K=1.0, h_x=0.0, h_y=0.5), h_x=field)
+
+
+@functools.cache
 def loci(kind):
     if kind == "disk":
         return pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
@@ -128,6 +134,12 @@ CASES = {
         "motions": lambda: P.hodograph(motions(), "R2"),
         "cusp": lambda: P.hodograph(CUSP),
         "no force": lambda: P.hodograph(FORCELESS, orbits=(0.0, 1.0)),
+    },
+    "hysteresis_loop": {
+        "magnet": lambda: P.hysteresis_loop(loop(), units={"phi": "deg"}),
+        "numbers": lambda: P.hysteresis_loop(loop(), y=np.cos(loop().phi)),
+        "no jump": lambda: P.hysteresis_loop(loop().isel(step=slice(9))),
+        "all NaN": lambda: P.hysteresis_loop(without_values(loop())),
     },
     "parameter_map": {
         "topology": lambda: P.parameter_map(plane(), angles="deg"),

@@ -233,3 +233,22 @@ def test_cusps_are_drawn(draw, system):
     draw(pk.Coefficients(*system), 20, ax=ax, legend=False)
     assert len([line for line in ax.lines if len(line.get_xdata()) > 10]) == 2
     assert np.isfinite([*ax.get_xlim(), *ax.get_ylim()]).all()
+
+
+@pytest.mark.parametrize("draw", [pk.plot.period_energy, pk.plot.frequency_action])
+def test_families_of_any_potential(draw):
+    well = pk.Potential("x^4/4 - x^2/2 + x/10", "x")
+    ax = draw(well, 20)
+    names = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"well 0", "well 2", "wells 0, 2", "small oscillations"} <= set(names)
+    ds = pk.orbit_families(well, 20)
+    x, y = ("energy_level", "period") if draw is pk.plot.period_energy else ("action", "frequency")
+    lines = {line.get_label(): line for line in ax.lines}
+    for label, family in (("well 0", "well_0"), ("wells 0, 2", "wells_0_2")):
+        first = 1
+        np.testing.assert_allclose(
+            lines[label].get_xdata()[first : first + 20], ds[x].sel(family=family)
+        )
+        np.testing.assert_allclose(
+            lines[label].get_ydata()[first : first + 20], ds[y].sel(family=family)
+        )

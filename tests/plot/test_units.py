@@ -20,6 +20,7 @@ MAP = pk.sweep(
 ATLAS = pk.branches(DISK, "beta", (0.2, 1.5))
 SET = pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
 DIAGRAM = pk.diagram(DISK, "beta", span=(0.05, 1.5))
+LOOP = pk.quasi_static(DISK.replace(beta=1.2), omega1=np.linspace(5.0, 40.0, 9), phi0=3.0)
 P = pk.plot
 SPAN = {"xlim": (0.2, 1.5), "ylim": (-0.05, 0.05), "cells": 4, "legend": False}
 
@@ -84,6 +85,12 @@ CASES = {
         {"rotator": "deg/s2"},
         (DEG, DEG),
         (r"(°/s$^2$)", r"(°/s$^2$)"),
+    ),
+    "hysteresis_loop": (
+        lambda **o: P.hysteresis_loop(LOOP, **o),
+        {"phi": "deg", "omega1": "rpm"},
+        (RPM, DEG),
+        ("(rpm)", "(°)"),
     ),
     "parameter_map": (
         lambda **o: P.parameter_map(MAP, "exponent", equilibrium="lower_saddle", **o),

@@ -317,6 +317,11 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "bifurcation_set": {
         "x": lambda: "B", "y": lambda: "C", "xlim": lambda: (-3, 3), "ylim": lambda: (-3, 3),
     },
+    "quasi_static": {"path": lambda: {"A": [1.0, 2.0]}},
+    "plot.hysteresis_loop": {
+        "dataset": lambda: pk.quasi_static(pk.Coefficients(1.0, 0.4, 0.1), A=[1.0, 0.2]),
+        "x": lambda: "A", "y": lambda: "phi",
+    },
     "figure_eights": {"path": lambda: {"B": (0.1, 1.0)}, "n": lambda: 5},
     "orbit_families": {"n": lambda: 3},
     "continuation": {

@@ -211,8 +211,8 @@ def test_names_that_sympy_takes_for_functions_are_parameters():
         (lambda: pk.separatrix_motion(WELL, 0.0, side="up"), "^side: got 'up'"),
         (lambda: pk.critical(WELL, "lam"), "critical is in closed form"),
         (lambda: pk.critical(ROTOR, "lam"), "critical is in closed form"),
-        (lambda: pk.orbit_families(ROTOR), "orbit_families is in closed form"),
-        (lambda: pk.action_angle(ROTOR, 0.1, 0.2), "action_angle is in closed form"),
+        (lambda: pk.quasi_static(ROTOR, b=[0.1, 0.2]), "pk.continuation follows the equilibria"),
+        (lambda: pk.state_of(ROTOR, 0.1, 0.2, "outer"), "state_of is in closed form"),
         (lambda: ROTOR.reduced(), "a system with coefficients"),
         (
             lambda: pk.sweep(WELL, mu=[1.0, 2.0], of="fold_margin"),

@@ -18,6 +18,8 @@ from phasekit.phase.exact.flow import Motion
 from phasekit.phase.numerical import motion as motions
 from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical import separatrices as loops
+from phasekit.phase.numerical.angles import AnglesWithErrors
+from phasekit.phase.numerical.angles import angles as find_angles
 from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
@@ -107,6 +109,14 @@ def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
     *parameters, phi, dphi = inputs
     ground, shape, (x, v) = _cells(formula, parameters, (phi, dphi))
     return _shaped(rounds.orbits(ground, x, v), shape)
+
+
+def angles(formula: Formula, *inputs: npt.ArrayLike) -> AnglesWithErrors:
+    """Angle variables of states (phi, dphi), the last of the inputs."""
+    *parameters, phi, dphi = inputs
+    ground, shape, (x, v) = _cells(formula, parameters, (phi, dphi))
+    found = find_angles(ground, x, v)
+    return AnglesWithErrors._make(array.reshape(shape) for array in found)
 
 
 def orbits_at_energy(formula: Formula, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:

@@ -12,10 +12,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from phasekit.labels.arguments import bad, unknown
+from phasekit.labels.conversion import in_si
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.units import UNITS, UNITS_OF, converted, factor, usual
-from phasekit.systems import analogues, disk  # noqa: F401  # they fill MODELS
-from phasekit.systems.system import MODELS
+from phasekit.systems.registry import models
 from phasekit.table.quantities import quantities
 
 Angles = Literal["rad", "deg"]
@@ -63,14 +63,7 @@ class Units:
         held = {str(name): str(one.attrs.get("units", "")) for name, one in ds.variables.items()}
         asked = cls.of(angles, units, {name: _base(unit) for name, unit in held.items()})
         others = {name: unit for name, unit in held.items() if _base(unit) != unit}
-        plain = {}
-        for name, unit in others.items():
-            one, base = ds[name].variable, _base(unit)
-            attrs = {**one.attrs, "units": base}
-            values = one.values * float(factor(name, unit, base))
-            plain[name] = xr.Variable(one.dims, values, attrs)
-        coords = {name: one for name, one in plain.items() if name in ds.coords}
-        ds = ds.assign_coords(coords).assign({n: v for n, v in plain.items() if n not in coords})
+        ds = in_si(ds)
         return ds, cls(asked.angles, {**others, **asked.chosen})
 
     def unit(self, name: str, held: str) -> str:
@@ -137,7 +130,7 @@ def _base(held: str) -> str:
 
 def _known() -> dict[str, str]:
     """Return the names that quantities, parameters and states have anywhere, with their units."""
-    parameters = {p.name: p.units for model in MODELS.values() for p in model.declared}
+    parameters = {p.name: p.units for model in models().values() for p in model.declared}
     states = {name: units for name, (units, _) in STATES.items()}
     rows = {name: row.units for name, row in quantities().items()}
     return {**UNITS_OF, **parameters, **states, **rows}

@@ -1,0 +1,175 @@
+"""The recipes of the documentation run as they stand, and their results are right."""
+
+import csv
+import re
+from pathlib import Path
+
+import matplotlib
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+import phasekit as pk
+from phasekit.maps import run as maps_run
+
+matplotlib.use("Agg")
+PAGE = (Path(__file__).parents[1] / "docs" / "recipes.md").read_text(encoding="utf-8")
+HEAD, *PARTS = re.split(r"^## ", PAGE, flags=re.MULTILINE)
+BLOCKS = {}
+for part in PARTS:
+    title, _, text = part.partition("\n")
+    (BLOCKS[title],) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+(START,) = re.findall(r"```python\n(.*?)```", HEAD, re.DOTALL)
+TITLES = list(BLOCKS)
+SECOND_CENTER, DIAGRAM, MAP, PERIOD, LOOP, POTENTIAL, HOPF, PORTRAITS, FORCE, LARGE = TITLES
+
+
+@pytest.fixture(autouse=True)
+def _own_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("RECIPE_SIDE", "60")
+    yield
+    plt.close("all")
+
+
+def run(*titles):
+    """The names that recipes make."""
+    names = {"__name__": "recipe"}
+    exec(START, names)
+    for title in titles:
+        exec(compile(BLOCKS[title], f"recipes.md: {title}", "exec"), names)
+    return names
+
+
+def test_a_second_center():
+    names = run(SECOND_CENTER)
+    said = float(re.search(r"# ([\d.]+) rpm", BLOCKS[SECOND_CENTER])[1])
+    assert names["speed"] == pytest.approx(said, abs=0.05)
+    counts = [int(pk.equilibria(names[name]).n_equilibria) for name in ("below", "above")]
+    assert counts == [2, 4]
+
+
+def test_b_diagram_in_rpm():
+    names = run(SECOND_CENTER, DIAGRAM)
+    axes = names["ax"]
+    assert "(rpm)" in axes.get_xlabel()
+    assert "(°)" in axes.get_ylabel()
+    counts = names["ds"].n_equilibria
+    first = names["ds"].omega1[int(np.argmax(counts.values == 4))].item() / pk.rpm
+    assert first - 1 < names["speed"] <= first
+    # The upper branches begin at the line.
+    starts = [line.get_xdata() for line in axes.lines if len(line.get_xdata()) > 10]
+    assert len(starts) >= 2
+
+
+def test_c_best_cell(capsys):
+    names = run(MAP)
+    peak, best = names["peak"], names["best"]
+    assert np.isfinite(peak).all()
+    assert peak.sel(beta=best.beta, omega1=best.omega1).item() == float(peak.min())
+    loads = pk.separatrices(best.phasekit.system()).phasekit.bearing_forces(on="separatrix")
+    assert float(loads.peak_force.max()) == pytest.approx(float(peak.min()), rel=1e-9)
+    assert capsys.readouterr().out == f"{best.phasekit.system()}\n"
+
+
+def test_d_period_against_amplitude():
+    run(PERIOD)
+    with open("period.csv", encoding="utf-8") as file:
+        head, *rows = csv.reader(file)
+    assert head == ["amplitude (deg)", "period (ms)"]
+    amplitude, period = np.array(rows, float).T
+    assert len(rows) == 81
+    assert (np.diff(period[2:]) > 0).all()
+    # The same lines for a pendulum, whose period is an elliptic integral.
+    names = {"pk": pk, "np": np, "disk": pk.Pendulum(length=0.5, g=10.0)}
+    exec(BLOCKS[PERIOD], names)
+    amplitude, period = names["table"][["amplitude (deg)", "period (ms)"]].values.T
+    wanted = 4e3 / np.sqrt(20.0) * ellipk(np.sin(np.radians(amplitude) / 2) ** 2)
+    np.testing.assert_allclose(period, wanted, rtol=1e-12)
+
+
+def test_e_hysteresis_loop():
+    names = run(LOOP)
+    c, s = np.cos(np.pi / 6), np.sin(np.pi / 6)
+    wanted = 2.0 * (c ** (2 / 3) + s ** (2 / 3)) ** -1.5
+    np.testing.assert_allclose(names["switching"], [wanted, wanted], rtol=1e-14)
+
+
+def test_f_potential():
+    names = run(POTENTIAL)
+    roots = np.sort(np.roots([1.0, 0.0, -1.0, 0.1]).real)
+    np.testing.assert_allclose(names["places"].phi, roots, rtol=1e-13)
+    assert bool(names["places"].complete)
+    well, period = names["well"], names["period"]
+    half = pk.flow(well, 1.2, 0.0, [period / 2, period])
+    np.testing.assert_allclose(half.motion_dphi, 0.0, atol=1e-9)
+    assert half.motion_phi.values[1] == pytest.approx(1.2, rel=1e-11)
+
+
+def test_g_hopf_point_and_curve():
+    names = run(HOPF)
+    hopf, curve = names["hopf"], names["curve"]
+    assert (hopf.kind, hopf.status) == ("hopf", "converged")
+
+    def current(b):  # the trace 1 - v^2 - 0.08 b vanishes
+        v = -np.sqrt(1.0 - 0.08 * b)
+        return (v + 0.7) / b - v + v**3 / 3
+
+    assert hopf["current"] == pytest.approx(current(0.8), rel=1e-10)
+    b = curve.points.b.values
+    near = curve.points.v.values < 0
+    assert near.sum() > 5
+    np.testing.assert_allclose(curve.points.current.values[near], current(b[near]), rtol=1e-8)
+    assert b.min() == pytest.approx(0.3)
+    assert b.max() == pytest.approx(1.2)
+
+
+def test_h_two_portraits():
+    left, right = run(PORTRAITS)["axes"]
+    assert left.get_ylim() == right.get_ylim()
+    assert left.lines
+    assert right.lines
+    assert (left.get_title(), right.get_title()) == ("β = 40°", "β = 75°")
+
+
+def test_i_force_in_time_and_animation():
+    names = run(FORCE)
+    loaded, motion, force = names["loaded"], names["motion"], names["force"]
+    orbit = pk.orbits(loaded, names["start"], 0.0)
+    assert orbit.orbit_kind == pk.OrbitKind.LIBRATION
+    # Just inside, so that it takes longer than small oscillations.
+    assert orbit.period.item() > 2 * 2 * np.pi / pk.equilibria(loaded).natural_frequency.max()
+    k = 17
+    phi, dphi = motion.motion_phi.values[k], motion.motion_dphi.values[k]
+    alone = pk.bearing_forces(loaded, phi, dphi).force_magnitude.sel(bearing="A2").item()
+    assert force.values[k] == pytest.approx(alone, rel=1e-12)
+    assert Path("motion.gif").read_bytes().startswith(b"GIF8")
+
+
+def test_j_large_map(monkeypatch, capsys):
+    done, finish = [], maps_run.Tally.finish
+
+    def stopped(self, tile):
+        finish(self, tile)
+        done.append(tile)
+        if len(done) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(maps_run.Tally, "finish", stopped)
+    names = run(LARGE)
+    out = capsys.readouterr().out
+    count, total = map(int, re.match(r"(\d+) of (\d+) tiles are done", out).groups())
+    assert 3 <= count < total
+    assert len(done) == 3 + total - count  # nothing was computed twice
+    ds = names["ds"]
+    whole = pk.sweep(
+        names["disk"],
+        beta=ds.beta.values,
+        a=ds.a.values,
+        of=("n_equilibria", "topology", "fold_margin"),
+    )
+    for name in whole.data_vars:
+        np.testing.assert_array_equal(ds[name], whole[name])
+    assert 0.0 < names["share"] < 1.0
+    assert int(re.search(r'"RECIPE_SIDE", (\d+)', BLOCKS[LARGE])[1]) ** 2 >= 10**7
