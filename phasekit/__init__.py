@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
+    from phasekit.errors import EscapeRegime as EscapeRegime
     from phasekit.errors import Loop as Loop
     from phasekit.errors import OrbitFamily as OrbitFamily
     from phasekit.errors import OrbitKind as OrbitKind
@@ -59,8 +60,10 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.perturbed import capture as capture
     from phasekit.labelled.perturbed import critical_torque as critical_torque
+    from phasekit.labelled.perturbed import escape_rate as escape_rate
     from phasekit.labelled.perturbed import melnikov as melnikov
     from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
+    from phasekit.labelled.perturbed import resonances as resonances
     from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
@@ -86,6 +89,7 @@ _MODULES = {
     "phasekit.errors": (
         "ConvergenceError",
         "EquilibriumKind",
+        "EscapeRegime",
         "Loop",
         "OrbitFamily",
         "OrbitKind",
@@ -121,8 +125,10 @@ _MODULES = {
     "phasekit.labelled.perturbed": (
         "capture",
         "critical_torque",
+        "escape_rate",
         "melnikov",
         "quiet_frequencies",
+        "resonances",
         "retrapping_torque",
     ),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),

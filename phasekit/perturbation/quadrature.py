@@ -110,9 +110,7 @@ def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov
         part = slice(start, min(start + CELLS, cells))
         one = {name: x[part] for name, x in flat.items()}
         own = Separatrices._make(x[part] if size == cells else x for x in loops)
-        own = Separatrices._make(
-            np.broadcast_to(x, (part.stop - start, *x.shape[1:])) for x in own
-        )
+        own = Separatrices._make(np.broadcast_to(x, (part.stop - start, *x.shape[1:])) for x in own)
         found.append(_cells(law, formula, one, own))
     fields = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in fields)

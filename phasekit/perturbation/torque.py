@@ -85,7 +85,9 @@ def critical_torque(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Cri
     return CriticalTorque(torque, np.stack(places, axis=-1))
 
 
-def critical_of_perturbed(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> CriticalTorque:
+def critical_of_perturbed(
+    law: PerturbedTrigonometric, *parameters: npt.ArrayLike
+) -> CriticalTorque:
     """The same for a perturbed system, whose own torque does not count."""
     return critical_torque(*law.coefficients(law.values(*parameters)))
 
