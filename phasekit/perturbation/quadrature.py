@@ -23,12 +23,14 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 #: Times up to this over the exponent; e^-REACH is below rounding.
-REACH = 38.0
-POINTS = 1 << 11
+REACH = 36.0
+#: Points in time: as few as do, else many.
+POINTS = (1 << 8, 1 << 11)
 #: Cells at a time, for the memory of their motions.
 CELLS = 256
-#: Greatest error of what is said, relative.
-WORST = 1e-6
+#: Greatest rounding of what is said, and difference from twice the step, relative: half the step
+#: squares the error.
+WORST, APART = 1e-6, 1e-4
 
 
 @functools.lru_cache(maxsize=32)
@@ -42,12 +44,14 @@ def derivative(formula: Formula, parameter: str) -> Formula:
 class Paths:
     """Motions along all separatrices of some cells: the axes are cell, saddle, side, time."""
 
-    def __init__(self, formula: Formula, parameters: list[Array], loops: Separatrices) -> None:
+    def __init__(
+        self, formula: Formula, parameters: list[Array], loops: Separatrices, points: int
+    ) -> None:
         self.formula = formula
         self.parameters = [p[:, None, None, None] for p in parameters]
         count = loops.saddle_phi.shape[-1]
         k = loops.saddle_exponent
-        grid = np.linspace(-REACH, REACH, POINTS + 1)
+        grid = np.linspace(-REACH, REACH, points + 1)
         with np.errstate(all="ignore"):
             times = grid / k[..., None]
         self.time = times[:, :, None, :]
@@ -72,7 +76,7 @@ class Paths:
         fine = values.sum(axis=-1)
         coarse = 2.0 * values[..., ::2].sum(axis=-1)
         rounding = 1e-13 * np.abs(values).sum(axis=-1)
-        good = np.abs(fine - coarse) + rounding <= WORST * np.abs(fine)
+        good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
         # What vanishes by symmetry, within rounding, vanishes.
         nothing = np.abs(fine) <= 0.1 * rounding
         return np.where(good, fine * self.step, np.where(nothing, 0.0, np.nan))
@@ -82,7 +86,7 @@ class Paths:
         at = np.exp(1j * nu[:, None, None, None] * self.time) * self.dphi * values
         rounding = 1e-13 * np.abs(at).sum(axis=-1)
         fine, coarse = at.sum(axis=-1), 2.0 * at[..., ::2].sum(axis=-1)
-        good = np.abs(fine - coarse) + rounding <= WORST * np.abs(fine)
+        good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
         return np.where(good, fine * self.step, np.nan)
 
 
@@ -111,15 +115,25 @@ def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov
         one = {name: x[part] for name, x in flat.items()}
         own = Separatrices._make(x[part] if size == cells else x for x in loops)
         own = Separatrices._make(np.broadcast_to(x, (part.stop - start, *x.shape[1:])) for x in own)
-        found.append(_cells(law, formula, one, own))
+        few, lost = _cells(law, formula, one, own, POINTS[0])
+        if lost.any():
+            rows = np.flatnonzero(lost)
+            left = Separatrices._make(x[rows] for x in own)
+            again = {name: x[rows] for name, x in one.items()}
+            many, _ = _cells(law, formula, again, left, POINTS[1])
+            for field, better in zip(few, many, strict=True):
+                field[rows] = better
+        found.append(few)
     fields = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in fields)
 
 
 def _cells(
-    law: PerturbedConservative, formula: Formula, values: dict[str, Array], loops: Separatrices
-) -> Melnikov:
-    paths = Paths(formula, [values[name] for name in formula.names], loops)
+    law: PerturbedConservative, formula: Formula, values: dict[str, Array], loops: Separatrices,
+    points: int,
+) -> tuple[Melnikov, Any]:  # fmt: skip
+    """Melnikov's function by so many points in time, and in which cells they were too few."""
+    paths = Paths(formula, [values[name] for name in formula.names], loops, points)
     each = {name: x[:, None, None] for name, x in values.items()}
     square = paths.dphi**2
     mean = -each["damping"] * paths.integral(square)
@@ -144,7 +158,10 @@ def _cells(
         amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
         slope = -derivative(formula, parameter).slopes(paths.phi, *paths.parameters)
         parts.append((paths.transform(slope, nu), amplitude, nu, phase))
-    return assembled(mean, parts, undamped(law, values))
+    found = assembled(mean, parts, undamped(law, values))
+    closed = np.isfinite(paths.phi[..., 0])
+    lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
+    return found, lost.any(axis=(1, 2))
 
 
 def _area_loss(paths: Paths, formula: Formula, parameter: str) -> Any:
