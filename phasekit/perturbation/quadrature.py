@@ -47,29 +47,33 @@ class Paths:
     def __init__(
         self, formula: Formula, parameters: list[Array], loops: Separatrices, points: int
     ) -> None:
-        self.formula = formula
-        self.parameters = [p[:, None, None, None] for p in parameters]
-        count = loops.saddle_phi.shape[-1]
-        k = loops.saddle_exponent
+        # Cells of one potential, under many drives, have the same motions.
+        keys = np.stack([*parameters, np.zeros(len(loops.saddle_phi))], axis=1)
+        _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        which = which.reshape(-1)
+        k = loops.saddle_exponent[first]
         grid = np.linspace(-REACH, REACH, points + 1)
         with np.errstate(all="ignore"):
             times = grid / k[..., None]
-        self.time = times[:, :, None, :]
-        self.step = self.time[..., 1] - self.time[..., 0]
-        shape = (len(k), count, 2, grid.size)
-        self.phi, self.dphi = np.full(shape, np.nan), np.full(shape, np.nan)
-        for saddle in range(count):
+        shape = (len(first), k.shape[-1], 2, grid.size)
+        phi, dphi = np.full(shape, np.nan), np.full(shape, np.nan)
+        for saddle in range(k.shape[-1]):
             there = np.flatnonzero(np.isfinite(k[:, saddle]) & (k[:, saddle] > 0.0))
-            own = [p[there, None] for p in parameters]
+            own = [p[first[there], None] for p in parameters]
             for side in (0, 1) if there.size else ():
                 found = functions.separatrix_motion(
                     formula, *own, times[there, saddle], saddle=saddle, side=side
                 )
+                speed = np.abs(found.motion_dphi)
+                size = speed.max(axis=-1, keepdims=True, initial=0.0)
                 closed = np.isfinite(found.motion_phi).all(axis=-1, keepdims=True)
-                size = np.abs(found.motion_dphi).max(axis=-1, keepdims=True, initial=0.0)
-                closed &= np.abs(found.motion_dphi[:, [0, -1]]).max(-1, keepdims=True) < 1e-9 * size
-                self.phi[there, saddle, side] = np.where(closed, found.motion_phi, np.nan)
-                self.dphi[there, saddle, side] = np.where(closed, found.motion_dphi, np.nan)
+                closed &= speed[:, [0, -1]].max(-1, keepdims=True) < 1e-9 * size
+                phi[there, saddle, side] = np.where(closed, found.motion_phi, np.nan)
+                dphi[there, saddle, side] = np.where(closed, found.motion_dphi, np.nan)
+        self.parameters = [p[:, None, None, None] for p in parameters]
+        self.time = times[which][:, :, None, :]
+        self.step = self.time[..., 1] - self.time[..., 0]
+        self.phi, self.dphi = phi[which], dphi[which]
 
     def integral(self, values: Any) -> Any:
         """Integral over time, NaN where it has lost too many digits."""
