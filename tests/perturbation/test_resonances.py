@@ -25,8 +25,8 @@ def test_the_pendulum():
         action = 8 / np.pi * (ellipe(k * k) - (1 - k * k) * K)
         q = np.exp(-np.pi * ellipk(1 - k * k) / K)
         V = F * 4 * q ** (n / 2) / (n * (1 + q**n))
-        h = 1e-5
-        twist = nu / n * (frequency(k + h) - frequency(k - h)) / (8 * k * h)
+        slope = (ellipe(k * k) - (1 - k * k) * K) / (k * (1 - k * k))  # dK/dk
+        twist = -nu / n * 0.5 * np.pi * slope / K**2 / (4 * k)  # h = 2 k^2 - 1
         assert ds.resonance_action.sel(order=n).item() == pytest.approx(action, rel=1e-9)
         width = ds.resonance_width.sel(order=n).item()
         assert width == pytest.approx(2 * np.sqrt(V / abs(twist)), rel=1e-5)
