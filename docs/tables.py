@@ -20,7 +20,7 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import MODELS, Model
-from phasekit.table.quantities import PASSES, QUANTITIES
+from phasekit.table.quantities import PASSES, QUANTITIES, variant
 from phasekit.table.row import LAW, Pass, Quantity
 
 
@@ -185,7 +185,7 @@ def _row(row: Quantity, rungs: set[type[Law]]) -> tuple[str, ...]:
         meaning += f": a code of [{row.flags.__name__}](codes.md)"
     equation = code(row.equation)
     for rung, words in ((Conservative, "in any potential"), (Routhian, "at a kept momentum")):
-        own = row.variant(rung).get("equation")
+        own = variant(row, rung).get("equation")
         if rung in rungs and own and own != row.equation:
             equation += f"; {words} {code(own)}"
     return code(row.name), codes(row.dims), code(row.units), meaning, equation, plain(row.source)

@@ -125,7 +125,16 @@ class Loop(IntEnum):
 
 
 class EscapeRegime(IntEnum):
-    """How a particle escapes from a well by thermal noise."""
+    """What limits the escape of a particle from a well by thermal noise.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> warm = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=3.0, kT=0.2)
+    >>> code = pk.escape_rate(warm).escape_regime.sel(saddle="upper", side="right").item()
+    >>> pk.EscapeRegime(code).name
+    'SPATIAL_DIFFUSION'
+    """
 
     NOT_COMPUTED = -1
     ABSENT = 0

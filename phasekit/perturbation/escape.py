@@ -64,7 +64,7 @@ def depopulation(D: npt.ArrayLike) -> Array:
     Examples
     --------
     >>> depopulation([1e-9, 1.0, 100.0]).round(6).tolist()
-    [0.0, 0.421463, 1.0]
+    [0.0, 0.442978, 1.0]
     """
     theta, weight = panels(QUARTER)
     with np.errstate(all="ignore"):

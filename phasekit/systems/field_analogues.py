@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -11,9 +11,6 @@ from phasekit.labels.arguments import NumberLike, bad, number
 from phasekit.laws.trigonometric import Values
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import Model, model
-
-if TYPE_CHECKING:
-    from phasekit.systems.perturbed import Perturbed
 
 
 @model
@@ -43,15 +40,15 @@ class JosephsonJunction(Model):
     -----
     ``A = -2 omega_p^2 second_harmonic``, ``B = omega_p^2 cos flux``, ``C = omega_p^2 sin flux``.
     The greatest currents without voltage, in units of I_1, are `critical_torque` over
-    ``omega_p^2``; where they differ in size the junction is a diode. `shunted` adds bias, shunt and
-    temperature.
+    ``omega_p^2``; where they differ in size the junction is a diode. `shunt` says what bias, shunt
+    and temperature are as damping, torque and noise.
 
     Examples
     --------
     >>> import phasekit as pk
     >>> diode = pk.JosephsonJunction(plasma_frequency=1.0, second_harmonic=0.5, flux=-45 * pk.deg)
     >>> minus, plus = pk.critical_torque(diode).critical_torque.values
-    >>> round(abs(plus + minus)/(plus - minus), 12)  # the greatest efficiency of two harmonics
+    >>> round(float(abs(plus + minus) / (plus - minus)), 12)  # the greatest efficiency of two harmonics
     0.333333333333
     """
 
@@ -76,25 +73,25 @@ class JosephsonJunction(Model):
         size = v["plasma_frequency"] * v["plasma_frequency"]
         return -2 * (size * v["second_harmonic"]) * unit, size * cosine, size * sine, unit
 
-    def shunted(
-        self, *, bias: NumberLike = 0.0, stewart_mccumber: float, gamma: NumberLike = 0.0
-    ) -> Perturbed:
-        """Return the junction with its shunt, a bias current and thermal noise.
+    def shunt(
+        self, *, stewart_mccumber: float, bias: float = 0.0, gamma: float = 0.0
+    ) -> dict[str, float]:
+        """Damping, torque and noise of a shunt, a bias current and a temperature.
 
         Parameters
         ----------
-        bias : float or array_like, default 0.0
-            Bias current over I_1.
         stewart_mccumber : float
             Stewart-McCumber parameter ``beta_c = (omega_p R C)^2``, > 0.
-        gamma : float or array_like, default 0.0
+        bias : float, default 0.0
+            Bias current over I_1.
+        gamma : float, default 0.0
             Thermal energy over the Josephson energy, ``2 e k_B T/(hbar I_1)``, >= 0.
 
         Returns
         -------
-        Perturbed
-            ``damping = omega_p/sqrt(beta_c)``, ``torque = omega_p^2 bias``,
-            ``kT = omega_p^2 gamma``.
+        dict
+            Arguments of `Perturbed`: ``damping = omega_p/sqrt(beta_c)``,
+            ``torque = omega_p^2 bias``, ``kT = omega_p^2 gamma``.
 
         Raises
         ------
@@ -104,20 +101,25 @@ class JosephsonJunction(Model):
         Notes
         -----
         [Stewart1968], [McCumber1968].
-        """
-        from phasekit.systems.perturbed import Perturbed
 
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> junction = pk.JosephsonJunction(plasma_frequency=2.0)
+        >>> pk.Perturbed(junction, **junction.shunt(stewart_mccumber=25.0, bias=0.5))
+        Perturbed(JosephsonJunction(plasma_frequency=2.0, second_harmonic=0.0, flux=0.0),
+        damping=0.4, torque=2.0)
+        """
         omega = number("plasma_frequency", self.plasma_frequency, "one number here")
         quality = number("stewart_mccumber", stewart_mccumber, "a number > 0")
         if not quality > 0.0:
             raise bad("stewart_mccumber", stewart_mccumber, "a number > 0")
         scale = omega * omega
-        return Perturbed(
-            self,
-            damping=omega / np.sqrt(quality),
-            torque=scale * np.asarray(bias) if np.ndim(bias) else scale * bias,  # type: ignore[operator]
-            kT=scale * np.asarray(gamma) if np.ndim(gamma) else scale * gamma,  # type: ignore[operator]
-        )
+        return {
+            "damping": omega / float(np.sqrt(quality)),
+            "torque": scale * number("bias", bias),
+            "kT": scale * number("gamma", gamma),
+        }
 
 
 @model
@@ -153,7 +155,7 @@ class SpinOrbit(Model):
     >>> import phasekit as pk
     >>> mercury = pk.SpinOrbit.resonance(1.5, eccentricity=0.206, asymmetry=1e-4)
     >>> tides = mercury.tides(1.5, eccentricity=0.206, rate=1e-8)
-    >>> odds = pk.capture(tides, start="rotation").capture_probability
+    >>> odds = pk.capture(pk.Perturbed(mercury, **tides), start="rotation").capture_probability
     >>> round(1.0 - odds.sel(region="none").item(), 4)
     0.0708
     """
@@ -202,8 +204,8 @@ class SpinOrbit(Model):
         strength = _strength(*_orbit(p, eccentricity))
         return cls(mean_motion=mean_motion, asymmetry=asymmetry, strength=strength)
 
-    def tides(self, p: float, *, eccentricity: float, rate: float) -> Perturbed:
-        """Return the spin under tides of a constant time lag.
+    def tides(self, p: float, *, eccentricity: float, rate: float) -> dict[str, float]:
+        """Damping and torque of tides of a constant time lag.
 
         Parameters
         ----------
@@ -216,8 +218,9 @@ class SpinOrbit(Model):
 
         Returns
         -------
-        Perturbed
-            ``damping = K Omega(e)`` and ``torque = -K n (p Omega(e) - N(e))``.
+        dict
+            Arguments of `Perturbed`: ``damping = K Omega(e)`` and
+            ``torque = -K n (p Omega(e) - N(e))``.
 
         Raises
         ------
@@ -229,8 +232,6 @@ class SpinOrbit(Model):
         ``Omega = (1 + 3 e^2 + 3 e^4/8)/(1 - e^2)^(9/2)``,
         ``N = (1 + 15 e^2/2 + 45 e^4/8 + 5 e^6/16)/(1 - e^2)^6`` ([CorreiaLaskar2004]).
         """
-        from phasekit.systems.perturbed import Perturbed
-
         p, e = _orbit(p, eccentricity)
         K = number("rate", rate, "a number > 0", "s-1")
         if not K > 0.0:
@@ -240,7 +241,7 @@ class SpinOrbit(Model):
         drag = (1.0 + 3.0 * square + 0.375 * square**2) / (1.0 - square) ** 4.5
         push = 1.0 + 7.5 * square + 5.625 * square**2 + 0.3125 * square**3
         push /= (1.0 - square) ** 6
-        return Perturbed(self, damping=K * drag, torque=-K * n * (p * drag - push))
+        return {"damping": K * drag, "torque": -K * n * (p * drag - push)}
 
 
 def _orbit(p: Any, eccentricity: Any) -> tuple[float, float]:
