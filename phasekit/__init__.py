@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
+    from phasekit.errors import EscapeRegime as EscapeRegime
     from phasekit.errors import InvalidCellsWarning as InvalidCellsWarning
     from phasekit.errors import Loop as Loop
     from phasekit.errors import OrbitFamily as OrbitFamily
@@ -63,8 +64,10 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import state_of as state_of
     from phasekit.labelled.perturbed import capture as capture
     from phasekit.labelled.perturbed import critical_torque as critical_torque
+    from phasekit.labelled.perturbed import escape_rate as escape_rate
     from phasekit.labelled.perturbed import melnikov as melnikov
     from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
+    from phasekit.labelled.perturbed import resonances as resonances
     from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
@@ -77,6 +80,8 @@ if TYPE_CHECKING:
     from phasekit.systems.analogues import Pendulum as Pendulum
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
     from phasekit.systems.disk import GyroRotorDisk as GyroRotorDisk
+    from phasekit.systems.field_analogues import JosephsonJunction as JosephsonJunction
+    from phasekit.systems.field_analogues import SpinOrbit as SpinOrbit
     from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
     from phasekit.systems.harmonic import Harmonic as Harmonic
     from phasekit.systems.perturbed import Perturbed as Perturbed
@@ -92,6 +97,7 @@ _MODULES = {
         "ConvergenceError",
         "EquilibriumKind",
         "InvalidCellsWarning",
+        "EscapeRegime",
         "Loop",
         "OrbitFamily",
         "OrbitKind",
@@ -112,6 +118,7 @@ _MODULES = {
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.systems.free_rotor": ("FreeGyroRotor",),
+    "phasekit.systems.field_analogues": ("JosephsonJunction", "SpinOrbit"),
     "phasekit.systems.harmonic": ("Harmonic",),
     "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
@@ -130,8 +137,10 @@ _MODULES = {
     "phasekit.labelled.perturbed": (
         "capture",
         "critical_torque",
+        "escape_rate",
         "melnikov",
         "quiet_frequencies",
+        "resonances",
         "retrapping_torque",
     ),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),

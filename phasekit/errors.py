@@ -138,6 +138,25 @@ class Loop(IntEnum):
     UNBOUNDED = 5
 
 
+class EscapeRegime(IntEnum):
+    """What limits the escape of a particle from a well by thermal noise.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> warm = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=3.0, kT=0.2)
+    >>> code = pk.escape_rate(warm).escape_regime.sel(saddle="upper", side="right").item()
+    >>> pk.EscapeRegime(code).name
+    'SPATIAL_DIFFUSION'
+    """
+
+    NOT_COMPUTED = -1
+    ABSENT = 0
+    ENERGY_DIFFUSION = 1
+    TURNOVER = 2
+    SPATIAL_DIFFUSION = 3
+
+
 class OrbitKind(IntEnum):
     """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at.
 

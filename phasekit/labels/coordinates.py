@@ -27,6 +27,7 @@ LABELS: dict[str, Labels] = {
     "fixed_bearing": (("A1", "B1"), "bearing of the fixed shaft: spherical at O1, cylindrical"),
     "component": (("F21", "F22", "F23", "F24"), "component along n1, w2, -v01, and R022"),
     "region": (("left", "right", "none"), "region: lobe of the lower saddle, or neither"),
+    "order": ((1,), "order of the resonance"),
     "direction": (("minus", "plus"), "direction of the torque"),
     "family": (("lower_well", "upper_well", "outer", "rotation"), "family of orbits"),
 }

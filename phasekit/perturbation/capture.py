@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import Loop
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
@@ -34,8 +35,12 @@ def capture(
     """Capture in the potential of (A, B, C): into the lobes of the lower saddle."""
     closed.refuse_prescribed(law, "capture")
     values = law.values(*parameters)
-    loss = -closed.means(law, values, separatrices(*law.coefficients(values)))
-    return regions(loss[..., 0, :], loss[..., 1, :], values["torque"], rotation)
+    loops = separatrices(*law.coefficients(values))
+    loss = -closed.means(law, values, loops)
+    # Between two saddles of one energy a region ends in an arc of each, one there and one back.
+    joined = loops.loop[..., :1] == Loop.HETEROCLINIC
+    lobes = loss[..., 0, :] + np.where(joined, loss[..., 1, ::-1], 0.0)
+    return regions(lobes, loss[..., 1, :], values["torque"], rotation)
 
 
 def capture_numerical(
@@ -79,7 +84,7 @@ def regions(lobes: Array, winding: Array, torque: Any, rotation: bool) -> Captur
         inside = winding.sum(axis=-1)
         share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)
     share = np.where(np.isnan(arriving), np.nan, share)
-    wells = np.isfinite(lobes).all(axis=-1)
+    wells = np.asarray(np.isfinite(lobes).all(axis=-1))
     single = np.stack([np.where(forward, 0.0, 1.0), np.where(forward, 1.0, 0.0)], axis=-1)
     parts = np.where(wells[..., None], _shares(lobes)[..., :2], single) * share[..., None]
     probability = np.concatenate([parts, 1.0 - parts.sum(axis=-1, keepdims=True)], axis=-1)

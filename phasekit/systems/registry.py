@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 
-from phasekit.errors import ParameterError
-from phasekit.labels.arguments import describe
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems import bases
+from phasekit.systems.system import Model
 
 #: Where models are; each registers itself when it is imported.
-HOMES = (
-    "phasekit.systems.disk",
-    "phasekit.systems.analogues",
-    "phasekit.systems.potential",
-    "phasekit.systems.free_rotor",
-    "phasekit.systems.perturbed",
-)
+HOMES = (*bases.HOMES, "phasekit.systems.free_rotor", "phasekit.systems.perturbed")
 
 
 def models() -> Mapping[str, type[Model]]:
@@ -27,9 +19,7 @@ def models() -> Mapping[str, type[Model]]:
     >>> "Pendulum" in models()
     True
     """
-    for module in HOMES:
-        importlib.import_module(module)
-    return MODELS
+    return bases.models(HOMES)
 
 
 def model_named(argument: str, name: object) -> type[Model]:
@@ -40,9 +30,4 @@ def model_named(argument: str, name: object) -> type[Model]:
     ParameterError
         If there is none.
     """
-    known = MODELS if name in MODELS else models()
-    if not isinstance(name, str) or name not in known:
-        raise ParameterError(
-            f"{argument}: got a map of the model {describe(name)}, wants one of {', '.join(known)}"
-        )
-    return known[name]
+    return bases.named_model(argument, name, HOMES)
