@@ -42,6 +42,10 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.diagram import diagram as diagram
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
+    from phasekit.labelled.driven import attractors as attractors
+    from phasekit.labelled.driven import basins as basins
+    from phasekit.labelled.driven import lyapunov as lyapunov
+    from phasekit.labelled.driven import stroboscopic as stroboscopic
     from phasekit.labelled.energy import curvature as curvature
     from phasekit.labelled.energy import energy as energy
     from phasekit.labelled.energy import gradient as gradient
@@ -103,6 +107,7 @@ _MODULES = {
     "phasekit.systems.harmonic": ("Harmonic",),
     "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
+    "phasekit.labelled.driven": ("attractors", "basins", "lyapunov", "stroboscopic"),
     "phasekit.labelled.energy": (
         "curvature",
         "energy",

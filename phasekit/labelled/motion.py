@@ -83,15 +83,24 @@ def flow(
             if value is not None:
                 raise bad(name, value, "nothing, because this system's motion is exact")
     else:
-        if np.any(np.asarray(system.kT) > 0.0):
-            raise bad(
-                "kT", system.kT, "0 for a motion: noise is not integrated", "use .replace(kT=0)"
-            )
+        refuse_noise(system)
         tolerances = checked_tolerances(rtol, atol)
         (one,) = passes_of(system, select("motion"))
         one = replace(one, function=functools.partial(one.resolved, **tolerances))
         return at_states(system, select("motion"), states, (one,))
     return at_states(system, select("motion"), states)
+
+
+def refuse_noise(system: Perturbed) -> None:
+    """Refuse a system with noise, which is not integrated.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if np.any(np.asarray(system.kT) > 0.0):
+        hint = "use .replace(kT=0)"
+        raise bad("kT", system.kT, "0 for a motion: noise is not integrated", hint)
 
 
 def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:

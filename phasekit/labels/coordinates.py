@@ -26,6 +26,9 @@ LABELS: dict[str, Labels] = {
     "bearing": (("A2", "B2"), "bearing of the shaft: spherical at +half_span, cylindrical"),
     "fixed_bearing": (("A1", "B1"), "bearing of the fixed shaft: spherical at O1, cylindrical"),
     "component": (("F21", "F22", "F23", "F24"), "component along n1, w2, -v01, and R022"),
+    "exponent": ((1, 2), "Lyapunov exponent, the largest first"),
+    "crossing": ((), "crossing of the section"),
+    "attractor": ((), "attractor, by its number"),
     "family": (("lower_well", "upper_well", "outer", "rotation"), "family of orbits"),
 }
 

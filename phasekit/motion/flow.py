@@ -161,6 +161,7 @@ def motions(
     atol: float = ATOL,
     threads: int | None = None,
     most: int = MOST,
+    tangents: int = 0,
 ) -> Cells:
     """Integrate from t = 0 to times of either sign, in any order.
 
@@ -168,8 +169,8 @@ def motions(
     ----------
     law, values, rtol, atol, threads
         As in `flow`; values of parameters in the cells, by name.
-    states : array, shape (cells, 2)
-        States at t = 0.
+    states : array, shape (cells, 2 + 2 tangents)
+        States at t = 0, with tangent vectors.
     times : array, shape (cells, times) or (1, times)
         Times of each cell, or of all.
     most : int
@@ -178,13 +179,12 @@ def motions(
     from phasekit.motion.kernels.motions import motions as kernel
     from phasekit.numerics.launch import launch
 
-    code, parameters = rates_of(law, values)
+    code, parameters = rates_of(law, values, tangents)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     finite = np.where(np.isfinite(times), times, 0.0)
     table = table_of(law.prescribed, float(finite.min(initial=0)), float(finite.max(initial=0)))
-    unit = 1.0 if law.base.period is None else law.base.period / (2.0 * np.pi)
-    result = np.full((count, times.shape[1], 2), np.nan)
+    result = np.full((count, times.shape[1], states.shape[1]), np.nan)
     status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
     for sense in (1.0, -1.0):
         ahead = sense * times > 0.0
@@ -193,10 +193,21 @@ def motions(
         own = np.where(ahead, times, 0.0)
         order = np.argsort(sense * own, axis=1)
         rising = np.array(np.take_along_axis(own, order, axis=1))
-        out = np.empty((count, times.shape[1], 2))
+        out = np.empty(result.shape)
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
-            arrays = (code.address, table, 0.0, rising, unit, rtol, atol, most, code.kink, states)
+            arrays = (
+                code.address,
+                table,
+                0.0,
+                rising,
+                unit_of(law),
+                rtol,
+                atol,
+                most,
+                code.kink,
+                np.array(states),
+            )
             groups: Any = (out, reached, taken)
             launch(kernel, (*arrays, parameters), count, groups, threads, WEIGHT)
         back = np.argsort(order, axis=1)[..., None]
@@ -205,6 +216,16 @@ def motions(
         result = np.where(wanted, out, result)
         status, steps = np.maximum(status, reached), steps + taken
     return Cells(result, status, steps)
+
+
+def circle(law: PerturbedConservative) -> float:
+    """Period of the coordinate; 0 on a line."""
+    return 0.0 if law.base.period is None else float(law.base.period)
+
+
+def unit_of(law: PerturbedConservative) -> float:
+    """Value from which on a coordinate is held as closely as there: a radian; none on a line."""
+    return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf
 
 
 def _tell(found: Cells) -> None:

@@ -7,41 +7,25 @@ import numpy as np
 from phasekit.motion.kernels.dop853 import ROWS, densify, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
-    AIMS,
     ARRIVED,
     CELL,
     END,
     IDLE,
     REALS,
-    REJECTED,
     RUNNING,
     STATE,
     STEPS,
     TRY,
     WHOLES,
     T,
-    Whole,
     advance,
     begin,
     commit,
+    load,
     renew,
 )
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.lanes import LANES
-
-
-@routine
-def load(
-    lane: int, cell: int, states: Array, parameters: Array, x: Array, p: Array, whole: Whole
-) -> None:
-    """Put a cell into a lane."""
-    whole[CELL, lane] = cell
-    whole[STATE, lane] = RUNNING
-    whole[STEPS, lane] = whole[REJECTED, lane] = whole[AIMS, lane] = 0
-    for c in range(states.shape[1]):
-        x[c * LANES + lane] = states[cell, c]
-    for c in range(parameters.shape[0]):
-        p[c * LANES + lane] = parameters[c, cell]
 
 
 @routine
@@ -83,7 +67,7 @@ def motions(
     """Integrate the motions of cells; times are all after the start or all before it, in order.
 
     `times` is of shape (cells, times), or (1, times) where they are the same; `states` of shape
-    (cells, n), `parameters` of shape (parameters, cells), `out` of shape (cells, times, 2): NaN
+    (cells, n), `parameters` of shape (parameters, cells), `out` of shape (cells, times, n): NaN
     where a motion did not come to a time.
     """
     size = states.shape[1] * LANES
@@ -112,7 +96,7 @@ def motions(
                 real[END, lane] = own_times[-1]
                 written[lane] = 0
                 while written[lane] < own_times.size and own_times[written[lane]] == start:
-                    out[cell, written[lane]] = states[cell, :2]
+                    out[cell, written[lane]] = states[cell]
                     written[lane] += 1
                 if written[lane] == own_times.size:
                     whole[STATE, lane] = ARRIVED

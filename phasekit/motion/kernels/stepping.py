@@ -40,6 +40,20 @@ _MOST_AIMS = 12
 
 
 @routine
+def load(
+    lane: int, cell: int, states: Array, parameters: Array, x: Array, p: Array, whole: Whole
+) -> None:
+    """Put a cell into a lane."""
+    whole[CELL, lane] = cell
+    whole[STATE, lane] = RUNNING
+    whole[STEPS, lane] = whole[REJECTED, lane] = whole[AIMS, lane] = 0
+    for c in range(states.shape[1]):
+        x[c * LANES + lane] = states[cell, c]
+    for c in range(parameters.shape[0]):
+        p[c * LANES + lane] = parameters[c, cell]
+
+
+@routine
 def begin(
     lane: int, x: Array, k: Array, p: Array, kink: int, real: Array, rtol: float, atol: float
 ) -> None:
