@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
+    from phasekit.labelled.run_up import run_up as run_up
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
@@ -126,6 +127,7 @@ _MODULES = {
     "phasekit.systems.problem": ("Problem",),
     "phasekit.table.quantities": ("quantities",),
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
+    "phasekit.labelled.run_up": ("run_up",),
     "phasekit.maps.whole": ("open_map",),
     "phasekit.maps.sweep": ("sweep",),
     "phasekit.systems.system": ("Coefficients", "Reduced"),

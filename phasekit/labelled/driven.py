@@ -284,7 +284,7 @@ def basins(
     >>> damped = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.2)
     >>> ds = pk.basins(damped, phi=np.linspace(-3.0, 3.0, 31), dphi=np.linspace(-1.0, 1.0, 21))
     >>> ds.attractor_phi.values.round(3).ravel().tolist(), float(ds.basin_fraction.sum())
-    ([-1.115, 1.283], 1.0)
+    ([-1.156, 1.255], 1.0)
     """
     periods = whole("periods", periods, "a number of periods, >= 1", 1)
     system, found, grid = _searched(perturbed, phi, dphi, period)

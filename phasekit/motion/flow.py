@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,7 +100,7 @@ def flow(
 
 def _motions(
     law: PerturbedConservative,
-    values: dict[str, Array],
+    values: Mapping[str, Array],
     states: Array,
     times: Array,
     *how: Any,
@@ -154,7 +155,7 @@ def _time_axes(arrays: tuple[Array, ...], t: Array, n: int) -> tuple[int, ...]:
 
 def motions(
     law: PerturbedConservative,
-    values: dict[str, Array],
+    values: Mapping[str, Array],
     states: Array,
     times: Array,
     rtol: float = RTOL,
@@ -244,3 +245,24 @@ def _tell(found: Cells) -> None:
                 RuntimeWarning,
                 stacklevel=3,
             )
+
+
+def accelerations(
+    law: PerturbedConservative,
+    values: Mapping[str, Array],
+    times: npt.ArrayLike,
+    phi: npt.ArrayLike,
+    dphi: npt.ArrayLike,
+) -> Array:
+    """phi'' at states and times, that broadcast with the values of the parameters."""
+    from phasekit.motion.kernels.motions import rates_at
+
+    arrays = [np.asarray(array, dtype=float) for array in (times, phi, dphi)]
+    code, parameters = rates_of(law, values)
+    t, x, v = (np.array(array).reshape(-1) for array in np.broadcast_arrays(*arrays))
+    table = table_of(law.prescribed, float(np.min(t, initial=0.0)), float(np.max(t, initial=0.0)))
+    parameters = np.array(np.broadcast_to(parameters, (len(parameters), t.size)))
+    out = np.empty((t.size, 2))
+    states = np.stack([x, v], axis=-1)
+    rates_at(code.address, table, t, states, parameters, np.sign(v), code.kink, 0, t.size, out)
+    return out[:, 1].reshape(np.broadcast_shapes(*(array.shape for array in arrays)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from phasekit.motion.kernels.dop853 import ROWS, densify, within
+from phasekit.motion.kernels.dop853 import ROWS, densify, rates, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
     ARRIVED,
@@ -131,3 +131,37 @@ def motions(
                 row = whole[CELL, lane] if times.shape[0] > 1 else 0
                 written[lane] = write(lane, times[row], written[lane], x, k, y, real, own)
         commit(x, k, y, real, whole)
+
+
+@kernel
+def rates_at(
+    address: int,
+    table: Array,
+    times: Array,
+    states: Array,
+    parameters: Array,
+    signs: Array,
+    kink: int,
+    first: int,
+    stop: int,
+    out: Array,
+) -> None:
+    """Rates at states of shape (cells, n), with the signs of quadratic damping."""
+    n = states.shape[1]
+    x, k, h = np.zeros(n * LANES), np.zeros(n * LANES), np.zeros(LANES)
+    t, z = np.zeros(LANES), np.zeros(3 * LANES)
+    p = np.zeros(max(parameters.shape[0], 1) * LANES)
+    for begun in range(first, stop, LANES):
+        for lane in range(LANES):
+            cell = min(begun + lane, stop - 1)
+            t[lane] = times[cell]
+            for c in range(n):
+                x[c * LANES + lane] = states[cell, c]
+            for c in range(parameters.shape[0]):
+                p[c * LANES + lane] = parameters[c, cell]
+            if kink >= 0:
+                p[kink * LANES + lane] = signs[cell]
+        rates(address, table, t, h, 0.0, x, p, z, k)
+        for lane in range(min(LANES, stop - begun)):
+            for c in range(n):
+                out[begun + lane, c] = k[c * LANES + lane]
