@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
+    from phasekit.errors import EscapeRegime as EscapeRegime
     from phasekit.errors import Loop as Loop
     from phasekit.errors import OrbitFamily as OrbitFamily
     from phasekit.errors import OrbitKind as OrbitKind
@@ -61,11 +62,17 @@ if TYPE_CHECKING:
     from phasekit.labelled.orbits import action_angle as action_angle
     from phasekit.labelled.orbits import orbits as orbits
     from phasekit.labelled.orbits import state_of as state_of
+    from phasekit.labelled.perturbed import capture as capture
+    from phasekit.labelled.perturbed import critical_torque as critical_torque
+    from phasekit.labelled.perturbed import escape_rate as escape_rate
     from phasekit.labelled.perturbed import melnikov as melnikov
     from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
+    from phasekit.labelled.perturbed import resonances as resonances
+    from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.labelled.run_up import run_up as run_up
+    from phasekit.labelled.section import poincare_section as poincare_section
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
@@ -88,6 +95,7 @@ _MODULES = {
     "phasekit.errors": (
         "ConvergenceError",
         "EquilibriumKind",
+        "EscapeRegime",
         "Loop",
         "OrbitFamily",
         "OrbitKind",
@@ -121,13 +129,22 @@ _MODULES = {
     "phasekit.systems.disk": ("GyroRotorDisk",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
-    "phasekit.labelled.perturbed": ("melnikov", "quiet_frequencies"),
+    "phasekit.labelled.perturbed": (
+        "capture",
+        "critical_torque",
+        "escape_rate",
+        "melnikov",
+        "quiet_frequencies",
+        "resonances",
+        "retrapping_torque",
+    ),
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.problem": ("Problem",),
     "phasekit.table.quantities": ("quantities",),
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
     "phasekit.labelled.run_up": ("run_up",),
+    "phasekit.labelled.section": ("poincare_section",),
     "phasekit.maps.whole": ("open_map",),
     "phasekit.maps.sweep": ("sweep",),
     "phasekit.systems.system": ("Coefficients", "Reduced"),

@@ -124,6 +124,16 @@ class Loop(IntEnum):
     UNBOUNDED = 5
 
 
+class EscapeRegime(IntEnum):
+    """How a particle escapes from a well by thermal noise."""
+
+    NOT_COMPUTED = -1
+    ABSENT = 0
+    ENERGY_DIFFUSION = 1
+    TURNOVER = 2
+    SPATIAL_DIFFUSION = 3
+
+
 class OrbitKind(IntEnum):
     """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at.
 

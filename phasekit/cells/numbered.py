@@ -55,9 +55,10 @@ def fitted(
         rows = [*rows, *(row for group in groups for row in NUMERICAL_ROWS.get(group, ()))]
     found = [_worded(row, system, labels) for row in rows]
     shapes = {row.name: row.label_shape for row in found}
+    numbered = {row.group for row in found if set(row.dims) & {"equilibrium", "saddle"}}
     return found, [
         replace(one, function=functools.partial(_padded, one, shapes))
-        if set(one.groups) & {"equilibria", "separatrices"}
+        if numbered.intersection(one.groups)
         else replace(one, function=functools.partial(_told, one, repr(system)))
         if set(one.groups) & {"orbits", "motion"}
         else one

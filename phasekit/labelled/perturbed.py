@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import functools
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import passes_of
+from phasekit.cells.dispatch import CENTERS, passes_of
 from phasekit.cells.evaluate import evaluate
-from phasekit.labels.arguments import whole
+from phasekit.labelled.orbits import FAMILIES, noted
+from phasekit.labels.arguments import bad, named, one_of, whole
+from phasekit.labels.coordinates import LABELS
 from phasekit.systems.as_system import as_system
 from phasekit.table.quantities import select
+from phasekit.table.row import Quantity
 
 
 def melnikov(perturbed: Any) -> xr.Dataset:
@@ -101,6 +108,231 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
     return ds.assign(quiet_frequency=listed).assign_coords(order=order)
 
 
-def _of_system(group: str, system: Any) -> xr.Dataset:
-    system, rows = as_system(system), select(group)
-    return evaluate(system, rows, passes_of(system, rows))
+def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
+    """Into which well a motion falls that is slowly led to a separatrix.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with damping, and parameters that drift or a constant torque.
+    start : {"outside", "rotation"}
+        Where the motion comes from: round both wells, from outside the figure-eight of the lower
+        saddle; or from rotation beyond the winding separatrix, braked by the torque (forward where
+        there is none).
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``region`` (left, right, none): ``capture_flux`` in s^-2 and ``capture_probability``,
+        which sums to 1. Left and right are the lobes of the lower saddle; in a system with one
+        well it is the side from which the rotation came that stays empty. "none": it is not
+        captured, or never comes to the separatrix. NaN where there is no such separatrix.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, start is unknown, or omega1 is a function of time.
+
+    Notes
+    -----
+    Each region takes phase at the rate ``damping S + dS/dt`` of its area S; the probability is the
+    ratio of the fluxes if both are positive ([Neishtadt1975]). From rotation it is
+    ``2/(1 + 2 torque w/(damping S))`` with the width w = 2 pi of a cell
+    ([GoldreichPeale1966]), 1 where it would be more. First order in damping and drift, for motions
+    whose actions are spread; right at the separatrix the error is of the order rate log(rate).
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> damped = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.003)
+    >>> pk.capture(damped).capture_probability.values.round(6).tolist()
+    [0.28055, 0.71945, 0.0]
+    """
+    rotation = bool(one_of("start", start, ("outside", "rotation")))
+    return noted(_of_system("capture", perturbed, rotation=rotation), start=start)
+
+
+def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
+    """Rates at which noise leads out of a well, over each saddle at its ends.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with coefficients (A, B, C), damping and a thermal energy kT, and no drive.
+    center : {"lower_center", "upper_center"}
+        The center of the well.
+
+    Returns
+    -------
+    xarray.Dataset
+        On (``saddle``, ``side``): ``escape_rate`` in s^-1 and ``barrier`` in s^-2; the side is that
+        of the saddle on which the well lies. Over the lower saddle it leads into the other well;
+        over the upper one, which winds, out of both wells together, on either side.
+        ``escape_regime`` (`EscapeRegime`) says what limits it, ``escape_error`` the order of the
+        relative error. Absent ones, barriers below 2 kT and systems with a drive are NaN.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, or the center unknown.
+
+    Notes
+    -----
+    Kramers' rate with the exact integral over the well, times the factors for recrossing and for
+    low damping ([MelnikovMeshkov1986], [HanggiTalknerBorkovec1990]). These factors hold for high
+    barriers; the mean first passage of the diffusing energy, by exact actions and periods, corrects
+    them with a weight that falls as the damping grows.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> warm = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.0), damping=0.5, kT=0.04)
+    >>> rate = pk.escape_rate(warm).escape_rate.sel(saddle="lower", side="right").item()
+    >>> round(rate, 6)
+    0.000534
+    """
+    number = one_of("center", center, CENTERS)
+    return noted(_of_system("escape", perturbed, center=number), center=center)
+
+
+def critical_torque(system: Any) -> xr.Dataset:
+    """Least and greatest constant torque under which an equilibrium exists.
+
+    Parameters
+    ----------
+    system : system
+        A system with coefficients (A, B, C), perturbed or not; a torque of its own does not count.
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``direction`` (minus, plus): ``critical_torque`` in s^-2, signed, and ``critical_phi``
+        in rad, where equilibria merge.
+
+    Raises
+    ------
+    ParameterError
+        If the system is unusable.
+
+    Notes
+    -----
+    The extremes of V', exact: V'' = 0 is the equation of equilibria of another system,
+    ``V''(phi; A, B, C) = V'(phi - pi/4; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.critical_torque(pk.Pendulum(length=1.0, g=9.81)).critical_torque.values.round(9).tolist()
+    [-9.81, 9.81]
+    """
+    return _of_system("critical_torques", system)
+
+
+def retrapping_torque(perturbed: Any) -> xr.Dataset:
+    """Least constant torque that keeps a rotation going, at small damping.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with coefficients (A, B, C) and damping; a torque of its own does not count.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``retrapping_torque`` in s^-2 on ``direction`` (minus, plus), signed.
+
+    Raises
+    ------
+    ParameterError
+        If the system is not perturbed, or omega1 is a function of time.
+
+    Notes
+    -----
+    Over one turn of the winding separatrix the torque gives what damping takes,
+    ``2 pi torque = damping S + quadratic int |phi'|^3 dt``: first order in the damping.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> damped = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.1)
+    >>> pk.retrapping_torque(damped).retrapping_torque.values.round(6).tolist()  # 0.4/pi
+    [-0.127324, 0.127324]
+    """
+    return _of_system("retrapping", perturbed)
+
+
+def resonances(
+    perturbed: Any, *, n: int | Sequence[int], m: int = 1, family: str = "lower_well"
+) -> xr.Dataset:
+    """Resonances of the orbits with the drive: their actions, widths and overlap.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        A system with coefficients (A, B, C) and a drive.
+    n : int or sequence of int
+        Orders of the resonances: all from 1 to n, or those given.
+    m : int, default 1
+        Multiple of the drive's frequency.
+    family : {"lower_well", "upper_well", "outer", "forward", "backward"}
+        The family of orbits.
+
+    Returns
+    -------
+    xarray.Dataset
+        On ``order``: ``resonance_action`` in s^-1, where ``n Omega(J) = m nu``, nu the frequency of
+        the first harmonic of the forcing, or else of the modulation; ``resonance_width``, the
+        half-width in action; ``resonance_overlap``, the sum of the half-widths of this order and
+        the next over their distance: near 1 motion between them becomes irregular. NaN where the
+        family has no such orbit; of several, that of least action, in "outer" and rotations that
+        next to the separatrix. The width is 0 where no harmonic has the frequency m nu, and NaN
+        closer to the separatrix than 1e-12 of its height.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Notes
+    -----
+    The pendulum approximation, first order in the drive ([Chirikov1979]); Fourier coefficients over
+    the exact angle variable.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> driven = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), forcing=pk.Harmonic(0.01, 0.8))
+    >>> ds = pk.resonances(driven, n=3)
+    >>> ds.resonance_action.dims, bool(ds.resonance_width.sel(order=1) > 0)
+    (('order',), True)
+    """
+    orders = _orders(n)
+    order = whole("m", m, "a whole number >= 1")
+    number = FAMILIES[named("family", family, FAMILIES)]
+    labels = {**LABELS, "order": (orders, "order of the resonance")}
+    rows = tuple(replace(row, labels=labels) for row in select("resonances"))
+    options = {"orders": orders, "m": order, "family": number}
+    ds = _of_system("resonances", perturbed, rows, **options)
+    return noted(ds, family=family, m=str(order))
+
+
+def _orders(n: Any) -> tuple[int, ...]:
+    wants = "a whole number >= 1, or a list of them that rises"
+    if isinstance(n, (list, tuple, range, np.ndarray)):
+        orders = tuple(whole("n", one, wants) for one in n)
+        if not orders or any(a >= b for a, b in itertools.pairwise(orders)):
+            raise bad("n", n, wants)
+        return orders
+    return tuple(range(1, whole("n", n, wants) + 1))
+
+
+def _of_system(
+    group: str, system: Any, rows: Sequence[Quantity] | None = None, **options: Any
+) -> xr.Dataset:
+    system, rows = as_system(system), rows or select(group)
+    passes = passes_of(system, rows)
+    if options:
+        passes = tuple(
+            replace(one, function=functools.partial(one.resolved, **options)) for one in passes
+        )
+    return evaluate(system, rows, passes)

@@ -29,6 +29,9 @@ LABELS: dict[str, Labels] = {
     "exponent": ((1, 2), "Lyapunov exponent, the largest first"),
     "crossing": ((), "crossing of the section"),
     "attractor": ((), "attractor, by its number"),
+    "region": (("left", "right", "none"), "region: lobe of the lower saddle, or neither"),
+    "order": ((1,), "order of the resonance"),
+    "direction": (("minus", "plus"), "direction of the torque"),
     "family": (("lower_well", "upper_well", "outer", "rotation"), "family of orbits"),
 }
 

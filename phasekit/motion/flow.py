@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -266,3 +266,23 @@ def accelerations(
     states = np.stack([x, v], axis=-1)
     rates_at(code.address, table, t, states, parameters, np.sign(v), code.kink, 0, t.size, out)
     return out[:, 1].reshape(np.broadcast_shapes(*(array.shape for array in arrays)))
+
+
+def pointwise(
+    law: PerturbedConservative, values: Mapping[str, Array], duration: float
+) -> Callable[[float, Any], Array]:
+    """The law of one system as a function of time and state, up to a time."""
+    from phasekit.motion.kernels.motions import rates_at
+
+    code, parameters = rates_of(law, values)
+    parameters = np.array(parameters[:, :1])
+    table = table_of(law.prescribed, 0.0, duration)
+
+    def rates(t: float, x: Any) -> Array:
+        state = np.array([[x[0], x[1]]])
+        out = np.empty((1, 2))
+        arrays = (np.array([float(t)]), state, parameters, np.sign(state[:, 1]))
+        rates_at(code.address, table, *arrays, code.kink, 0, 1, out)
+        return out[0]
+
+    return rates

@@ -67,7 +67,9 @@ def _of_kind(Z: Complex, nu: Array, sign: Array) -> tuple[Array, Array]:
     turns = np.exp(1j * np.outer(numbers, t))
     values = sign[:, None] * (Z @ turns).real
     primitive = sign[:, None] * ((Z / numbers) @ turns).imag
-    return _peak(Z * sign[:, None], numbers, t, values), _above(values, primitive, Z, numbers, t, sign) / base
+    return _peak(Z * sign[:, None], numbers, t, values), _above(
+        values, primitive, Z, numbers, t, sign
+    ) / base
 
 
 def _whole(nu: Array) -> Any:

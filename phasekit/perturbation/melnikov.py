@@ -88,7 +88,9 @@ def means(law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatric
         if law.rate is not None and law.rate.parameter == parameter:
             level = np.asarray(law.euler(values)[0])[..., None, None]
             winds = loops.loop[..., None] == Loop.WINDING
-            change = change - np.where(winds, rate[..., None, None] * level * net_angles(loops), 0.0)
+            change = change - np.where(
+                winds, rate[..., None, None] * level * net_angles(loops), 0.0
+            )
         mean = mean - np.where(rate[..., None, None] == 0.0, 0.0, change)
     return np.asarray(mean)
 

@@ -50,7 +50,7 @@ def discriminant(A: float, B: float, C: float, phi: float, k2: float) -> float:
 
 @inline
 def over_sinh(n: float, z: complex) -> tuple[complex, complex]:
-    """sinh z/sinh(pi n) and cosh z/sinh(pi n), |Re z| <= pi n; times pi n where n is 0."""
+    """Sinh z/sinh(pi n) and cosh z/sinh(pi n), |Re z| <= pi n; times pi n where n is 0."""
     if n == 0.0:
         return z, complex(1.0)
     if n < LARGE:

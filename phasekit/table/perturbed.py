@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from phasekit.errors import EscapeRegime
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
-from phasekit.table.row import LAW, SIDES, Pass, Quantity
+from phasekit.table.row import ABC, LAW, SIDES, Pass, Quantity
 
+REGION, DIRECTION = ("region",), ("direction",)
+CHIRIKOV = "[Chirikov1979] section 4"
+ESCAPE = "[MelnikovMeshkov1986]; [HanggiTalknerBorkovec1990]"
+TORQUE = "derivative of [Veljovic2015] (12), corrected coefficients"
+CAPTURE = "[Neishtadt1975]; [GoldreichPeale1966] (18)"
 MELNIKOV = "[GuckenheimerHolmes1983] section 4.5; [Melnikov1963]"
 
 _GENERAL = PerturbedConservative
@@ -35,12 +41,71 @@ QUANTITIES: tuple[Quantity, ...] = (
              "multiples are the others",
              "nu x = pi, cosh(k (x + i y)) = (-S + i k^2)/sqrt(D)", MELNIKOV,
              of=PerturbedTrigonometric),
+    Quantity("capture_flux", "capture", REGION, "float64", "s-2",
+             "energy that a round of the region's separatrix loses: rate at which it takes phase",
+             "damping S + dS/dt", CAPTURE, of=_GENERAL),
+    Quantity("capture_probability", "capture", REGION, "float64", "1",
+             "probability that a motion led to the separatrix ends in the region",
+             "P_i = Theta_i/sum Theta, 0 or 1 where one region gives phase away", CAPTURE,
+             of=_GENERAL),
+    Quantity("critical_torque", "critical_torques", DIRECTION, "float64", "s-2",
+             "least and greatest constant torque, over the inertia, under which an equilibrium "
+             "exists", "extremes of V'(phi), where V''(phi) = 0", TORQUE),
+    Quantity("critical_phi", "critical_torques", DIRECTION, "float64", "rad",
+             "angle at which equilibria merge under the critical torque", "V''(phi) = 0", TORQUE),
+    Quantity("retrapping_torque", "retrapping", DIRECTION, "float64", "s-2",
+             "least constant torque, over the inertia, that keeps a rotation going, at small "
+             "damping", "(damping S + quadratic int |phi'|^3 dt)/(2 pi) of a winding separatrix",
+             "[Stewart1968]; " + MELNIKOV, of=PerturbedTrigonometric),
+    Quantity("escape_rate", "escape", SIDES, "float64", "s-1",
+             "rate at which noise leads out of the well on that side of the saddle, over it",
+             "[sqrt(1 + (d/2k)^2) - d/2k] Y sqrt(kT/2 pi) exp(-barrier/kT)/int exp(-(V - V_c)/kT); "
+             "Y = Y(D1) Y(D2)/Y(D1 + D2), D = d S/kT; corrected by the mean passage of the energy",
+             ESCAPE, of=PerturbedTrigonometric),
+    Quantity("barrier", "escape", SIDES, "float64", "s-2",
+             "energy from the center to the saddle", "V(phi_s) - V(phi_c)", ESCAPE,
+             of=PerturbedTrigonometric),
+    Quantity("escape_regime", "escape", SIDES, "int8", "1",
+             "what limits the escape", "damping S < kT: diffusion of the energy; damping > 2 k: "
+             "diffusion in space; else the turnover between them", ESCAPE, EscapeRegime,
+             of=PerturbedTrigonometric),
+    Quantity("escape_error", "escape", SIDES, "float64", "1",
+             "estimated order of the relative error of the rate",
+             "of the order kT/barrier, less the higher the damping", ESCAPE,
+             of=PerturbedTrigonometric),
+    Quantity("resonance_action", "resonances", ("order",), "float64", "s-1",
+             "action of the orbit in resonance with the drive", "n Omega(J) = m nu", CHIRIKOV,
+             of=PerturbedTrigonometric),
+    Quantity("resonance_width", "resonances", ("order",), "float64", "s-1",
+             "half-width of the resonance in action",
+             "2 sqrt(V/|dOmega/dJ|), V = |(f dphi/dtheta)_n|/n of the drive f(phi) cos(m nu t)",
+             CHIRIKOV, of=PerturbedTrigonometric),
+    Quantity("resonance_overlap", "resonances", ("order",), "float64", "1",
+             "half-widths of the resonance and of that of the next order over their distance",
+             "(width_n + width_(n+1))/|J_(n+1) - J_n|", CHIRIKOV, of=PerturbedTrigonometric),
 )
 # fmt: on
 
+_CAPTURE = "phasekit.perturbation.capture:"
+_TORQUE = "phasekit.perturbation.torque:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
 
 PASSES: tuple[Pass, ...] = (
     Pass(_MELNIKOV + "melnikov", (LAW,), ("melnikov",), PerturbedTrigonometric),
     Pass(_MELNIKOV + "quiet_frequency", (LAW,), ("quiet_frequencies",), PerturbedTrigonometric),
+    Pass("phasekit.perturbation.quadrature:melnikov", (LAW,), ("melnikov",), _GENERAL),
+    Pass(_CAPTURE + "capture", (LAW,), ("capture",), PerturbedTrigonometric),
+    Pass(_CAPTURE + "capture_numerical", (LAW,), ("capture",), _GENERAL),
+    Pass(_TORQUE + "critical_torque", ABC, ("critical_torques",)),
+    Pass(_TORQUE + "critical_of_perturbed", (LAW,), ("critical_torques",), PerturbedTrigonometric),
+    Pass(_TORQUE + "retrapping_torque", (LAW,), ("retrapping",), PerturbedTrigonometric),
+    Pass(_TORQUE + "torqued_equilibria", (LAW,), ("equilibria",), PerturbedTrigonometric),
+    Pass("phasekit.perturbation.escape:escape_rate", (LAW,), ("escape",), PerturbedTrigonometric),
+    Pass(
+        "phasekit.perturbation.resonances:resonances",
+        (LAW,),
+        ("resonances",),
+        PerturbedTrigonometric,
+    ),
+    Pass("phasekit.perturbation.quadrature:most", (LAW,), ("labels",), _GENERAL),
 )

@@ -1,0 +1,97 @@
+"""Capture at a separatrix: where motions go that are slowly led to it, by the fluxes of phase.
+
+Energies on arrival are spread evenly over what one round loses, so that probabilities are ratios
+of the rates at which areas lose phase, ``damping S + dS/dt``: minus the mean of Melnikov's
+function.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
+from phasekit.perturbation import melnikov as closed
+from phasekit.perturbation import quadrature
+from phasekit.phase.exact.separatrices import separatrices
+from phasekit.phase.numerical import functions
+
+Array = npt.NDArray[np.float64]
+
+
+class Capture(NamedTuple):
+    """Capture; the last axis is the region (left, right, none)."""
+
+    capture_flux: Array
+    capture_probability: Array
+
+
+def capture(
+    law: PerturbedTrigonometric, *parameters: npt.ArrayLike, rotation: bool = False
+) -> Capture:
+    """Capture in the potential of (A, B, C): into the lobes of the lower saddle."""
+    closed.refuse_prescribed(law, "capture")
+    values = law.values(*parameters)
+    loss = -closed.means(law, values, separatrices(*law.coefficients(values)))
+    return regions(loss[..., 0, :], loss[..., 1, :], values["torque"], rotation)
+
+
+def capture_numerical(
+    law: PerturbedConservative, *parameters: npt.ArrayLike, rotation: bool = False
+) -> Capture:
+    """Capture in any potential: lobes of the lowest saddle that has two, loops of the highest."""
+    values = law.values(*parameters)
+    formula: Any = law.base
+    loops = functions.separatrices(formula, *(values[name] for name in formula.names))
+    loss = -quadrature.melnikov(law, *parameters).melnikov_mean
+    if not loss.shape[-2]:
+        nothing = np.full((*loss.shape[:-2], 2), np.nan)
+        return regions(nothing, nothing, values["torque"], rotation)
+    winds = np.isin(loops.loop, (2, 3))
+    height = np.broadcast_to(loops.saddle_energy, loss.shape[:-1])
+    both = np.isfinite(loss).all(axis=-1)
+    lowest = np.where(both & ~np.broadcast_to(winds, both.shape), height, np.inf)
+    highest = np.where(both & np.broadcast_to(winds, both.shape), height, -np.inf)
+    lobes, winding = (
+        np.where(
+            np.isfinite(np.take_along_axis(which, at[..., None], -1)),
+            np.take_along_axis(loss, at[..., None, None], -2)[..., 0, :],
+            np.nan,
+        )
+        for which, at in ((lowest, lowest.argmin(-1)), (highest, highest.argmax(-1)))
+    )
+    return regions(lobes, winding, values["torque"], rotation)
+
+
+def regions(lobes: Array, winding: Array, torque: Any, rotation: bool) -> Capture:
+    """Fluxes and probabilities from the losses of the lobes and of both winding branches."""
+    if not rotation:
+        flux = np.concatenate([lobes, np.zeros((*lobes.shape[:-1], 1))], axis=-1)
+        flux[np.isnan(lobes).any(axis=-1)] = np.nan
+        flux[..., 2] -= np.minimum(lobes.sum(axis=-1), 0.0)
+        return Capture(flux, _shares(lobes))
+    # Braked by the torque, or running forward where there is none.
+    forward = np.broadcast_to(np.asarray(torque) <= 0.0, winding.shape[:-1])
+    with np.errstate(all="ignore"):
+        arriving = np.where(forward, winding[..., 1], winding[..., 0])
+        inside = winding.sum(axis=-1)
+        share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)
+    share = np.where(np.isnan(arriving), np.nan, share)
+    wells = np.isfinite(lobes).all(axis=-1)
+    single = np.stack([np.where(forward, 0.0, 1.0), np.where(forward, 1.0, 0.0)], axis=-1)
+    parts = np.where(wells[..., None], _shares(lobes)[..., :2], single) * share[..., None]
+    probability = np.concatenate([parts, 1.0 - parts.sum(axis=-1, keepdims=True)], axis=-1)
+    flux = probability * np.maximum(arriving, 0.0)[..., None]
+    return Capture(flux, probability)
+
+
+def _shares(lobes: Array) -> Array:
+    """Probabilities of left, right and none from outside, by the losses of both lobes."""
+    total = lobes.sum(axis=-1, keepdims=True)
+    kept = np.maximum(lobes, 0.0)
+    with np.errstate(all="ignore"):
+        parts = np.where(total > 0.0, kept / kept.sum(axis=-1, keepdims=True), 0.0)
+    parts = np.where(np.isnan(total), np.nan, parts)
+    return np.concatenate([parts, 1.0 - parts.sum(axis=-1, keepdims=True)], axis=-1)

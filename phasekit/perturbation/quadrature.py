@@ -1,0 +1,156 @@
+"""Melnikov's function in any potential: quadrature along the separatrices, with its error.
+
+The trapezoidal rule over the whole time converges exponentially, because the motion is analytic
+next to the real axis and decays at both ends.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.laws.formulas import symbols_of
+from phasekit.laws.perturbed import PerturbedConservative, drift_name, modulation_names
+from phasekit.perturbation.melnikov import Melnikov, Part, assembled, refuse_prescribed, undamped
+from phasekit.phase.numerical import functions
+from phasekit.phase.numerical.formula import Formula, make_formula
+from phasekit.phase.numerical.separatrices import Separatrices
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+#: Times up to this over the exponent; e^-REACH is below rounding.
+REACH = 38.0
+POINTS = 1 << 11
+#: Cells at a time, for the memory of their motions.
+CELLS = 256
+#: Greatest error of what is said, relative.
+WORST = 1e-6
+
+
+@functools.lru_cache(maxsize=32)
+def derivative(formula: Formula, parameter: str) -> Formula:
+    """The derivative of a potential by a parameter."""
+    symbol = symbols_of((formula.coordinate, *formula.names))[parameter]
+    by = formula.expression.diff(symbol)
+    return make_formula(by, formula.coordinate, formula.names, formula.period, formula.interval)
+
+
+class Paths:
+    """Motions along all separatrices of some cells: the axes are cell, saddle, side, time."""
+
+    def __init__(self, formula: Formula, parameters: list[Array], loops: Separatrices) -> None:
+        self.formula = formula
+        self.parameters = [p[:, None, None, None] for p in parameters]
+        count = loops.saddle_phi.shape[-1]
+        k = loops.saddle_exponent
+        grid = np.linspace(-REACH, REACH, POINTS + 1)
+        with np.errstate(all="ignore"):
+            times = grid / k[..., None]
+        self.time = times[:, :, None, :]
+        self.step = self.time[..., 1] - self.time[..., 0]
+        shape = (len(k), count, 2, grid.size)
+        self.phi, self.dphi = np.full(shape, np.nan), np.full(shape, np.nan)
+        for saddle in range(count):
+            there = np.flatnonzero(np.isfinite(k[:, saddle]) & (k[:, saddle] > 0.0))
+            own = [p[there, None] for p in parameters]
+            for side in (0, 1) if there.size else ():
+                found = functions.separatrix_motion(
+                    formula, *own, times[there, saddle], saddle=saddle, side=side
+                )
+                closed = np.isfinite(found.motion_phi).all(axis=-1, keepdims=True)
+                size = np.abs(found.motion_dphi).max(axis=-1, keepdims=True, initial=0.0)
+                closed &= np.abs(found.motion_dphi[:, [0, -1]]).max(-1, keepdims=True) < 1e-9 * size
+                self.phi[there, saddle, side] = np.where(closed, found.motion_phi, np.nan)
+                self.dphi[there, saddle, side] = np.where(closed, found.motion_dphi, np.nan)
+
+    def integral(self, values: Any) -> Any:
+        """Integral over time, NaN where it has lost too many digits."""
+        fine = values.sum(axis=-1)
+        coarse = 2.0 * values[..., ::2].sum(axis=-1)
+        rounding = 1e-13 * np.abs(values).sum(axis=-1)
+        good = np.abs(fine - coarse) + rounding <= WORST * np.abs(fine)
+        # What vanishes by symmetry, within rounding, vanishes.
+        nothing = np.abs(fine) <= 0.1 * rounding
+        return np.where(good, fine * self.step, np.where(nothing, 0.0, np.nan))
+
+    def transform(self, values: Any, nu: Array) -> Any:
+        """Integral of phi' g e^{i nu t}, its real and imaginary part."""
+        at = np.exp(1j * nu[:, None, None, None] * self.time) * self.dphi * values
+        rounding = 1e-13 * np.abs(at).sum(axis=-1)
+        fine, coarse = at.sum(axis=-1), 2.0 * at[..., ::2].sum(axis=-1)
+        good = np.abs(fine - coarse) + rounding <= WORST * np.abs(fine)
+        return np.where(good, fine * self.step, np.nan)
+
+
+def most(law: PerturbedConservative, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
+    """Greatest numbers of equilibria and saddles of the potential, and what is not proved."""
+    values = law.values(*parameters)
+    formula: Any = law.base
+    return functions.most(formula, *(values[name] for name in formula.names))
+
+
+def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov:
+    """Melnikov's function along the separatrices of any potential."""
+    refuse_prescribed(law, "melnikov")
+    values = law.values(*parameters)
+    formula: Any = law.base
+    shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
+    flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
+    loops = functions.separatrices(formula, *(flat[name] for name in formula.names))
+    size = loops.saddle_phi.shape[0] if formula.names else 1
+    if not formula.names:  # a formula without parameters is one system
+        loops = Separatrices._make(np.asarray(x)[None] for x in loops)
+    cells = int(np.prod(shape, dtype=int))
+    found = []
+    for start in range(0, cells, CELLS):
+        part = slice(start, min(start + CELLS, cells))
+        one = {name: x[part] for name, x in flat.items()}
+        own = Separatrices._make(x[part] if size == cells else x for x in loops)
+        own = Separatrices._make(np.broadcast_to(x, (part.stop - start, *x.shape[1:])) for x in own)
+        found.append(_cells(law, formula, one, own))
+    fields = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in fields)
+
+
+def _cells(
+    law: PerturbedConservative, formula: Formula, values: dict[str, Array], loops: Separatrices
+) -> Melnikov:
+    paths = Paths(formula, [values[name] for name in formula.names], loops)
+    each = {name: x[:, None, None] for name, x in values.items()}
+    square = paths.dphi**2
+    mean = -each["damping"] * paths.integral(square)
+    net = paths.phi[..., -1] - paths.phi[..., 0]
+    lobe = np.abs(net) < 1e-6 * np.abs(paths.phi - paths.phi[..., :1]).max(axis=-1)
+    net = np.where(lobe, 0.0, net)
+    mean = mean + np.where(each["torque"] == 0.0, 0.0 * net, each["torque"] * net)
+    if np.any(values["quadratic"] != 0.0):
+        mean = mean - each["quadratic"] * paths.integral(square * np.abs(paths.dphi))
+    for parameter in law.drifting:
+        rate = values[drift_name(parameter)]
+        mean = mean + np.where(
+            each[drift_name(parameter)] == 0.0,
+            0.0,
+            rate[:, None, None] * _area_loss(paths, formula, parameter),
+        )
+    parts: list[Part] = [
+        (paths.transform(1.0, nu), amplitude, nu, phase)
+        for amplitude, nu, phase in law.forcing(values)
+    ]
+    for parameter in law.modulated:
+        amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
+        slope = -derivative(formula, parameter).slopes(paths.phi, *paths.parameters)
+        parts.append((paths.transform(slope, nu), amplitude, nu, phase))
+    return assembled(mean, parts, undamped(law, values))
+
+
+def _area_loss(paths: Paths, formula: Formula, parameter: str) -> Any:
+    """Integral of V_p(phi) - V_p(phi_s): minus the derivative of the area."""
+    level = derivative(formula, parameter).values(paths.phi, *paths.parameters)
+    rise = level - level[..., :1]
+    size = np.abs(rise).max(axis=-1)
+    found = paths.integral(rise)
+    return np.where(np.abs(rise[..., -1]) <= 1e-9 * size, found, np.nan)
