@@ -212,7 +212,7 @@ def attractors(
     Notes
     -----
     Motions are followed until they repeat themselves; Newton's method then finds the periodic
-    orbit, and its multipliers whether it attracts. What has come to none after 4,000 periods counts
+    orbit, and its multipliers whether it attracts. What has come to none after 4,300 periods counts
     as an attractor that does not repeat itself: chaotic, or a rotation in step with nothing.
 
     Examples

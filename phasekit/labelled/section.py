@@ -74,8 +74,8 @@ def poincare_section(
     >>> import phasekit as pk
     >>> pendulum = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=0.1)
     >>> pk.poincare_section(pendulum, 0.0, 1.0, duration=20.0, section=0.0).section_dphi.round(3)
-    <xarray.DataArray 'section_dphi' (crossing: 2)> Size: 16B
-    array([0.722, 0.525])...
+    <xarray.DataArray 'section_dphi' (crossing: 3)> Size: 24B
+    array([0.724, 0.527, 0.384])...
     """
     wants = "a time in s, > 0"
     duration = number("duration", duration, wants, "s")

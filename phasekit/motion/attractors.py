@@ -18,7 +18,9 @@ Array = npt.NDArray[np.float64]
 #: Longest orbit that counts as periodic, in legs.
 LONGEST = 16
 #: Legs after which motions are looked at, one round after another.
-ROUNDS = (60, 240, 1000, 4000)
+ROUNDS = (60, 240, 1000, 3000)
+#: Motions that are followed further where many have come to nothing that repeats itself.
+MOST_OPEN = 24
 #: Change within an orbit, of the size of the box, that Newton's method takes up.
 NEAR = 1e-4
 #: Two attractors that are closer than this part of the size of the box are one.
@@ -89,7 +91,9 @@ class Search:
             for orbit in found[np.isfinite(found[:, -1]).all(axis=1)]:
                 if not self._is_known(orbit[-1]) and not self._take(orbit):
                     open_.append(orbit[-1])
-            states = np.array(open_).reshape(-1, 2)
+            number = min(len(open_), MOST_OPEN)
+            some = np.linspace(0, len(open_) - 1, number).round().astype(int)
+            states = np.array(open_).reshape(-1, 2)[some]
         for state in states:
             self._take_other(state)
 

@@ -254,7 +254,7 @@ def accelerations(
     phi: npt.ArrayLike,
     dphi: npt.ArrayLike,
 ) -> Array:
-    """phi'' at states and times, that broadcast with the values of the parameters."""
+    """Phi'' at states and times, that broadcast with the values of the parameters."""
     from phasekit.motion.kernels.motions import rates_at
 
     arrays = [np.asarray(array, dtype=float) for array in (times, phi, dphi)]

@@ -19,7 +19,6 @@ from phasekit.motion.kernels.stepping import (
     WHOLES,
     T,
     advance,
-    begin,
     commit,
     load,
     renew,
@@ -90,7 +89,7 @@ def motions(
                 out[old, written[lane] :] = np.nan
                 whole[STATE, lane] = IDLE
             if cell < stop:
-                load(lane, cell, states, parameters, x, p, whole)
+                load(lane, cell, states, parameters, x, p, kink, real, whole)
                 real[T, lane] = start
                 own_times = times[cell if times.shape[0] > 1 else 0]
                 real[END, lane] = own_times[-1]
@@ -100,15 +99,10 @@ def motions(
                     written[lane] += 1
                 if written[lane] == own_times.size:
                     whole[STATE, lane] = ARRIVED
-                whole[ACCEPTED, lane] = 2
                 fresh += 1
                 cell += 1
         if fresh > 0:
-            renew(address, table, x, k, p, z, h, real)
-            for lane in range(LANES):
-                if whole[ACCEPTED, lane] == 2:
-                    begin(lane, x, k, p, kink, real, rtol, atol)
-                    whole[ACCEPTED, lane] = 0
+            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
         running = False
         for lane in range(LANES):
             running = running or whole[STATE, lane] == RUNNING

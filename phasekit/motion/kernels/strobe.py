@@ -9,18 +9,18 @@ import numpy.typing as npt
 
 from phasekit.motion.kernels.dop853 import ROWS
 from phasekit.motion.kernels.stepping import (
+    ACCEPTED,
     ARRIVED,
     CELL,
+    CHANGED,
     END,
     IDLE,
     REALS,
     RUNNING,
     STATE,
     WHOLES,
-    H,
     T,
     advance,
-    begin,
     commit,
     load,
     renew,
@@ -137,7 +137,9 @@ def strobe(
                 ended = near >= 0 or done[lane] >= many
                 if not ended:
                     whole[STATE, lane] = RUNNING
-                    fresh = fresh or again
+                    if again:
+                        fresh = True
+                        whole[ACCEPTED, lane] = CHANGED
                     real[T, lane] = 0.0 if again else done[lane] * leg
                     real[END, lane] = leg if again else (done[lane] + 1) * leg
             if ended:
@@ -146,18 +148,13 @@ def strobe(
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:
-                load(lane, cell, states, parameters, x, p, whole)
-                real[T, lane] = 0.0
+                load(lane, cell, states, parameters, x, p, kink, real, whole)
                 real[END, lane] = legs[cell]
-                real[H, lane] = 0.0
                 done[lane] = last[lane] = same[lane] = 0
                 fresh = True
                 cell += 1
         if fresh:
-            renew(address, table, x, k, p, z, h, real)
-            for lane in range(LANES):
-                if whole[STATE, lane] == RUNNING and real[H, lane] == 0.0:
-                    begin(lane, x, k, p, kink, real, rtol, atol)
+            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
         if left > 0:
             advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
             commit(x, k, y, real, whole)

@@ -9,18 +9,17 @@ import numpy.typing as npt
 
 from phasekit.motion.kernels.dop853 import ROWS
 from phasekit.motion.kernels.stepping import (
+    ACCEPTED,
     ARRIVED,
     CELL,
+    CHANGED,
     END,
     IDLE,
     REALS,
     RUNNING,
     STATE,
     WHOLES,
-    H,
-    T,
     advance,
-    begin,
     commit,
     load,
     renew,
@@ -92,6 +91,7 @@ def growth(
                 one, two = orthonormal(lane, x)
                 sums[lane, 0] += one
                 sums[lane, 1] += two
+                whole[ACCEPTED, lane] = CHANGED
                 fresh = True
             if state == RUNNING:
                 continue
@@ -109,19 +109,14 @@ def growth(
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:
-                load(lane, cell, states, parameters, x, p, whole)
-                real[T, lane] = 0.0
+                load(lane, cell, states, parameters, x, p, kink, real, whole)
                 real[END, lane] = legs[cell]
-                real[H, lane] = 0.0
                 done[lane] = 0
                 sums[lane, 0] = sums[lane, 1] = 0.0
                 fresh = True
                 cell += 1
         if fresh:
-            renew(address, table, x, k, p, z, h, real)
-            for lane in range(LANES):
-                if whole[STATE, lane] == RUNNING and real[H, lane] == 0.0:
-                    begin(lane, x, k, p, kink, real, rtol, atol)
+            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
         if left > 0:
             advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
             commit(x, k, y, real, whole)
