@@ -81,6 +81,8 @@ if TYPE_CHECKING:
     from phasekit.systems.analogues import Pendulum as Pendulum
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
     from phasekit.systems.disk import GyroRotorDisk as GyroRotorDisk
+    from phasekit.systems.field_analogues import JosephsonJunction as JosephsonJunction
+    from phasekit.systems.field_analogues import SpinOrbit as SpinOrbit
     from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
     from phasekit.systems.harmonic import Harmonic as Harmonic
     from phasekit.systems.perturbed import Perturbed as Perturbed
@@ -113,6 +115,7 @@ _MODULES = {
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
     "phasekit.systems.free_rotor": ("FreeGyroRotor",),
+    "phasekit.systems.field_analogues": ("JosephsonJunction", "SpinOrbit"),
     "phasekit.systems.harmonic": ("Harmonic",),
     "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import Loop
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
@@ -34,8 +35,12 @@ def capture(
     """Capture in the potential of (A, B, C): into the lobes of the lower saddle."""
     closed.refuse_prescribed(law, "capture")
     values = law.values(*parameters)
-    loss = -closed.means(law, values, separatrices(*law.coefficients(values)))
-    return regions(loss[..., 0, :], loss[..., 1, :], values["torque"], rotation)
+    loops = separatrices(*law.coefficients(values))
+    loss = -closed.means(law, values, loops)
+    # Between two saddles of one energy a region ends in an arc of each, one there and one back.
+    joined = loops.loop[..., :1] == Loop.HETEROCLINIC
+    lobes = loss[..., 0, :] + np.where(joined, loss[..., 1, ::-1], 0.0)
+    return regions(lobes, loss[..., 1, :], values["torque"], rotation)
 
 
 def capture_numerical(

@@ -2,9 +2,9 @@
 
 Transition-state theory with the exact integral over the well in place of its harmonic value, times
 Kramers' factor for recrossing at the saddle, times the factor of Mel'nikov and Meshkov for what is
-short of energy at low damping. That holds for high barriers. At low damping the energy diffuses, and
-its mean first passage is known for any barrier, by the exact actions and periods; the ratio of both
-corrects the rate, with the weight 1/(1 + D), D the loss of a round over kT.
+short of energy at low damping. That holds for high barriers. At low damping the energy diffuses,
+and its mean first passage is known for any barrier, by the exact actions and periods; the ratio of
+both corrects the rate, with the weight 1/(1 + D^1.5), D the loss of a round over kT.
 """
 
 from __future__ import annotations
@@ -221,7 +221,7 @@ def _combined(
         # Both in the limit of low damping: 1 for a high barrier.
         ratio = diffusing / (first * share)
         known = np.isfinite(ratio)
-        weight = 1.0 / (1.0 + loss)
+        weight = 1.0 / (1.0 + loss**1.5)
         rate = first * _recrossing(damping, k) * factor
         rate = rate * np.where(known, ratio, 1.0) ** weight
         low = kT / height

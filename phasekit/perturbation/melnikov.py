@@ -177,7 +177,7 @@ def quiet_frequency(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> 
     phi, k = loops.saddle_phi, loops.saddle_exponent
     A, B, C = (np.asarray(x)[..., None] for x in (A, B, C))
     with np.errstate(all="ignore"):
-        # cosh(a) = (-S + i k^2)/sqrt D; sinh(Re a) = |(k^2, Re q)|/sqrt D, q = i k sqrt(A) e^{i phi}
+        # cosh(a) = (-S + i k^2)/sqrt D; sinh(Re a) = |(k^2, Re q)|/sqrt D
         q = 1j * k * np.sqrt(A.astype(complex)) * np.exp(1j * phi)
         # D = mu (A - mu) in the forms that do not cancel, mu = B/cos phi
         upright = B / np.cos(phi) * (k * k + A * np.sin(phi) ** 2)

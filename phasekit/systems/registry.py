@@ -12,6 +12,7 @@ from phasekit.systems.system import MODELS, Model
 HOMES = (
     "phasekit.systems.disk",
     "phasekit.systems.analogues",
+    "phasekit.systems.field_analogues",
     "phasekit.systems.potential",
     "phasekit.systems.free_rotor",
     "phasekit.systems.perturbed",
