@@ -120,6 +120,8 @@ def run_up(
     if getattr(found, "m", None) is None or getattr(found, "half_span", None) is None:
         return ds
     forces = bearing_forces(found, ds)
-    return ds.assign({name: forces[name].variable for name in forces.data_vars}).assign_coords(
+    order = [dim for dim in map(str, ds.motion_phi.dims)]
+    loads = {name: force.transpose(*order, ...).variable for name, force in forces.items()}
+    return ds.assign(loads).assign_coords(
         {dim: forces[dim] for dim in ("bearing", "disk_axis", "component")}
     )

@@ -12,7 +12,6 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import (
     NumberLike,
     Value,
-    bad,
     brief,
     describe,
     named_arguments,
