@@ -211,7 +211,7 @@ class Search:
         radius = min(0.4 * far, 0.05 * self.size)
         angles = 2.0 * np.pi * np.arange(RING) / RING
         ring = np.stack([np.cos(angles), self.scale * np.sin(angles)], axis=-1)
-        legs = len(orbit) * (2 + int(np.log(0.1) / np.log(max(multiplier, 1e-3))))
+        legs = len(orbit) * (2 + int(np.log(1e-3) / np.log(max(multiplier, 1e-3))))
         for _ in range(40):
             states = (orbit[:, None] + radius * ring).reshape(-1, 2)
             ends = self.run(states, 1, min(legs, 20_000)).states[:, 0]
@@ -253,9 +253,9 @@ def find(
     states : array, shape (n, 2)
         Where motions start; they also say how coordinates and rates are measured.
     """
-    spread = np.ptp(states, axis=0)
-    width = float(spread[0]) or 1.0
-    scale = float(spread[1]) / width if spread[1] > 0.0 else 1.0
+    width = float(np.ptp(states[:, 0])) or 1.0
+    fastest = float(np.abs(states[:, 1]).max(initial=0.0))
+    scale = 2.0 * fastest / width if fastest > 0.0 else 1.0
     search = Search(law, values, leg, scale, width)
     search.look(states)
     search.order()

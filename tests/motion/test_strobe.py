@@ -17,7 +17,7 @@ MATHIEU = pk.Potential("a*x^2/2", "x", {"a": 1.0})
 
 
 def mathieu(a, q):
-    """x'' + (a - 2 q cos 2t) x = 0."""
+    """X'' + (a - 2 q cos 2t) x = 0."""
     return pk.Perturbed(MATHIEU.replace(a=a), modulation={"a": pk.Harmonic(-2.0 * q, 2.0)})
 
 
