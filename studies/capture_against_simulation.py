@@ -1,9 +1,9 @@
-"""Into which rest does a decaying rotor fall: are the odds in closed form those of its motions?
+"""Which rest a decaying rotor falls into, and whether the odds in closed form are those of motions.
 
-A rotor swings round both of its rests, loses speed by friction, and comes to lie in one of them. For
-damping that vanishes the odds are the areas of the lobes of the separatrix over their sum; here they
-are held against the basins of thousands of motions between the two saddles' energies, at damping
-that does not vanish.
+A rotor swings round both of its rests, loses speed by friction, and comes to lie in one of them.
+For damping that vanishes the odds are the areas of the lobes of the separatrix over their sum; here
+they are held against the basins of thousands of motions between the two saddles' energies, at
+damping that does not vanish.
 
 Answer. The odds of the right rest are 0.719. At a damping of 0.04 of the frequency of small
 oscillations and less the share of the motions is that, to its standard error of 0.01; at 0.08 it is

@@ -53,7 +53,7 @@ def run(argv: Sequence[str]) -> None:
     lines = [repr(system)]
     for bearing in ds.bearing.values:
         force = ds.force_magnitude.sel(bearing=bearing)
-        place = ds.isel(time=int(force.argmax()))
+        place = ds.isel(time=int(np.argmax(force.values)))
         lines.append(
             f"bearing {bearing}: at most {force.max().item():.6g} N, at t = "
             f"{place.time.item():.5g} s and omega1 = {place.motion_omega1.item():.5g} rad/s"

@@ -107,8 +107,10 @@ def run_up(
     states = ds.motion_phi.values, ds.motion_dphi.values
     bend = accelerations(law, law.values(*parameters.values()), spread, *states)
     rows = {
-        "motion_omega1": (ds.time.dims, speed, "s-1", "angular velocity of the support", "omega1(t)"),
-        "domega1": (ds.time.dims, change, "s-2", "angular acceleration of the support", "omega1'(t)"),
+        "motion_omega1": (ds.time.dims, speed, "s-1",
+                          "angular velocity of the support", "omega1(t)"),
+        "domega1": (ds.time.dims, change, "s-2",
+                    "angular acceleration of the support", "omega1'(t)"),
         "ddphi": (ds.motion_phi.dims, bend, "s-2", "angular acceleration of the disk",
                   "phi'' = -V'(phi; omega1) - omega1' kappa cos phi - d phi' - q |phi'| phi' + N"),
     }  # fmt: skip

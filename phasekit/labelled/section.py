@@ -90,8 +90,7 @@ def poincare_section(
         arguments |= {"direction": direction, **tolerances}
         return system.poincare(phi0, _needed(dphi0), duration, section=section, **arguments)
     if arguments:
-        raise TypeError(f"poincare_section: got {', '.join(arguments)}, wants them of no system but "
-                        "a FreeGyroRotor")  # fmt: skip
+        raise bad(*next(iter(arguments.items())), "nothing, except of a FreeGyroRotor")
     if isinstance(system, Problem):
         return _of_problem(system, phi0, duration, section, direction, tolerances)
     return _of_system(as_system(system), phi0, dphi0, duration, section, direction, tolerances)
