@@ -23,7 +23,7 @@ def run(argv: Sequence[str]) -> None:
     own: dict[str, Any] = {
         name: number(f"--{name}", getattr(options, name), unit) for name, unit in units.items()
     }
-    grid = {
+    grid: dict[str, Any] = {
         "phi": span("--phi", options.phi, "rad"),
         "dphi": span("--dphi", options.dphi, "s-1"),
     }

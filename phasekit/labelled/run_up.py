@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,11 @@ from phasekit.motion.prescribed import prescribed_at, table_of
 from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
 
-#: What a function or table of omega1 may be.
-OmegaLike = Callable[[float], float] | tuple[Any, Any] | xr.DataArray
-
 
 def run_up(
     disk: Any,
     *,
-    omega1: OmegaLike,
+    omega1: Any,
     phi0: NumberLike,
     dphi0: NumberLike,
     t: NumberLike,
@@ -86,7 +82,7 @@ def run_up(
     >>> ds.force.dims
     ('time', 'bearing', 'disk_axis')
     """
-    found = as_system(disk)
+    found: Any = as_system(disk)
     if not is_disk(found):
         raise bad("disk", disk, "a GyroRotorDisk")
     if omega1 is None or isinstance(omega1, (int, float)):

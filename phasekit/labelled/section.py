@@ -109,7 +109,7 @@ def _of_system(
     duration: float,
     section: float,
     direction: int,
-    tolerances: dict[str, float],
+    tolerances: dict[str, Any],
 ) -> xr.Dataset:
     perturbed = system if isinstance(system, Perturbed) else Perturbed(system)
     refuse_noise(perturbed)
@@ -120,7 +120,7 @@ def _of_system(
     )
     _, parameters = single(system)
     law = perturbed.law
-    rates = pointwise(law, law.values(*perturbed.parameters.values()), duration)
+    rates = pointwise(law, law.values(*perturbed.parameters.values()), 0.0, duration)
     turn = circle(law)
     found = passages(
         InitialValue(rates, state, **tolerances),
@@ -150,7 +150,7 @@ def _of_problem(
     duration: float,
     section: Any,
     direction: int,
-    tolerances: dict[str, float],
+    tolerances: dict[str, Any],
 ) -> xr.Dataset:
     wants = f"one of the states {', '.join(problem.state)} with a value: ('{problem.state[0]}', 0.)"
     if not isinstance(section, tuple) or len(section) != 2 or section[0] not in problem.state:

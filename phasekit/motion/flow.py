@@ -130,7 +130,7 @@ def _motions(
     return result
 
 
-def _is_still(law: PerturbedConservative, values: dict[str, Array], count: int) -> Any:
+def _is_still(law: PerturbedConservative, values: Mapping[str, Array], count: int) -> Any:
     """In which cells there is neither damping nor torque nor anything that varies."""
     if not isinstance(law.base, Trigonometric) or law.prescribed is not None:
         return np.zeros(count, bool)
@@ -265,24 +265,25 @@ def accelerations(
     out = np.empty((t.size, 2))
     states = np.stack([x, v], axis=-1)
     rates_at(code.address, table, t, states, parameters, np.sign(v), code.kink, 0, t.size, out)
-    return out[:, 1].reshape(np.broadcast_shapes(*(array.shape for array in arrays)))
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    return np.asarray(out[:, 1].reshape(shape))
 
 
 def pointwise(
-    law: PerturbedConservative, values: Mapping[str, Array], duration: float
+    law: PerturbedConservative, values: Mapping[str, Array], start: float, stop: float
 ) -> Callable[[float, Any], Array]:
-    """The law of one system as a function of time and state, up to a time."""
+    """The law of one system as a function of time and state, between two times."""
     from phasekit.motion.kernels.motions import rates_at
 
     code, parameters = rates_of(law, values)
     parameters = np.array(parameters[:, :1])
-    table = table_of(law.prescribed, 0.0, duration)
+    table = table_of(law.prescribed, start, stop)
 
     def rates(t: float, x: Any) -> Array:
         state = np.array([[x[0], x[1]]])
         out = np.empty((1, 2))
         arrays = (np.array([float(t)]), state, parameters, np.sign(state[:, 1]))
         rates_at(code.address, table, *arrays, code.kink, 0, 1, out)
-        return out[0]
+        return np.asarray(out[0])
 
     return rates

@@ -37,7 +37,8 @@ def table_of(prescribed: Any, start: float, stop: float) -> Array:
     if prescribed is None:
         return np.zeros((0, 3))
     if not callable(prescribed):
-        return _of_table(*prescribed, start, stop)
+        times, values = prescribed
+        return _of_table(times, values, start, stop)
     return _of_function(prescribed, start, stop if stop > start else start + 1.0)
 
 

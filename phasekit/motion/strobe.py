@@ -281,5 +281,8 @@ def sections(
         angles = 0.5 * turn - np.mod(0.5 * turn - angles, turn)
     else:
         turned = np.full(count, np.nan)
-    rows = (x.reshape(*shape, n) for x in (times, angles, found[..., 1]))
-    return Sections(*rows, turned.reshape(shape) if n > 1 else np.full(shape, np.nan))
+    time, angle, speed = (
+        np.asarray(x, float).reshape(*shape, n) for x in (times, angles, found[..., 1])
+    )
+    turns = turned.reshape(shape) if n > 1 else np.full(shape, np.nan)
+    return Sections(time, angle, speed, turns)

@@ -246,3 +246,43 @@ def test_a_rate_of_the_support_with_a_kink_is_followed():
     first = solve_ivp(rates, (0, 1.3), [0.2, 0.0], "DOP853", rtol=1e-12, atol=1e-13)
     last = solve_ivp(rates, (1.3 + 1e-12, 3.0), first.y[:, -1], "DOP853", rtol=1e-12, atol=1e-13)
     assert pk.flow(ramp, 0.2, 0.0, 3.0).motion_phi.item() == pytest.approx(last.y[0, -1], abs=1e-8)
+
+
+def test_events_are_zeros_on_the_motion():
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.2, 1.0))
+
+    def turns(t, phi, dphi):
+        return dphi
+
+    def second_passage(t, phi, dphi):
+        return phi - 1.3
+
+    second_passage.terminal = 2
+    times = np.linspace(0.0, 40.0, 401)
+    fine = {"rtol": 1e-12, "atol": 1e-13}
+    plain = pk.flow(system, 0.4, 0.5, times, **fine)
+    ds = pk.flow(system, 0.4, 0.5, times, events={"turns": turns}, **fine)
+    assert ds.motion_phi.equals(plain.motion_phi)
+    changes = int(np.sum(np.diff(np.sign(plain.motion_dphi.values)) != 0))
+    assert changes > 5
+    assert ds.sizes["event"] == changes
+    there = pk.flow(system, 0.4, 0.5, ds.event_time.values, **fine)
+    assert np.abs(there.motion_dphi).max() < 1e-8
+    assert np.abs(there.motion_phi.values - ds.event_phi.values).max() < 1e-8
+    ended = pk.flow(system, 0.4, 0.5, times, events=second_passage)
+    assert ended.event_name.values.tolist() == ["event", "event"]
+    last = ended.event_time.values[-1]
+    assert np.array_equal(np.isnan(ended.motion_phi), times > last)
+    back = pk.flow(system, 0.4, 0.5, [-5.0, 5.0], events=turns)
+    assert (np.diff(back.event_time) > 0).all()
+    assert back.event_time.values[0] < 0.0 < back.event_time.values[-1]
+
+
+def test_events_of_what_has_none_are_refused():
+    system = pk.Perturbed(EIGHT, damping=0.1)
+    with pytest.raises(pk.ParameterError, match="wants nothing, or one motion"):
+        pk.flow(system, [0.1, 0.2], 0.0, 1.0, events=lambda t, phi, dphi: dphi)
+    with pytest.raises(pk.ParameterError, match=r"a function of \(t, phi, dphi\)"):
+        pk.flow(system, 0.1, 0.0, 1.0, events=lambda t: t)
+    with pytest.raises(pk.ParameterError, match="events: got"):
+        pk.flow(EIGHT, 0.1, 0.0, 1.0, events=lambda t, phi, dphi: dphi)
