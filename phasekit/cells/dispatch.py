@@ -172,7 +172,7 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
-        words = [system.law.words(row.name, row.units, row.long_name) for row in kept]
+        words: list[Any] = [system.law.words(r.name, r.units, r.long_name) for r in kept]
         told = (replace(row, **w) if w else row for row, w in zip(kept, words, strict=True))
         return tuple(told), passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need

@@ -84,7 +84,7 @@ def regions(lobes: Array, winding: Array, torque: Any, rotation: bool) -> Captur
         inside = winding.sum(axis=-1)
         share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)
     share = np.where(np.isnan(arriving), np.nan, share)
-    wells = np.isfinite(lobes).all(axis=-1)
+    wells = np.asarray(np.isfinite(lobes).all(axis=-1))
     single = np.stack([np.where(forward, 0.0, 1.0), np.where(forward, 1.0, 0.0)], axis=-1)
     parts = np.where(wells[..., None], _shares(lobes)[..., :2], single) * share[..., None]
     probability = np.concatenate([parts, 1.0 - parts.sum(axis=-1, keepdims=True)], axis=-1)

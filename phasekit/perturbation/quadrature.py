@@ -23,12 +23,14 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 #: Times up to this over the exponent; e^-REACH is below rounding.
-REACH = 38.0
-POINTS = 1 << 11
+REACH = 36.0
+#: Points in time: as few as do, else many.
+POINTS = (1 << 8, 1 << 11)
 #: Cells at a time, for the memory of their motions.
 CELLS = 256
-#: Greatest error of what is said, relative.
-WORST = 1e-6
+#: Greatest rounding of what is said, and difference from twice the step, relative: half the step
+#: squares the error.
+WORST, APART = 1e-6, 1e-4
 
 
 @functools.lru_cache(maxsize=32)
@@ -42,37 +44,43 @@ def derivative(formula: Formula, parameter: str) -> Formula:
 class Paths:
     """Motions along all separatrices of some cells: the axes are cell, saddle, side, time."""
 
-    def __init__(self, formula: Formula, parameters: list[Array], loops: Separatrices) -> None:
-        self.formula = formula
-        self.parameters = [p[:, None, None, None] for p in parameters]
-        count = loops.saddle_phi.shape[-1]
-        k = loops.saddle_exponent
-        grid = np.linspace(-REACH, REACH, POINTS + 1)
+    def __init__(
+        self, formula: Formula, parameters: list[Array], loops: Separatrices, points: int
+    ) -> None:
+        # Cells of one potential, under many drives, have the same motions.
+        keys = np.stack([*parameters, np.zeros(len(loops.saddle_phi))], axis=1)
+        _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+        which = which.reshape(-1)
+        k = loops.saddle_exponent[first]
+        grid = np.linspace(-REACH, REACH, points + 1)
         with np.errstate(all="ignore"):
             times = grid / k[..., None]
-        self.time = times[:, :, None, :]
-        self.step = self.time[..., 1] - self.time[..., 0]
-        shape = (len(k), count, 2, grid.size)
-        self.phi, self.dphi = np.full(shape, np.nan), np.full(shape, np.nan)
-        for saddle in range(count):
+        shape = (len(first), k.shape[-1], 2, grid.size)
+        phi, dphi = np.full(shape, np.nan), np.full(shape, np.nan)
+        for saddle in range(k.shape[-1]):
             there = np.flatnonzero(np.isfinite(k[:, saddle]) & (k[:, saddle] > 0.0))
-            own = [p[there, None] for p in parameters]
+            own = [p[first[there], None] for p in parameters]
             for side in (0, 1) if there.size else ():
                 found = functions.separatrix_motion(
                     formula, *own, times[there, saddle], saddle=saddle, side=side
                 )
+                speed = np.abs(found.motion_dphi)
+                size = speed.max(axis=-1, keepdims=True, initial=0.0)
                 closed = np.isfinite(found.motion_phi).all(axis=-1, keepdims=True)
-                size = np.abs(found.motion_dphi).max(axis=-1, keepdims=True, initial=0.0)
-                closed &= np.abs(found.motion_dphi[:, [0, -1]]).max(-1, keepdims=True) < 1e-9 * size
-                self.phi[there, saddle, side] = np.where(closed, found.motion_phi, np.nan)
-                self.dphi[there, saddle, side] = np.where(closed, found.motion_dphi, np.nan)
+                closed &= speed[:, [0, -1]].max(-1, keepdims=True) < 1e-9 * size
+                phi[there, saddle, side] = np.where(closed, found.motion_phi, np.nan)
+                dphi[there, saddle, side] = np.where(closed, found.motion_dphi, np.nan)
+        self.parameters = [p[:, None, None, None] for p in parameters]
+        self.time = times[which][:, :, None, :]
+        self.step = self.time[..., 1] - self.time[..., 0]
+        self.phi, self.dphi = phi[which], dphi[which]
 
     def integral(self, values: Any) -> Any:
         """Integral over time, NaN where it has lost too many digits."""
         fine = values.sum(axis=-1)
         coarse = 2.0 * values[..., ::2].sum(axis=-1)
         rounding = 1e-13 * np.abs(values).sum(axis=-1)
-        good = np.abs(fine - coarse) + rounding <= WORST * np.abs(fine)
+        good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
         # What vanishes by symmetry, within rounding, vanishes.
         nothing = np.abs(fine) <= 0.1 * rounding
         return np.where(good, fine * self.step, np.where(nothing, 0.0, np.nan))
@@ -82,7 +90,7 @@ class Paths:
         at = np.exp(1j * nu[:, None, None, None] * self.time) * self.dphi * values
         rounding = 1e-13 * np.abs(at).sum(axis=-1)
         fine, coarse = at.sum(axis=-1), 2.0 * at[..., ::2].sum(axis=-1)
-        good = np.abs(fine - coarse) + rounding <= WORST * np.abs(fine)
+        good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
         return np.where(good, fine * self.step, np.nan)
 
 
@@ -111,15 +119,25 @@ def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov
         one = {name: x[part] for name, x in flat.items()}
         own = Separatrices._make(x[part] if size == cells else x for x in loops)
         own = Separatrices._make(np.broadcast_to(x, (part.stop - start, *x.shape[1:])) for x in own)
-        found.append(_cells(law, formula, one, own))
+        few, lost = _cells(law, formula, one, own, POINTS[0])
+        if lost.any():
+            rows = np.flatnonzero(lost)
+            left = Separatrices._make(x[rows] for x in own)
+            again = {name: x[rows] for name, x in one.items()}
+            many, _ = _cells(law, formula, again, left, POINTS[1])
+            for field, better in zip(few, many, strict=True):
+                field[rows] = better
+        found.append(few)
     fields = (np.concatenate(parts) for parts in zip(*found, strict=True))
     return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in fields)
 
 
 def _cells(
-    law: PerturbedConservative, formula: Formula, values: dict[str, Array], loops: Separatrices
-) -> Melnikov:
-    paths = Paths(formula, [values[name] for name in formula.names], loops)
+    law: PerturbedConservative, formula: Formula, values: dict[str, Array], loops: Separatrices,
+    points: int,
+) -> tuple[Melnikov, Any]:  # fmt: skip
+    """Melnikov's function by so many points in time, and in which cells they were too few."""
+    paths = Paths(formula, [values[name] for name in formula.names], loops, points)
     each = {name: x[:, None, None] for name, x in values.items()}
     square = paths.dphi**2
     mean = -each["damping"] * paths.integral(square)
@@ -144,7 +162,10 @@ def _cells(
         amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
         slope = -derivative(formula, parameter).slopes(paths.phi, *paths.parameters)
         parts.append((paths.transform(slope, nu), amplitude, nu, phase))
-    return assembled(mean, parts, undamped(law, values))
+    found = assembled(mean, parts, undamped(law, values))
+    closed = np.isfinite(paths.phi[..., 0])
+    lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
+    return found, lost.any(axis=(1, 2))
 
 
 def _area_loss(paths: Paths, formula: Formula, parameter: str) -> Any:

@@ -58,8 +58,8 @@ class Ladder(NamedTuple):
     def at(self, u: Array) -> tuple[Array, Orbits]:
         """Gap, signed, and orbit."""
         gap = self.sign * self.height[:, None] * np.exp(u)
-        spread = (x[:, None] for x in (self.A, self.B, self.C))
-        return gap, orbits_at_gap(*spread, gap, self.saddle[:, None], self.side[:, None])
+        a, b, c = (x[:, None] for x in (self.A, self.B, self.C))
+        return gap, orbits_at_gap(a, b, c, gap, self.saddle[:, None], self.side[:, None])
 
 
 def resonances(
@@ -164,8 +164,8 @@ def _coefficient(
         dphi = np.sqrt(2.0 * level) * (1.0 if family == OrbitFamily.FORWARD else -1.0)
     part = (np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5
     t = period[:, None] * part
-    spread = (x[:, None] for x in (A, B, C, phi, dphi))
-    motion = flow(*spread, t)
+    a, b, c, x, v = (one[:, None] for one in (A, B, C, phi, dphi))
+    motion = flow(a, b, c, x, v, t)
     path, speed = motion[0], motion[1]
     nu = drive[0][1]
     total = np.zeros(len(A), complex)

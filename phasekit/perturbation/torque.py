@@ -120,7 +120,8 @@ def torqued_equilibria(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) 
         bent = _under_torque(A[cells], B[cells], C[cells], N[cells], points.phi[cells])
         invalid = (points.n_equilibria[cells] < 0) | np.isnan(N[cells])
         bent = bent._replace(n_equilibria=np.where(invalid, -1, bent.n_equilibria))
-        for field, one in zip(fields, bent, strict=True):
+        parts: tuple[Any, ...] = bent
+        for field, one in zip(fields, parts, strict=True):
             field[cells] = one
     return Equilibria._make(x.reshape(shape + x.shape[1:]) for x in fields)
 

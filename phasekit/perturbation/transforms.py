@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import cmath
 import math
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -125,7 +126,7 @@ def of_winding(S: float, k2: float, D: float, q: complex, n: float) -> tuple[com
         sine, cosine = (up - down) / 2j, 0.5 * (up + down)
     over = -2.0 / math.expm1(-2.0 * PI * n)  # e^{pi n}/sinh pi n
     if abs(zeta) * max(n, 1.0) <= 1e-8:
-        lead = -4.0 * PI * k * over * n * math.exp(-0.5 * PI * n) / E
+        lead = complex(-4.0 * PI * k * over * n * math.exp(-0.5 * PI * n) / E)
     else:
         lead = -4.0 * PI * k * over * sine / (E * sinh)
     if abs(zeta) * max(n, 1.0) > SMALL:
@@ -262,8 +263,8 @@ def _flat(shape: tuple[int, ...], *arrays: npt.ArrayLike, dtype: type = float) -
 
 
 def transforms(
-    A: Array, B: Array, C: Array, phi: Array, k: Array, loop: Array, nu: npt.ArrayLike,
-    *weights: npt.ArrayLike, threads: int | None = None,
+    A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: Array, k: Array,
+    loop: npt.NDArray[Any], nu: npt.ArrayLike, *weights: npt.ArrayLike, threads: int | None = None,
 ) -> Complex:  # fmt: skip
     """Integrals of ``phi' (g0 + gs sin phi + gc cos phi + g2 sin 2 phi) e^{i nu t}``.
 
@@ -304,8 +305,8 @@ def transforms(
 
 
 def area_rates(
-    A: Array, B: Array, C: Array, phi: Array, k: Array, loop: Array,
-    dA: npt.ArrayLike, dB: npt.ArrayLike, dC: npt.ArrayLike, *, threads: int | None = None,
+    A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: Array, k: Array,
+    loop: npt.NDArray[Any], dA: npt.ArrayLike, dB: npt.ArrayLike, dC: npt.ArrayLike, *, threads: int | None = None,
 ) -> Array:  # fmt: skip
     """Rates at which the areas of the loops change while the coefficients do, 1/s^2.
 

@@ -8,6 +8,7 @@ from typing import Any
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad
 from phasekit.laws.ladder import Law, Lawful
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.system import MODELS, Model
 
 
@@ -55,6 +56,13 @@ def stands_on(system: Model, rung: type[Law], what: str) -> Model:
     """
     if issubclass(system.rung, rung):
         return system
+    if issubclass(system.rung, PerturbedConservative):
+        # What is a function of the potential alone.
+        if issubclass(getattr(system, "system", system).rung, rung):
+            raise ParameterError(
+                f"system: got {system!r}, wants a system without damping and drive for {what}; "
+                "perturbed.system has it"
+            )
     because = f"because {what} is in closed form" if rung.labels_fixed else f"for {what}"
     raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}")
 

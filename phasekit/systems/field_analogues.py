@@ -155,7 +155,7 @@ class SpinOrbit(Model):
     >>> tides = mercury.tides(1.5, eccentricity=0.206, rate=1e-8)
     >>> odds = pk.capture(tides, start="rotation").capture_probability
     >>> round(1.0 - odds.sel(region="none").item(), 4)
-    0.0707
+    0.0708
     """
 
     mean_motion: NumberLike

@@ -63,7 +63,8 @@ class Harmonic:
     @property
     def values(self) -> tuple[Value, Value, Value]:
         """Amplitude, frequency and phase."""
-        values: Any = (self.amplitude, self.frequency, self.phase)
+        kept: Any = self
+        values: tuple[Value, Value, Value] = (kept.amplitude, kept.frequency, kept.phase)
         return values
 
     def __repr__(self) -> str:

@@ -1,0 +1,110 @@
+"""Capture: fluxes and probabilities, and ensembles on demand."""
+
+import os
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+ORBITS = int(os.environ.get("PHASEKIT_ENSEMBLES", "0"))
+EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
+
+
+def odds(perturbed, **options):
+    ds = pk.capture(perturbed, **options)
+    found = ds.capture_probability.values
+    assert found.sum(axis=-1) == pytest.approx(1.0)
+    return found
+
+
+def test_damping_alone_shares_by_areas():
+    damped = pk.Perturbed(EIGHT, damping=0.003)
+    assert odds(damped) == pytest.approx([0.280550, 0.719450, 0.0], abs=1e-6)
+    areas = pk.separatrices(EIGHT).lobe_area.sel(saddle="lower").values
+    assert areas == pytest.approx([0.963911, 2.471876], abs=1e-6)
+    flux = pk.capture(damped).capture_flux.values
+    assert flux == pytest.approx([*(0.003 * areas), 0.0])
+
+
+def test_nothing_is_captured_without_damping_or_by_driving():
+    assert odds(pk.Perturbed(EIGHT)).tolist() == [0.0, 0.0, 1.0]
+    assert odds(pk.Perturbed(EIGHT, damping=-0.1)).tolist() == [0.0, 0.0, 1.0]
+    assert odds(pk.Perturbed(EIGHT), start="rotation").tolist() == [0.0, 0.0, 1.0]
+
+
+@pytest.mark.parametrize("rate", [0.002, -0.002, 0.0004])
+def test_drift_changes_the_shares(rate):
+    step = 1e-6
+    areas = [pk.separatrices(EIGHT.replace(B=0.35 + s * step)).lobe_area.values[0] for s in (1, -1)]
+    theta = 0.003 * pk.separatrices(EIGHT).lobe_area.values[0]
+    theta = theta + rate * (areas[0] - areas[1]) / (2 * step)
+    found = pk.capture(pk.Perturbed(EIGHT, damping=0.003, drift={"B": rate}))
+    assert found.capture_flux.values[:2] == pytest.approx(theta, abs=1e-9)
+    kept = np.maximum(theta, 0.0)
+    want = [*(kept / kept.sum()), 0.0] if theta.sum() > 0.0 else [0.0, 0.0, 1.0]
+    assert found.capture_probability.values == pytest.approx(want, abs=1e-7)
+
+
+def test_capture_from_rotation():
+    """2/(1 + 2 N w/(damping S)), at most 1, with both branches in S."""
+    pendulum = pk.Pendulum(length=1.0, g=1.0)
+    for torque in (0.02, 0.05, -0.05, 0.001):
+        found = odds(pk.Perturbed(pendulum, damping=0.01, torque=torque), start="rotation")
+        want = min(1.0, 2 / (1 + 2 * abs(torque) * 2 * np.pi / (0.01 * 16)))
+        assert 1.0 - found[2] == pytest.approx(want, rel=1e-12)
+        assert found[1 if torque > 0.0 else 0] == 0.0
+    both = odds(pk.Perturbed(EIGHT, damping=0.01, torque=0.02), start="rotation")
+    assert both[0] / both[1] == pytest.approx(0.280550 / 0.719450, abs=1e-5)
+
+
+def test_mercury():
+    mercury = pk.SpinOrbit.resonance(1.5, eccentricity=0.206, asymmetry=1e-4)
+    found = odds(mercury.tides(1.5, eccentricity=0.206, rate=1e-9), start="rotation")
+    assert 1.0 - found[2] == pytest.approx(0.0707, abs=2e-4)
+    assert found[0] == pytest.approx(found[1])
+
+
+def test_where_there_is_no_eight():
+    alone = pk.capture(pk.Perturbed(pk.Pendulum(length=1.0), damping=0.1))
+    assert np.isnan(alone.capture_probability).all()
+    with pytest.raises(pk.ParameterError, match="start: got 'inside', wants one of"):
+        pk.capture(pk.Perturbed(EIGHT), start="inside")
+
+
+@pytest.mark.skipif(not ORBITS, reason="slow: PHASEKIT_ENSEMBLES=6000 runs so many orbits")
+@pytest.mark.parametrize("abc", [(1.0, 0.35, 0.12), (-1.0, 0.2, 0.3)])
+@pytest.mark.parametrize("rate", [0.0, 0.0005, -0.0005])
+def test_ensembles(abc, rate):
+    """Orbits from a band of actions outside the eight, by leapfrog with exact damping."""
+    delta, step, rng = 0.001, 0.02, np.random.default_rng(1)
+    A, B, C = abc
+    system = pk.Coefficients(*abc)
+    sep = pk.separatrices(system).sel(saddle="lower")
+    rise = pk.separatrices(system).saddle_energy.diff("saddle").item()
+    phi = np.full(ORBITS, sep.saddle_phi.item())
+    dphi = np.sqrt(2 * rise * rng.uniform(0.1, 0.3, ORBITS))
+    where, t, b = np.zeros(ORBITS, int), 0.0, B
+    for i in range(int(6.0 / delta / step)):
+        dphi -= 0.5 * step * ((b - A * np.cos(phi)) * np.sin(phi) - C * np.cos(phi))
+        phi += 0.5 * step * dphi
+        dphi *= np.exp(-delta * step)
+        phi += 0.5 * step * dphi
+        t += step
+        b = B + rate * t
+        dphi -= 0.5 * step * ((b - A * np.cos(phi)) * np.sin(phi) - C * np.cos(phi))
+        if i % 500 == 0:
+            now = pk.separatrices(pk.Coefficients(A, b, C)).sel(saddle="lower")
+            V = -b * np.cos(phi) + 0.5 * A * np.cos(phi) ** 2 - C * np.sin(phi)
+            inside = 0.5 * dphi**2 + V < now.saddle_energy.item() - 1e-3
+            offset = np.mod(phi - now.saddle_phi.item() + np.pi, 2 * np.pi) - np.pi
+            where = np.where((where == 0) & inside, np.where(offset > 0, 2, 1), where)
+            if (where > 0).all():
+                break
+    caught = where > 0
+    assert caught.mean() > 0.99
+    right = (where[caught] == 2).mean()
+    # The parameters have drifted until the orbits come to the separatrix.
+    want = odds(pk.Perturbed(pk.Coefficients(A, 0.5 * (b + B), C), damping=delta,
+                             drift={"B": rate}))[1]  # fmt: skip
+    assert abs(right - want) < 3 * np.sqrt(0.25 / ORBITS) + 20 * delta

@@ -1,0 +1,87 @@
+"""Constant torques: equilibria under them, critical and retrapping torques."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import phasekit as pk
+
+RNG = np.random.default_rng(3)
+
+
+def cells(n):
+    A, B, C, N = (xr.DataArray(x, dims="cell") for x in RNG.normal(size=(4, n)))
+    return pk.Coefficients(A, B, C), 0.6 * N
+
+
+def test_equilibria_under_torque_are_all_there():
+    base, torque = cells(400)
+    ds = pk.equilibria(pk.Perturbed(base, torque=torque))
+    A, B, C, N = (x.values[:, None] for x in (*base, torque))
+    x = np.linspace(-np.pi, np.pi, 20001)
+    slope = (B - A * np.cos(x)) * np.sin(x) - C * np.cos(x) - N
+    want = ((slope[:, 1:] * slope[:, :-1]) < 0.0).sum(axis=1)
+    assert ds.n_equilibria.values.tolist() == want.tolist()
+    assert {0, 2, 4} == set(want)
+    phi = ds.phi.values
+    assert np.isfinite(phi).sum() == want.sum()
+    assert np.nanmax(abs((B - A * np.cos(phi)) * np.sin(phi) - C * np.cos(phi) - N)) < 1e-14
+    centers = ds.kind.values == pk.EquilibriumKind.CENTER
+    assert np.array_equal(centers, ds.curvature.values > 0.0)
+
+
+def test_labels_are_those_without_torque():
+    base, _ = cells(300)
+    still = pk.equilibria(base)
+    same = pk.equilibria(pk.Perturbed(base))
+    for name in same:
+        assert np.array_equal(still[name], same[name], equal_nan=True)
+    bent = pk.equilibria(pk.Perturbed(base, torque=1e-9))
+    assert np.array_equal(np.isnan(bent.phi), np.isnan(still.phi))
+    assert np.nanmax(abs(np.exp(1j * bent.phi) - np.exp(1j * still.phi))) < 1e-5
+
+
+def test_critical_torques_are_the_extremes():
+    base, _ = cells(300)
+    ds = pk.critical_torque(base)
+    A, B, C = (x.values[:, None, None] for x in base)
+
+    def slope(x):
+        return (B - A * np.cos(x)) * np.sin(x) - C * np.cos(x)
+
+    extremes = ds.critical_torque.values
+    assert slope(ds.critical_phi.values[:, None])[:, 0] == pytest.approx(extremes, abs=1e-14)
+    all_values = slope(np.linspace(-np.pi, np.pi, 4001))[:, 0]
+    assert (all_values.max(axis=1) <= extremes[:, 1] + 1e-14).all()
+    assert (all_values.min(axis=1) >= extremes[:, 0] - 1e-14).all()
+    assert all_values.max(axis=1) == pytest.approx(extremes[:, 1], abs=1e-5)
+    for factor, number in ((0.999999, 2), (1.000001, 0)):
+        torque = factor * ds.critical_torque.sel(direction="plus", drop=True)
+        found = pk.equilibria(pk.Perturbed(base, torque=torque)).n_equilibria
+        assert (found == number).all()
+
+
+def test_the_diode():
+    """Two harmonics rectify a third at the most, at A = 1, B = C = 1/sqrt(2)."""
+    minus, plus = pk.critical_torque(pk.Coefficients(1.0, 0.5**0.5, 0.5**0.5)).critical_torque
+    assert (plus + minus) / (plus - minus) == pytest.approx(1 / 3, rel=1e-14)
+    free = pk.critical_torque(pk.Coefficients(0.0, 0.0, 0.0))
+    assert free.critical_torque.values.tolist() == [0.0, 0.0]
+
+
+def test_beyond_the_critical_torque_there_is_no_equilibrium():
+    pendulum = pk.Pendulum(length=1.0, g=1.0)
+    assert pk.equilibria(pk.Perturbed(pendulum, torque=1.5)).n_equilibria == 0
+    on = pk.equilibria(pk.Perturbed(pendulum, torque=1.0))
+    assert on.n_equilibria == 1
+    assert on.kind.max() == pk.EquilibriumKind.DEGENERATE
+
+
+def test_retrapping():
+    damped = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.1)
+    found = pk.retrapping_torque(damped).retrapping_torque.values
+    assert found == pytest.approx([-0.4 / np.pi, 0.4 / np.pi], rel=1e-14)
+    # over both arcs of a cycle, as next to it
+    at = [pk.Perturbed(pk.Coefficients(1.0, B, 0.3), damping=0.1) for B in (0.0, 1e-9)]
+    left, right = (pk.retrapping_torque(p).retrapping_torque.values for p in at)
+    assert left == pytest.approx(right, rel=1e-6)
