@@ -47,6 +47,10 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.periodic_orbit import periodic_orbit as periodic_orbit
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
+    from phasekit.labelled.driven import attractors as attractors
+    from phasekit.labelled.driven import basins as basins
+    from phasekit.labelled.driven import lyapunov as lyapunov
+    from phasekit.labelled.driven import stroboscopic as stroboscopic
     from phasekit.labelled.energy import curvature as curvature
     from phasekit.labelled.energy import energy as energy
     from phasekit.labelled.energy import gradient as gradient
@@ -72,6 +76,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.labelled.quasi_static import quasi_static as quasi_static
+    from phasekit.labelled.run_up import run_up as run_up
+    from phasekit.labelled.section import poincare_section as poincare_section
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
@@ -122,6 +128,7 @@ _MODULES = {
     "phasekit.systems.harmonic": ("Harmonic",),
     "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
+    "phasekit.labelled.driven": ("attractors", "basins", "lyapunov", "stroboscopic"),
     "phasekit.labelled.energy": (
         "curvature",
         "energy",
@@ -149,6 +156,8 @@ _MODULES = {
     "phasekit.systems.problem": ("Problem",),
     "phasekit.table.quantities": ("quantities",),
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
+    "phasekit.labelled.run_up": ("run_up",),
+    "phasekit.labelled.section": ("poincare_section",),
     "phasekit.maps.whole": ("open_map",),
     "phasekit.maps.sweep": ("sweep",),
     "phasekit.systems.system": ("Coefficients", "Reduced"),

@@ -1,5 +1,6 @@
 """The command line: what it writes, what it prints, and how it refuses."""
 
+import re
 import subprocess
 import sys
 
@@ -477,3 +478,31 @@ def test_help_tells_the_units(capsys):
     words = " ".join(capsys.readouterr().out.split())
     assert "a number with a unit, such as 40deg, 5mm or 300rpm" in words
     assert "radius of the disk, m or cm or mm or um" in words
+
+
+def test_basins(tmp_path, capsys):
+    argv = ["basins", "--model", "Coefficients", "--A", "1", "--B", "0.35", "--C", "0.12",
+            "--damping", "0.2", "--phi", "-180:180deg:41", "--dphi", "-1:1:21"]  # fmt: skip
+    assert main([*argv, "--out", str(tmp_path / "x.png")]) == 0
+    out = capsys.readouterr().out
+    shares = [float(x) for x in re.findall(r"rad: (\S+) \+- ", out)]
+    assert len(shares) == 2
+    assert sum(shares) == pytest.approx(1.0, abs=2e-4)
+    assert (tmp_path / "x.png").exists()
+    assert main([*argv, "--forcing", "0.2", "--out", str(tmp_path / "y.png")]) == 2
+    assert "--forcing: got '0.2', wants AMPLITUDE,FREQUENCY" in capsys.readouterr().err
+    assert main([*argv, "--damping", "0", "--out", str(tmp_path / "y.png")]) == 2
+    assert "without damping there are no attractors" in capsys.readouterr().err
+
+
+def test_run_up(tmp_path, capsys):
+    argv = ["run-up", "--beta", "1", "--e", "10mm", "--a", "0.1", "--r", "0.1", "--m", "2",
+            "--omega1", "0", "--duration", "2"]  # fmt: skip
+    done = [*argv, "--half_span", "0.1", "--to", "10", "--out", str(tmp_path / "x.png")]
+    assert main(done) == 0
+    out = capsys.readouterr().out
+    assert len(re.findall(r"bearing [AB]2: at most \d", out)) == 2
+    assert main([*argv, "--to", "10", "--out", str(tmp_path / "y.png")]) == 2
+    assert "--half_span: got nothing" in capsys.readouterr().err
+    assert main([*argv, "--half_span", "0.1", "--out", str(tmp_path / "y.png")]) == 2
+    assert "--to: got nothing" in capsys.readouterr().err

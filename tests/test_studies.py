@@ -110,3 +110,19 @@ def test_every_study_begins_with_its_title_and_says_how_it_runs():
         assert set(line) == {"="}
         assert len(line) == len(title)
         assert f"python studies/{script.parent.name}/{script.name}" in script.read_text()
+
+
+def test_a_rotor_leaves_a_fold_late(run):
+    """The lag's power lies between those of strong damping and of none."""
+    _, text = run("run_down_through_the_fold")
+    assert 2 / 3 < float(re.search(r"to the power (\S+)", text)[1]) < 4 / 5
+    assert len(re.findall(r"leaves 0\.\d+ 1/s late", text)) == 5
+
+
+def test_the_share_of_captured_motions_is_that_in_closed_form(run):
+    """Within three standard errors at small damping."""
+    _, text = run("capture_against_simulation")
+    assert "0.719450" in text
+    off = [float(x) for x in re.findall(r"(\S+) standard errors off", text)]
+    assert len(off) == 4
+    assert max(map(abs, off[1:])) < 3.0

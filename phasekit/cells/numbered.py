@@ -68,7 +68,7 @@ def fitted(
 
 def worded(system: Model, rows: Sequence[Quantity]) -> Sequence[Quantity]:
     """Return rows without label dims with the words that the system's results have."""
-    return [_worded(row, system, dict(LABELS)) for row in rows]
+    return [_worded(row, system, dict(row.labels or LABELS)) for row in rows]
 
 
 def _most(system: Model, count: Pass) -> tuple[int, int]:

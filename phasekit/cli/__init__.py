@@ -1,4 +1,4 @@
-"""The command line: ``phasekit demo | portrait | diagram | explore | sweep | info``.
+"""The command line: ``phasekit demo | portrait | basins | run-up | diagram | explore | sweep | info``.
 
 What a command needs is imported when it runs, so that ``phasekit --version`` and ``--help`` answer
 at once. Whatever a user can get wrong ends in one line that says what to do, and exit code 2.
@@ -21,6 +21,8 @@ from phasekit.version import __version__
 COMMANDS = {
     "demo": "map a real rotor, draw it, store it",
     "portrait": "draw the phase portrait of one system",
+    "basins": "draw where the motions of a damped system end",
+    "run-up": "run a disk up, and draw the forces of its bearings",
     "diagram": "draw the equilibria against one parameter",
     "explore": "write a page with which a system is looked at by hand, and open it",
     "sweep": "make a map from a TOML file, or go on with it",
@@ -80,7 +82,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if options.command not in COMMANDS:
         parser.error(f"unknown command {options.command!r}; wants one of {', '.join(COMMANDS)}")
     try:
-        command = importlib.import_module(f"phasekit.cli.{options.command}")
+        command = importlib.import_module(f"phasekit.cli.{options.command.replace('-', '_')}")
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", InvalidCellsWarning)  # commands say it in their words
             command.run(options.rest)

@@ -31,6 +31,7 @@ def flow(
     *,
     rtol: float | None = None,
     atol: float | None = None,
+    events: Any = None,
 ) -> xr.Dataset:
     """States after times, exact for any time; with damping and drive integrated.
 
@@ -47,13 +48,19 @@ def flow(
         Of a `Perturbed` system: the error of a step that is allowed, relative (default 1e-10) and
         absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is relative to
         one radian.
+    events : callable or mapping of str to callable, optional
+        Of one motion of a `Perturbed` system: functions of (t, phi, dphi) whose zeros are looked
+        for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True
+        or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. Two zeros within
+        one step are not seen.
 
     Returns
     -------
     xarray.Dataset
         ``motion_phi`` in rad, continuous in time (a rotation runs past pi), and ``motion_dphi``
         in s^-1. NaN where a motion with damping and drive could not be followed to a time, which
-        a RuntimeWarning says.
+        a RuntimeWarning says. With events also ``event_name``, ``event_time``, ``event_phi`` and
+        ``event_dphi`` on the dim ``event``; after one that ends the motion it is NaN.
 
     Raises
     ------
@@ -80,19 +87,33 @@ def flow(
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
     system = as_system(system)
     if not isinstance(system, Perturbed):
-        for name, value in (("rtol", rtol), ("atol", atol)):
+        for name, value in (("rtol", rtol), ("atol", atol), ("events", events)):
             if value is not None:
                 raise bad(name, value, "nothing, because this system's motion is exact")
     else:
-        if np.any(np.asarray(system.kT) > 0.0):
-            raise bad(
-                "kT", system.kT, "0 for a motion: noise is not integrated", "use .replace(kT=0)"
-            )
+        refuse_noise(system)
         tolerances = checked_tolerances(rtol, atol)
         (one,) = passes_of(system, select("motion"))
         one = replace(one, function=functools.partial(one.resolved, **tolerances))
-        return at_states(system, select("motion"), states, (one,))
+        ds = at_states(system, select("motion"), states, (one,))
+        if events is None:
+            return ds
+        from phasekit.labelled.events import with_events
+
+        return with_events(ds, system, events, tolerances)
     return at_states(system, select("motion"), states)
+
+
+def refuse_noise(system: Perturbed) -> None:
+    """Refuse a system with noise, which is not integrated.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if np.any(np.asarray(system.kT) > 0.0):
+        hint = "use .replace(kT=0)"
+        raise bad("kT", system.kT, "0 for a motion: noise is not integrated", hint)
 
 
 def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:

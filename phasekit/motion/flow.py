@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,7 +100,7 @@ def flow(
 
 def _motions(
     law: PerturbedConservative,
-    values: dict[str, Array],
+    values: Mapping[str, Array],
     states: Array,
     times: Array,
     *how: Any,
@@ -129,7 +130,7 @@ def _motions(
     return result
 
 
-def _is_still(law: PerturbedConservative, values: dict[str, Array], count: int) -> Any:
+def _is_still(law: PerturbedConservative, values: Mapping[str, Array], count: int) -> Any:
     """In which cells there is neither damping nor torque nor anything that varies."""
     if not isinstance(law.base, Trigonometric) or law.prescribed is not None:
         return np.zeros(count, bool)
@@ -154,13 +155,14 @@ def _time_axes(arrays: tuple[Array, ...], t: Array, n: int) -> tuple[int, ...]:
 
 def motions(
     law: PerturbedConservative,
-    values: dict[str, Array],
+    values: Mapping[str, Array],
     states: Array,
     times: Array,
     rtol: float = RTOL,
     atol: float = ATOL,
     threads: int | None = None,
     most: int = MOST,
+    tangents: int = 0,
 ) -> Cells:
     """Integrate from t = 0 to times of either sign, in any order.
 
@@ -168,8 +170,8 @@ def motions(
     ----------
     law, values, rtol, atol, threads
         As in `flow`; values of parameters in the cells, by name.
-    states : array, shape (cells, 2)
-        States at t = 0.
+    states : array, shape (cells, 2 + 2 tangents)
+        States at t = 0, with tangent vectors.
     times : array, shape (cells, times) or (1, times)
         Times of each cell, or of all.
     most : int
@@ -178,13 +180,12 @@ def motions(
     from phasekit.motion.kernels.motions import motions as kernel
     from phasekit.numerics.launch import launch
 
-    code, parameters = rates_of(law, values)
+    code, parameters = rates_of(law, values, tangents)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     finite = np.where(np.isfinite(times), times, 0.0)
     table = table_of(law.prescribed, float(finite.min(initial=0)), float(finite.max(initial=0)))
-    unit = 1.0 if law.base.period is None else law.base.period / (2.0 * np.pi)
-    result = np.full((count, times.shape[1], 2), np.nan)
+    result = np.full((count, times.shape[1], states.shape[1]), np.nan)
     status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
     for sense in (1.0, -1.0):
         ahead = sense * times > 0.0
@@ -193,10 +194,21 @@ def motions(
         own = np.where(ahead, times, 0.0)
         order = np.argsort(sense * own, axis=1)
         rising = np.array(np.take_along_axis(own, order, axis=1))
-        out = np.empty((count, times.shape[1], 2))
+        out = np.empty(result.shape)
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
-            arrays = (code.address, table, 0.0, rising, unit, rtol, atol, most, code.kink, states)
+            arrays = (
+                code.address,
+                table,
+                0.0,
+                rising,
+                unit_of(law),
+                rtol,
+                atol,
+                most,
+                code.kink,
+                np.array(states),
+            )
             groups: Any = (out, reached, taken)
             launch(kernel, (*arrays, parameters), count, groups, threads, WEIGHT)
         back = np.argsort(order, axis=1)[..., None]
@@ -205,6 +217,16 @@ def motions(
         result = np.where(wanted, out, result)
         status, steps = np.maximum(status, reached), steps + taken
     return Cells(result, status, steps)
+
+
+def circle(law: PerturbedConservative) -> float:
+    """Period of the coordinate; 0 on a line."""
+    return 0.0 if law.base.period is None else float(law.base.period)
+
+
+def unit_of(law: PerturbedConservative) -> float:
+    """Value from which on a coordinate is held as closely as there: a radian; none on a line."""
+    return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf
 
 
 def _tell(found: Cells) -> None:
@@ -223,3 +245,45 @@ def _tell(found: Cells) -> None:
                 RuntimeWarning,
                 stacklevel=3,
             )
+
+
+def accelerations(
+    law: PerturbedConservative,
+    values: Mapping[str, Array],
+    times: npt.ArrayLike,
+    phi: npt.ArrayLike,
+    dphi: npt.ArrayLike,
+) -> Array:
+    """Phi'' at states and times, that broadcast with the values of the parameters."""
+    from phasekit.motion.kernels.motions import rates_at
+
+    arrays = [np.asarray(array, dtype=float) for array in (times, phi, dphi)]
+    code, parameters = rates_of(law, values)
+    t, x, v = (np.array(array).reshape(-1) for array in np.broadcast_arrays(*arrays))
+    table = table_of(law.prescribed, float(np.min(t, initial=0.0)), float(np.max(t, initial=0.0)))
+    parameters = np.array(np.broadcast_to(parameters, (len(parameters), t.size)))
+    out = np.empty((t.size, 2))
+    states = np.stack([x, v], axis=-1)
+    rates_at(code.address, table, t, states, parameters, np.sign(v), code.kink, 0, t.size, out)
+    shape = np.broadcast_shapes(*(array.shape for array in arrays))
+    return np.asarray(out[:, 1].reshape(shape))
+
+
+def pointwise(
+    law: PerturbedConservative, values: Mapping[str, Array], start: float, stop: float
+) -> Callable[[float, Any], Array]:
+    """The law of one system as a function of time and state, between two times."""
+    from phasekit.motion.kernels.motions import rates_at
+
+    code, parameters = rates_of(law, values)
+    parameters = np.array(parameters[:, :1])
+    table = table_of(law.prescribed, start, stop)
+
+    def rates(t: float, x: Any) -> Array:
+        state = np.array([[x[0], x[1]]])
+        out = np.empty((1, 2))
+        arrays = (np.array([float(t)]), state, parameters, np.sign(state[:, 1]))
+        rates_at(code.address, table, *arrays, code.kink, 0, 1, out)
+        return np.asarray(out[0])
+
+    return rates

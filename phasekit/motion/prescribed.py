@@ -37,7 +37,8 @@ def table_of(prescribed: Any, start: float, stop: float) -> Array:
     if prescribed is None:
         return np.zeros((0, 3))
     if not callable(prescribed):
-        return _of_table(*prescribed, start, stop)
+        times, values = prescribed
+        return _of_table(times, values, start, stop)
     return _of_function(prescribed, start, stop if stop > start else start + 1.0)
 
 
@@ -100,3 +101,25 @@ def _value(function: Callable[[float], float], t: float) -> float:
             "number in s^-1"
         )
     return number
+
+
+def prescribed_at(table: Array, t: npt.ArrayLike) -> tuple[Array, Array]:
+    """Values and slopes at times of what `table_of` made.
+
+    Examples
+    --------
+    >>> table = table_of(lambda t: 3.0 * t * t, 0.0, 2.0)
+    >>> [array.round(9).tolist() for array in prescribed_at(table, [0.5, 1.0, 2.0])]
+    [[0.75, 3.0, 12.0], [3.0, 6.0, 12.0]]
+    """
+    t = np.asarray(t, dtype=float)
+    row = np.clip(np.searchsorted(table[:, 0], t, side="right") - 1, 0, len(table) - 1)
+    start, half = table[row, 0], table[row, 1]
+    s = (t - start) / half - 1.0
+    values, slopes = np.empty(t.shape), np.empty(t.shape)
+    for number in np.unique(row):
+        here = row == number
+        series = table[number, 3:]
+        values[here] = chebyshev.chebval(s[here], series)
+        slopes[here] = chebyshev.chebval(s[here], chebyshev.chebder(series)) / half[here]
+    return values, slopes

@@ -268,6 +268,15 @@ def levels_of(land: LevelCurves, energies: ArrayLike | None, density: float = 1.
 
 def starts_of(land: LevelCurves, orbits: ArrayLike | None) -> list[strokes.State]:
     """Return initial conditions as pairs of floats."""
+    starts = starts_of_pairs(orbits)
+    for start in starts:
+        if not _has_speed(land, land.energy(*start)):
+            raise bad("orbits", start, "pairs (phi0, dphi0) whose energies are finite")
+    return starts
+
+
+def starts_of_pairs(orbits: ArrayLike | None) -> list[strokes.State]:
+    """Return pairs of numbers as pairs of floats."""
     if orbits is None:
         return []
     pairs = _finite(orbits, "orbits", "rad and rad/s")
@@ -277,11 +286,7 @@ def starts_of(land: LevelCurves, orbits: ArrayLike | None) -> list[strokes.State
         pairs = pairs[np.newaxis]
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise bad("orbits", orbits, "pairs (phi0, dphi0), of shape (2,) or (n, 2)")
-    starts = [(float(phi), float(speed)) for phi, speed in pairs]
-    for start in starts:
-        if not _has_speed(land, land.energy(*start)):
-            raise bad("orbits", start, "pairs (phi0, dphi0) whose energies are finite")
-    return starts
+    return [(float(phi), float(speed)) for phi, speed in pairs]
 
 
 def _has_speed(land: LevelCurves, energy: float) -> bool:

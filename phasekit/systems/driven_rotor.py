@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -44,6 +44,9 @@ DERIVED = {
     ),
 }
 
+
+#: What functions of time and state take.
+ARGUMENTS = ("t", "phi1", "phi", "omega1", "dphi")
 
 #: What messages suppose where the integrator cannot go on.
 CAUSES = (
@@ -117,17 +120,17 @@ def checked_torque(
     return function
 
 
-def event_of(name: Any, event: Any) -> Event:
-    """Return an event of a function of (t, phi1, phi, omega1, dphi), which may bear attributes.
+def event_of(name: Any, event: Any, arguments: Sequence[str] = ARGUMENTS) -> Event:
+    """Return an event of a function of time and state, which may bear attributes.
 
     These are SciPy's: `terminal`, and `direction`.
     """
     if not isinstance(name, str):
         raise bad("events", name, "names that are strings")
-    wants = "a function of (t, phi1, phi, omega1, dphi), or a mapping of names to such"
+    wants = f"a function of ({', '.join(arguments)}), or a mapping of names to such"
     if not callable(event):
         raise bad("events", event, wants)
-    check_call("events", event, wants)
+    check_call("events", event, wants, len(arguments))
     terminal, direction = getattr(event, "terminal", None), getattr(event, "direction", 0)
     try:
         count = 0 if terminal is None else int(terminal)
@@ -148,10 +151,12 @@ def checked_number(argument: str, value: Any, wants: str, *, low: float = -np.in
     return kept
 
 
-def check_call(argument: str, function: Callable[..., Any], wants: str) -> None:
-    """Raise a `ParameterError` unless a function takes (t, phi1, phi, omega1, dphi)."""
+def check_call(
+    argument: str, function: Callable[..., Any], wants: str, count: int = len(ARGUMENTS)
+) -> None:
+    """Raise a `ParameterError` unless a function takes so many arguments."""
     try:
-        inspect.signature(function).bind(*range(5))
+        inspect.signature(function).bind(*range(count))
     except TypeError:
         raise bad(argument, function, wants, "its arguments do not fit") from None
     except ValueError:  # a builtin without signature

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, NoReturn, Self
 import numpy as np
 import xarray as xr
 
+from phasekit.errors import ParameterError
 from phasekit.labels.arguments import (
     NumberLike,
     Value,
-    bad,
     brief,
     describe,
     named_arguments,
@@ -245,9 +245,9 @@ class Perturbed(Model):
     @property
     def definition(self) -> dict[str, str]:
         """What maps store beside the parameters' values."""
-        if self.omega1 is not None:
-            raise bad("omega1", self.omega1, "None: a function or table of time is not stored")
+        prescribed = {} if self.omega1 is None else {"phasekit_prescribed": "omega1"}
         return {
+            **prescribed,
             **self.system.definition,
             "phasekit_perturbed": type(self.system).__name__,
             "phasekit_forcing": str(len(self.forcing)),
@@ -266,6 +266,11 @@ class Perturbed(Model):
             attributes that hold what is perturbed are damaged.
         """
         refuse_another(ds, cls.__name__)
+        if "phasekit_prescribed" in ds.attrs:
+            raise ParameterError(
+                "ds: got results of a system whose omega1 is a function or table of time, which "
+                "is not stored with them; make the system again: pk.Perturbed(disk, omega1=...)"
+            )
         name, number, modulated, drifting = (
             parts.attribute(ds, key) for key in ("perturbed", "forcing", "modulation", "drift")
         )

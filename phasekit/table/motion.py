@@ -1,17 +1,69 @@
-"""Damped and driven motions: passes of any perturbed law, and rows of what they are drawn into."""
+"""Damped and driven motions: once a period, exponents, attractors and their basins."""
 
 from __future__ import annotations
 
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.table.row import LAW, STATE, Pass, Quantity
 
-QUANTITIES: tuple[Quantity, ...] = ()
+RUNGE_KUTTA = "[HairerNorsettWanner1993] II.5"
+EXPONENTS = "[BenettinGalganiGiorgilliStrelcyn1980]"
+RECURRENCE = "[DatserisWagemakers2022]"
+
+_OF = PerturbedConservative
+_ATTRACTOR = ("attractor",)
+
+# fmt: off
+QUANTITIES: tuple[Quantity, ...] = (
+    Quantity("lyapunov_exponent", "lyapunov", ("exponent",), "float64", "s-1",
+             "Lyapunov exponent of the motion, the largest first",
+             "mean growth of log|u|, u'' = -V''(phi) u - d u' - 2 q |phi'| u'", EXPONENTS, of=_OF),
+    Quantity("lyapunov_error", "lyapunov", ("exponent",), "float64", "s-1",
+             "estimated error of the Lyapunov exponent",
+             "of the mean over 18 parts of the time, or their trend", EXPONENTS, of=_OF),
+    Quantity("lyapunov_sum", "lyapunov", (), "float64", "s-1",
+             "sum of the Lyapunov exponents: -damping, without quadratic damping",
+             "mean of -d - 2 q |phi'|", EXPONENTS, of=_OF),
+    Quantity("section_time", "stroboscopic", ("crossing",), "float64", "s",
+             "time of the crossing", "n T", RUNGE_KUTTA, of=_OF),
+    Quantity("section_phi", "stroboscopic", ("crossing",), "float64", "rad",
+             "angle in the section", "phi(n T), wrapped", RUNGE_KUTTA, of=_OF),
+    Quantity("section_dphi", "stroboscopic", ("crossing",), "float64", "s-1",
+             "angular velocity in the section", "phi'(n T)", RUNGE_KUTTA, of=_OF),
+    Quantity("rotation_number", "stroboscopic", (), "float64", "1",
+             "turns in a period, the mean over the section", "(phi(n T) - phi(0))/(2 pi n)",
+             RUNGE_KUTTA, of=_OF),
+    Quantity("attractor_phi", "attractors", (*_ATTRACTOR, "crossing"), "float64", "rad",
+             "angle on the attractor, once a period", "phi(n T), wrapped", RECURRENCE, of=_OF),
+    Quantity("attractor_dphi", "attractors", (*_ATTRACTOR, "crossing"), "float64", "s-1",
+             "angular velocity on the attractor, once a period", "phi'(n T)", RECURRENCE, of=_OF),
+    Quantity("attractor_period", "attractors", _ATTRACTOR, "int64", "1",
+             "periods after which the attractor repeats itself, 0: it does not",
+             "least q with phi(n + q) = phi(n)", RECURRENCE, of=_OF),
+    Quantity("attractor_multiplier", "attractors", _ATTRACTOR, "float64", "1",
+             "greatest modulus of the attractor's multipliers, NaN where it is not periodic",
+             "max |eigenvalue of the map's derivative|", RECURRENCE, of=_OF),
+    Quantity("attractor_rotation", "attractors", _ATTRACTOR, "float64", "1",
+             "turns in a period on the attractor", "(phi(n T) - phi(0))/(2 pi n)", RECURRENCE,
+             of=_OF),
+    Quantity("basin", "basins", (), "int16", "1",
+             "attractor to which the motion comes; -1: undecided, -2: away to infinity",
+             "first state near the attractor", RECURRENCE, of=_OF),
+    Quantity("basin_time", "basins", (), "float64", "s",
+             "time until the motion is near its attractor", "first state near the attractor",
+             RECURRENCE, of=_OF),
+    Quantity("basin_fraction", "basins", _ATTRACTOR, "float64", "1",
+             "share of the states in the attractor's basin", "number of states over all",
+             RECURRENCE, of=_OF),
+    Quantity("basin_fraction_error", "basins", _ATTRACTOR, "float64", "1",
+             "error of the share: that of a sample of as many states, and the undecided",
+             "sqrt(f (1 - f)/N) + undecided", RECURRENCE, of=_OF),
+    Quantity("boundary_fraction", "basins", (), "float64", "1",
+             "share of the states beside another basin", "number of cells over all",
+             RECURRENCE, of=_OF),
+)
+# fmt: on
 
 PASSES: tuple[Pass, ...] = (
-    Pass(
-        "phasekit.motion.flow:flow",
-        (LAW, *STATE, "time"),
-        ("motion",),
-        PerturbedConservative,
-    ),
+    Pass("phasekit.motion.flow:flow", (LAW, *STATE, "time"), ("motion",), _OF),
+    Pass("phasekit.motion.strobe:lyapunov", (LAW, *STATE, "time"), ("lyapunov",), _OF),
 )

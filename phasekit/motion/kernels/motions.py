@@ -4,44 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from phasekit.motion.kernels.dop853 import ROWS, densify, within
+from phasekit.motion.kernels.dop853 import ROWS, densify, rates, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
-    AIMS,
     ARRIVED,
     CELL,
     END,
     IDLE,
     REALS,
-    REJECTED,
     RUNNING,
     STATE,
     STEPS,
     TRY,
     WHOLES,
     T,
-    Whole,
     advance,
-    begin,
     commit,
+    load,
     renew,
 )
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.lanes import LANES
-
-
-@routine
-def load(
-    lane: int, cell: int, states: Array, parameters: Array, x: Array, p: Array, whole: Whole
-) -> None:
-    """Put a cell into a lane."""
-    whole[CELL, lane] = cell
-    whole[STATE, lane] = RUNNING
-    whole[STEPS, lane] = whole[REJECTED, lane] = whole[AIMS, lane] = 0
-    for c in range(states.shape[1]):
-        x[c * LANES + lane] = states[cell, c]
-    for c in range(parameters.shape[0]):
-        p[c * LANES + lane] = parameters[c, cell]
 
 
 @routine
@@ -83,7 +66,7 @@ def motions(
     """Integrate the motions of cells; times are all after the start or all before it, in order.
 
     `times` is of shape (cells, times), or (1, times) where they are the same; `states` of shape
-    (cells, n), `parameters` of shape (parameters, cells), `out` of shape (cells, times, 2): NaN
+    (cells, n), `parameters` of shape (parameters, cells), `out` of shape (cells, times, n): NaN
     where a motion did not come to a time.
     """
     size = states.shape[1] * LANES
@@ -106,25 +89,20 @@ def motions(
                 out[old, written[lane] :] = np.nan
                 whole[STATE, lane] = IDLE
             if cell < stop:
-                load(lane, cell, states, parameters, x, p, whole)
+                load(lane, cell, states, parameters, x, p, kink, real, whole)
                 real[T, lane] = start
                 own_times = times[cell if times.shape[0] > 1 else 0]
                 real[END, lane] = own_times[-1]
                 written[lane] = 0
                 while written[lane] < own_times.size and own_times[written[lane]] == start:
-                    out[cell, written[lane]] = states[cell, :2]
+                    out[cell, written[lane]] = states[cell]
                     written[lane] += 1
                 if written[lane] == own_times.size:
                     whole[STATE, lane] = ARRIVED
-                whole[ACCEPTED, lane] = 2
                 fresh += 1
                 cell += 1
         if fresh > 0:
-            renew(address, table, x, k, p, z, h, real)
-            for lane in range(LANES):
-                if whole[ACCEPTED, lane] == 2:
-                    begin(lane, x, k, p, kink, real, rtol, atol)
-                    whole[ACCEPTED, lane] = 0
+            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
         running = False
         for lane in range(LANES):
             running = running or whole[STATE, lane] == RUNNING
@@ -147,3 +125,37 @@ def motions(
                 row = whole[CELL, lane] if times.shape[0] > 1 else 0
                 written[lane] = write(lane, times[row], written[lane], x, k, y, real, own)
         commit(x, k, y, real, whole)
+
+
+@kernel
+def rates_at(
+    address: int,
+    table: Array,
+    times: Array,
+    states: Array,
+    parameters: Array,
+    signs: Array,
+    kink: int,
+    first: int,
+    stop: int,
+    out: Array,
+) -> None:
+    """Rates at states of shape (cells, n), with the signs of quadratic damping."""
+    n = states.shape[1]
+    x, k, h = np.zeros(n * LANES), np.zeros(n * LANES), np.zeros(LANES)
+    t, z = np.zeros(LANES), np.zeros(3 * LANES)
+    p = np.zeros(max(parameters.shape[0], 1) * LANES)
+    for begun in range(first, stop, LANES):
+        for lane in range(LANES):
+            cell = min(begun + lane, stop - 1)
+            t[lane] = times[cell]
+            for c in range(n):
+                x[c * LANES + lane] = states[cell, c]
+            for c in range(parameters.shape[0]):
+                p[c * LANES + lane] = parameters[c, cell]
+            if kink >= 0:
+                p[kink * LANES + lane] = signs[cell]
+        rates(address, table, t, h, 0.0, x, p, z, k)
+        for lane in range(min(LANES, stop - begun)):
+            for c in range(n):
+                out[begun + lane, c] = k[c * LANES + lane]

@@ -32,11 +32,40 @@ REALS = 6
 CELL, STATE, ACCEPTED, STEPS, REJECTED, AIMS = range(6)
 WHOLES = 6
 
+#: In place of `ACCEPTED`: its state was changed between steps.
+CHANGED = 2
+
 #: States: nothing to do, under way, at its end, too many steps, steps too short.
 IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED = range(5)
 
 _EPS = float(np.finfo(float).eps)
 _MOST_AIMS = 12
+
+
+@routine
+def load(
+    lane: int,
+    cell: int,
+    states: Array,
+    parameters: Array,
+    x: Array,
+    p: Array,
+    kink: int,
+    real: Array,
+    whole: Whole,
+) -> None:
+    """Put a cell into a lane."""
+    whole[CELL, lane] = cell
+    whole[STATE, lane] = RUNNING
+    whole[STEPS, lane] = whole[REJECTED, lane] = whole[AIMS, lane] = 0
+    for c in range(states.shape[1]):
+        x[c * LANES + lane] = states[cell, c]
+    for c in range(parameters.shape[0]):
+        p[c * LANES + lane] = parameters[c, cell]
+    if kink >= 0:
+        p[kink * LANES + lane] = np.sign(states[cell, 1])
+    real[T, lane] = real[H, lane] = real[AIM, lane] = 0.0
+    whole[ACCEPTED, lane] = CHANGED
 
 
 @routine
@@ -53,10 +82,8 @@ def begin(
     size, speed = math.sqrt(size), math.sqrt(speed)
     h = 0.01 * size / speed if size > 1e-5 and speed > 1e-5 else 1e-6
     real[H, lane] = sense * min(h, abs(real[END, lane] - real[T, lane]))
-    real[AIM, lane] = 0.0
-    if kink >= 0:
-        rate, bend = x[LANES + lane], sense * k[0, LANES + lane]
-        p[kink * LANES + lane] = np.sign(rate) if rate != 0.0 else np.sign(bend)
+    if kink >= 0 and x[LANES + lane] == 0.0:
+        p[kink * LANES + lane] = np.sign(sense * k[0, LANES + lane])
 
 
 @inline
@@ -200,7 +227,25 @@ def commit(x: Array, k: Array, y: Array, real: Array, whole: Whole) -> None:
 
 @routine
 def renew(
-    address: int, table: Array, x: Array, k: Array, p: Array, z: Array, h: Array, real: Array
+    address: int,
+    table: Array,
+    rtol: float,
+    atol: float,
+    x: Array,
+    k: Array,
+    p: Array,
+    z: Array,
+    kink: int,
+    h: Array,
+    real: Array,
+    whole: Whole,
 ) -> None:
-    """Rates of all lanes where they are."""
-    rates(address, table, real[T], h, 0.0, x, p, z, k[0])
+    """Rates of the lanes that were changed, and first steps of those that have none."""
+    rates(address, table, real[T], h, 0.0, x, p, z, k[13])
+    for lane in range(LANES):
+        if whole[ACCEPTED, lane] != CHANGED:
+            continue
+        for m in range(lane, x.size, LANES):
+            k[0, m] = k[13, m]
+        if real[H, lane] == 0.0:
+            begin(lane, x, k, p, kink, real, rtol, atol)

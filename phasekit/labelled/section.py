@@ -1,0 +1,174 @@
+"""Poincare sections, labelled: the states in which a motion passes a value of its coordinate."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.labelled.motion import checked_tolerances, refuse_noise
+from phasekit.labels.arguments import FloatArray, bad, number, whole
+from phasekit.labels.coordinates import LABELS
+from phasekit.labels.grid import variable
+from phasekit.motion.flow import circle, pointwise
+from phasekit.motion.sections import Section, passages
+from phasekit.motion.steps import InitialValue
+from phasekit.systems.as_system import as_system, single
+from phasekit.systems.free_rotor import FreeGyroRotor
+from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.problem import Problem
+from phasekit.table.row import ROWS
+
+
+def poincare_section(
+    system: Any,
+    phi0: Any,
+    dphi0: float | None = None,
+    *,
+    duration: float,
+    section: Any,
+    direction: int = 1,
+    rtol: float | None = None,
+    atol: float | None = None,
+    **arguments: Any,
+) -> xr.Dataset:
+    """States in which one motion passes a value of its coordinate, from time 0 on.
+
+    Parameters
+    ----------
+    system : system, Perturbed, FreeGyroRotor or Problem
+        One system. `stroboscopic` gives the states once a period of a drive.
+    phi0, dphi0 : float
+        State at t = 0: angle in rad, angular velocity in s^-1; of a `Problem` ``phi0`` is the
+        sequence of its states, and ``dphi0`` None.
+    duration : float
+        Time to follow the motion, s.
+    section : float or (str, float)
+        The angle of the section in rad, full turns aside; of a `Problem` the name of a state with
+        its value.
+    direction : {1, -1, 0}
+        Passages in which the coordinate rises, falls, or both.
+    rtol, atol : float, optional
+        Error of a step that is allowed, relative and absolute; default 1e-10 and 1e-12.
+    **arguments
+        What `FreeGyroRotor.poincare` takes besides.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dim ``crossing``: ``section_time`` in s, ``section_phi`` in rad in (-pi, pi],
+        ``section_dphi`` in s^-1; of a `Problem` ``section_`` and the name of each state; of a
+        `FreeGyroRotor` what its `poincare` gives.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+    ConvergenceError
+        If the integrator cannot reach the end with the accuracy asked for.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pendulum = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=0.1)
+    >>> pk.poincare_section(pendulum, 0.0, 1.0, duration=20.0, section=0.0).section_dphi.round(3)
+    <xarray.DataArray 'section_dphi' (crossing: 3)> Size: 24B
+    array([0.724, 0.527, 0.384])...
+    """
+    wants = "a time in s, > 0"
+    duration = number("duration", duration, wants, "s")
+    if not duration > 0.0:
+        raise bad("duration", duration, wants)
+    senses = "1 (rising), -1 (falling) or 0 (both)"
+    direction = whole("direction", direction, senses, -1)
+    if direction > 1:
+        raise bad("direction", direction, senses)
+    tolerances = checked_tolerances(rtol, atol)
+    if isinstance(system, FreeGyroRotor):
+        arguments |= {"direction": direction, **tolerances}
+        return system.poincare(phi0, _needed(dphi0), duration, section=section, **arguments)
+    if arguments:
+        raise bad(*next(iter(arguments.items())), "nothing, except of a FreeGyroRotor")
+    if isinstance(system, Problem):
+        return _of_problem(system, phi0, duration, section, direction, tolerances)
+    return _of_system(as_system(system), phi0, dphi0, duration, section, direction, tolerances)
+
+
+def _needed(dphi0: float | None) -> float:
+    if dphi0 is None:
+        raise bad("dphi0", None, "the angular velocity at t = 0, in s^-1")
+    return dphi0
+
+
+def _of_system(
+    system: Any,
+    phi0: float,
+    dphi0: float | None,
+    duration: float,
+    section: float,
+    direction: int,
+    tolerances: dict[str, Any],
+) -> xr.Dataset:
+    perturbed = system if isinstance(system, Perturbed) else Perturbed(system)
+    refuse_noise(perturbed)
+    level = number("section", section, "a finite number", system.unit_of("state_phi"))
+    state = (
+        number("phi0", phi0, units=system.unit_of("state_phi")),
+        number("dphi0", _needed(dphi0), units=system.unit_of("state_dphi")),
+    )
+    _, parameters = single(system)
+    law = perturbed.law
+    rates = pointwise(law, law.values(*perturbed.parameters.values()), 0.0, duration)
+    turn = circle(law)
+    found = passages(
+        InitialValue(rates, state, **tolerances),
+        duration, 0, level, period=turn or None, direction=direction,
+    )  # fmt: skip
+    if turn:
+        found.state[0] = 0.5 * turn - np.mod(0.5 * turn - found.state[0], turn)
+    names = ("section_time", "section_phi", "section_dphi")
+    data = {}
+    for name, values in zip(names, (found.time, *found.state), strict=True):
+        row = ROWS[name]
+        attrs = {**row.attrs, **law.words(name, row.units, row.long_name)}
+        data[name] = variable(("crossing",), values, {**attrs, "equation": "phi = section"})
+    coords = {
+        name: variable((), value, input_attrs(system, name)) for name, value in parameters.items()
+    }
+    return xr.Dataset(data, {**coords, "crossing": _numbers(found)}, dataset_attrs(system))
+
+
+def _numbers(found: Section) -> xr.Variable:
+    return variable(("crossing",), np.arange(found.time.size), {"long_name": LABELS["crossing"][1]})
+
+
+def _of_problem(
+    problem: Problem,
+    x0: Any,
+    duration: float,
+    section: Any,
+    direction: int,
+    tolerances: dict[str, Any],
+) -> xr.Dataset:
+    wants = f"one of the states {', '.join(problem.state)} with a value: ('{problem.state[0]}', 0.)"
+    if not isinstance(section, tuple) or len(section) != 2 or section[0] not in problem.state:
+        raise bad("section", section, wants)
+    level = number("section", section[1], wants)
+    start: FloatArray = np.asarray(x0, dtype=float)
+    if start.shape != (len(problem.state),) or not np.isfinite(start).all():
+        raise bad("phi0", x0, f"a finite number for each of {', '.join(problem.state)}")
+    found = passages(
+        InitialValue(lambda t, x: problem(x), list(start), **tolerances),
+        duration, problem.state.index(section[0]), level,
+        period=problem.periods.get(section[0]), direction=direction,
+    )  # fmt: skip
+    equation = f"{section[0]} = {level!r}"
+    attrs = {"long_name": "time of the crossing", "units": "1", "equation": equation}
+    data = {"section_time": variable(("crossing",), found.time, attrs)}
+    for name, values in zip(problem.state, found.state, strict=True):
+        attrs = {"long_name": f"{name} in the section", "units": "1", "equation": equation}
+        data[f"section_{name}"] = variable(("crossing",), values, attrs)
+    coords = {name: variable((), value) for name, value in problem.parameters.items()}
+    return xr.Dataset(data, {**coords, "crossing": _numbers(found)})

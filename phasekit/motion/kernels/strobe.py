@@ -1,0 +1,160 @@
+"""States of motions after equal times, one after another: kept, or held against attractors."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.motion.kernels.dop853 import ROWS
+from phasekit.motion.kernels.stepping import (
+    ACCEPTED,
+    ARRIVED,
+    CELL,
+    CHANGED,
+    END,
+    IDLE,
+    REALS,
+    RUNNING,
+    STATE,
+    WHOLES,
+    T,
+    advance,
+    commit,
+    load,
+    renew,
+)
+from phasekit.numerics.compile import Array, inline, kernel
+from phasekit.numerics.lanes import LANES
+
+Codes = npt.NDArray[np.int16]
+Index = npt.NDArray[np.int64]
+
+
+@inline
+def nearest_of(phi: float, dphi: float, points: Array, period: float, scale: float) -> int:
+    """Number of the attractor's point near which a state lies; -1: of none.
+
+    Rows of the points: coordinate, rate, radius, attractor. Rates are measured by `scale`.
+    """
+    for row in range(points.shape[0]):
+        off = phi - points[row, 0]
+        if period > 0.0:
+            off -= period * np.rint(off / period)
+        speed = (dphi - points[row, 1]) / scale
+        if off * off + speed * speed <= points[row, 2] ** 2:
+            return int(points[row, 3])
+    return -1
+
+
+@inline
+def box_of(phi: float, dphi: float, period: float, box: Array, boxes: Codes) -> int:
+    """What is written in the box of a grid in which a state lies; -1 outside."""
+    if boxes.shape[0] == 0:
+        return -1
+    if period > 0.0:
+        phi -= period * math.floor((phi - box[0]) / period)
+    i = math.floor((phi - box[0]) / (box[1] - box[0]) * boxes.shape[0])
+    j = math.floor((dphi - box[2]) / (box[3] - box[2]) * boxes.shape[1])
+    if not (0 <= i < boxes.shape[0] and 0 <= j < boxes.shape[1]):
+        return -1
+    return int(boxes[int(i), int(j)])
+
+
+@kernel
+def strobe(
+    address: int,
+    table: Array,
+    legs: Array,
+    again: bool,
+    unit: float,
+    rtol: float,
+    atol: float,
+    most: int,
+    kink: int,
+    skip: int,
+    many: int,
+    period: float,
+    scale: float,
+    points: Array,
+    box: Array,
+    boxes: Codes,
+    visits: int,
+    states: Array,
+    parameters: Array,
+    first: int,
+    stop: int,
+    out: Array,
+    code: Index,
+    taken: Index,
+    status: Index,
+) -> None:
+    """States after a leg, two legs, ... of each cell: from the one after `skip` on in `out`.
+
+    `out` is of shape (cells, kept, 2); the state after no leg is not written.
+
+    Where the law repeats itself after each leg (`again`), time begins anew. A motion ends early
+    near a point of an attractor, in whose number `code` is then, or after so many visits in
+    succession to boxes of the same attractor. `taken` is the number of legs.
+    """
+    size = states.shape[1] * LANES
+    x, y, h = np.zeros(size), np.zeros(size), np.zeros(size)
+    k = np.zeros((ROWS, size))
+    p = np.zeros(max(parameters.shape[0], 1) * LANES)
+    z = np.zeros(3 * LANES)
+    real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
+    done, last, same = (
+        np.zeros(LANES, np.int64),
+        np.zeros(LANES, np.int64),
+        np.zeros(LANES, np.int64),
+    )
+    cell = first
+    left = stop - first
+    while left > 0:
+        fresh = False
+        for lane in range(LANES):
+            state = whole[STATE, lane]
+            if state == RUNNING:
+                continue
+            own = whole[CELL, lane]
+            leg = legs[own]
+            ended = state != IDLE and state != ARRIVED
+            if state == ARRIVED:
+                done[lane] += 1
+                phi, dphi = x[lane], x[LANES + lane]
+                if skip <= done[lane] < skip + out.shape[1]:
+                    out[own, done[lane] - skip, 0] = phi
+                    out[own, done[lane] - skip, 1] = dphi
+                near = nearest_of(phi, dphi, points, period, scale)
+                inside = box_of(phi, dphi, period, box, boxes)
+                same[lane] = same[lane] + 1 if inside >= 0 and inside == last[lane] else 1
+                last[lane] = inside
+                if near < 0 and inside >= 0 and same[lane] >= visits:
+                    near = inside
+                if near >= 0:
+                    code[own] = near
+                ended = near >= 0 or done[lane] >= many
+                if not ended:
+                    whole[STATE, lane] = RUNNING
+                    if again:
+                        fresh = True
+                        whole[ACCEPTED, lane] = CHANGED
+                    real[T, lane] = 0.0 if again else done[lane] * leg
+                    real[END, lane] = leg if again else (done[lane] + 1) * leg
+            if ended:
+                taken[own] = done[lane]
+                status[own] = state
+                whole[STATE, lane] = IDLE
+                left -= 1
+            if whole[STATE, lane] == IDLE and cell < stop:
+                load(lane, cell, states, parameters, x, p, kink, real, whole)
+                real[END, lane] = legs[cell]
+                done[lane] = last[lane] = same[lane] = 0
+                fresh = True
+                cell += 1
+        if fresh:
+            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
+        if left > 0:
+            advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
+            commit(x, k, y, real, whole)

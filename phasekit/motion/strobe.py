@@ -1,0 +1,288 @@
+"""States of damped and driven motions once a period, and the growth of what lies beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.inputs import bad
+from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
+from phasekit.motion.flow import ATOL, MOST, RTOL, WEIGHT, circle, unit_of
+from phasekit.motion.prescribed import table_of
+from phasekit.motion.rates import rates_of
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+#: Greatest denominator of a ratio of frequencies that counts as commensurate.
+DENOMINATOR = 64
+#: Parts of the time of an exponent, and those at first that are not counted.
+PARTS, SKIPPED = 20, 2
+
+
+def common_period(law: PerturbedConservative, values: Mapping[str, Array]) -> Array | None:
+    """Period of all that varies with time; None without such, NaN without a common one.
+
+    Frequencies whose ratio is a fraction of small numbers, to rounding, are commensurate.
+    """
+    if law.drifting or law.prescribed is not None:
+        return np.array(np.nan)
+    names = [forcing_names(i) for i in range(law.harmonics)]
+    names += [modulation_names(name) for name in law.modulated]
+    if not names:
+        return None
+    frequencies = np.broadcast_arrays(*(values[frequency] for _, frequency, _ in names))
+    flat = np.stack([x.reshape(-1) for x in frequencies], axis=-1)
+    return np.array([_period(row) for row in flat]).reshape(frequencies[0].shape)
+
+
+def _period(frequencies: Array) -> float:
+    if not (np.isfinite(frequencies).all() and (frequencies > 0.0).all()):
+        return float("nan")
+    base = float(frequencies[0])
+    turns = 1
+    for frequency in frequencies[1:]:
+        ratio = float(frequency) / base
+        near = Fraction(ratio).limit_denominator(DENOMINATOR)
+        if near == 0 or abs(ratio - near) > 1e-12 * ratio:
+            return float("nan")
+        turns = int(np.lcm(turns, near.denominator))
+    return 2.0 * np.pi * turns / base
+
+
+class Strobed(NamedTuple):
+    """States of motions after equal times."""
+
+    states: Array
+    """Of shape (cells, kept, 2)."""
+    code: Index
+    """Attractor at which a motion came; -1: at none."""
+    taken: Index
+    """Legs until then."""
+    status: Index
+
+
+class Targets(NamedTuple):
+    """Where motions end: near points, or in boxes of a grid."""
+
+    points: Array
+    """Rows: coordinate, rate, radius, attractor."""
+    scale: float
+    """By which rates are measured against coordinates."""
+    box: Array
+    """Ends of the grid: coordinate from, to, rate from, to."""
+    boxes: npt.NDArray[np.int16]
+    """Attractor of each box, -1 for none."""
+    visits: int
+    """Boxes of one attractor in succession after which a motion belongs to it."""
+
+
+NO_TARGETS = Targets(
+    np.zeros((0, 4)), 1.0, np.array([0.0, 1.0, 0.0, 1.0]), np.zeros((0, 0), np.int16), 1
+)
+
+
+def strobe(
+    law: PerturbedConservative,
+    values: Mapping[str, Array],
+    states: Array,
+    legs: npt.ArrayLike,
+    kept: int,
+    skip: int = 0,
+    *,
+    targets: Targets = NO_TARGETS,
+    most_legs: int | None = None,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    threads: int | None = None,
+) -> Strobed:
+    """States after skip, skip + 1, ... legs.
+
+    Parameters
+    ----------
+    law, values
+        The law, and values of its parameters in the cells.
+    states : array, shape (cells, 2)
+        States at t = 0.
+    legs : array_like, shape (cells,) or ()
+        Time of a leg. Where it is the period of the law, time begins anew after each.
+    kept, skip : int
+        States to keep, and legs before the first of them.
+    targets : Targets
+        Where motions end early.
+    most_legs : int, optional
+        Legs of a motion; default: as many as the states that are kept need.
+    """
+    from phasekit.motion.kernels.strobe import strobe as kernel
+    from phasekit.numerics.launch import launch
+
+    code, parameters = rates_of(law, values)
+    count = len(states)
+    parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
+    legs = np.array(np.broadcast_to(np.asarray(legs, float), (count,)))
+    many = max(skip + kept - 1, 0) if most_legs is None else most_legs
+    period = common_period(law, values)
+    again = period is None or bool(np.all(np.abs(legs - period) <= 1e-14 * legs))
+    end = float(np.max(legs, initial=0.0)) * many
+    table = table_of(law.prescribed, 0.0, end)
+    out = np.full((count, kept, 2), np.nan)
+    if skip == 0 and kept:
+        out[:, 0] = states
+    found = np.full(count, -1, np.int64)
+    taken, status = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    if count and many:
+        how = (unit_of(law), rtol, atol, MOST, code.kink, skip, many, circle(law))
+        arrays: Any = (code.address, table, legs, again, *how, targets.scale, targets.points)
+        arrays += (targets.box, targets.boxes, targets.visits, np.array(states), parameters)
+        groups: Any = (out, found, taken, status)
+        launch(kernel, arrays, count, groups, threads, WEIGHT)
+    return Strobed(out, found, taken, status)
+
+
+class Exponents(NamedTuple):
+    """The group "lyapunov"."""
+
+    lyapunov_exponent: Array
+    lyapunov_error: Array
+    lyapunov_sum: Array
+
+
+def lyapunov(
+    law: PerturbedConservative,
+    *arrays: npt.ArrayLike,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    threads: int | None = None,
+) -> Exponents:
+    """Lyapunov exponents of motions.
+
+    Parameters
+    ----------
+    law : PerturbedConservative
+        The law.
+    *arrays : array_like
+        Its parameters, angles and angular velocities at t = 0, and the times over which vectors
+        grow; they broadcast.
+    rtol, atol, threads
+        As in `phasekit.motion.flow.flow`.
+
+    Returns
+    -------
+    Exponents
+        With the two exponents on the last axis; NaN where a motion came to no end.
+
+    Notes
+    -----
+    Two tangent vectors move along by the variational equation, and are made orthonormal whenever
+    they are no longer nearly so. The first tenth of the time is not counted. The error is that of
+    the mean over the parts of the time, and the trend in them.
+    """
+    from phasekit.motion.kernels.tangents import growth
+    from phasekit.numerics.launch import launch
+
+    given = [np.asarray(array, dtype=float) for array in arrays]
+    shape = np.broadcast_shapes(*(array.shape for array in given))
+    *flat, phi, dphi, time = (
+        x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).reshape(-1) for x in given
+    )
+    values = law.values(*flat)
+    code, parameters = rates_of(law, values, 2)
+    count = int(np.prod(shape, dtype=int))
+    states = np.zeros((count, 6))
+    states[:, 0], states[:, 1], states[:, 2], states[:, 5] = phi, dphi, 1.0, 1.0
+    parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
+    valid = np.isfinite(time) & (time > 0.0)
+    legs = np.array(np.broadcast_to(np.where(valid, time, np.nan) / PARTS, (count,)))
+    table = table_of(law.prescribed, 0.0, float(np.max(np.where(valid, time, 0.0), initial=0.0)))
+    out, status = np.full((count, PARTS, 2), np.nan), np.zeros(count, np.int64)
+    if count:
+        how = (unit_of(law), rtol, atol, MOST, code.kink)
+        arguments: Any = (code.address, table, legs, *how, states, parameters)
+        groups: Any = (out, status)
+        launch(growth, arguments, count, groups, threads, WEIGHT)
+    means = np.diff(out[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
+    exponents = means.mean(axis=1)
+    number = PARTS - SKIPPED
+    spread = means.std(axis=1, ddof=1) / np.sqrt(number)
+    trend = np.abs(means[:, number // 2 :].mean(axis=1) - exponents)
+    found = np.sort(exponents, axis=-1)[:, ::-1]
+    error = np.maximum(spread, trend)
+    total = exponents.sum(axis=-1)
+    return Exponents(
+        found.reshape(*shape, 2), error.reshape(*shape, 2), np.asarray(total.reshape(shape))
+    )
+
+
+def check_period(name: str, period: Array | None) -> Array:
+    """Refuse where there is no period.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if period is None or not np.isfinite(period).all():
+        why = "nothing varies in time" if period is None else "what varies has no common period"
+        raise bad(name, None, "a time in s, > 0", f"{why}, so there is no period of its own")
+    return period
+
+
+class Sections(NamedTuple):
+    """The group "stroboscopic"."""
+
+    section_time: Array
+    section_phi: Array
+    section_dphi: Array
+    rotation_number: Array
+
+
+def sections(
+    law: PerturbedConservative,
+    *arrays: npt.ArrayLike,
+    n: int,
+    skip: int = 0,
+    period: float | None = None,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+) -> Sections:
+    """States once a period, with the crossings on the last axis.
+
+    Parameters
+    ----------
+    law : PerturbedConservative
+        The law.
+    *arrays : array_like
+        Its parameters, angles and angular velocities at t = 0; they broadcast.
+    n, skip : int
+        States to keep, and periods before the first of them.
+    period : float, optional
+        Time from state to state; default: the period of all that varies.
+    """
+    given = [np.asarray(array, dtype=float) for array in arrays]
+    shape = np.broadcast_shapes(*(array.shape for array in given))
+    *flat, phi, dphi = (
+        x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).reshape(-1) for x in given
+    )
+    values = law.values(*flat)
+    count = int(np.prod(shape, dtype=int))
+    legs = np.asarray(
+        check_period("period", common_period(law, values)) if period is None else period
+    )
+    states = np.stack([np.broadcast_to(x, (count,)) for x in (phi, dphi)], axis=-1)
+    found = strobe(law, values, states, legs, n, skip, rtol=rtol, atol=atol).states
+    times = np.broadcast_to(np.reshape(legs, (-1, 1)) * (skip + np.arange(n)), (count, n))
+    turn = circle(law)
+    angles = found[..., 0]
+    if turn:
+        turned = (angles[:, -1] - angles[:, 0]) / (turn * max(n - 1, 1))
+        angles = 0.5 * turn - np.mod(0.5 * turn - angles, turn)
+    else:
+        turned = np.full(count, np.nan)
+    time, angle, speed = (
+        np.asarray(x, float).reshape(*shape, n) for x in (times, angles, found[..., 1])
+    )
+    turns = turned.reshape(shape) if n > 1 else np.full(shape, np.nan)
+    return Sections(time, angle, speed, turns)

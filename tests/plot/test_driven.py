@@ -1,0 +1,72 @@
+"""Pictures of damped and driven motions: what they show is what was computed."""
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.plot.parts import style
+
+EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
+DAMPED = pk.Perturbed(EIGHT, damping=0.2)
+DISK = pk.GyroRotorDisk(beta=1.0, e=0.01, a=0.1, r=0.1, omega1=0.0, m=2.0, half_span=0.1)
+
+
+def test_manifolds_end_at_rest_and_begin_at_saddles(ax):
+    pk.plot.damped_portrait(DAMPED, ax=ax)
+    found = pk.equilibria(DAMPED).phi
+    rests = found.values[[0, 2]]
+    unstable = [line for line in ax.get_lines() if line.get_color() == style.VERMILLION
+                and line.get_linestyle() == "-"]  # fmt: skip
+    assert len(unstable) == 4
+    ends = []
+    for line in unstable:
+        x, v = line.get_data()
+        keep = np.isfinite(x)
+        assert abs(v[keep][-1]) < 1e-2
+        ends.append(np.abs(x[keep][-1] - rests + np.pi) % (2 * np.pi) - np.pi)
+    assert (np.abs(ends).min(axis=1) < 0.05).all()
+
+
+def test_a_motion_crosses_no_stable_manifold(ax):
+    pk.plot.damped_portrait(DAMPED, orbits=[[1.0, 0.5], [-1.5, 0.2]], angles="deg", ax=ax)
+    assert ax.get_xlabel() == "$\\varphi$ (°)"
+    with pytest.raises(pk.ParameterError, match="a system that does not vary with time"):
+        pk.plot.damped_portrait(pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.1, 1.0)))
+    with pytest.raises(pk.ParameterError, match="perturbed: got"):
+        pk.plot.damped_portrait(EIGHT)
+
+
+def test_basins_show_shares_and_odds(ax):
+    ds = pk.basins(DAMPED, phi=np.linspace(-3, 3, 31), dphi=np.linspace(-1.5, 1.5, 25))
+    pk.plot.basins(ds, capture=pk.capture(DAMPED), ax=ax)
+    shown = ax.collections[0].get_array().reshape(25, 31)
+    assert np.array_equal(shown, ds.basin.values.T)
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    for i, region in enumerate(("left", "right")):
+        odds = pk.capture(DAMPED).capture_probability.sel(region=region).item()
+        assert f"{ds.basin_fraction.values[i]:.3f}" in texts[i]
+        assert f"predicted odds {odds:.3f}" in texts[i]
+    with pytest.raises(pk.ParameterError, match="dataset"):
+        pk.plot.basins(ds.drop_vars("basin"))
+
+
+def test_a_section_shows_its_states(ax):
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.6, 1.0))
+    ds = pk.stroboscopic(system, [0.1, 0.4], 0.0, n=30, skip=5)
+    pk.plot.poincare_section(ds, angles="deg", ax=ax)
+    assert len(ax.get_lines()) == 2
+    x, v = ax.get_lines()[1].get_data()
+    assert np.allclose(x, np.degrees(ds.section_phi.values[1]))
+    assert np.allclose(v, np.degrees(ds.section_dphi.values[1]))
+
+
+def test_a_run_up_shows_forces_and_speed(ax):
+    ds = pk.run_up(DISK, omega1=lambda t: 5.0 * t, phi0=0.1, dphi0=0.0, t=np.linspace(0, 2, 41))
+    pk.plot.run_up(ds, ax=ax)
+    for line, bearing in zip(ax.get_lines(), ("A2", "B2"), strict=True):
+        assert np.array_equal(line.get_ydata(), ds.force_magnitude.sel(bearing=bearing))
+    speeds = [other for other in ax.figure.axes if other is not ax][0]
+    assert speeds.get_lines()[0].get_ydata()[-1] == pytest.approx(10.0)
+    many = pk.run_up(DISK, omega1=lambda t: t, phi0=[0.1, 0.2], dphi0=0.0, t=[0.0, 1.0])
+    with pytest.raises(pk.ParameterError, match="one motion over time"):
+        pk.plot.run_up(many)
