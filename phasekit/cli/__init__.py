@@ -1,4 +1,4 @@
-"""The command line: ``phasekit demo | portrait | basins | run-up | diagram | explore | sweep | info``.
+"""The command line: ``phasekit`` and its commands, one module each.
 
 What a command needs is imported when it runs, so that ``phasekit --version`` and ``--help`` answer
 at once. Whatever a user can get wrong ends in one line that says what to do, and exit code 2.

@@ -24,8 +24,8 @@ from phasekit.motion import basins as shares
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
-from phasekit.table.quantities import select
-from phasekit.table.row import ROWS, STATE, Pass, Quantity
+from phasekit.table.quantities import ROWS, select
+from phasekit.table.row import STATE, Pass, Quantity
 
 #: Start states of a search along each axis, where none are given.
 STARTS = 16

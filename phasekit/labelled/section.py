@@ -19,7 +19,7 @@ from phasekit.systems.as_system import as_system, single
 from phasekit.systems.free_rotor import FreeGyroRotor
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.problem import Problem
-from phasekit.table.row import ROWS
+from phasekit.table.quantities import ROWS
 
 
 def poincare_section(

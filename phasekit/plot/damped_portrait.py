@@ -16,6 +16,7 @@ from phasekit.labelled.motion import flow
 from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import strokes, style
+from phasekit.plot.parts.circle import Circle
 from phasekit.plot.phase_portrait import starts_of_pairs
 from phasekit.systems.as_system import single
 from phasekit.systems.perturbed import Perturbed
@@ -79,6 +80,7 @@ def damped_portrait(
     single(system)
     factor = style.angle_factor(angles)
     period = system.system.law.period  # type: ignore[attr-defined]
+    circle = Circle(-np.pi if period is None else -0.5 * period, period)
     points = _points(system)
     saddles = points[points[:, 1] == EquilibriumKind.SADDLE]
     if not len(saddles):
@@ -92,12 +94,12 @@ def damped_portrait(
                 x, v = _manifold(system, phi, exponent, stable=stable, side=side, period=period)
                 if not stable:  # backwards in time speeds grow without end
                     reach = max(reach, 1.6 * float(np.nanmax(np.abs(v))))
-                across, up = strokes.round_the_cylinder(x, v, period)
+                across, up = circle.unrolled(x, v)
                 axes.plot(across * factor, up * factor, **(STABLE if stable else UNSTABLE))
     for number, (phi, dphi) in enumerate(starts):
         motion = flow(system, phi, dphi, np.linspace(0.0, _duration(system, saddles), 4001))
         pair = motion.motion_phi.values, motion.motion_dphi.values
-        across, up = strokes.round_the_cylinder(*pair, period)
+        across, up = circle.unrolled(*pair)
         axes.plot(across * factor, up * factor, **strokes.orbit_look(number))
         reach = max(reach, 1.1 * abs(dphi))
     handles: list[Artist] = [
@@ -110,7 +112,7 @@ def damped_portrait(
             look["label"] = _name_of_centers(system)
         own = points[points[:, 1] == kind, 0]
         if own.size:
-            across = strokes.round_the_cylinder(own, np.zeros(own.size), period)[0]
+            across = circle.points(own, np.zeros(own.size))[0]
             handles += axes.plot(across * factor, np.zeros(across.size), zorder=4, **look)
     axes.set_ylim(-reach * factor, reach * factor)
     if period is not None and abs(period - 2.0 * np.pi) < 1e-12:
