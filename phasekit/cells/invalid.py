@@ -58,7 +58,8 @@ def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) 
         f"{parameter.name}: {np.count_nonzero(~inside)} of {inside.size} values are not legal, "
         f"such as {describe(example)}; wants {parameter.wants}"
     )
-    in_degrees = parameter.units == "rad" and parameter.valid(value * np.pi / 180.0).all()
+    with np.errstate(all="ignore"):
+        in_degrees = parameter.units == "rad" and parameter.valid(value * np.pi / 180.0).all()
     return f"{text}; if they are in degrees: {parameter.name} * pk.deg" if in_degrees else text
 
 

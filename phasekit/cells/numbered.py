@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import warnings
+from collections import namedtuple
 from collections.abc import Sequence
 from dataclasses import replace
 from math import prod
@@ -18,7 +19,7 @@ from phasekit.labels.grid import make_grid
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.system import Model
 from phasekit.table.numerical import NUMERICAL_ROWS
-from phasekit.table.quantities import variant
+from phasekit.table.quantities import ROWS, variant
 from phasekit.table.row import Pass, Quantity
 
 _POINTWISE = (
@@ -136,7 +137,12 @@ def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:
     """Call a pass and fill its label axes up to the lengths that the whole map has."""
     result = one.resolved(*arrays)
     filled = []
-    for group in result if len(one.groups) > 1 else (result,):
+    for title, group in zip(
+        one.groups, result if len(one.groups) > 1 else (result,), strict=True
+    ):
+        if not isinstance(group, tuple):  # the only row of its group
+            (name,) = (row.name for row in ROWS.values() if row.group == title)
+            group = namedtuple("Row", [name])(group)
         fields = {}
         for name, values in group._asdict().items():
             tail = shapes.get(name, ())
