@@ -48,7 +48,7 @@ class JosephsonJunction(Model):
     >>> import phasekit as pk
     >>> diode = pk.JosephsonJunction(plasma_frequency=1.0, second_harmonic=0.5, flux=-45 * pk.deg)
     >>> minus, plus = pk.critical_torque(diode).critical_torque.values
-    >>> round(float(abs(plus + minus) / (plus - minus)), 12)  # the most of two harmonics
+    >>> round(float(abs(plus + minus) / (plus - minus)), 12)  # no greater with two
     0.333333333333
     """
 

@@ -48,7 +48,10 @@ def _height(force, gradient, level, saddle, k, nu, t0, side, winds, *, unstable)
         state = [start + at.real + leaves * AWAY, moving.real + way * leaves * k * AWAY]
 
         def section(t, y):
-            return y[0] - middle if winds else y[1] * leaves * way
+            if winds:
+                return y[0] - middle
+            # Next to the saddle the drive alone may turn the motion for a while.
+            return y[1] * leaves * way if abs(y[0] - saddle) > 0.05 else 1.0
 
         section.terminal = True
         section.direction = 0 if winds else -1
