@@ -137,10 +137,11 @@ def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:
     """Call a pass and fill its label axes up to the lengths that the whole map has."""
     result = one.resolved(*arrays)
     filled = []
+    group: Any
     for title, group in zip(one.groups, result if len(one.groups) > 1 else (result,), strict=True):
         if not isinstance(group, tuple):  # the only row of its group
             (name,) = (row.name for row in ROWS.values() if row.group == title)
-            group = namedtuple("Row", [name])(group)
+            group = namedtuple("Row", [name])(group)  # type: ignore[misc]
         fields = {}
         for name, values in group._asdict().items():
             tail = shapes.get(name, ())

@@ -371,3 +371,20 @@ def test_invalid_cells():
 def test_bad_threads(threads):
     with pytest.raises(ParameterError, match="threads"):
         flow(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, threads=threads)
+
+
+def test_at_time_zero_every_state_is_where_it_was():
+    """States next to equilibria at 0, at the top and a quarter turn away, on either side of them."""
+    rng = np.random.default_rng(1)
+    n = 20_000
+
+    def coefficient():
+        return rng.normal(size=n) * rng.choice([0.0, 1.0, 1e-9], n)
+
+    A, B, C = coefficient(), coefficient(), coefficient()
+    phi = rng.choice([0.0, np.pi, -np.pi, 0.5 * np.pi], n)
+    phi += rng.normal(size=n) * 10.0 ** rng.integers(-8, 1, n)
+    dphi = rng.normal(size=n) * 10.0 ** rng.integers(-6, 1, n)
+    motion = flow(A, B, C, phi, dphi, np.zeros(n))
+    assert np.max(np.abs(motion.motion_phi - phi)) < 2e-14
+    assert np.max(np.abs(motion.motion_dphi - dphi)) < 2e-14

@@ -188,6 +188,9 @@ def phase_at(angle: float, rate: float, w: Array) -> float:
         size = w[U] * x + abs(y)
         square = 1.0 + w[U] * w[U]
     else:
+        if c < 0.0:  # the angle is a turn away from the reference
+            c = -c
+            s = -s
         to_high = np.sqrt(1.0 + w[Z_HIGH] * w[Z_HIGH])
         to_low = np.sqrt(1.0 + w[Z_LOW] * w[Z_LOW])
         high = abs(c - w[Z_HIGH] * s) / to_high
