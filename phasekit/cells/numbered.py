@@ -141,7 +141,7 @@ def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:
     for title, group in zip(one.groups, result if len(one.groups) > 1 else (result,), strict=True):
         if not isinstance(group, tuple):  # the only row of its group
             (name,) = (row.name for row in ROWS.values() if row.group == title)
-            group = namedtuple("Row", [name])(group)  # type: ignore[misc]
+            group = namedtuple("Row", [name])(group)
         fields = {}
         for name, values in group._asdict().items():
             tail = shapes.get(name, ())

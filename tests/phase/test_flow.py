@@ -374,7 +374,7 @@ def test_bad_threads(threads):
 
 
 def test_at_time_zero_every_state_is_where_it_was():
-    """States next to equilibria at 0, at the top and a quarter turn away, on either side of them."""
+    """States next to equilibria at 0, at the top and a quarter turn away, on either side."""
     rng = np.random.default_rng(1)
     n = 20_000
 
