@@ -210,7 +210,13 @@ def _refuse_missing(
 
 
 def _refuse_taken(grid: Grid, rows: Sequence[Quantity]) -> None:
-    taken = {row.name for row in rows} | {dim for row in rows for dim in row.dims}
+    names, dims = {row.name for row in rows}, {dim for row in rows for dim in row.dims}
+    for name in sorted(names & dims):
+        counted = ", ".join(sorted(row.name for row in rows if name in row.dims))
+        raise ParameterError(
+            f"of: got {name!r} beside {counted}, whose dim has that name; compute them apart"
+        )
+    taken = names | dims
     for dim in grid.sizes:
         if dim in taken:
             raise ParameterError(

@@ -11,6 +11,7 @@ import phasekit as pk
 from phasekit.cells.dispatch import pass_from, passes_of
 from phasekit.cells.states import at_states
 from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
 from phasekit.table.quantities import PASSES, ROWS
@@ -104,5 +105,6 @@ def test_a_quantity_of_a_higher_rung_is_refused_below():
 
 def test_rungs_are_the_only_thing_that_systems_are_asked_for():
     rungs = {model.rung for model in models().values()}
-    assert rungs <= {Trigonometric, Conservative, Routhian}
+    driven = {PerturbedTrigonometric, PerturbedConservative}
+    assert rungs <= {Trigonometric, Conservative, Routhian} | driven
     assert isinstance(pk.equilibria(SYSTEMS[1]), xr.Dataset)
