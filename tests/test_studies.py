@@ -126,3 +126,12 @@ def test_the_share_of_captured_motions_is_that_in_closed_form(run):
     off = [float(x) for x in re.findall(r"(\S+) standard errors off", text)]
     assert len(off) == 4
     assert max(map(abs, off[1:])) < 3.0
+
+
+def test_a_driven_disk_jumps_at_two_frequencies(run):
+    _, text = run("response_of_a_driven_disk")
+    jumps = [float(one) for one in re.findall(r"jump at (\S+) 1/s", text)]
+    natural = float(re.search(r"oscillations: (\S+) 1/s", text)[1])
+    assert len(jumps) == 2
+    assert 0.8 * natural < jumps[1] < jumps[0] < natural
+    assert float(re.search(r"exp\(-damping T\) to (\S+)", text)[1]) < 1e-6

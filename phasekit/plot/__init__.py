@@ -16,6 +16,7 @@ from phasekit.plot.damped_portrait import damped_portrait
 from phasekit.plot.force_polygon import force_polygon
 from phasekit.plot.hodograph import hodograph
 from phasekit.plot.hysteresis_loop import hysteresis_loop
+from phasekit.plot.multipliers import multipliers
 from phasekit.plot.parameter_map import parameter_map
 from phasekit.plot.periods import frequency_action, period_energy
 from phasekit.plot.phase_portrait import phase_portrait
@@ -37,6 +38,7 @@ __all__ = [
     "frequency_action",
     "hodograph",
     "hysteresis_loop",
+    "multipliers",
     "parameter_map",
     "period_energy",
     "phase_portrait",

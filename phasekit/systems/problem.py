@@ -15,6 +15,8 @@ from phasekit.labels.arguments import bad, flag, reals, unknown
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.as_system import as_system, stands_on
+from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.perturbed_problem import formulas_of
 from phasekit.systems.problem_parts import clock_of, make_field, names_of, values_of
 from phasekit.systems.system import MODELS, Model
 
@@ -357,6 +359,8 @@ def _made(
 def as_problem(problem: Any) -> Problem:
     """Return the problem that an argument is: a Problem, or a system.
 
+    Of a `Perturbed` system the states are the angle and its rate; forced, it depends on time.
+
     Raises
     ------
     ParameterError
@@ -364,6 +368,9 @@ def as_problem(problem: Any) -> Problem:
     """
     if isinstance(problem, Problem):
         return problem
+    if isinstance(problem, Perturbed):
+        f, states, values, keywords = formulas_of(problem)
+        return Problem(f, states, values, **keywords)
     if isinstance(problem, Model):
         return Problem.from_system(problem)
     convert = getattr(problem, "as_problem", None)

@@ -105,6 +105,27 @@ def with_quadratic_damping(q, system, state, times):
     return np.array(out).T
 
 
+def test_quadratic_damping_between_the_steps_before_a_turn():
+    """Many times within the steps that end on a turn, where the sign changes."""
+    system = pk.Perturbed(
+        pk.Pendulum(length=1.0, g=80.0), quadratic=0.2, forcing=pk.Harmonic(4.0, 3.0)
+    )
+    times = np.linspace(0.0, 4.0, 401)
+
+    def f(t, x):
+        v = x[1]
+        return [v, -80.0 * np.sin(x[0]) - 0.2 * abs(v) * v + 4.0 * np.cos(3.0 * t)]
+
+    found = pk.flow(system, 0.3, -4.0, times)
+    wanted = solve_ivp(
+        f, (0.0, 4.0), [0.3, -4.0], "DOP853", times, rtol=1e-11, atol=1e-11, max_step=0.02
+    ).y
+    turns = np.count_nonzero(np.diff(np.sign(wanted[1])))
+    assert turns > 8
+    np.testing.assert_allclose(found.motion_phi.values.ravel(), wanted[0], atol=1e-8)
+    np.testing.assert_allclose(found.motion_dphi.values.ravel(), wanted[1], atol=1e-7)
+
+
 def test_quadratic_damping_turns_without_a_kink():
     times = np.linspace(0.0, 25.0, 26)
     expected = with_quadratic_damping(0.4, EIGHT, [2.0, 1.3], times)

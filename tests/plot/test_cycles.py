@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import phasekit as pk
 
@@ -22,3 +23,22 @@ def test_largest_and_least_values_with_stability(ax):
     ax.clear()
     cycles.plot(ax=ax, y="period")
     assert ax.get_ylabel() == "period of the orbit"
+
+
+def test_multipliers_are_shown_beside_the_unit_circle(ax):
+    pendulum = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.1, torque=0.5)
+    orbit = pk.periodic_orbit(pendulum, [0.0, 5.0])
+    family = pk.continuation(pendulum, "torque", orbit=orbit, span=(0.4, 0.8))
+    assert pk.plot.multipliers(family, ax=ax) is ax
+    (dots,) = (one for one in ax.collections if len(one.get_offsets()))
+    x, y = dots.get_offsets().T
+    found = family.points["multiplier"].values
+    assert np.array_equal(x + 1j * y, found.ravel())
+    assert np.array_equal(dots.get_array(), np.repeat(family.points.torque.values, 2))
+    (circle,) = ax.lines
+    np.testing.assert_allclose(np.hypot(*circle.get_data()), 1.0, rtol=1e-15)
+    assert ax.get_aspect() == 1.0
+    low, high = ax.get_xlim()
+    assert low <= -1.0 < x.max() <= high
+    with pytest.raises(pk.ParameterError, match="^branch: got"):
+        pk.plot.multipliers(orbit)

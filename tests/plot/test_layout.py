@@ -70,6 +70,14 @@ def diagram():
 
 
 @functools.cache
+def cycles():
+    """Swings of a driven disk, through folds."""
+    disk = pk.Perturbed(DISK.replace(omega1=2.0), damping=0.4, forcing=pk.Harmonic(8.0, 6.0))
+    orbit = pk.periodic_orbit(disk, [0.0, 0.0], settle=60.0)
+    return pk.continuation(disk, "forcing_frequency", orbit=orbit, span=(3.0, 9.0))
+
+
+@functools.cache
 def column():
     return pk.equilibria(pk.Reduced(lam=np.linspace(0.0, 1.5, 31), psi=0.1))
 
@@ -140,6 +148,9 @@ CASES = {
         "numbers": lambda: P.hysteresis_loop(loop(), y=np.cos(loop().phi)),
         "no jump": lambda: P.hysteresis_loop(loop().isel(step=slice(9))),
         "all NaN": lambda: P.hysteresis_loop(without_values(loop())),
+    },
+    "multipliers": {
+        "driven": lambda: P.multipliers(cycles()),
     },
     "parameter_map": {
         "topology": lambda: P.parameter_map(plane(), angles="deg"),

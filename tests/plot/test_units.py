@@ -21,6 +21,11 @@ ATLAS = pk.branches(DISK, "beta", (0.2, 1.5))
 SET = pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
 DIAGRAM = pk.diagram(DISK, "beta", span=(0.05, 1.5))
 LOOP = pk.quasi_static(DISK.replace(beta=1.2), omega1=np.linspace(5.0, 40.0, 9), phi0=3.0)
+SWINGS = pk.Problem(
+    ["v", "-a*v - sin(phi) + 0.2*cos(t)"], ("phi", "v"), {"a": 0.3}, periods={"phi": 2 * np.pi},
+    time="t", period=2 * np.pi,
+)  # fmt: skip
+CYCLES = pk.continuation(SWINGS, "a", orbit=pk.periodic_orbit(SWINGS, [0.0, 0.0]), span=(0.2, 0.5))
 P = pk.plot
 SPAN = {"xlim": (0.2, 1.5), "ylim": (-0.05, 0.05), "cells": 4, "legend": False}
 
@@ -91,6 +96,12 @@ CASES = {
         {"phi": "deg", "omega1": "rpm"},
         (RPM, DEG),
         ("(rpm)", "(°)"),
+    ),
+    "multipliers": (  # pure numbers
+        lambda **o: P.multipliers(CYCLES, **o),
+        {"beta": "deg"},
+        (1.0, 1.0),
+        ("multipliers", "part"),
     ),
     "parameter_map": (
         lambda **o: P.parameter_map(MAP, "exponent", equilibrium="lower_saddle", **o),

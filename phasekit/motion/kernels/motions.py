@@ -23,7 +23,7 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 
 
@@ -42,6 +42,14 @@ def write(
             out[done, c] = y[m] if s == 1.0 else within(s, step, x, y, k, m)
         done += 1
     return done
+
+
+@inline
+def swap(p: Array, kink: int, signs: Array) -> None:
+    """Exchange the signs of quadratic damping; a turn at the end of a step changes them there."""
+    for lane in range(signs.size if kink >= 0 else 0):
+        m = kink * LANES + lane
+        p[m], signs[lane] = signs[lane], p[m]
 
 
 @kernel
@@ -73,6 +81,7 @@ def motions(
     x, y, spare, h = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
     k = np.zeros((ROWS, size))
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
+    signs = np.zeros(LANES)  # those within the step
     z = np.zeros(3 * LANES)
     real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
     written = np.zeros(LANES, np.int64)
@@ -110,6 +119,8 @@ def motions(
             if fresh > 0:
                 continue
             break
+        for lane in range(LANES if kink >= 0 else 0):
+            signs[lane] = p[kink * LANES + lane]
         advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
         dense = False
         for lane in range(LANES):
@@ -118,7 +129,9 @@ def motions(
                 passed = abs(times[row, written[lane]] - real[T, lane]) < abs(real[TRY, lane])
                 dense = dense or passed
         if dense:
+            swap(p, kink, signs)
             densify(address, table, real[T], h, x, k, spare, p, z)
+            swap(p, kink, signs)
         for lane in range(LANES):
             if whole[ACCEPTED, lane] == 1:
                 own = out[whole[CELL, lane]]
