@@ -207,7 +207,10 @@ def _columns(
         cycle = one.kind == "cycle" and y in one.problem_state
         for name in (f"{y}_max", f"{y}_min") if cycle else (y,):
             branches.append(one)
-            columns.append((_column(one, "x", x, sel), _column(one, "y", name, sel)))
+            column = _column(one, "y", name, sel)
+            if cycle:
+                column = column.rename(y).assign_attrs(long_name="")
+            columns.append((_column(one, "x", x, sel), column))
     return branches, columns
 
 
@@ -260,7 +263,8 @@ def _pieces(
 def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[FloatArray, ...]:
     """Return x, y, arclength, and the slopes of x and y over it, NaN where they are not known."""
     points = one.points
-    unknowns = points["unknown"].values.tolist()
+    # Those of periodic orbits are whole orbits.
+    unknowns = points["unknown"].values.tolist() if "unknown" in points.coords else []
     x, y = (column.values.astype(float) for column in pair)
     if all(column.dims == ("point",) and column.name in unknowns for column in pair):
         slopes = [points.tangent.sel(unknown=column.name).values for column in pair]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,9 @@ from phasekit.labelled.motion import flow
 from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import strokes, style
-from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.circle import TURN
+from phasekit.plot.parts.plane import StatePlane
+from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import starts_of_pairs
 from phasekit.systems.as_system import single
 from phasekit.systems.perturbed import Perturbed
@@ -36,6 +39,8 @@ def damped_portrait(
     *,
     orbits: ArrayLike | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -53,6 +58,11 @@ def damped_portrait(
         that are drawn as well.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
+    units : mapping of str to str, optional
+        Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -78,9 +88,13 @@ def damped_portrait(
     system = perturbed_of(perturbed)
     _refuse_varying(system)
     single(system)
-    factor = style.angle_factor(angles)
-    period = system.system.law.period  # type: ignore[attr-defined]
-    circle = Circle(-np.pi if period is None else -0.5 * period, period)
+    law: Any = system.system.law
+    period = law.period
+    on_angle = period is not None and abs(period - TURN) < 1e-12
+    plane = StatePlane.of(
+        Units.of(angles, units), period, cut, on_angle=on_angle, coordinate=law.coordinate
+    )
+    circle, (stretch, pace) = plane.circle, plane.scale
     points = _points(system)
     saddles = points[points[:, 1] == EquilibriumKind.SADDLE]
     if not len(saddles):
@@ -95,12 +109,12 @@ def damped_portrait(
                 if not stable:  # backwards in time speeds grow without end
                     reach = max(reach, 1.6 * float(np.nanmax(np.abs(v))))
                 across, up = circle.unrolled(x, v)
-                axes.plot(across * factor, up * factor, **(STABLE if stable else UNSTABLE))
+                axes.plot(across * stretch, up * pace, **(STABLE if stable else UNSTABLE))
     for number, (phi, dphi) in enumerate(starts):
         motion = flow(system, phi, dphi, np.linspace(0.0, _duration(system, saddles), 4001))
         pair = motion.motion_phi.values, motion.motion_dphi.values
         across, up = circle.unrolled(*pair)
-        axes.plot(across * factor, up * factor, **strokes.orbit_look(number))
+        axes.plot(across * stretch, up * pace, **strokes.orbit_look(number))
         reach = max(reach, 1.1 * abs(dphi))
     handles: list[Artist] = [
         Line2D([], [], label="stable manifold", **STABLE),
@@ -113,13 +127,15 @@ def damped_portrait(
         own = points[points[:, 1] == kind, 0]
         if own.size:
             across = circle.points(own, np.zeros(own.size))[0]
-            handles += axes.plot(across * factor, np.zeros(across.size), zorder=4, **look)
-    axes.set_ylim(-reach * factor, reach * factor)
-    if period is not None and abs(period - 2.0 * np.pi) < 1e-12:
-        style.circle_axis(axes, "x", angles)
-    unit = style.angle_unit(angles) if period is not None else ""
-    axes.set_xlabel(rf"$\varphi$ ({unit})" if unit else "$x$")
-    axes.set_ylabel(rf"$\dot\varphi$ ({unit}/s)" if unit else r"$\dot x$")
+            handles += axes.plot(
+                across * stretch, np.zeros(across.size), zorder=4, clip_on=False, **look
+            )
+    axes.set_ylim(-reach * pace, reach * pace)
+    if on_angle:
+        style.circle_axis(axes, "x", plane.units, circle)
+    elif period is not None:
+        axes.set_xlim(*circle.ends)
+    plane.name_axes(axes)
     if legend:
         style.legend_below(axes, handles)
     return axes
@@ -156,7 +172,7 @@ def _manifold(
     damping = float(system.damping)
     root = np.sqrt(exponent**2 + 0.25 * damping**2)
     rate = -0.5 * damping + (-root if stable else root)
-    length = NEAR * (1.0 if period is None else period / (2.0 * np.pi))
+    length = NEAR * (1.0 if period is None else period / TURN)
     times = np.linspace(0.0, GROWTHS / abs(rate), 6001) * np.sign(rate)
     motion = flow(system, phi + side * length, side * length * rate, times)
     return motion.motion_phi.values, motion.motion_dphi.values
