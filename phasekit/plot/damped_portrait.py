@@ -128,7 +128,7 @@ def damped_portrait(
         if own.size:
             across = circle.points(own, np.zeros(own.size))[0]
             handles += axes.plot(
-                across * stretch, np.zeros(across.size), zorder=4, clip_on=False, **look
+                across * stretch, np.zeros(across.size), zorder=5, clip_on=False, **look
             )
     axes.set_ylim(-reach * pace, reach * pace)
     if on_angle:
