@@ -22,8 +22,8 @@ from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
-#: Colors of attractors; light enough that their points show.
-COLORS = ("#CFE8F7", "#F6D7A7", "#BFE3D0", "#E8C9DD", "#F4E59A", "#D5D5D5")
+#: Colors of attractors; light enough that their points show, and apart in gray print.
+COLORS = ("#DCEFFA", "#E9A94B", "#5FAF95", "#F4E59A", "#C08BB0", "#8C8C8C")
 ESCAPED, UNDECIDED = "#FFFFFF", style.NOTHING
 
 
@@ -104,14 +104,15 @@ def basins(
         axes.plot(across * stretch, up * pace, color=style.BLACK, ls="none", zorder=3, **look)
         share, error = points.basin_fraction.item(), points.basin_fraction_error.item()
         text = f"{_name(points, stretch)}: {share:.3f} $\\pm$ {error:.3f}"
+        text = text.replace("at -", "at \N{MINUS SIGN}")
         if i in predicted:
             text += f", predicted odds {predicted[i]:.3f}"
         handles.append(Patch(facecolor=colors[i + 2], edgecolor=style.GRAY, label=text))
     for code, text in ((-1, "undecided"), (-2, "away to infinity")):
         if (ds.basin == code).any():
             handles.append(Patch(facecolor=colors[code + 2], edgecolor=style.GRAY, label=text))
-    handles.append(Line2D([], [], color=style.BLACK, marker="o", linestyle="none",
-                          label="attractor, once a period"))  # fmt: skip
+    key = style.inked({"color": style.BLACK, "marker": "o", "linestyle": "none"})
+    handles.append(Line2D([], [], label="attractor, once a period", **key))
     axes.set_xlim(phi.min(), phi.max())
     axes.set_ylim(dphi.min(), dphi.max())
     if on_angle:

@@ -26,7 +26,7 @@ from phasekit.systems.perturbed import Perturbed
 
 FloatArray = NDArray[np.float64]
 
-STABLE: style.Look = {"color": style.BLUE, "linestyle": "-", "linewidth": 1.6}
+STABLE: style.Look = {"color": style.BLUE, "linestyle": (0, (5, 1.5)), "linewidth": 1.6}
 UNSTABLE: style.Look = {"color": style.VERMILLION, "linestyle": "-", "linewidth": 1.6}
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
@@ -101,25 +101,27 @@ def damped_portrait(
         raise bad("perturbed", system, "a system with a saddle", "its torque may be too large")
     starts = starts_of_pairs(orbits)
     axes = style.axes_for(ax, legend=legend)
-    reach = 0.0
-    for phi, _, exponent in saddles:
-        for stable in (False, True):
-            for side in (1.0, -1.0):
-                x, v = _manifold(system, phi, exponent, stable=stable, side=side, period=period)
-                if not stable:  # backwards in time speeds grow without end
-                    reach = max(reach, 1.6 * float(np.nanmax(np.abs(v))))
-                across, up = circle.unrolled(x, v)
-                axes.plot(across * stretch, up * pace, **(STABLE if stable else UNSTABLE))
-    for number, (phi, dphi) in enumerate(starts):
-        motion = flow(system, phi, dphi, np.linspace(0.0, _duration(system, saddles), 4001))
-        pair = motion.motion_phi.values, motion.motion_dphi.values
-        across, up = circle.unrolled(*pair)
-        axes.plot(across * stretch, up * pace, **strokes.orbit_look(number))
-        reach = max(reach, 1.1 * abs(dphi))
+    curves = [*_manifolds(system, saddles, period), *_orbits(system, saddles, starts)]
+    # Of one kind of manifold the speeds may grow without end: backwards in time, where damped.
+    fastest = [
+        max(float(np.nanmax(np.abs(v))) for _, v, look in curves if look is kind)
+        for kind in (STABLE, UNSTABLE)
+    ]
+    reach = max([1.6 * min(fastest), *(1.1 * abs(dphi) for _, dphi in starts)])
+    for x, v, look in curves:
+        seen = np.abs(v) <= 1.3 * reach
+        across, up = circle.unrolled(np.where(seen, x, np.nan), np.where(seen, v, np.nan))
+        axes.plot(across * stretch, up * pace, **look)
     handles: list[Artist] = [
         Line2D([], [], label="stable manifold", **STABLE),
         Line2D([], [], label="unstable manifold", **UNSTABLE),
     ]
+    for number, (phi, dphi) in enumerate(starts):
+        look, where = strokes.orbit_look(number), float(circle.home(phi))
+        look = {**look, **strokes.START}
+        axes.plot([where * stretch], [dphi * pace], zorder=6, **{**look, "linestyle": "none"})
+        text = f"from ({where * stretch:.4g}, {dphi * pace:.4g})".replace("-", "\N{MINUS SIGN}")
+        handles.append(Line2D([], [], label=text, **look))
     for kind in (EquilibriumKind.CENTER, EquilibriumKind.SADDLE):
         look = {**style.POINTS[kind], "linestyle": "none"}
         if kind is EquilibriumKind.CENTER:
@@ -157,6 +159,30 @@ def _points(system: Perturbed) -> FloatArray:
     found = equilibria(system)
     table = np.stack([found.phi, found.kind, found.exponent], axis=-1).astype(float)
     return np.asarray(table[np.isfinite(table[:, 0])])
+
+
+def _manifolds(
+    system: Perturbed, saddles: FloatArray, period: float | None
+) -> list[tuple[FloatArray, FloatArray, style.Look]]:
+    """Branches of the manifolds of all saddles, with their looks."""
+    return [
+        (*_manifold(system, phi, exponent, stable=stable, side=side, period=period), look)
+        for phi, _, exponent in saddles
+        for stable, look in ((False, UNSTABLE), (True, STABLE))
+        for side in (1.0, -1.0)
+    ]
+
+
+def _orbits(
+    system: Perturbed, saddles: FloatArray, starts: list[strokes.State]
+) -> list[tuple[FloatArray, FloatArray, style.Look]]:
+    """Motions from the starts, with their looks."""
+    times = np.linspace(0.0, _duration(system, saddles), 4001)
+    motions = [flow(system, *start, times) for start in starts]
+    return [
+        (motion.motion_phi.values, motion.motion_dphi.values, strokes.orbit_look(number))
+        for number, motion in enumerate(motions)
+    ]
 
 
 def _manifold(

@@ -127,7 +127,7 @@ CASES = {
     "damped_portrait": {
         "eight": lambda: P.damped_portrait(DAMPED, orbits=[(1.0, 0.5), (-1.5, 0.2)]),
         "cut": lambda: P.damped_portrait(DAMPED, angles="deg", cut=0.0),
-        "line": lambda: P.damped_portrait(pk.Perturbed(DOUBLE_WELL, damping=0.2)),
+        "driven": lambda: P.damped_portrait(DAMPED.replace(damping=-0.2)),
     },
     "poincare_section": {
         "line": lambda: P.poincare_section(section("well")),
