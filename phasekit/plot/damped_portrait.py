@@ -28,6 +28,7 @@ FloatArray = NDArray[np.float64]
 
 STABLE: style.Look = {"color": style.BLUE, "linestyle": (0, (5, 1.5)), "linewidth": 1.6}
 UNSTABLE: style.Look = {"color": style.VERMILLION, "linestyle": "-", "linewidth": 1.6}
+SHORT = {"stable manifold": "stable", "unstable manifold": "unstable"}
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
 #: How often the motion near a saddle grows by e along its manifolds.
@@ -139,7 +140,7 @@ def damped_portrait(
         axes.set_xlim(*circle.ends)
     plane.name_axes(axes)
     if legend:
-        style.legend_below(axes, handles)
+        style.legend_below(axes, handles, SHORT)
     return axes
 
 
