@@ -100,7 +100,9 @@ def basins(
         across, up = points.attractor_phi.values, points.attractor_dphi.values
         if on_angle:
             across, up = _copies(across, up, ds.state_phi.values)
-        look = {"marker": "o", "markersize": 5} if still else {"marker": ".", "markersize": 2}
+        look: style.Look = (
+            {"marker": "o", "markersize": 5} if still else {"marker": ".", "markersize": 2}
+        )
         axes.plot(across * stretch, up * pace, color=style.BLACK, ls="none", zorder=3, **look)
         share, error = points.basin_fraction.item(), points.basin_fraction_error.item()
         text = f"{_name(points, stretch)}: {share:.3f} $\\pm$ {error:.3f}"
