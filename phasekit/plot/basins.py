@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,12 +12,18 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import labels, style
+from phasekit.plot.parts.circle import TURN
+from phasekit.plot.parts.plane import StatePlane
+from phasekit.plot.parts.units import Units
 
-#: Colors of attractors; light enough that their points show.
-COLORS = ("#CFE8F7", "#F6D7A7", "#BFE3D0", "#E8C9DD", "#F4E59A", "#D5D5D5")
+FloatArray = NDArray[np.float64]
+
+#: Colors of attractors; light enough that their points show, and apart in gray print.
+COLORS = ("#DCEFFA", "#E9A94B", "#5FAF95", "#F4E59A", "#C08BB0", "#8C8C8C")
 ESCAPED, UNDECIDED = "#FFFFFF", style.NOTHING
 
 
@@ -25,6 +32,7 @@ def basins(
     *,
     capture: xr.Dataset | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -39,6 +47,8 @@ def basins(
         falls to either side, which are written beside the shares of the attractors that lie there.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
+    units : mapping of str to str, optional
+        Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
     legend : bool
         Whether to name the attractors under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -63,8 +73,12 @@ def basins(
     >>> ax.get_xlabel()
     '$\\varphi$ (rad)'
     """
-    factor = style.angle_factor(angles)
     ds = labels.dataset(dataset, "dataset", ("basin", "attractor_phi"), "pk.basins")
+    ds, shown = Units.of_dataset(ds, angles, units)
+    on_angle = ds.attractor_phi.attrs.get("units") == "rad"
+    plane = StatePlane.of(
+        shown, None, None, on_angle=on_angle, coordinate=ds.attrs.get("phasekit_coordinate")
+    )
     if min(ds.basin.shape) < 2:
         raise bad("dataset", ds, "basins over at least two angles and two angular velocities")
     count = ds.sizes["attractor"]
@@ -72,7 +86,8 @@ def basins(
               for i in range(count + 2)]  # fmt: skip
     axes = style.axes_for(ax, legend=legend)
     norm = BoundaryNorm(np.arange(count + 3) - 2.5, count + 2)
-    phi, dphi = ds.state_phi.values * factor, ds.state_dphi.values * factor
+    stretch, pace = plane.scale
+    phi, dphi = ds.state_phi.values * stretch, ds.state_dphi.values * pace
     axes.pcolormesh(
         phi, dphi, ds.basin.values.T, cmap=ListedColormap(colors), norm=norm, shading="nearest",
         rasterized=True,
@@ -82,37 +97,50 @@ def basins(
     for i in range(count):
         points = ds.isel(attractor=i)
         still = points.attractor_period.item() > 0
-        axes.plot(
-            points.attractor_phi.values * factor, points.attractor_dphi.values * factor,
-            color=style.BLACK, marker="o" if still else ".", markersize=5 if still else 2,
-            linestyle="none", zorder=3,
-        )  # fmt: skip
+        across, up = points.attractor_phi.values, points.attractor_dphi.values
+        if on_angle:
+            across, up = _copies(across, up, ds.state_phi.values)
+        look: style.Look = (
+            {"marker": "o", "markersize": 5} if still else {"marker": ".", "markersize": 2}
+        )
+        axes.plot(across * stretch, up * pace, color=style.BLACK, ls="none", zorder=3, **look)
         share, error = points.basin_fraction.item(), points.basin_fraction_error.item()
-        text = f"{_name(points, factor)}: {share:.3f} $\\pm$ {error:.3f}"
+        text = f"{_name(points, stretch)}: {share:.3f} $\\pm$ {error:.3f}"
+        text = text.replace("at -", "at \N{MINUS SIGN}")
         if i in predicted:
             text += f", predicted odds {predicted[i]:.3f}"
         handles.append(Patch(facecolor=colors[i + 2], edgecolor=style.GRAY, label=text))
     for code, text in ((-1, "undecided"), (-2, "away to infinity")):
         if (ds.basin == code).any():
             handles.append(Patch(facecolor=colors[code + 2], edgecolor=style.GRAY, label=text))
-    handles.append(Line2D([], [], color=style.BLACK, marker="o", linestyle="none",
-                          label="attractor, once a period"))  # fmt: skip
-    axes.set_xlim(phi[0], phi[-1])
-    axes.set_ylim(dphi[0], dphi[-1])
-    on_angle = ds.attractor_phi.attrs.get("units") == "rad"
-    unit = style.angle_unit(angles)
-    axes.set_xlabel(rf"$\varphi$ ({unit})" if on_angle else "$x$")
-    axes.set_ylabel(rf"$\dot\varphi$ ({unit}/s)" if on_angle else r"$\dot x$")
+    key = style.inked({"color": style.BLACK, "marker": "o", "linestyle": "none"})
+    handles.append(Line2D([], [], label="attractor, once a period", **key))
+    axes.set_xlim(phi.min(), phi.max())
+    axes.set_ylim(dphi.min(), dphi.max())
+    if on_angle:
+        style.unwrapped_axis(axes, "x", shown)
+    plane.name_axes(axes)
     if legend:
         style.legend_below(axes, handles)
     return axes
 
 
-def _name(points: xr.Dataset, factor: float) -> str:
+def _copies(x: FloatArray, other: FloatArray, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Points on a circle wherever they are among the angles that are seen."""
+    first = int(np.ceil((seen.min() - np.nanmax(x)) / TURN))
+    last = int(np.floor((seen.max() - np.nanmin(x)) / TURN))
+    turns = range(first, last + 1)
+    return (
+        np.concatenate([x + k * TURN for k in turns] or [x]),
+        np.concatenate([other for _ in turns] or [other]),
+    )
+
+
+def _name(points: xr.Dataset, stretch: float) -> str:
     q = int(points.attractor_period.item())
     if q == 0:
         return "never repeats itself"
-    place = f"at {points.attractor_phi.values[0] * factor:.3g}"
+    place = f"at {points.attractor_phi.values[0] * stretch:.3g}"
     return place if q == 1 else f"{place}, {q} periods"
 
 

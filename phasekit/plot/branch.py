@@ -207,7 +207,10 @@ def _columns(
         cycle = one.kind == "cycle" and y in one.problem_state
         for name in (f"{y}_max", f"{y}_min") if cycle else (y,):
             branches.append(one)
-            columns.append((_column(one, "x", x, sel), _column(one, "y", name, sel)))
+            column = _column(one, "y", name, sel)
+            if cycle:
+                column = column.rename(y).assign_attrs(long_name="")
+            columns.append((_column(one, "x", x, sel), column))
     return branches, columns
 
 

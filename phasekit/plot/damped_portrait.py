@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,18 @@ from phasekit.labelled.motion import flow
 from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import strokes, style
-from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.circle import TURN
+from phasekit.plot.parts.plane import StatePlane
+from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import starts_of_pairs
 from phasekit.systems.as_system import single
 from phasekit.systems.perturbed import Perturbed
 
 FloatArray = NDArray[np.float64]
 
-STABLE: style.Look = {"color": style.BLUE, "linestyle": "-", "linewidth": 1.6}
+STABLE: style.Look = {"color": style.BLUE, "linestyle": (0, (5, 1.5)), "linewidth": 1.6}
 UNSTABLE: style.Look = {"color": style.VERMILLION, "linestyle": "-", "linewidth": 1.6}
+SHORT = {"stable manifold": "stable", "unstable manifold": "unstable"}
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
 #: How often the motion near a saddle grows by e along its manifolds.
@@ -36,6 +40,8 @@ def damped_portrait(
     *,
     orbits: ArrayLike | None = None,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
@@ -53,6 +59,11 @@ def damped_portrait(
         that are drawn as well.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
+    units : mapping of str to str, optional
+        Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -78,34 +89,40 @@ def damped_portrait(
     system = perturbed_of(perturbed)
     _refuse_varying(system)
     single(system)
-    factor = style.angle_factor(angles)
-    period = system.system.law.period  # type: ignore[attr-defined]
-    circle = Circle(-np.pi if period is None else -0.5 * period, period)
+    law: Any = system.system.law
+    period = law.period
+    on_angle = period is not None and abs(period - TURN) < 1e-12
+    plane = StatePlane.of(
+        Units.of(angles, units), period, cut, on_angle=on_angle, coordinate=law.coordinate
+    )
+    circle, (stretch, pace) = plane.circle, plane.scale
     points = _points(system)
     saddles = points[points[:, 1] == EquilibriumKind.SADDLE]
     if not len(saddles):
         raise bad("perturbed", system, "a system with a saddle", "its torque may be too large")
     starts = starts_of_pairs(orbits)
     axes = style.axes_for(ax, legend=legend)
-    reach = 0.0
-    for phi, _, exponent in saddles:
-        for stable in (False, True):
-            for side in (1.0, -1.0):
-                x, v = _manifold(system, phi, exponent, stable=stable, side=side, period=period)
-                if not stable:  # backwards in time speeds grow without end
-                    reach = max(reach, 1.6 * float(np.nanmax(np.abs(v))))
-                across, up = circle.unrolled(x, v)
-                axes.plot(across * factor, up * factor, **(STABLE if stable else UNSTABLE))
-    for number, (phi, dphi) in enumerate(starts):
-        motion = flow(system, phi, dphi, np.linspace(0.0, _duration(system, saddles), 4001))
-        pair = motion.motion_phi.values, motion.motion_dphi.values
-        across, up = circle.unrolled(*pair)
-        axes.plot(across * factor, up * factor, **strokes.orbit_look(number))
-        reach = max(reach, 1.1 * abs(dphi))
+    curves = [*_manifolds(system, saddles, period), *_orbits(system, saddles, starts)]
+    # Of one kind of manifold the speeds may grow without end: backwards in time, where damped.
+    fastest = [
+        max(float(np.nanmax(np.abs(v))) for _, v, look in curves if look is kind)
+        for kind in (STABLE, UNSTABLE)
+    ]
+    reach = max([1.6 * min(fastest), *(1.1 * abs(dphi) for _, dphi in starts)])
+    for x, v, look in curves:
+        seen = np.abs(v) <= 1.3 * reach
+        across, up = circle.unrolled(np.where(seen, x, np.nan), np.where(seen, v, np.nan))
+        axes.plot(across * stretch, up * pace, **look)
     handles: list[Artist] = [
         Line2D([], [], label="stable manifold", **STABLE),
         Line2D([], [], label="unstable manifold", **UNSTABLE),
     ]
+    for number, (phi, dphi) in enumerate(starts):
+        look, where = strokes.orbit_look(number), float(circle.home(phi))
+        look = {**look, **strokes.START}
+        axes.plot([where * stretch], [dphi * pace], zorder=6, **{**look, "linestyle": "none"})
+        text = f"from ({where * stretch:.4g}, {dphi * pace:.4g})".replace("-", "\N{MINUS SIGN}")
+        handles.append(Line2D([], [], label=text, **look))
     for kind in (EquilibriumKind.CENTER, EquilibriumKind.SADDLE):
         look = {**style.POINTS[kind], "linestyle": "none"}
         if kind is EquilibriumKind.CENTER:
@@ -113,15 +130,17 @@ def damped_portrait(
         own = points[points[:, 1] == kind, 0]
         if own.size:
             across = circle.points(own, np.zeros(own.size))[0]
-            handles += axes.plot(across * factor, np.zeros(across.size), zorder=4, **look)
-    axes.set_ylim(-reach * factor, reach * factor)
-    if period is not None and abs(period - 2.0 * np.pi) < 1e-12:
-        style.circle_axis(axes, "x", angles)
-    unit = style.angle_unit(angles) if period is not None else ""
-    axes.set_xlabel(rf"$\varphi$ ({unit})" if unit else "$x$")
-    axes.set_ylabel(rf"$\dot\varphi$ ({unit}/s)" if unit else r"$\dot x$")
+            handles += axes.plot(
+                across * stretch, np.zeros(across.size), zorder=5, clip_on=False, **look
+            )
+    axes.set_ylim(-reach * pace, reach * pace)
+    if on_angle:
+        style.circle_axis(axes, "x", plane.units, circle)
+    elif period is not None:
+        axes.set_xlim(*circle.ends)
+    plane.name_axes(axes)
     if legend:
-        style.legend_below(axes, handles)
+        style.legend_below(axes, handles, SHORT)
     return axes
 
 
@@ -143,6 +162,30 @@ def _points(system: Perturbed) -> FloatArray:
     return np.asarray(table[np.isfinite(table[:, 0])])
 
 
+def _manifolds(
+    system: Perturbed, saddles: FloatArray, period: float | None
+) -> list[tuple[FloatArray, FloatArray, style.Look]]:
+    """Branches of the manifolds of all saddles, with their looks."""
+    return [
+        (*_manifold(system, phi, exponent, stable=stable, side=side, period=period), look)
+        for phi, _, exponent in saddles
+        for stable, look in ((False, UNSTABLE), (True, STABLE))
+        for side in (1.0, -1.0)
+    ]
+
+
+def _orbits(
+    system: Perturbed, saddles: FloatArray, starts: list[strokes.State]
+) -> list[tuple[FloatArray, FloatArray, style.Look]]:
+    """Motions from the starts, with their looks."""
+    times = np.linspace(0.0, _duration(system, saddles), 4001)
+    motions = [flow(system, *start, times) for start in starts]
+    return [
+        (motion.motion_phi.values, motion.motion_dphi.values, strokes.orbit_look(number))
+        for number, motion in enumerate(motions)
+    ]
+
+
 def _manifold(
     system: Perturbed,
     phi: float,
@@ -156,7 +199,7 @@ def _manifold(
     damping = float(system.damping)
     root = np.sqrt(exponent**2 + 0.25 * damping**2)
     rate = -0.5 * damping + (-root if stable else root)
-    length = NEAR * (1.0 if period is None else period / (2.0 * np.pi))
+    length = NEAR * (1.0 if period is None else period / TURN)
     times = np.linspace(0.0, GROWTHS / abs(rate), 6001) * np.sign(rate)
     motion = flow(system, phi + side * length, side * length * rate, times)
     return motion.motion_phi.values, motion.motion_dphi.values

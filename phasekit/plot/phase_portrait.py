@@ -189,12 +189,7 @@ class Picture:
     @property
     def symbol(self) -> str:
         """The coordinate for print."""
-        name = self.land.answers.coordinate
-        if name in labels.SYMBOLS:
-            return labels.SYMBOLS[name].strip("$")
-        import sympy as sp
-
-        return str(sp.latex(sp.Symbol(name)))
+        return labels.coordinate_symbol(self.land.answers.coordinate)
 
     def reach(self, *, given: bool) -> float:
         """Return the greatest speed to show: past the separatrices, and past what was asked for."""

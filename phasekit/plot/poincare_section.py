@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
 from phasekit.plot.parts import labels, style
+from phasekit.plot.parts.circle import TURN
+from phasekit.plot.parts.plane import StatePlane
+from phasekit.plot.parts.units import Units
 
 
 def poincare_section(
     dataset: xr.Dataset,
     *,
     angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    cut: float | None = None,
     ax: Axes | None = None,
 ) -> Axes:
     r"""Draw the states of motions in a section, each motion in its color.
@@ -23,6 +30,11 @@ def poincare_section(
         What `stroboscopic` or `poincare_section` returns.
     angles : {"rad", "deg"}
         Unit of the angle on both axes.
+    units : mapping of str to str, optional
+        Units in which quantities are shown, by name: ``{"phi": "deg", "dphi": "rpm"}``.
+    cut : float, optional
+        Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
+        left out. What lies on the cut is drawn at both ends.
     ax : matplotlib.axes.Axes, optional
         Where to draw; a new figure if left out.
 
@@ -45,22 +57,27 @@ def poincare_section(
     >>> ax.get_ylabel()
     '$\\dot x$'
     """
-    factor = style.angle_factor(angles)
     ds = labels.dataset(dataset, "dataset", ("section_phi", "section_dphi"), "pk.stroboscopic")
-    axes = style.axes_for(ax, legend=False)
+    ds, shown = Units.of_dataset(ds, angles, units)
     on_angle = ds.section_phi.attrs.get("units") == "rad"
+    plane = StatePlane.of(
+        shown, TURN if on_angle else None, cut, on_angle=on_angle,
+        coordinate=ds.attrs.get("phasekit_coordinate"),
+    )  # fmt: skip
+    axes = style.axes_for(ax, legend=False)
     across, up = (np.moveaxis(ds[name].values, ds[name].dims.index("crossing"), -1)
                   for name in ("section_phi", "section_dphi"))  # fmt: skip
     size = ds.sizes["crossing"]
-    stretch = factor if on_angle else 1.0
-    for number, (x, v) in enumerate(
+    for number, motion in enumerate(
         zip(across.reshape(-1, size), up.reshape(-1, size), strict=True)
     ):
-        color = (style.BLUE, *style.ORBIT_COLORS)[number % (1 + len(style.ORBIT_COLORS))]
-        axes.plot(x * stretch, v * stretch, linestyle="none", marker=".", markersize=2, color=color)
+        x, v = plane.circle.points(*motion)
+        color = style.ORBIT_COLORS[(number - 1) % len(style.ORBIT_COLORS)]
+        axes.plot(
+            x * plane.scale[0], v * plane.scale[1],
+            linestyle="none", marker=".", markersize=2, color=color,
+        )  # fmt: skip
     if on_angle:
-        style.circle_axis(axes, "x", angles)
-    unit = style.angle_unit(angles)
-    axes.set_xlabel(rf"$\varphi$ ({unit})" if on_angle else "$x$")
-    axes.set_ylabel(rf"$\dot\varphi$ ({unit}/s)" if on_angle else r"$\dot x$")
+        style.circle_axis(axes, "x", shown, plane.circle)
+    plane.name_axes(axes)
     return axes

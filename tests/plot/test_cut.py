@@ -24,6 +24,8 @@ ANGLED = {
     "branch",
     "branch_surface",
     "bearing_forces",
+    "damped_portrait",
+    "poincare_section",
 }
 CUBE = pk.diagram(DISK, "beta", span=(0.05, 1.5))
 

@@ -70,3 +70,23 @@ def test_a_run_up_shows_forces_and_speed(ax):
     many = pk.run_up(DISK, omega1=lambda t: t, phi0=[0.1, 0.2], dphi0=0.0, t=[0.0, 1.0])
     with pytest.raises(pk.ParameterError, match="one motion over time"):
         pk.plot.run_up(many)
+
+
+def test_speeds_without_end_are_drawn_as_far_as_they_are_seen(ax):
+    # Backwards in time a damped motion speeds up: it would turn round 10^5 times.
+    for damping in (0.3, -0.3):
+        ax.clear()
+        pk.plot.damped_portrait(DAMPED.replace(damping=damping), ax=ax, cut=0.0)
+        assert ax.get_ylim()[1] < 5.0
+        assert ax.get_xlim() == pytest.approx((0.0, 2.0 * np.pi))
+        sizes = [line.get_xdata().size for line in ax.get_lines()]
+        assert len(sizes) >= 10
+        assert sum(sizes) < 200_000
+
+
+def test_attractors_are_shown_wherever_they_are_seen(ax):
+    ds = pk.basins(DAMPED, phi=np.linspace(0.0, 12.0, 31), dphi=np.linspace(-1.0, 1.0, 21))
+    pk.plot.basins(ds, ax=ax)
+    places = np.concatenate([line.get_xdata() for line in ax.get_lines()])
+    assert places.size == 4
+    assert ((places >= 0.0) & (places <= 12.0)).all()

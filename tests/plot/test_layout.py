@@ -69,6 +69,42 @@ def diagram():
     return pk.diagram(DISK, "beta", span=(0.05, 1.5))
 
 
+DAMPED = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.2)
+DOUBLE_WELL = pk.Potential("x^4/4 - x^2/2", "x")
+
+
+@functools.cache
+def fates(kind):
+    if kind == "well":
+        driven = pk.Perturbed(DOUBLE_WELL, damping=0.25, forcing=pk.Harmonic(0.1, 1.0))
+        return pk.basins(driven, phi=np.linspace(-2.0, 2.0, 25), dphi=np.linspace(-2.0, 2.0, 25))
+    ends = {"damped": 3.0, "two turns": 6.5}[kind]
+    phi, dphi = np.linspace(-ends, ends, 41), np.linspace(-1.5, 1.5, 31)
+    return pk.basins(DAMPED, phi=phi, dphi=dphi)
+
+
+@functools.cache
+def section(kind):
+    base = {"well": DOUBLE_WELL, "eight": pk.Coefficients(1.0, 0.35, 0.12)}[kind]
+    driven = pk.Perturbed(base, damping=0.25, forcing=pk.Harmonic(0.4, 1.0))
+    return pk.stroboscopic(driven, [0.1, 0.4], 0.0, n=60, skip=5)
+
+
+@functools.cache
+def speeding():
+    still = DISK.replace(omega1=0.0)
+    times = np.linspace(0.0, 4.0, 201)
+    return pk.run_up(still, omega1=lambda t: 5.0 * t, phi0=0.1, dphi0=0.0, t=times)
+
+
+@functools.cache
+def cycles():
+    rate = "(p + x**2 + y**2 - (x**2 + y**2)**2)"
+    problem = pk.Problem([f"x*{rate} - y", f"y*{rate} + x"], ("x", "y"), {"p": -0.5})
+    rest = pk.continuation(problem, "p", x0=[0.0, 0.0], span=(-0.5, 0.5))
+    return [rest, rest.special("H")[0].switch()]
+
+
 @functools.cache
 def cycles():
     """Swings of a driven disk, through folds."""
@@ -91,6 +127,26 @@ P = pk.plot
 PLANE = (pk.Reduced(0.0, 0.0), "lam", "psi")
 #: Cases of every picture: what it shows, and how it is drawn.
 CASES = {
+    "basins": {
+        "odds": lambda: P.basins(fates("damped"), capture=pk.capture(DAMPED)),
+        "degrees": lambda: P.basins(fates("two turns"), units={"phi": "deg", "dphi": "rpm"}),
+        "line": lambda: P.basins(fates("well")),
+    },
+    "damped_portrait": {
+        "eight": lambda: P.damped_portrait(DAMPED, orbits=[(1.0, 0.5), (-1.5, 0.2)]),
+        "cut": lambda: P.damped_portrait(DAMPED, angles="deg", cut=0.0),
+        "driven": lambda: P.damped_portrait(DAMPED.replace(damping=-0.2)),
+    },
+    "poincare_section": {
+        "line": lambda: P.poincare_section(section("well")),
+        "cut": lambda: P.poincare_section(section("eight"), units={"phi": "deg"}, cut=0.0),
+        "all NaN": lambda: P.poincare_section(without_values(section("eight"))),
+    },
+    "run_up": {
+        "disk": lambda: P.run_up(speeding()),
+        "units": lambda: P.run_up(speeding(), units={"omega1": "rpm", "force": "kN"}),
+        "all NaN": lambda: P.run_up(without_values(speeding())),
+    },
     "phase_portrait": {
         "eight": lambda: P.phase_portrait(EIGHT, orbits=[(0.3, 0.0), (2.0, 2.0)]),
         "disk": lambda: P.phase_portrait(DISK, angles="deg", cut=0.0),
@@ -111,6 +167,7 @@ CASES = {
     },
     "branch": {
         "cubic": lambda: cubic().plot(),
+        "cycles": lambda: P.branch(cycles()),
         "disk": lambda: P.branch(diagram(), units={"phi": "deg", "beta": "deg"}, cut=-90.0),
     },
     "bifurcation_set": {

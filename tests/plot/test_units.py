@@ -26,11 +26,31 @@ SWINGS = pk.Problem(
     time="t", period=2 * np.pi,
 )  # fmt: skip
 CYCLES = pk.continuation(SWINGS, "a", orbit=pk.periodic_orbit(SWINGS, [0.0, 0.0]), span=(0.2, 0.5))
+DAMPED = pk.Perturbed(EIGHT, damping=0.2)
+FATES = pk.basins(DAMPED, phi=np.linspace(-3.0, 3.0, 25), dphi=np.linspace(-1.5, 1.5, 21))
+SECTION = pk.stroboscopic(
+    pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.6, 1.0)), [0.1, 0.4], 0.0, n=30
+)
+STILL, EVEN = DISK.replace(omega1=0.0), np.linspace(0.0, 2.0, 41)
+SPEEDING = pk.run_up(STILL, omega1=lambda t: 5.0 * t, phi0=0.1, dphi0=0.0, t=EVEN)
+STATE_UNITS = ({"phi": "deg", "dphi": "rpm"}, (DEG, RPM), ("(°)", "(rpm)"))
 P = pk.plot
 SPAN = {"xlim": (0.2, 1.5), "ylim": (-0.05, 0.05), "cells": 4, "legend": False}
 
 #: A picture, the units asked for, what both axes are multiplied by, and words at them.
 CASES = {
+    "basins": (lambda **o: P.basins(FATES, **o), *STATE_UNITS),
+    "damped_portrait": (
+        lambda **o: P.damped_portrait(DAMPED, orbits=(1.0, 0.5), **o),
+        *STATE_UNITS,
+    ),
+    "poincare_section": (lambda **o: P.poincare_section(SECTION, **o), *STATE_UNITS),
+    "run_up": (
+        lambda **o: P.run_up(SPEEDING, **o),
+        {"time": "ms", "force": "kN", "omega1": "rpm"},
+        (1e3, 1e-3),
+        ("(ms)", "(kN)"),
+    ),
     "phase_portrait": (
         lambda **o: P.phase_portrait(EIGHT, orbits=(0.3, 0.2), **o),
         {"phi": "deg", "dphi": "rpm"},

@@ -58,6 +58,15 @@ def label(values: xr.DataArray, units: Angles | Units, width: int, extra: str = 
     return fitting(width, unit, long, short, brief)
 
 
+def coordinate_symbol(name: str) -> str:
+    """Return a coordinate for print, without the dollars."""
+    if name in SYMBOLS:
+        return SYMBOLS[name].strip("$")
+    import sympy as sp
+
+    return str(sp.latex(sp.Symbol(name)))
+
+
 def with_unit(text: str, unit: str) -> str:
     """Return a text with its unit, if it has one."""
     return f"{text} ({unit})" if unit else text

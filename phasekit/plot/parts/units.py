@@ -68,7 +68,9 @@ class Units:
 
     def unit(self, name: str, held: str) -> str:
         """Return the unit in which values are shown that are held in the unit `held`."""
-        bare = name.removeprefix("motion_").removeprefix("state_")
+        bare = name
+        for prefix in ("motion_", "state_", "section_", "attractor_"):
+            bare = bare.removeprefix(prefix)
         chosen = self.chosen.get(name, self.chosen.get(bare))
         if chosen is not None:
             return chosen
