@@ -106,7 +106,7 @@ def cycles():
 
 
 @functools.cache
-def cycles():
+def swings():
     """Swings of a driven disk, through folds."""
     disk = pk.Perturbed(DISK.replace(omega1=2.0), damping=0.4, forcing=pk.Harmonic(8.0, 6.0))
     orbit = pk.periodic_orbit(disk, [0.0, 0.0], settle=60.0)
@@ -207,7 +207,7 @@ CASES = {
         "all NaN": lambda: P.hysteresis_loop(without_values(loop())),
     },
     "multipliers": {
-        "driven": lambda: P.multipliers(cycles()),
+        "driven": lambda: P.multipliers(swings()),
     },
     "parameter_map": {
         "topology": lambda: P.parameter_map(plane(), angles="deg"),
