@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -79,6 +80,9 @@ def run_up(
     speeds = axes.twinx()
     speed = ds.motion_omega1.values * shown.scale("motion_omega1", SPEEDS_UNIT)
     handles += speeds.plot(times, speed, label=r"$\omega_1$", **style.inked(SPEED))
+    for panel, values in ((axes, ds.force_magnitude), (speeds, speed)):
+        if not np.isfinite(values).any():
+            panel.set_ylim(0.0, 1.0)
     axes.set_xlim(*sorted((float(times[0]), float(times[-1]))))
     axes.set_xlabel(labels.with_unit("$t$", shown.text("time", "s")))
     unit, room = shown.text(force, "N"), style.letters(axes, "y")
