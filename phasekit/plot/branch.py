@@ -260,7 +260,7 @@ def _pieces(
 def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[FloatArray, ...]:
     """Return x, y, arclength, and the slopes of x and y over it, NaN where they are not known."""
     points = one.points
-    unknowns = points["unknown"].values.tolist()
+    unknowns = points["unknown"].values.tolist() if "unknown" in points else []  # none of orbits
     x, y = (column.values.astype(float) for column in pair)
     if all(column.dims == ("point",) and column.name in unknowns for column in pair):
         slopes = [points.tangent.sel(unknown=column.name).values for column in pair]
