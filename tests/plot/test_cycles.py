@@ -22,3 +22,13 @@ def test_largest_and_least_values_with_stability(ax):
     ax.clear()
     cycles.plot(ax=ax, y="period")
     assert ax.get_ylabel() == "period of the orbit"
+
+
+def test_one_family_alone(ax):
+    system = pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 0.5})
+    few = pk.ContinuationOptions(max_points=3, intervals=10)
+    orbit = pk.periodic_orbit(system, [2.0, 0.0], options=few)
+    cycles = pk.continuation(system, "mu", orbit=orbit, span=(0.4, 0.6), options=few)
+    cycles.plot(ax=ax)
+    values = np.concatenate([line.get_ydata() for line in ax.lines])
+    assert np.isclose(np.nanmax(values), float(cycles.points.x_max.max()))

@@ -70,3 +70,9 @@ def test_a_run_up_shows_forces_and_speed(ax):
     many = pk.run_up(DISK, omega1=lambda t: t, phi0=[0.1, 0.2], dphi0=0.0, t=[0.0, 1.0])
     with pytest.raises(pk.ParameterError, match="one motion over time"):
         pk.plot.run_up(many)
+
+
+def test_manifolds_against_strong_damping_stay_small(ax):
+    pk.plot.damped_portrait(pk.Perturbed(pk.Coefficients(2.0, 1.0, 0.3), damping=0.5), ax=ax)
+    assert len(ax.get_lines()) >= 10
+    assert max(len(line.get_xdata()) for line in ax.get_lines()) < 1_000_000

@@ -6,6 +6,7 @@ import datetime
 import enum
 import functools
 import inspect
+import warnings
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
@@ -232,7 +233,9 @@ def section() -> xr.Dataset:
 
 @functools.cache
 def shares() -> xr.Dataset:
-    return pk.basins(damped(), phi=[-1.0, 0.0, 1.0], dphi=[0.0, 0.5])
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "basin: ")  # so small a grid is too coarse
+        return pk.basins(damped(), phi=[-1.0, 0.0, 1.0], dphi=[0.0, 0.5])
 
 
 @functools.cache
@@ -474,8 +477,13 @@ INSTANCES: dict[str, Callable[[], Any]] = {
 }
 
 
-#: Calls that take longer than a test should: spans over hundreds of decades.
+#: Calls that take longer than a test should: spans over hundreds of decades ...
 LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surface")}
+#: ... and motions so fast or long that they take all the steps they may before they are given up.
+_MOTIONS = ("attractors", "basins", "lyapunov", "poincare_section", "run_up", "stroboscopic")
+LONG |= {(name, value) for name in _MOTIONS for value in ("1e16", "1e200", "huge in list")}
+#: Warnings that are part of an answer, by how they begin: the grid does not show the basins.
+ANNOUNCED = ("basin: ",)
 
 
 def callables() -> dict[str, Callable[..., Any]]:
