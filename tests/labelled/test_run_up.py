@@ -94,6 +94,6 @@ def test_unusable_speeds(omega1, message):
 
 def test_starts_that_are_missing_run_nowhere(recwarn):
     ds = pk.run_up(DISK, omega1=lambda t: 5.0 * t, phi0=[0.1, np.nan], dphi0=0.0, t=[0.0, 0.5])
-    phi = ds.motion_phi.transpose("phi0", ...).values if "phi0" in ds.dims else ds.motion_phi.values
-    assert np.isfinite(phi).any() and np.isnan(phi).any()
+    lost = np.isnan(ds.motion_phi.values)
+    assert 0 < lost.sum() < lost.size
     assert not [w for w in recwarn if "run to infinity" in str(w.message)]

@@ -482,8 +482,8 @@ LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surf
 #: ... and motions so fast or long that they take all the steps they may before they are given up.
 _MOTIONS = ("attractors", "basins", "lyapunov", "poincare_section", "run_up", "stroboscopic")
 LONG |= {(name, value) for name in _MOTIONS for value in ("1e16", "1e200", "huge in list")}
-#: Warnings that are part of an answer, by how they begin: the grid does not show the basins.
-ANNOUNCED = ("basin: ",)
+#: Warnings that are part of an answer, by how they begin: the grid is too coarse, motions are lost.
+ANNOUNCED = ("basin: ", "motion_phi: ")
 
 
 def callables() -> dict[str, Callable[..., Any]]:
