@@ -61,6 +61,11 @@ def run_up(
     ParameterError
         If an argument is unusable, or a table does not reach over the motion.
 
+    Warns
+    -----
+    RuntimeWarning
+        If a motion ends before its last time, as in `flow`; it is NaN from there on.
+
     Notes
     -----
     ``phi'' + V'(phi; omega1(t)) = -omega1' kappa cos phi - damping phi' - ...`` with ``kappa`` as

@@ -109,7 +109,7 @@ def _motions(
     still = _is_still(law, values, len(states))
     if not still.any():
         found = motions(law, values, states, times, *how)
-        _tell(found)
+        _tell(found, states)
         return found.states
     from phasekit.phase.exact.flow import flow as exact
 
@@ -125,7 +125,7 @@ def _motions(
     if not still.all():
         rest = {name: some(value, ~still) for name, value in values.items()}
         found = motions(law, rest, states[~still], some(times, ~still), *how)
-        _tell(found)
+        _tell(found, states[~still])
         result[~still] = found.states
     return result
 
@@ -229,9 +229,9 @@ def unit_of(law: PerturbedConservative) -> float:
     return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf
 
 
-def _tell(found: Cells) -> None:
-    """Say how many motions did not come to their ends, and why."""
-    valid = np.isfinite(found.status)
+def _tell(found: Cells, states: Array) -> None:
+    """Say how many motions did not come to their ends, and why; invalid starts are no motions."""
+    valid = np.isfinite(states).all(axis=1)
     reasons: dict[int, Any] = {
         EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol",
         FAILED: "their steps become too short: they run to infinity, or the law has no value there",

@@ -32,7 +32,9 @@ SHORT = {"stable manifold": "stable", "unstable manifold": "unstable"}
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
 #: How often the motion near a saddle grows by e along its manifolds.
-GROWTHS = 60.0
+GROWTHS = 60
+#: Samples of the time of each growth.
+SAMPLES = 100
 
 
 def damped_portrait(

@@ -90,3 +90,10 @@ def test_unusable_speeds(omega1, message):
         pk.run_up(DISK, omega1=omega1, phi0=0.1, dphi0=0.0, t=TIMES)
     with pytest.raises(pk.ParameterError, match="disk: got"):
         pk.run_up(pk.Pendulum(length=1.0), omega1=speed, phi0=0.1, dphi0=0.0, t=TIMES)
+
+
+def test_starts_that_are_missing_run_nowhere(recwarn):
+    ds = pk.run_up(DISK, omega1=lambda t: 5.0 * t, phi0=[0.1, np.nan], dphi0=0.0, t=[0.0, 0.5])
+    lost = np.isnan(ds.motion_phi.values)
+    assert 0 < lost.sum() < lost.size
+    assert not [w for w in recwarn if "run to infinity" in str(w.message)]

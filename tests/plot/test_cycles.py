@@ -42,3 +42,13 @@ def test_multipliers_are_shown_beside_the_unit_circle(ax):
     assert low <= -1.0 < x.max() <= high
     with pytest.raises(pk.ParameterError, match="^branch: got"):
         pk.plot.multipliers(orbit)
+
+
+def test_one_family_alone(ax):
+    system = pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 0.5})
+    few = pk.ContinuationOptions(max_points=3, intervals=10)
+    orbit = pk.periodic_orbit(system, [2.0, 0.0], options=few)
+    cycles = pk.continuation(system, "mu", orbit=orbit, span=(0.4, 0.6), options=few)
+    cycles.plot(ax=ax)
+    values = np.concatenate([line.get_ydata() for line in ax.lines])
+    assert np.isclose(np.nanmax(values), float(cycles.points.x_max.max()))

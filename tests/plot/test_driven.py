@@ -90,3 +90,9 @@ def test_attractors_are_shown_wherever_they_are_seen(ax):
     places = np.concatenate([line.get_xdata() for line in ax.get_lines()])
     assert places.size == 4
     assert ((places >= 0.0) & (places <= 12.0)).all()
+
+
+def test_manifolds_against_strong_damping_stay_small(ax):
+    pk.plot.damped_portrait(pk.Perturbed(pk.Coefficients(2.0, 1.0, 0.3), damping=0.5), ax=ax)
+    assert len(ax.get_lines()) >= 10
+    assert max(len(line.get_xdata()) for line in ax.get_lines()) < 1_000_000

@@ -6,6 +6,7 @@ import datetime
 import enum
 import functools
 import inspect
+import warnings
 from collections.abc import Callable
 from decimal import Decimal
 from fractions import Fraction
@@ -22,7 +23,7 @@ from phasekit.inputs import describe
 
 #: What models share for the rest of the package, and results that only phasekit makes.
 MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
-RESULTS = (pk.Branch, pk.SpecialPoint)
+RESULTS = (pk.Branch, pk.CycleBranch, pk.SpecialPoint)
 
 
 class Odd:
@@ -207,6 +208,56 @@ def branch() -> Any:
 
 
 @functools.cache
+def oscillator() -> Any:
+    return pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 0.5})
+
+
+@functools.cache
+def cycles() -> Any:
+    few = pk.ContinuationOptions(max_points=3, intervals=10)
+    orbit = pk.periodic_orbit(oscillator(), [2.0, 0.0], options=few)
+    return pk.continuation(oscillator(), "mu", orbit=orbit, span=(0.4, 0.6), options=few)
+
+
+@functools.cache
+def driven() -> Any:
+    """Damped and driven."""
+    system = pk.Coefficients(2.0, 1.0, 0.3)
+    return pk.Perturbed(system, damping=0.2, forcing=pk.Harmonic(0.1, 1.0))
+
+
+@functools.cache
+def section() -> xr.Dataset:
+    return pk.stroboscopic(driven(), 0.3, 0.2, n=2)
+
+
+@functools.cache
+def shares() -> xr.Dataset:
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "basin: ")  # so small a grid is too coarse
+        return pk.basins(damped(), phi=[-1.0, 0.0, 1.0], dphi=[0.0, 0.5])
+
+
+@functools.cache
+def damped() -> Any:
+    return pk.Perturbed(pk.Coefficients(2.0, 1.0, 0.3), damping=0.5)
+
+
+def speed(t: float) -> float:
+    return 10.0 + t
+
+
+@functools.cache
+def started() -> xr.Dataset:
+    return pk.run_up(disk(), omega1=speed, phi0=0.3, dphi0=0.2, t=[0.0, 0.1])
+
+
+@functools.cache
+def page() -> Any:
+    return pk.explore(pk.Pendulum(length=1.0))
+
+
+@functools.cache
 def rotor() -> Any:
     body = pk.GyroRotorDisk(**{k: v for k, v in DISK.items() if k != "half_span"})
     return pk.FreeGyroRotor(body, 0.1)
@@ -229,6 +280,7 @@ GOOD: dict[str, Callable[[], Any]] = {
     "system": lambda: pk.Coefficients(2.0, 1.0, 0.3),
     "disk": disk,
     "problem": problem,
+    "perturbed": driven,
     "dataset": dataset,
     "ds": dataset,
     "branches": branch,
@@ -259,6 +311,13 @@ GOOD: dict[str, Callable[[], Any]] = {
     "inertia": lambda: np.eye(3),
     "masses": lambda: [1.0, 2.0],
     "positions": lambda: [[0.0, 0.0, 1.0], [0.0, 1.0, 0.0]],
+    "amplitude": lambda: 0.1,
+    "frequency": lambda: 1.0,
+    "plasma_frequency": lambda: 1.0,
+    "mean_motion": lambda: 1.0,
+    "asymmetry": lambda: 1e-4,
+    "eccentricity": lambda: 0.2,
+    "rate": lambda: 1e-8,
     "matrix": lambda: np.eye(3),
     "vector": lambda: [1.0, 0.0, 0.0],
     "angular_velocity": lambda: [1.0, 0.0, 0.0],
@@ -300,6 +359,12 @@ GOOD: dict[str, Callable[[], Any]] = {
                 "K",
                 "h_x",
                 "h_y",
+                "plasma_frequency",
+                "second_harmonic",
+                "flux",
+                "mean_motion",
+                "asymmetry",
+                "strength",
             ),
             0.7,
         ),
@@ -332,6 +397,33 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "rotators": {"dphi": lambda: 0.2},
     "sweep": {"axes": lambda: {"A": [1.0, 2.0]}, "workers": lambda: None},
     "diagram": {"options": lambda: pk.ContinuationOptions(max_points=10), "depth": lambda: 1},
+    "periodic_orbit": {
+        "problem": oscillator, "x0": lambda: [2.0, 0.0], "period": lambda: 6.4,
+        "options": lambda: pk.ContinuationOptions(intervals=10),
+    },
+    "stroboscopic": {"n": lambda: 2},
+    "lyapunov": {"time": lambda: 5.0},
+    "attractors": {"phi": lambda: [-1.0, 1.0], "dphi": lambda: [0.0], "period": lambda: None},
+    "basins": {"phi": lambda: [-1.0, 1.0], "dphi": lambda: [0.0], "periods": lambda: 100},
+    "poincare_section": {"section": lambda: 0.5, "dphi0": lambda: 0.2},
+    "resonances": {"n": lambda: 2},
+    "quiet_frequencies": {"n": lambda: 2},
+    "escape_rate": {"perturbed": lambda: pk.Perturbed(GOOD["system"](), damping=0.5, kT=0.1)},
+    "capture": {
+        "perturbed": lambda: pk.Perturbed(GOOD["system"](), damping=0.5, drift={"C": 0.1}),
+    },
+    "run_up": {"omega1": lambda: speed, "t": lambda: [0.0, 0.1]},
+    "JosephsonJunction.shunt": {"stewart_mccumber": lambda: 4.0},
+    "SpinOrbit.resonance": {"p": lambda: 1.5},
+    "SpinOrbit.tides": {"p": lambda: 1.5},
+    "Explorer.save": {"path": lambda: "page.html"},
+    "CycleBranch.save": {"path": lambda: "branch.zarr"},
+    "CycleBranch.extend": {"points": lambda: 1},
+    "CycleBranch.orbit": {"i": lambda: -1},
+    "plot.basins": {"dataset": shares},
+    "plot.poincare_section": {"dataset": section},
+    "plot.run_up": {"dataset": started},
+    "plot.damped_portrait": {"perturbed": damped},
     "FreeGyroRotor": {"disk": lambda: rotor().disk},
     "FreeGyroRotor.trajectory": {"span": lambda: (0.0, 0.5)},
     "Potential": {"parameters": dict},
@@ -361,6 +453,12 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "ContinuationOptions": pk.ContinuationOptions,
     "Branch": branch,
     "SpecialPoint": lambda: branch().special_points[0],
+    "CycleBranch": cycles,
+    "Perturbed": driven,
+    "Harmonic": lambda: pk.Harmonic(0.1, 1.0),
+    "JosephsonJunction": lambda: pk.JosephsonJunction(plasma_frequency=1.0),
+    "SpinOrbit": lambda: pk.SpinOrbit(mean_motion=1.0, asymmetry=1e-4),
+    "Explorer": page,
     "FreeGyroRotor": rotor,
     "GyroRotorDisk": disk,
     "Coefficients": lambda: pk.Coefficients(2.0, 1.0, 0.3),
@@ -379,8 +477,13 @@ INSTANCES: dict[str, Callable[[], Any]] = {
 }
 
 
-#: Calls that take longer than a test should: spans over hundreds of decades.
+#: Calls that take longer than a test should: spans over hundreds of decades ...
 LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surface")}
+#: ... and motions so fast or long that they take all the steps they may before they are given up.
+_MOTIONS = ("attractors", "basins", "lyapunov", "poincare_section", "run_up", "stroboscopic")
+LONG |= {(name, value) for name in _MOTIONS for value in ("1e16", "1e200", "huge in list")}
+#: Warnings that are part of an answer, by how they begin: the grid is too coarse, motions are lost.
+ANNOUNCED = ("basin: ", "motion_phi: ")
 
 
 def callables() -> dict[str, Callable[..., Any]]:
