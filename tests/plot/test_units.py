@@ -1,5 +1,6 @@
 """Quantities are shown in the units that are asked for by their names."""
 
+import functools
 import inspect
 
 import numpy as np
@@ -10,43 +11,93 @@ import phasekit as pk
 DEG, MM, RPM = 180.0 / np.pi, 1000.0, 30.0 / np.pi
 EIGHT = pk.Coefficients(1.0, 0.4, 0.1)
 DISK = pk.GyroRotorDisk(beta=1.4, e=0.05, a=0.012, r=0.2, omega1=31.4, m=2.0, half_span=0.2, g=9.81)
-MOTION = pk.flow(DISK, 0.5, 3.0, np.linspace(0.0, 2.0, 51))
-MAP = pk.sweep(
-    DISK,
-    beta=np.linspace(0.2, 1.5, 9),
-    a=np.linspace(-0.06, 0.06, 7),
-    of=("equilibria", "separatrices", "separatrix_forces"),
-)
-ATLAS = pk.branches(DISK, "beta", (0.2, 1.5))
-SET = pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
-DIAGRAM = pk.diagram(DISK, "beta", span=(0.05, 1.5))
-LOOP = pk.quasi_static(DISK.replace(beta=1.2), omega1=np.linspace(5.0, 40.0, 9), phi0=3.0)
+
+
+@functools.cache
+def the_motion():
+    return pk.flow(DISK, 0.5, 3.0, np.linspace(0.0, 2.0, 51))
+
+
+@functools.cache
+def the_map():
+    return pk.sweep(
+        DISK,
+        beta=np.linspace(0.2, 1.5, 9),
+        a=np.linspace(-0.06, 0.06, 7),
+        of=("equilibria", "separatrices", "separatrix_forces"),
+    )
+
+
+@functools.cache
+def the_atlas():
+    return pk.branches(DISK, "beta", (0.2, 1.5))
+
+
+@functools.cache
+def the_set():
+    return pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
+
+
+@functools.cache
+def the_diagram():
+    return pk.diagram(DISK, "beta", span=(0.05, 1.5))
+
+
+@functools.cache
+def the_loop():
+    return pk.quasi_static(DISK.replace(beta=1.2), omega1=np.linspace(5.0, 40.0, 9), phi0=3.0)
+
+
 SWINGS = pk.Problem(
     ["v", "-a*v - sin(phi) + 0.2*cos(t)"], ("phi", "v"), {"a": 0.3}, periods={"phi": 2 * np.pi},
     time="t", period=2 * np.pi,
 )  # fmt: skip
-CYCLES = pk.continuation(SWINGS, "a", orbit=pk.periodic_orbit(SWINGS, [0.0, 0.0]), span=(0.2, 0.5))
+
+
+@functools.cache
+def the_cycles():
+    return pk.continuation(
+        SWINGS, "a", orbit=pk.periodic_orbit(SWINGS, [0.0, 0.0]), span=(0.2, 0.5)
+    )
+
+
 DAMPED = pk.Perturbed(EIGHT, damping=0.2)
-FATES = pk.basins(DAMPED, phi=np.linspace(-3.0, 3.0, 25), dphi=np.linspace(-1.5, 1.5, 21))
-SECTION = pk.stroboscopic(
-    pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.6, 1.0)), [0.1, 0.4], 0.0, n=30
-)
+
+
+@functools.cache
+def the_fates():
+    return pk.basins(DAMPED, phi=np.linspace(-3.0, 3.0, 25), dphi=np.linspace(-1.5, 1.5, 21))
+
+
+@functools.cache
+def the_section():
+    return pk.stroboscopic(
+        pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.6, 1.0)), [0.1, 0.4], 0.0, n=30
+    )
+
+
 STILL, EVEN = DISK.replace(omega1=0.0), np.linspace(0.0, 2.0, 41)
-SPEEDING = pk.run_up(STILL, omega1=lambda t: 5.0 * t, phi0=0.1, dphi0=0.0, t=EVEN)
+
+
+@functools.cache
+def the_speeding():
+    return pk.run_up(STILL, omega1=lambda t: 5.0 * t, phi0=0.1, dphi0=0.0, t=EVEN)
+
+
 STATE_UNITS = ({"phi": "deg", "dphi": "rpm"}, (DEG, RPM), ("(°)", "(rpm)"))
 P = pk.plot
 SPAN = {"xlim": (0.2, 1.5), "ylim": (-0.05, 0.05), "cells": 4, "legend": False}
 
 #: A picture, the units asked for, what both axes are multiplied by, and words at them.
 CASES = {
-    "basins": (lambda **o: P.basins(FATES, **o), *STATE_UNITS),
+    "basins": (lambda **o: P.basins(the_fates(), **o), *STATE_UNITS),
     "damped_portrait": (
         lambda **o: P.damped_portrait(DAMPED, orbits=(1.0, 0.5), **o),
         *STATE_UNITS,
     ),
-    "poincare_section": (lambda **o: P.poincare_section(SECTION, **o), *STATE_UNITS),
+    "poincare_section": (lambda **o: P.poincare_section(the_section(), **o), *STATE_UNITS),
     "run_up": (
-        lambda **o: P.run_up(SPEEDING, **o),
+        lambda **o: P.run_up(the_speeding(), **o),
         {"time": "ms", "force": "kN", "omega1": "rpm"},
         (1e3, 1e-3),
         ("(ms)", "(kN)"),
@@ -64,19 +115,19 @@ CASES = {
         ("", r"(°/s$^2$)"),
     ),
     "bifurcation_diagram": (
-        lambda **o: P.bifurcation_diagram(ATLAS, **o),
+        lambda **o: P.bifurcation_diagram(the_atlas(), **o),
         {"beta": "deg"},
         (DEG, 1.0),
         ("(°)", "(rad)"),
     ),
     "branch": (
-        lambda **o: P.branch(DIAGRAM, **o),
+        lambda **o: P.branch(the_diagram(), **o),
         {"beta": "deg", "phi": "degrees"},
         (DEG, DEG),
         ("(°)", "(°)"),
     ),
     "bifurcation_set": (
-        lambda **o: P.bifurcation_set(SET, **o),
+        lambda **o: P.bifurcation_set(the_set(), **o),
         {"beta": "deg", "a": "mm"},
         (DEG, MM),
         ("(°)", "(mm)"),
@@ -94,13 +145,13 @@ CASES = {
         ("(kN)", "(kN)"),
     ),
     "bearing_forces": (
-        lambda **o: P.bearing_forces(MOTION, x="time", **o),
+        lambda **o: P.bearing_forces(the_motion(), x="time", **o),
         {"time": "ms", "force": "kN"},
         (1e3, 1e-3),
         ("(ms)", "(kN)"),
     ),
     "bearing_load_map": (
-        lambda **o: P.bearing_load_map(MAP, **o),
+        lambda **o: P.bearing_load_map(the_map(), **o),
         {"beta": "deg", "a": "mm"},
         (DEG, MM),
         ("(°)", "(mm)"),
@@ -112,19 +163,19 @@ CASES = {
         (r"(°/s$^2$)", r"(°/s$^2$)"),
     ),
     "hysteresis_loop": (
-        lambda **o: P.hysteresis_loop(LOOP, **o),
+        lambda **o: P.hysteresis_loop(the_loop(), **o),
         {"phi": "deg", "omega1": "rpm"},
         (RPM, DEG),
         ("(rpm)", "(°)"),
     ),
     "multipliers": (  # pure numbers
-        lambda **o: P.multipliers(CYCLES, **o),
+        lambda **o: P.multipliers(the_cycles(), **o),
         {"beta": "deg"},
         (1.0, 1.0),
         ("multipliers", "part"),
     ),
     "parameter_map": (
-        lambda **o: P.parameter_map(MAP, "exponent", equilibrium="lower_saddle", **o),
+        lambda **o: P.parameter_map(the_map(), "exponent", equilibrium="lower_saddle", **o),
         {"beta": "deg", "a": "mm"},
         (DEG, MM),
         ("(°)", "(mm)"),
@@ -142,7 +193,7 @@ CASES = {
         ("(rad$^2$/s)", "(rpm)"),
     ),
     "time_history": (
-        lambda **o: P.time_history(MOTION, "motion_dphi", **o),
+        lambda **o: P.time_history(the_motion(), "motion_dphi", **o),
         {"time": "ms", "dphi": "rpm"},
         (1e3, RPM),
         ("(ms)", "(rpm)"),
@@ -198,13 +249,13 @@ def test_degrees_by_name_are_degrees_of_all():
     for line, same in zip(one.lines, other.lines, strict=True):
         np.testing.assert_allclose(line.get_data(), same.get_data(), rtol=1e-14)
     assert one.get_ylabel() == other.get_ylabel() == r"$\dot\varphi$ (°/s)"
-    mixed = P.parameter_map(MAP, angles="deg", units={"beta": "rad"})
+    mixed = P.parameter_map(the_map(), angles="deg", units={"beta": "rad"})
     assert mixed.get_xlabel().endswith("(rad)")
 
 
 def test_colors_have_units_too():
-    bar = P.bearing_load_map(MAP, units={"peak_force": "kN"}).collections[0]
-    plain = P.bearing_load_map(MAP).collections[0]
+    bar = P.bearing_load_map(the_map(), units={"peak_force": "kN"}).collections[0]
+    plain = P.bearing_load_map(the_map()).collections[0]
     np.testing.assert_allclose(bar.get_array(), plain.get_array() / 1000.0)
     assert bar.colorbar.ax.get_ylabel().endswith("(kN)")
     colored = P.phase_portrait(EIGHT, color_by="period", units={"period": "ms"})
@@ -214,9 +265,9 @@ def test_colors_have_units_too():
 @pytest.mark.parametrize("draw", [P.bifurcation_diagram, P.parameter_map, P.time_history])
 def test_a_dataset_in_other_units_is_drawn_in_them(draw):
     ds = {
-        P.bifurcation_diagram: MAP.isel(a=3, drop=False),
-        P.parameter_map: MAP,
-        P.time_history: MOTION,
+        P.bifurcation_diagram: the_map().isel(a=3, drop=False),
+        P.parameter_map: the_map(),
+        P.time_history: the_motion(),
     }[draw]
     options = {"variable": "fold_margin"} if draw is P.parameter_map else {}
     other = ds.copy()
@@ -238,7 +289,7 @@ def test_a_dataset_in_other_units_is_drawn_in_them(draw):
 
 def test_a_map_in_other_units_is_selected_in_them():
     three = pk.sweep(
-        DISK, beta=MAP.beta.values[::2], a=MAP.a.values[::2], omega1=[10.0, 20.0, 30.0]
+        DISK, beta=the_map().beta.values[::2], a=the_map().a.values[::2], omega1=[10.0, 20.0, 30.0]
     )
     speeds = three.omega1
     other = three.assign_coords(omega1=("omega1", speeds.values * RPM, {"units": "rpm"}))
@@ -269,7 +320,7 @@ def test_a_map_in_other_units_is_selected_in_them():
 def test_wrong_units_are_named(units, message):
     for draw in (P.parameter_map, P.bearing_load_map):
         with pytest.raises(pk.ParameterError, match=message):
-            draw(MAP, units=units)
+            draw(the_map(), units=units)
     with pytest.raises(pk.ParameterError, match=message):
         P.phase_portrait(DISK, units=units)
 
