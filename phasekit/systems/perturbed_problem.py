@@ -10,7 +10,6 @@ from typing import Any
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import forcing_names
-from phasekit.systems.perturbed import Perturbed
 
 #: What is added to the potential; kT is noise, of which a periodic orbit knows nothing.
 ADDED = ("damping", "quadratic", "torque")
@@ -18,7 +17,7 @@ LONGEST = 100  # periods of the first harmonic that a common period may have
 ULP = 2.0**-52
 
 
-def formulas_of(system: Perturbed) -> tuple[list[Any], tuple[str, str], dict[str, float], Any]:
+def formulas_of(system: Any) -> tuple[list[Any], tuple[str, str], dict[str, float], Any]:
     """Right-hand side, states, parameters and keywords of the `Problem` of a system.
 
     Frequencies of further harmonics stay in their ratio to the first, which is the parameter.
@@ -83,7 +82,7 @@ def ratios_of(frequencies: Sequence[float]) -> list[Fraction]:
     return found
 
 
-def _refuse(system: Perturbed) -> None:
+def _refuse(system: Any) -> None:
     """What a problem with periodic orbits cannot hold, by name."""
     wants = "none, to continue it: a Problem holds damping, torque and forcing"
     if system.modulation:

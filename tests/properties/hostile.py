@@ -417,6 +417,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "SpinOrbit.resonance": {"p": lambda: 1.5},
     "SpinOrbit.tides": {"p": lambda: 1.5},
     "Explorer.save": {"path": lambda: "page.html"},
+    "plot.multipliers": {"branch": cycles},
     "CycleBranch.save": {"path": lambda: "branch.zarr"},
     "CycleBranch.extend": {"points": lambda: 1},
     "CycleBranch.orbit": {"i": lambda: -1},

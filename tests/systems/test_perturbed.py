@@ -94,8 +94,9 @@ def test_a_table_of_time():
     table = pk.Perturbed(DISK, omega1=([0.0, 1.0], [1.0, 2.0]))
     assert [column.tolist() for column in table.omega1] == [[0.0, 1.0], [1.0, 2.0]]
     assert pickle.loads(pickle.dumps(table)) == table
+    ds = pk.sweep(table, damping=[0.1], of="equilibria")
     with pytest.raises(pk.ParameterError, match="is not stored"):
-        pk.sweep(table, damping=[0.1], of="equilibria")
+        ds.phasekit.system()
 
 
 def test_the_euler_force_of_a_particle():
