@@ -202,9 +202,19 @@ def _manifold(
     root = np.sqrt(exponent**2 + 0.25 * damping**2)
     rate = -0.5 * damping + (-root if stable else root)
     length = NEAR * (1.0 if period is None else period / TURN)
-    times = np.linspace(0.0, GROWTHS / abs(rate), 6001) * np.sign(rate)
-    motion = flow(system, phi + side * length, side * length * rate, times)
-    return motion.motion_phi.values, motion.motion_dphi.values
+    times = np.linspace(0.0, 1.0 / rate, SAMPLES + 1)
+    x, v = np.array([phi + side * length]), np.array([side * length * rate])
+    farthest = np.inf if period is None else 0.5 * period  # steps that still show a curve
+    # By parts: against damping speeds, and with them turns and work, grow exponentially.
+    for _ in range(GROWTHS):
+        motion = flow(system, x[-1], v[-1], times)
+        x = np.append(x, motion.motion_phi.values[1:])
+        v = np.append(v, motion.motion_dphi.values[1:])
+        shown = np.abs(np.diff(x)) < farthest
+        if not shown.all():
+            end = 1 + int(np.argmin(shown))
+            return x[:end], v[:end]
+    return x, v
 
 
 def _duration(system: Perturbed, saddles: FloatArray) -> float:

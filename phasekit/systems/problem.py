@@ -14,15 +14,13 @@ from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labels.arguments import bad, flag, reals, unknown
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.as_system import as_system, stands_on
 from phasekit.systems.perturbed_problem import formulas_of
 from phasekit.systems.problem_parts import clock_of, make_field, names_of, values_of
 from phasekit.systems.system import MODELS, Model
 
 FloatArray = npt.NDArray[np.float64]
-
-PERTURBED = (PerturbedTrigonometric, PerturbedConservative)
 
 
 class Problem:
@@ -370,7 +368,7 @@ def as_problem(problem: Any) -> Problem:
     """
     if isinstance(problem, Problem):
         return problem
-    if isinstance(problem, Model) and issubclass(problem.rung, PERTURBED):
+    if isinstance(problem, Model) and issubclass(problem.rung, PerturbedConservative):
         f, states, values, keywords = formulas_of(problem)
         return Problem(f, states, values, **keywords)
     if isinstance(problem, Model):
