@@ -23,6 +23,8 @@ Flags = npt.NDArray[np.bool_]
 MOST_BOXES = 1 << 16
 #: Relative width at which a box that nothing decides is given up: a multiple zero, or a pole.
 NARROW = 1e-9
+#: Half the spacing of doubles next to one.
+UNIT = 2.0**-53
 #: A box is tested a little larger than it is, so that zeros on its faces lie inside.
 INFLATED = 0.05
 
@@ -97,6 +99,8 @@ def zeros_in_box(
     system = _System(f, states, values)
     whole = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     width = whole[1] - whole[0]
+    # Nothing is cut that is only a few doubles wide.
+    narrowest = np.maximum(NARROW * width, 8.0 * UNIT * np.max(np.abs(whole), axis=0))
     lows, highs = whole[0][None, :], whole[1][None, :]
     sure: list[tuple[Array, Array, Array]] = []
     lost: list[tuple[Array, Array]] = []
@@ -107,7 +111,7 @@ def zeros_in_box(
         keep, one, centers, lows, highs = _judge(system, lows, highs, width)
         sure += [(c, a, b) for c, a, b in zip(centers[one], lows[one], highs[one], strict=True)]
         keep &= ~one
-        narrow = np.all(highs - lows <= NARROW * width, axis=1) & keep
+        narrow = np.all(highs - lows <= narrowest, axis=1) & keep
         if narrow.any():
             lost.append((lows[narrow], highs[narrow]))
         lows, highs = _halved(lows[keep & ~narrow], highs[keep & ~narrow], width)
@@ -140,16 +144,19 @@ def _judge(
     with np.errstate(all="ignore"):
         value = 0.5 * (at[0] + at[1])
         blur = 0.5 * (at[1] - at[0])
+        # A sum of n products is off by n rounded units at most, of the products' sizes.
+        rounding = UNIT * (2 * system.n + 6)
         step = np.einsum("kij,kj->ki", inverse, value)
         size = np.abs(inverse)
-        error = np.einsum("kij,kj->ki", size, blur + 8e-16 * np.abs(value))
-        spread = 0.5 * (slopes[1] - slopes[0]) + 8e-16 * np.abs(center)
+        error = np.einsum("kij,kj->ki", size, blur + rounding * np.abs(value))
+        spread = 0.5 * (slopes[1] - slopes[0]) + rounding * np.abs(center)
         eye = np.eye(system.n)
         off = np.abs(eye - np.einsum("kij,kjl->kil", inverse, center))
         off += np.einsum("kij,kjl->kil", size, spread)
-        reach = 0.5 * (wide_high - wide_low)
-        radius = (error + np.einsum("kij,kj->ki", off, reach)) * (1.0 + 1e-12)
-    radius += 4e-16 * (np.abs(middle) + np.abs(step))
+        off += rounding * eye
+        reach = np.maximum(wide_high - middle, middle - wide_low)
+        radius = (error + np.einsum("kij,kj->ki", off, reach)) * (1.0 + 2.0 * rounding)
+    radius += 4.0 * UNIT * (np.abs(middle) + np.abs(step))
     k_low, k_high = middle - step - radius, middle - step + radius
     one = usable & np.all((k_low > wide_low) & (k_high < wide_high), axis=1)
     apart = usable & np.any((k_low > high) | (k_high < low), axis=1)

@@ -16,7 +16,6 @@ from phasekit.cells.dispatch import pass_from, passes_of
 from phasekit.cells.states import at_states
 from phasekit.labelled.orbits import noted
 from phasekit.labels.arguments import NumberLike, bad, number, state_arguments
-from phasekit.motion.flow import ATOL, RTOL
 from phasekit.systems.as_system import as_system
 from phasekit.systems.perturbed import Perturbed
 from phasekit.table.quantities import select
@@ -124,6 +123,8 @@ def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, floa
     ParameterError
         If one is no number, or so small that rounding hides it.
     """
+    from phasekit.motion.flow import ATOL, RTOL
+
     found = {}
     for name, value, default in (("rtol", rtol, RTOL), ("atol", atol, ATOL)):
         wants = "a number from 1e-14 to 0.1"

@@ -32,12 +32,13 @@ class _Compiling(event.Listener):
     def __init__(self) -> None:
         self.depth = 0  # compiling one function compiles those that it calls
         self.timer: threading.Timer | None = None
+        self.told = False  # once a process is enough
         self.lock = threading.Lock()
 
     def on_start(self, started: Any) -> None:
         with self.lock:
             self.depth += 1
-            if self.depth == 1 and _is_ours(started) and watched():
+            if self.depth == 1 and not self.told and _is_ours(started) and watched():
                 self.timer = threading.Timer(PATIENCE, self.tell)
                 self.timer.daemon = True
                 self.timer.start()
@@ -50,6 +51,7 @@ class _Compiling(event.Listener):
                 self.timer = None
 
     def tell(self) -> None:
+        self.told = True
         print(
             "phasekit: compiling once for this machine, which takes some seconds",
             file=sys.stderr,
@@ -62,4 +64,5 @@ def _is_ours(started: Any) -> bool:
     return str(getattr(function, "__module__", "")).startswith("phasekit.")
 
 
-event.register("numba:compile", _Compiling())  # type: ignore[no-untyped-call]
+_COMPILING = _Compiling()
+event.register("numba:compile", _COMPILING)  # type: ignore[no-untyped-call]

@@ -16,6 +16,7 @@ from phasekit.numerics import waits
 def terminal(monkeypatch):
     monkeypatch.setattr(waits, "watched", lambda: True)
     monkeypatch.setattr(waits, "PATIENCE", 0.01)
+    monkeypatch.setattr(waits._COMPILING, "told", False)
 
 
 def compiled(module, seconds=0.0):
@@ -35,6 +36,7 @@ def compiled(module, seconds=0.0):
 
 
 def test_compiling_is_said_once(terminal, capfd):
+    compiled("phasekit.made_up", 0.3)
     compiled("phasekit.made_up", 0.3)
     text = "phasekit: compiling once for this machine, which takes some seconds\n"
     assert capfd.readouterr().err == text

@@ -179,17 +179,6 @@ def _ways(ground: Ground, x: Array, side: float) -> Array:
     return way if period is None else way % period
 
 
-def _level(ground: Ground, states: States) -> npt.NDArray[np.bool_]:
-    """Equilibria, but for centers, at the energy of the orbit within rounding."""
-    flat = ground.points.kind != EquilibriumKind.CENTER
-    return np.asarray(flat & (np.abs(states.excess) <= states.blur))
-
-
-def _nearest_level(ground: Ground, states: States, side: float) -> Array:
-    way = _ways(ground, states.x, side)
-    return np.asarray(np.min(np.where(_level(ground, states), way, np.inf), axis=1, initial=np.inf))
-
-
 def resting_ends(ground: Ground, states: States) -> list[tuple[Index, Array]]:
     """For each side (left, right), the equilibrium at which an orbit comes to rest, and how far.
 
