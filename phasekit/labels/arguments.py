@@ -35,9 +35,9 @@ __all__ += [
 ]
 
 #: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
-NumberLike: TypeAlias = float | Sequence[float] | NDArray[Any] | xr.DataArray
+NumberLike: TypeAlias = "float | Sequence[float] | NDArray[Any] | xr.DataArray"
 #: What is kept of it: a float, a read-only 1-D array, or a DataArray of float64.
-Value: TypeAlias = float | FloatArray | xr.DataArray
+Value: TypeAlias = "float | FloatArray | xr.DataArray"
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

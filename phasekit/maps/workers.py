@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import pickle
-import signal
 import sys
-import threading
 import types
 from collections import Counter
 from collections.abc import Generator, Iterable, Iterator
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import wait
 from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from phasekit.errors import StoreError
 from phasekit.maps.interrupts import noted, unheard
 from phasekit.maps.tile import Tile, compute, release_buffers
+from phasekit.maps.worker_process import work
 
 #: How often a tile is begun again whose worker process ended, or a process that did not get to one.
 RESTARTS = 3
@@ -136,7 +134,7 @@ class _Worker:
     def __init__(self) -> None:
         self.pipe, theirs = multiprocessing.Pipe()
         self.tile: Tile | None = None
-        self.process = SpawnProcess(target=_work, args=(theirs,), daemon=True)
+        self.process = SpawnProcess(target=work, args=(theirs,), daemon=True)
         with theirs, unheard(), _no_main():
             self.process.start()
 
@@ -160,38 +158,6 @@ class _Worker:
         self.process.kill()
         self.process.join()
         self.pipe.close()
-
-
-def _work(pipe: Connection) -> None:
-    """Compute the tiles that come, and answer for each; the first answer says that it can begin.
-
-    It ends with its parent, however that ends.
-    """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if "fork" in multiprocessing.get_all_start_methods():
-        # Then locks, as those of codecs, have no names, which the system kept after a kill.
-        multiprocessing.set_start_method("fork", force=True)
-    parent = multiprocessing.parent_process()
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    import zarr  # noqa: F401  # loaded while the parent is not ready, as are the kernels
-
-    import phasekit.numerics.launch  # noqa: F401
-
-    with contextlib.suppress(EOFError, OSError):
-        pipe.send("")
-        while True:
-            tile = pipe.recv()
-            try:
-                compute(tile)
-            except StoreError as error:
-                pipe.send(str(error))
-            else:
-                pipe.send("")
-
-
-def _end_with(parent: Any) -> None:
-    parent.join()
-    os._exit(1)
 
 
 @contextlib.contextmanager

@@ -1,5 +1,6 @@
 """Sweeps into stores: the same map in every way, and only what is new is computed."""
 
+import pickle
 import shutil
 import subprocess
 import sys
@@ -446,6 +447,32 @@ def test_processes_are_started_for_long_work_alone(tmp_path, monkeypatch):
         monkeypatch.setattr(run, "FEW_SECONDS", seconds)
         pk.sweep(DISK, axes, store=tmp_path / f"{number}.zarr", of=CODES, chunks=50)
     assert started == [3]
+
+
+AS_IN_A_WORKER = """
+import pickle, sys
+from phasekit.maps.worker_process import Later
+sys.modules["xarray"] = Later("xarray")
+calls = pickle.load(open(sys.argv[1], "rb"))
+from phasekit.maps.tile import compute_cells
+for call in calls:
+    assert compute_cells(*call)["n_equilibria"].max() == 4
+assert "pandas" not in sys.modules, "labels were loaded"
+import xarray
+assert xarray.DataArray([1.0]).item() == 1.0
+assert type(sys.modules["xarray"]).__name__ == "module"
+"""
+
+
+def test_worker_processes_start_without_labels(tmp_path, monkeypatch):
+    calls = []
+    original = tile.compute_cells
+    monkeypatch.setattr(tile, "compute_cells", lambda *call: calls.append(call) or original(*call))
+    pk.sweep(DISK, AXES, store=tmp_path / "map.zarr", of=CODES, workers=1)
+    assert calls
+    (tmp_path / "calls").write_bytes(pickle.dumps(calls))
+    command = [sys.executable, "-c", AS_IN_A_WORKER, str(tmp_path / "calls")]
+    subprocess.run(command, check=True, timeout=120)
 
 
 # ------------------------------------------------------------------------------ options
