@@ -42,8 +42,10 @@ Value: TypeAlias = "float | FloatArray | xr.DataArray"
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
+def unknown(what: str, name: object, valid: Iterable[str], listed: str = "") -> ParameterError:
     """Return the error for a name that is not one of `valid`, with the nearest of them.
+
+    Where they are too many for a message, `listed` says what lists them.
 
     >>> print(unknown("axis", "bata", ["beta", "e"]))
     axis 'bata' is unknown; did you mean 'beta'? Valid are: beta, e
@@ -51,6 +53,9 @@ def unknown(what: str, name: object, valid: Iterable[str]) -> ParameterError:
     names = list(dict.fromkeys(valid))
     text = f"{what} {describe(name)} is unknown"
     near = difflib.get_close_matches(name, names, n=1) if isinstance(name, str) else []
+    if listed:
+        text += f"; did you mean {near[0]!r}?" if near else ";"
+        return ParameterError(f"{text} {listed} lists those that are valid")
     text += f"; did you mean {near[0]!r}? Valid are: " if near else "; valid are: "
     return ParameterError(text + ", ".join(names))
 

@@ -116,7 +116,8 @@ def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
                 f"of: got {name!r}, which needs an argument of its own; call pk.{row.group}"
             )
         if not isinstance(name, str) or (name not in offered and name not in offered.groups):
-            raise unknown("of: the quantity", name, [*offered.groups, *offered])
+            valid = [*offered.groups, *offered]
+            raise unknown("of: the quantity", name, valid, listed="pk.quantities()")
         wanted.update([name] if name in offered else offered.groups[name])
     return tuple(row for row in QUANTITIES if row.name in wanted)
 
