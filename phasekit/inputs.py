@@ -140,6 +140,9 @@ def reals(argument: str, value: Any, wants: str) -> FloatArray:
     """
     if type(value) is float:
         return np.array(value)
+    if type(value) is np.ndarray and value.dtype.kind in "iuf":
+        with np.errstate(over="ignore"):  # of numbers in extended precision
+            return value.astype(np.float64)
     if is_labelled(value):
         raise bad(argument, value, wants, "arrays with named dims have their numbers in .values")
     if hasattr(value, "magnitude") or (hasattr(value, "unit") and hasattr(value, "to_value")):

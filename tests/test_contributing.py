@@ -1,5 +1,6 @@
 """The worked examples of the contributing guide run as they stand, and do what they say."""
 
+import json
 import re
 from pathlib import Path
 
@@ -7,9 +8,12 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+import xarray as xr
+from scipy.integrate import solve_ivp
 
 import phasekit as pk
 from phasekit.laws.ladder import Conservative
+from phasekit.systems.perturbed_parts import RATES
 from phasekit.systems.registry import models
 from phasekit.systems.system import MODELS
 from phasekit.table import quantities
@@ -27,11 +31,11 @@ SECTIONS = dict(
 @pytest.fixture(autouse=True)
 def registries(monkeypatch):
     """The tables and registries as they were before."""
-    known, rows = dict(models()), dict(quantities.ROWS)
+    known, rows, rates = dict(models()), dict(quantities.ROWS), dict(RATES)
     monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
     monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
     yield
-    for registry, before in ((MODELS, known), (quantities.ROWS, rows)):
+    for registry, before in ((MODELS, known), (quantities.ROWS, rows), (RATES, rates)):
         registry.clear()
         registry.update(before)
     plt.close("all")
@@ -50,6 +54,8 @@ def test_every_example_of_the_guide_is_run_here():
     assert with_code == {
         "A new quantity",
         "A new system",
+        "A new perturbation",
+        "A new storage option",
         "A new picture",
         "Your own equations, with damping",
     }
@@ -122,6 +128,47 @@ def test_a_system_is_one_class():
     assert pk.plot.phase_portrait(satellite).lines
     with pytest.raises(pk.ParameterError, match="shape: got 2, wants a number from -1 to 1"):
         satellite.replace(shape=2)
+
+
+def test_a_perturbation_is_a_torque():
+    """The seat in the carousel's frame in space, by Newton's law with its tension left out."""
+    names = run("A new perturbation")
+    motion, seat = names["motion"], names["seat"]
+
+    def rate(t, state):
+        phi, speed = state
+        omega, alpha = np.tanh(0.3 * t), 0.3 / np.cosh(0.3 * t) ** 2
+        along, up = np.array([np.cos(phi), 0.0, np.sin(phi)]), np.array([0.0, 0.0, 1.0])
+        place = np.array([seat.length * np.sin(phi), -seat.rim, -seat.length * np.cos(phi)])
+        fictitious = np.cross(omega * up, np.cross(omega * up, place))
+        fictitious += np.cross(alpha * up, place)  # Coriolis acts across the plane
+        force = along @ (-9.81 * up - fictitious)
+        return speed, force / seat.length - 0.2 * speed
+
+    exact = solve_ivp(
+        rate, (0.0, 20.0), (0.0, 0.0), "DOP853", motion.time.values, rtol=1e-12, atol=1e-12
+    )
+    assert np.ptp(exact.y[0]) > 0.2
+    np.testing.assert_allclose(motion.motion_phi, exact.y[0], atol=1e-7)
+    with pytest.raises(pk.ParameterError, match="omega1: got"):
+        pk.Perturbed(pk.Pendulum(length=1.0), omega1=lambda t: t)
+
+
+def test_a_storage_option_is_a_field(tmp_path):
+    names = run("A new storage option")
+    disk, beta = names["disk"], names["ds"].beta.values
+    in_memory = pk.sweep(disk, beta=beta, of="equilibria")
+    xr.testing.assert_identical(names["ds"], in_memory)
+    # What one option made, calls with another go on with, and check.
+    options = names["StoreOptions"](compressor="zstd", workers=1)
+    store = tmp_path / "map.zarr"
+    names["sweep_into"](names["place_of"](store), names["request"], options)
+    written = json.loads((store / "phi" / "zarr.json").read_text("utf-8"))
+    assert written["codecs"][-2]["configuration"]["cname"] == "zstd"
+    longer = np.append(beta, 1.55)
+    ds = pk.sweep(disk, beta=longer, of="equilibria", store=store, workers=1)
+    xr.testing.assert_identical(ds.load(), pk.sweep(disk, beta=longer, of="equilibria"))
+    xr.testing.assert_identical(pk.open_map(store, verify=True).load(), ds)
 
 
 def test_a_picture_draws_what_is_there_as_numbers():

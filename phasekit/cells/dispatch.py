@@ -74,7 +74,7 @@ def rungs_of(group: str) -> set[type[Law]]:
 
 def is_offered(system: Model, group: str) -> bool:
     """Whether a group is computed on the rung of a system's law."""
-    return any(issubclass(system.rung, rung) for rung in rungs_of(group))
+    return any(group in one.groups and issubclass(system.rung, one.of) for one in quantities.PASSES)
 
 
 def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:

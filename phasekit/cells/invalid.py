@@ -27,13 +27,6 @@ def warn_of_invalid(system: Model, stacklevel: int = 2) -> None:
     stacklevel : int
         As `warnings.warn` has it, counted from the caller.
     """
-    text = invalid_cells(system)
-    if text:
-        warnings.warn(text, InvalidCellsWarning, stacklevel=stacklevel + 1)
-
-
-def invalid_cells(system: Model) -> str:
-    """Say which share of the cells has parameters that are not legal, and why; empty if few."""
     valid: list[xr.Variable] = []
     reasons = []
     for parameter in system.declared:
@@ -46,10 +39,12 @@ def invalid_cells(system: Model) -> str:
         dims = value.dims if isinstance(value, xr.DataArray) else (parameter.name,)
         valid.append(xr.Variable(dims, inside))
         reasons.append(_reason(parameter, np.asarray(value), inside))
+    if not reasons:
+        return
     share = _share_inside(valid)
-    if share > 1.0 - MANY:
-        return ""
-    return f"{100.0 * (1.0 - share):.3g} % of the cells are empty: {'; '.join(reasons)}"
+    if share <= 1.0 - MANY:
+        text = f"{100.0 * (1.0 - share):.3g} % of the cells are empty: {'; '.join(reasons)}"
+        warnings.warn(text, InvalidCellsWarning, stacklevel=stacklevel + 1)
 
 
 def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) -> str:

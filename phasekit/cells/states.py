@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import passes_of
 from phasekit.cells.evaluate import evaluate
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, numeric
@@ -61,7 +60,7 @@ def at_states(
     return evaluate(
         system,
         rows,
-        passes or passes_of(system, rows),
+        passes,
         states=kept,
         axis={name: "point" for name in kept if name not in AXES},
         called={name: argument for argument, (name, _) in states.items()},

@@ -8,12 +8,13 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.cells.evaluate import lay_out
+from phasekit.cells.request import ask
 from phasekit.labelled.accessor import PhasekitAccessor
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.memory import human
 from phasekit.maps.estimate import Estimate
-from phasekit.maps.job import Job, Left
+from phasekit.maps.job import Job
+from phasekit.maps.left import Left
 from phasekit.maps.marks import marks_of
 from phasekit.maps.place import Place, place_of
 from phasekit.maps.plan import Plan
@@ -22,7 +23,6 @@ from phasekit.maps.unfinished import COMPUTED
 from phasekit.maps.whole import open_map
 from phasekit.systems.identity import SCHEMA
 from phasekit.systems.registry import models
-from phasekit.table.quantities import plan_passes
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:
     rows = [row for one in left for row in one.part.rows]
     states = {name: ds[name] for name in STATES if name in ds.coords}
     values = {name: float(x) if not x.dims else x.load() for name, x in states.items()}
-    layout = lay_out(system, rows, plan_passes(rows), states=values, order=list(plan.sizes))
-    return Job(place, layout, plan, plan, tuple(left))
+    request = ask(system, rows, states=values, order=list(plan.sizes))
+    return Job(place, request, plan, plan, tuple(left))
 
 
 def _axis(name: str, coord: xr.DataArray) -> str:

@@ -9,7 +9,6 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.cells.dispatch import passes_of
 from phasekit.cells.evaluate import evaluate
 from phasekit.cells.invalid import warn_of_invalid
 from phasekit.labels.arguments import bad
@@ -125,4 +124,4 @@ def separatrices(system: Any) -> xr.Dataset:
 def _of_system(group: str, system: Any) -> xr.Dataset:
     system, rows = as_system(system), select(group)
     warn_of_invalid(system, stacklevel=3)
-    return evaluate(system, rows, passes_of(system, rows))
+    return evaluate(system, rows)

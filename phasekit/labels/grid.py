@@ -33,11 +33,7 @@ class Grid:
     sizes: dict[str, int]  # the dims in their order
     inputs: dict[str, xr.Variable]  # float64
     coords: dict[str, xr.Variable]  # of the dims alone
-
-    @property
-    def lazy(self) -> bool:
-        """Whether an input is chunked, so that nothing may be computed now."""
-        return any(given.chunks is not None for given in self.inputs.values())
+    lazy: bool  # whether an input is chunked, so that nothing may be computed now
 
     def dims_of(self, names: Iterable[str]) -> tuple[str, ...]:
         """Dims on which the named inputs depend, in the grid's order."""
@@ -90,13 +86,26 @@ def make_grid(
         that does not lie along it.
     """
     axis, called = axis or {}, called or {}
-    inputs = {name: _variable(name, value, axis.get(name, name)) for name, value in values.items()}
+    inputs: dict[str, xr.Variable] = {}
+    for name, value in values.items():
+        if isinstance(value, xr.DataArray):
+            inputs[name] = value.variable
+        else:
+            inputs[name] = variable(
+                () if isinstance(value, float) else (axis.get(name, name),), value
+            )
     owner: dict[str, str] = {}
     found: dict[str, int] = {}
     for name, given in inputs.items():
         argument = called.get(name, name)
         for dim, size in given.sizes.items():
-            _check_size(str(dim), size, argument, found, owner)
+            if found.setdefault(str(dim), size) != size:
+                raise ParameterError(
+                    f"{argument}: got {size} values along {dim!r}, wants {found[str(dim)]} as "
+                    f"{owner[str(dim)]} has; arrays pair along a dim only when their lengths are "
+                    "equal"
+                )
+            owner.setdefault(str(dim), argument)
             if str(dim) in inputs and inputs[str(dim)].dims != (dim,):
                 raise ParameterError(
                     f"{argument}: got the dim {dim!r}, but {dim!r} is an input that does not lie "
@@ -104,49 +113,29 @@ def make_grid(
                 )
     sizes = {dim: found[dim] for dim in order if dim in found}
     sizes.update(found)
-    return Grid(sizes, inputs, _dim_coords(values, inputs, called))
-
-
-def _variable(name: str, value: Value, dim: str) -> xr.Variable:
-    if isinstance(value, xr.DataArray):
-        return value.variable
-    return variable(() if isinstance(value, float) else (dim,), value)
-
-
-def _check_size(
-    dim: str, size: int, name: str, found: dict[str, int], owner: dict[str, str]
-) -> None:
-    if found.setdefault(dim, size) != size:
-        raise ParameterError(
-            f"{name}: got {size} values along {dim!r}, wants {found[dim]} as {owner[dim]} has; "
-            f"arrays pair along a dim only when their lengths are equal"
-        )
-    owner.setdefault(dim, name)
-
-
-def _dim_coords(
-    values: Mapping[str, Value], inputs: Mapping[str, xr.Variable], called: Mapping[str, str]
-) -> dict[str, xr.Variable]:
-    """Coordinates of the dims: an axis is its own, others come with the DataArrays."""
-    coords: dict[str, xr.Variable] = {}
-    for name, given in inputs.items():
-        if given.dims == (name,):
-            coords[name] = variable((name,), np.asarray(given.data))
+    coords = {  # an axis is its own coordinate, others come with the DataArrays
+        name: variable((name,), np.asarray(given.data))
+        for name, given in inputs.items()
+        if given.dims == (name,)
+    }
     for name, value in values.items():
-        if not isinstance(value, xr.DataArray):
+        if isinstance(value, xr.DataArray):
+            _add_coords(coords, value, called.get(name, name))
+    lazy = any(given.chunks is not None for given in inputs.values())
+    return Grid(sizes, inputs, coords, lazy)
+
+
+def _add_coords(coords: dict[str, xr.Variable], value: xr.DataArray, argument: str) -> None:
+    for dim in map(str, value.dims):
+        if dim not in value.coords:
             continue
-        argument = called.get(name, name)
-        for dim in map(str, value.dims):
-            if dim not in value.coords:
-                continue
-            coord = value.coords[dim].variable
-            known = coords.setdefault(dim, coord)
-            if not known.to_base_variable().equals(coord.to_base_variable()):  # type: ignore[no-untyped-call]
-                raise ParameterError(
-                    f"{argument}: got {describe(value)} whose coordinate {dim!r} differs from that "
-                    f"of another argument; align them with xr.align, or select the same {dim} first"
-                )
-    return coords
+        coord = value.coords[dim].variable
+        known = coords.setdefault(dim, coord)
+        if not known.to_base_variable().equals(coord.to_base_variable()):  # type: ignore[no-untyped-call]
+            raise ParameterError(
+                f"{argument}: got {describe(value)} whose coordinate {dim!r} differs from that "
+                f"of another argument; align them with xr.align, or select the same {dim} first"
+            )
 
 
 def combine(

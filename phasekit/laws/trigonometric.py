@@ -86,7 +86,7 @@ class Trigonometric(Conservative):
 
     def coefficients(self, values: Values) -> tuple[Any, Any, Any]:
         """A, B and C from floats or arrays that broadcast; NaN where N is not positive."""
-        *products, scale = self(values)
+        *products, scale = self.products(self.turned(values))
         scale = np.where(np.asarray(scale) > 0, scale, np.nan)
         A, B, C = (np.asarray(product / scale) for product in products)
         return A, B, C

@@ -15,7 +15,7 @@ import numpy as np
 from phasekit.errors import StoreError
 from phasekit.maps import files
 from phasekit.maps.marks import Chunk, Index, Mark, Marks, key_of, sound
-from phasekit.maps.parts import Part
+from phasekit.maps.parts import StoredPart
 from phasekit.maps.stored_arrays import codec
 
 AGAIN = "make the sweep's call again, which computes these tiles anew"
@@ -73,12 +73,12 @@ def place(part: Any, index: Index, sizes: Mapping[str, int]) -> str:
 class Damage:
     """A tile that is not what was written."""
 
-    part: Part
+    part: StoredPart
     index: Index
     what: str  # is wrong
 
 
-def lost_tiles(part: Part, marks: Marks, sizes: Mapping[str, int]) -> list[Damage]:
+def lost_tiles(part: StoredPart, marks: Marks, sizes: Mapping[str, int]) -> list[Damage]:
     """Return the tiles of a part that is said to be complete which have no mark."""
     if not part.complete or len(marks.done) == prod(part.grid(sizes)):
         return []
@@ -87,7 +87,7 @@ def lost_tiles(part: Part, marks: Marks, sizes: Mapping[str, int]) -> list[Damag
     return [Damage(part, index, "has no mark that it is done") for index in lost]
 
 
-def at_a_glance(store: Any, part: Part, known: Mapping[Index, Mark]) -> list[Damage]:
+def at_a_glance(store: Any, part: StoredPart, known: Mapping[Index, Mark]) -> list[Damage]:
     """Return the finished tiles whose files are gone or have another size."""
     found: dict[Index, Damage] = {}
     for row in part.rows:
@@ -109,7 +109,7 @@ def at_a_glance(store: Any, part: Part, known: Mapping[Index, Mark]) -> list[Dam
     return list(found.values())
 
 
-def in_full(store: Any, part: Part, known: Mapping[Index, Mark]) -> list[Damage]:
+def in_full(store: Any, part: StoredPart, known: Mapping[Index, Mark]) -> list[Damage]:
     """Return the finished tiles whose files are not what was written; all are read."""
     from zarr.core.buffer import default_buffer_prototype
     from zarr.core.sync import sync
@@ -155,6 +155,6 @@ def describe(damaged: Sequence[Damage], sizes: Mapping[str, int]) -> str:
     return "; ".join(named) + (f"; and {more} more tiles" if more else "")
 
 
-def _some(part: Part) -> str:
+def _some(part: StoredPart) -> str:
     names = list(part.quantities)
     return ", ".join(names[:3]) + (", ..." if names[3:] else "")

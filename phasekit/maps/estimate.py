@@ -11,6 +11,7 @@ from typing import Any
 from phasekit.cells.tiling import cut
 from phasekit.errors import StoreError
 from phasekit.labels.memory import human
+from phasekit.maps.left import Left
 from phasekit.maps.place import Place
 from phasekit.maps.stored_arrays import codecs
 from phasekit.maps.tile import Tile, compute_cells, release_buffers
@@ -22,9 +23,6 @@ SAMPLE_CELLS = 1 << 14
 SAMPLES = 4
 SAMPLE_SECONDS = 0.1
 LEAST_CELLS, MOST_CELLS = 1 << 13, 1 << 17
-
-#: Bytes that a file takes at least.
-FILE_BYTES = 4096
 
 
 @dataclass(frozen=True)
@@ -61,37 +59,17 @@ def duration(seconds: float) -> str:
     return f"{seconds:.0f} s"
 
 
-@dataclass(frozen=True)
-class Share:
-    """What is left of one part, and some of its tiles to take samples of."""
-
-    cells: int
-    tiles: int
-    rows: Sequence[Quantity]
-    samples: Sequence[Tile]
-
-    @property
-    def raw(self) -> int:
-        """Bytes before compression."""
-        return self.cells * sum(row.cell_bytes for row in self.rows)
-
-    @property
-    def overhead(self) -> int:
-        """Bytes that files and folders take beside what is in them, at most."""
-        return FILE_BYTES * (self.tiles * (len(self.rows) + 1) + 2 * len(self.rows))
-
-
-def estimate(shares: Sequence[Share]) -> Estimate:
-    """Estimate what is left, from samples."""
+def estimate(shares: Sequence[tuple[Left, Sequence[Tile]]]) -> Estimate:
+    """Estimate what is left of parts, each with samples of its tiles."""
     stored = seconds = 0.0
-    for share in shares:
-        ratio, rate = _sample(share.samples)
-        stored += share.raw * ratio + share.overhead
-        seconds += share.cells * rate
+    for left, samples in shares:
+        ratio, rate = _sample(samples)
+        stored += left.raw * ratio + left.overhead
+        seconds += left.cells * rate
     return Estimate(
-        sum(share.cells for share in shares),
-        sum(share.tiles for share in shares),
-        sum(share.raw for share in shares),
+        sum(left.cells for left, _ in shares),
+        sum(len(left) for left, _ in shares),
+        sum(left.raw for left, _ in shares),
         int(stored),
         seconds,
     )

@@ -19,7 +19,7 @@ import xarray as xr
 from google_crc32c import value as crc32c
 
 from phasekit.maps import files
-from phasekit.maps.parts import Part
+from phasekit.maps.parts import StoredPart
 from phasekit.maps.plan import Plan
 from phasekit.maps.plan_file import GROUP
 
@@ -71,7 +71,7 @@ def key_of(index: Sequence[int]) -> str:
     return ".".join(("c", *map(str, index)))
 
 
-def read_marks(store: Any, part: Part) -> dict[Index, Mark]:
+def read_marks(store: Any, part: StoredPart) -> dict[Index, Mark]:
     """Return the marks of a part; what cannot be read is none."""
     folder = f"{GROUP}/{part.name}"
     found = {}
@@ -87,7 +87,7 @@ def read_marks(store: Any, part: Part) -> dict[Index, Mark]:
     return found
 
 
-def _mark_of(data: bytes, part: Part) -> Mark | None:
+def _mark_of(data: bytes, part: StoredPart) -> Mark | None:
     if not sound(data):
         return None
     if not part.checked:
@@ -100,7 +100,7 @@ def _mark_of(data: bytes, part: Part) -> Mark | None:
 class Inputs:
     """Digests of what the tiles of a part are computed from: inputs, quantities, place."""
 
-    def __init__(self, plan: Plan, part: Part, values: Mapping[str, xr.Variable]) -> None:
+    def __init__(self, plan: Plan, part: StoredPart, values: Mapping[str, xr.Variable]) -> None:
         self.part = part
         made = [plan.model, part.dims, part.chunks, sorted(part.quantities.items())]
         self.seed = json.dumps([*made, part.inputs]).encode()
@@ -147,7 +147,11 @@ class Marks:
 
 
 def marks_of(
-    store: Any, plan: Plan, part: Part, values: Mapping[str, xr.Variable], old: Plan | None = None
+    store: Any,
+    plan: Plan,
+    part: StoredPart,
+    values: Mapping[str, xr.Variable],
+    old: Plan | None = None,
 ) -> Marks:
     """Return the marks of a part; those without checksums hold if the map was not shorter (old)."""
     inputs = Inputs(plan, part, values)

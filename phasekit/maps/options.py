@@ -3,13 +3,49 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from phasekit.cells.request import Request
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.table.row import Quantity
+
+
+@dataclass(frozen=True)
+class StoreOptions:
+    """How a map is put into a Zarr store, as a call asks for it: checked against its request."""
+
+    chunks: Mapping[str, int] = field(default_factory=dict)  # by dims; -1: the whole dim
+    dtypes: Mapping[str, str] = field(default_factory=dict)  # by the names of quantities
+    workers: int | None = None
+    client: Any = None
+    overwrite: bool = False
+    force: bool = False
+    compressor: str = "lz4"  # one of blosc's
+
+    @classmethod
+    def of(
+        cls,
+        request: Request,
+        chunks: Any = None,
+        dtype: Any = None,
+        workers: Any = None,
+        client: Any = None,
+        **flags: bool,
+    ) -> StoreOptions:
+        """Check what a call asks for.
+
+        Raises
+        ------
+        ParameterError
+        """
+        dtypes = check_dtypes(dtype, request.rows)
+        tiles = check_chunks(chunks, request.grid.sizes)
+        return cls(tiles, dtypes, check_workers(workers, client), client, **flags)
+
 
 #: What numbers can be stored as.
 FLOATS = ("float32", "float64")
@@ -72,14 +108,12 @@ def check_workers(workers: Any, client: Any) -> int | None:
     return number
 
 
-def refuse_without_store(**options: Any) -> None:
-    """Raise a `ParameterError` for options that only a Zarr store has."""
-    for name, value in options.items():
-        if value is not None and value is not False:
-            raise bad(
-                name,
-                value,
-                "None, for what is not put into a Zarr store tile by tile: maps without a store, "
-                "in a .nc file, or of a Potential",
-                "give store='map.zarr', or leave it out",
-            )
+def without_store(option: str, value: Any) -> ParameterError:
+    """Return the error for an option that only a Zarr store has; the caller raises it."""
+    return bad(
+        option,
+        value,
+        "None, for what is not put into a Zarr store tile by tile: maps without a store, "
+        "in a .nc file, or of a Potential",
+        "give store='map.zarr', or leave it out",
+    )

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import prod
 
-from phasekit.cells.evaluate import Box
+from phasekit.cells.request import Part
 from phasekit.errors import ParameterError
 from phasekit.labels.memory import SHARE, available_memory, human
 from phasekit.table.quantities import ROWS
@@ -26,8 +26,8 @@ TOO_SMALL = 16
 
 
 @dataclass(frozen=True)
-class Part:
-    """Quantities that are computed together, tile by tile."""
+class StoredPart:
+    """A part as a store has it: its name there, its tiles, and how its quantities are kept."""
 
     name: str
     dims: tuple[str, ...]
@@ -68,7 +68,9 @@ class Part:
         )
 
 
-def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str, int]) -> Part:
+def new_part(
+    name: str, part: Part, sizes: Mapping[str, int], chunks: Mapping[str, int]
+) -> StoredPart:
     """Cut the dims that the call leaves open into tiles that are about as long in each.
 
     Raises
@@ -76,42 +78,42 @@ def new_part(name: str, box: Box, sizes: Mapping[str, int], chunks: Mapping[str,
     ParameterError
         If the call asks for tiles that do not fit into memory, or arrays have no room.
     """
-    quantities = {row.name: row.dtype for row in box.rows}
-    whole = prod(sizes[dim] for dim in box.dims)
-    if whole * max(prod(row.label_shape) for row in box.rows) >= 2**63:
-        axes = " x ".join(f"{dim} {sizes[dim]}" for dim in box.dims)
+    quantities = {row.name: row.dtype for row in part.rows}
+    whole = prod(sizes[dim] for dim in part.dims)
+    if whole * max(prod(row.label_shape) for row in part.rows) >= 2**63:
+        axes = " x ".join(f"{dim} {sizes[dim]}" for dim in part.dims)
         raise ParameterError(
             f"axes: got {axes} = {whole:.3g} cells, wants fewer than 2^63 numbers in an array "
             "(9.2e18): such a map fits nowhere; take coarser axes or fewer of them"
         )
     cells = min(
         MOST_CELLS,
-        MOST_BYTES // sum(row.cell_bytes for row in box.rows),
+        MOST_BYTES // sum(row.cell_bytes for row in part.rows),
         max(FEWEST_CELLS, whole // FEWEST_TILES),
     )
     found = {
-        dim: sizes[dim] if chunks[dim] == -1 else chunks[dim] for dim in box.dims if dim in chunks
+        dim: sizes[dim] if chunks[dim] == -1 else chunks[dim] for dim in part.dims if dim in chunks
     }
     room = max(cells // prod(found.values()), 1)
-    open_dims = sorted((dim for dim in box.dims if dim not in found), key=lambda dim: sizes[dim])
+    open_dims = sorted((dim for dim in part.dims if dim not in found), key=lambda dim: sizes[dim])
     for place, dim in enumerate(open_dims):  # the shortest first: what it leaves, others take
         step = max(int(room ** (1.0 / (len(open_dims) - place)) + 1e-9), 1)
         pieces = -(-sizes[dim] // step)
         found[dim] = -(-sizes[dim] // pieces)
         room = max(room // found[dim], 1)
-    chunks_of = tuple(found[dim] for dim in box.dims)
-    part = Part(name, box.dims, chunks_of, quantities, inputs=tuple(sorted(box.names)))
-    _refuse_large_tiles(part)
-    return part
+    chunks_of = tuple(found[dim] for dim in part.dims)
+    stored = StoredPart(name, part.dims, chunks_of, quantities, inputs=tuple(sorted(part.inputs)))
+    _refuse_large_tiles(stored)
+    return stored
 
 
 def cut_again(
-    part: Part,
+    part: StoredPart,
     names: Iterable[str],
     before: Mapping[str, int],
     sizes: Mapping[str, int],
     chunks: Mapping[str, int],
-) -> Part:
+) -> StoredPart:
     """Return a part of a map that is made longer, cut as if it were new if its tiles are too small.
 
     Parameters
@@ -128,11 +130,11 @@ def cut_again(
         return part
     if not chunks.keys().isdisjoint(part.dims):
         return part
-    fresh = new_part(part.name, Box(part.dims, (), part.rows, tuple(names)), sizes, {})
+    fresh = new_part(part.name, Part(part.dims, (), part.rows, tuple(names)), sizes, {})
     return fresh if tiles > TOO_SMALL * prod(fresh.grid(sizes)) else part
 
 
-def _refuse_large_tiles(part: Part) -> None:
+def _refuse_large_tiles(part: StoredPart) -> None:
     """Refuse tiles that no process could hold; those cut here are never as large."""
     needed = prod(part.chunks) * part.cell_bytes
     available = available_memory() if needed > MOST_BYTES else None

@@ -19,10 +19,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.evaluate import Layout
+from phasekit.cells.request import Request
 from phasekit.errors import StoreError
 from phasekit.labels.coordinates import STATES
-from phasekit.maps.parts import Part, cut_again, new_part
+from phasekit.maps.options import StoreOptions
+from phasekit.maps.parts import StoredPart, cut_again, new_part
 
 #: Version of the layout of stores. In layout 1 nothing had checksums.
 LAYOUT = 2
@@ -36,7 +37,7 @@ class Plan:
     scalars: dict[str, float]
     arrays: dict[str, dict[str, Any]]  # name -> dims and fingerprint of its values
     sizes: dict[str, int]
-    parts: tuple[Part, ...]
+    parts: tuple[StoredPart, ...]
     ready: bool = False  # whether all arrays are in place
     earlier: tuple[dict[str, int], ...] = ()  # sizes of which tiles at the end may be left
     #: SHA-256 of each file that describes the arrays or holds a coordinate.
@@ -45,7 +46,7 @@ class Plan:
     before: dict[str, bytes | None] = field(default_factory=dict, compare=False)
 
     @property
-    def quantities(self) -> dict[str, Part]:
+    def quantities(self) -> dict[str, StoredPart]:
         """The part of each quantity."""
         return {name: part for part in self.parts for name in part.quantities}
 
@@ -59,16 +60,16 @@ class Plan:
         return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
 
 
-def new_plan(layout: Layout) -> Plan:
-    """Return the plan of a layout, without parts."""
-    inputs = layout.grid.inputs
+def new_plan(request: Request) -> Plan:
+    """Return the plan of a request, without parts."""
+    inputs = request.grid.inputs
     scalars = {name: float(x.data) for name, x in inputs.items() if not x.dims}
     arrays = {
         name: {"dims": list(map(str, x.dims)), "sha256": fingerprint(x)}
-        for name, x in {**layout.grid.coords, **inputs}.items()
+        for name, x in {**request.grid.coords, **inputs}.items()
         if x.dims
     }
-    return Plan(type(layout.system).__name__, scalars, arrays, dict(layout.grid.sizes), ())
+    return Plan(type(request.system).__name__, scalars, arrays, dict(request.grid.sizes), ())
 
 
 def fingerprint(values: xr.Variable) -> str:
@@ -84,7 +85,7 @@ def fingerprint(values: xr.Variable) -> str:
     return hashlib.sha256(kind.str.encode() + repr(array.shape).encode() + data).hexdigest()
 
 
-def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]) -> Plan:
+def continued(stored: Plan, request: Request, name: str, chunks: Mapping[str, int]) -> Plan:
     """Return the plan of a stored map that a call continues: the same, or with longer axes.
 
     Tiles that are far too small for longer axes are chosen anew, unless the call names `chunks`.
@@ -94,8 +95,8 @@ def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]
     StoreError
         If the call is for another map, with all differences.
     """
-    wanted = new_plan(layout)
-    found = list(_differences(stored, wanted, layout))
+    wanted = new_plan(request)
+    found = list(_differences(stored, wanted, request))
     if found:
         raise StoreError(
             f"store: {name} holds another map than the call asks for: {'; '.join(found)}; make "
@@ -103,7 +104,7 @@ def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]
         )
     sizes = {**stored.sizes, **{dim: wanted.sizes[dim] for dim in wanted.sizes}}
     grown = [dim for dim in stored.sizes if sizes[dim] != stored.sizes[dim]]
-    asked = {row.name for row in layout.rows}
+    asked = {row.name for row in request.rows}
     for part in stored.parts:
         left = [quantity for quantity in part.quantities if quantity not in asked]
         if left and not set(grown).isdisjoint(part.dims):
@@ -115,8 +116,10 @@ def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]
     parts = []
     for part in stored.parts:
         if not set(grown).isdisjoint(part.dims):
-            boxes = (b for b in layout.boxes() if any(r.name in part.quantities for r in b.rows))
-            names = {input for box in boxes for input in box.names}
+            asked_for = (
+                one for one in request.parts if any(row.name in part.quantities for row in one.rows)
+            )
+            names = {name for one in asked_for for name in one.inputs}
             part = replace(part, complete=False)
             part = cut_again(part, names, stored.sizes, sizes, chunks)
         parts.append(part)
@@ -132,12 +135,12 @@ def continued(stored: Plan, layout: Layout, name: str, chunks: Mapping[str, int]
     )
 
 
-def _differences(stored: Plan, wanted: Plan, layout: Layout) -> Iterable[str]:
+def _differences(stored: Plan, wanted: Plan, request: Request) -> Iterable[str]:
     """Name what keeps a call from continuing a map."""
     if stored.model != wanted.model:
         yield f"the model is {stored.model}, the call's {wanted.model}"
         return
-    required = {p.name for p in layout.system.declared if not p.optional} | set(stored.sizes)
+    required = {p.name for p in request.system.declared if not p.optional} | set(stored.sizes)
     for name in dict.fromkeys([*stored.scalars, *stored.arrays, *wanted.scalars, *wanted.arrays]):
         old, new = _shown(stored, name), _shown(wanted, name)
         if old is None or new is None:
@@ -150,14 +153,14 @@ def _differences(stored: Plan, wanted: Plan, layout: Layout) -> Iterable[str]:
         elif name in stored.scalars or name in wanted.scalars:
             yield f"{name} is {old}, in the call {new}"
         else:
-            yield from _array_differences(stored, wanted, layout, name)
+            yield from _array_differences(stored, wanted, request, name)
     common = [dim for dim in stored.sizes if dim in wanted.sizes]
     order = [dim for dim in wanted.sizes if dim in stored.sizes]
     if common != order:
         yield f"the order of its axes is {', '.join(common)}, in the call {', '.join(order)}"
 
 
-def _array_differences(stored: Plan, wanted: Plan, layout: Layout, name: str) -> Iterable[str]:
+def _array_differences(stored: Plan, wanted: Plan, request: Request, name: str) -> Iterable[str]:
     dims = stored.arrays[name]["dims"]
     if dims != wanted.arrays[name]["dims"]:
         yield f"{name} lies on {dims}, in the call on {wanted.arrays[name]['dims']}"
@@ -166,7 +169,7 @@ def _array_differences(stored: Plan, wanted: Plan, layout: Layout, name: str) ->
     if shorter:
         yield f"{name} is {_shown(stored, name)}, in the call {_shown(wanted, name)}"
         return
-    values = {**layout.grid.coords, **layout.grid.inputs}[name]
+    values = {**request.grid.coords, **request.grid.inputs}[name]
     if (
         fingerprint(values.isel({dim: slice(stored.sizes[dim]) for dim in dims}))
         != stored.arrays[name]["sha256"]
@@ -185,34 +188,25 @@ def _shown(plan: Plan, name: str) -> str | None:
     return f"an axis of {' and '.join(sizes)}"
 
 
-def with_parts(
-    plan: Plan, layout: Layout, chunks: Mapping[str, int], dtypes: Mapping[str, str], name: str
-) -> Plan:
-    """Add parts for what a layout computes and the plan does not hold.
-
-    Parameters
-    ----------
-    chunks : mapping of str to int
-        Sizes of tiles that the call asks for; -1: the whole dim.
-    dtypes : mapping of str to str
-        Dtypes of quantities that the call asks for.
+def with_parts(plan: Plan, request: Request, options: StoreOptions, name: str) -> Plan:
+    """Add parts for what a request computes and the plan does not hold.
 
     Raises
     ------
     StoreError
         If the map holds a quantity with another dtype or in other chunks.
     """
-    held = plan.quantities
-    for row in layout.rows:
-        part = held.get(row.name)
-        if part is None:
+    held, chunks, dtypes = plan.quantities, options.chunks, options.dtypes
+    for row in request.rows:
+        known = held.get(row.name)
+        if known is None:
             continue
-        if row.name in dtypes and dtypes[row.name] != part.quantities[row.name]:
+        if row.name in dtypes and dtypes[row.name] != known.quantities[row.name]:
             raise StoreError(
-                f"store: {name} holds {row.name} as {part.quantities[row.name]}, the call asks "
+                f"store: {name} holds {row.name} as {known.quantities[row.name]}, the call asks "
                 f"for {dtypes[row.name]}; choose another name, or pass overwrite=True"
             )
-        for dim, n in zip(part.dims, part.chunks, strict=True):
+        for dim, n in zip(known.dims, known.chunks, strict=True):
             if chunks.get(dim, n) not in (n, -1):
                 raise StoreError(
                     f"store: {name} holds {row.name} in chunks of {n} along {dim}, the call asks "
@@ -220,14 +214,14 @@ def with_parts(
                     "overwrite=True"
                 )
     parts = list(plan.parts)
-    for box in layout.boxes():
+    for part in request.parts:
         rows = tuple(
             replace(row, dtype=dtypes.get(row.name, row.dtype))
-            for row in box.rows
+            for row in part.rows
             if row.name not in held
         )
         if rows:
-            taken = {part.name for part in parts}
+            taken = {stored.name for stored in parts}
             free = next(n for n in map("part{}".format, itertools.count()) if n not in taken)
-            parts.append(new_part(free, replace(box, rows=rows), plan.sizes, chunks))
+            parts.append(new_part(free, replace(part, rows=rows), plan.sizes, chunks))
     return replace(plan, parts=tuple(parts))

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from phasekit.errors import ParameterError
-from phasekit.maps.parts import Part
+from phasekit.maps.parts import StoredPart
 from phasekit.maps.plan import LAYOUT, Plan
 from phasekit.table.quantities import ROWS
 
@@ -106,7 +106,7 @@ def plan_from(data: bytes) -> Plan:
 
 def _read(stored: Mapping[str, Any]) -> Plan:
     parts = tuple(
-        Part(
+        StoredPart(
             part["name"],
             tuple(part["dims"]),
             tuple(part["chunks"]),

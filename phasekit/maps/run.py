@@ -9,11 +9,11 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from phasekit.cells.evaluate import Layout
+from phasekit.cells.request import Request
 from phasekit.cells.tiling import progress_bar
 from phasekit.errors import StoreError
 from phasekit.maps import workers as run
@@ -22,6 +22,7 @@ from phasekit.maps.damage import describe
 from phasekit.maps.estimate import SAMPLE_CELLS, refuse_too_large_for
 from phasekit.maps.interrupts import noted
 from phasekit.maps.job import Job, plan_job
+from phasekit.maps.options import StoreOptions
 from phasekit.maps.place import Place
 from phasekit.maps.plan_file import CLEARED, PLAN_KEY, plan_bytes
 from phasekit.maps.stored_arrays import prepare, read_plan, write_plan
@@ -35,16 +36,7 @@ MANY_CELLS = 10_000_000
 
 
 def sweep_into(
-    place: Place,
-    layout: Layout,
-    *,
-    chunks: Mapping[str, int],
-    dtypes: Mapping[str, str],
-    workers: int | None = None,
-    client: Any = None,
-    progress: bool | None = None,
-    overwrite: bool = False,
-    force: bool = False,
+    place: Place, request: Request, options: StoreOptions, progress: bool | None = None
 ) -> None:
     """Compute what a store does not hold yet.
 
@@ -56,28 +48,27 @@ def sweep_into(
     place.refuse_file()
     refused = place.unwritable()
     if refused is not None:
-        if overwrite or _to_do(place, layout, chunks, dtypes):
+        if options.overwrite or _to_do(place, request, options):
             raise StoreError(refused)
         return  # complete, so that nothing is to be written
     with place.locked():
-        job = plan_job(
-            place, layout, chunks=chunks, dtypes=dtypes, overwrite=overwrite, verify=True
-        )
+        job = plan_job(place, request, options, verify=True)
         _say_damaged(job)
         tally = Tally(job)
         with contextlib.ExitStack() as stack:
             stack.enter_context(_told(tally))
+            client, workers = options.client, options.workers
             if client is not None:
                 client = stack.enter_context(connected(client))
             most = _most(job, workers, client)
             early = most > 1 and (workers is not None or job.cells > MANY_CELLS)
             staff = stack.enter_context(run.hired(most)) if early else None
-            processes = _weigh(job, most, workers, force)
+            processes = _weigh(job, most, workers, options.force)
             with _written(place):
                 if job.old is None:
                     place.clear({PLAN_KEY: plan_bytes(CLEARED)})
                 if job.plan != job.old:
-                    prepare(place, job.old, job.plan, layout)
+                    prepare(place, job.old, job.plan, request, options.compressor)
                 _compute(tally, staff or processes, client, progress)
                 _finish(job)
 
@@ -107,7 +98,7 @@ def _weigh(job: Job, most: int, workers: int | None, force: bool) -> int:
     """Refuse what will not fit, and return how many processes the work is worth."""
     freed = (job.place.size() or 0) if job.old is None and not job.place.empty else 0
     free = job.place.free_bytes()
-    most_bytes = sum(share.raw + share.overhead for share in job.shares(0))
+    most_bytes = sum(left.raw + left.overhead for left in job.left if len(left))
     tight = not force and free is not None and most_bytes > free + freed
     if not tight and (most <= 1 or job.cells <= SAMPLE_CELLS):
         return 1 if workers is None else most
@@ -212,13 +203,11 @@ def _finish(job: Job) -> None:
         write_plan(job.place, replace(plan, parts=parts, earlier=earlier))
 
 
-def _to_do(
-    place: Place, layout: Layout, chunks: Mapping[str, int], dtypes: Mapping[str, str]
-) -> bool:
+def _to_do(place: Place, request: Request, options: StoreOptions) -> bool:
     """Whether a call has anything to write."""
     if place.path is not None and not place.path.is_dir():
         return True
-    job = plan_job(place, layout, chunks=chunks, dtypes=dtypes)
+    job = plan_job(place, request, options)
     return job.plan != job.old or job.count > 0
 
 

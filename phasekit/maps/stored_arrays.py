@@ -16,14 +16,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.evaluate import Layout, assemble
+from phasekit.cells.evaluate import assemble
+from phasekit.cells.request import Request
 from phasekit.cells.schema import label_coords
 from phasekit.errors import ParameterError, PhasekitError, StoreError
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.maps import files
 from phasekit.maps.marks import key_of, marks_of
-from phasekit.maps.parts import Part
+from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan, fingerprint
 from phasekit.maps.plan_file import GROUP, PLAN_KEY, plan_bytes, plan_from
@@ -67,24 +68,25 @@ def write_plan(place: Place, plan: Plan) -> None:
     files.put(place.open(read_only=False), {PLAN_KEY: plan_bytes(plan)})
 
 
-def prepare(place: Place, old: Plan | None, plan: Plan, layout: Layout) -> None:
+def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compressor: str) -> None:
     """Make the store's arrays those of the plan; done again in whole if it is interrupted.
 
     Each document is written in one piece, and those that are there as they should be are left.
     Until the last one the plan keeps what there was, so that the map can be read meanwhile.
     """
     store = place.open(read_only=False)
-    ds = assemble(layout, {})
-    kept: dict[str, Part] = {}
+    ds = assemble(request, {})
+    kept: dict[str, StoredPart] = {}
     before: dict[str, bytes | None] = {}
     known: dict[str, str] = {}
     if old is None:
-        documents = _documents(ds, plan, {})
+        documents = _documents(ds, plan, {}, compressor)
         # What says that this is a map comes first, then what it will be.
         files.put(store, {"zarr.json": documents["zarr.json"]})
         write_plan(place, replace(plan, parts=()))
     else:
-        documents = _documents(ds, plan, dict(zarr_group(place.open(read_only=True)).attrs))
+        root = dict(zarr_group(place.open(read_only=True)).attrs)
+        documents = _documents(ds, plan, root, compressor)
         kept = {part.name: part for part in old.parts if _same_tiles(part, plan)}
         dropped = {row for part in old.parts if part.name not in kept for row in part.quantities}
         known = {k: v for k, v in old.documents.items() if k.split("/")[0] not in dropped}
@@ -109,12 +111,14 @@ def prepare(place: Place, old: Plan | None, plan: Plan, layout: Layout) -> None:
     write_plan(place, replace(plan, documents={**known, **digests}, before={}))
 
 
-def _same_tiles(part: Part, plan: Plan) -> bool:
+def _same_tiles(part: StoredPart, plan: Plan) -> bool:
     """Whether a part of the old plan is in the new one, cut as it was."""
     return any((part.name, part.chunks) == (other.name, other.chunks) for other in plan.parts)
 
 
-def _documents(ds: xr.Dataset, plan: Plan, root: Mapping[str, Any]) -> dict[str, bytes]:
+def _documents(
+    ds: xr.Dataset, plan: Plan, root: Mapping[str, Any], compressor: str
+) -> dict[str, bytes]:
     """Return what describes the arrays of a plan, and its coordinates, as they will be stored.
 
     They are made in memory, by xarray and zarr.
@@ -140,7 +144,7 @@ def _documents(ds: xr.Dataset, plan: Plan, root: Mapping[str, Any]) -> dict[str,
         _create_marks(group, part, part.grid(plan.sizes))
         for row in part.rows:
             shape = tuple(plan.sizes[dim] for dim in part.dims) + row.label_shape
-            _create(group, part, row, shape)
+            _create(group, part, row, shape, compressor)
     kept.pop(PLAN_KEY, None)  # is written last
     return {key: value.to_bytes() for key, value in kept.items()}
 
@@ -222,7 +226,7 @@ def _forget_marks(store: Any, old: Plan, plan: Plan) -> None:
             files.put(store, {f"{GROUP}/{part.name}/{key_of(i)}": None for i in sorted(others)})
 
 
-def _create_marks(group: Any, part: Part, shape: tuple[int, ...]) -> None:
+def _create_marks(group: Any, part: StoredPart, shape: tuple[int, ...]) -> None:
     from zarr.codecs import Crc32cCodec
 
     group.create_array(
@@ -246,7 +250,9 @@ def fill_value(row: Quantity) -> Any:
     return -1 if row.flags is None or -1 in {flag.value for flag in row.flags} else 0
 
 
-def _create(group: Any, part: Part, row: Quantity, shape: tuple[int, ...]) -> None:
+def _create(
+    group: Any, part: StoredPart, row: Quantity, shape: tuple[int, ...], compressor: str
+) -> None:
     attrs = dict(row.attrs)
     if "flag_values" in attrs:
         attrs["flag_values"] = attrs["flag_values"].tolist()
@@ -256,7 +262,7 @@ def _create(group: Any, part: Part, row: Quantity, shape: tuple[int, ...]) -> No
         chunks=part.chunks + row.label_shape,
         dtype=row.dtype,
         fill_value=fill_value(row),
-        compressors=codecs() if part.checked else [codec()],
+        compressors=codecs(compressor) if part.checked else [codec(compressor)],
         chunk_key_encoding={"name": "default", "separator": "."},
         dimension_names=(*part.dims, *row.dims),
         attributes=attrs,
@@ -264,15 +270,15 @@ def _create(group: Any, part: Part, row: Quantity, shape: tuple[int, ...]) -> No
     )
 
 
-def codec() -> Any:
-    """Return the codec that compresses stored results."""
+def codec(compressor: str = "lz4") -> Any:
+    """Return the codec that compresses stored results; it reads what any compressor wrote."""
     from zarr.codecs import BloscCodec
 
-    return BloscCodec(cname="lz4", clevel=5, shuffle="shuffle")
+    return BloscCodec(cname=compressor, clevel=5, shuffle="shuffle")
 
 
-def codecs() -> list[Any]:
+def codecs(compressor: str = "lz4") -> list[Any]:
     """Return the codecs of stored results: compression, then a checksum."""
     from zarr.codecs import Crc32cCodec
 
-    return [codec(), Crc32cCodec()]
+    return [codec(compressor), Crc32cCodec()]

@@ -7,28 +7,23 @@ from dataclasses import replace
 from os import PathLike
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from phasekit.cells.dispatch import inputs_of, is_offered, passes_of
-from phasekit.cells.evaluate import Layout, evaluate, lay_out, leaves
+from phasekit.cells.evaluate import compute
 from phasekit.cells.invalid import warn_of_invalid
+from phasekit.cells.request import Request, ask, needs_of
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.memory import refuse_too_large
 from phasekit.maps.job import Job, plan_job
-from phasekit.maps.options import (
-    check_chunks,
-    check_dtypes,
-    check_workers,
-    refuse_without_store,
-)
+from phasekit.maps.options import StoreOptions, check_dtypes, without_store
 from phasekit.maps.whole import WholeTarget, open_map, target_of
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
 from phasekit.table.quantities import select
-from phasekit.table.row import Pass, Quantity
+from phasekit.table.row import Quantity
 
 #: What is computed where nothing is said, as far as the system's law offers it.
 OFFERED = ("equilibria", "separatrices")
@@ -122,31 +117,32 @@ def sweep(
         flag("progress", progress)
     place = None if store is None else target_of(store)
     system = as_system(system)
+    rows = select(of)
+    if of is OFFERED:
+        rows = tuple(row for row in rows if is_offered(system, row.group))
     if place is not None and not place.is_netcdf and system.rung.labels_fixed:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
-        layout, dtypes = _lay_out(system, axes, of, dtype, axes_by_name)
-        warn_of_invalid(layout.system)
-        sweep_into(
-            place,
-            layout,
-            chunks=check_chunks(chunks, layout.grid.sizes),
-            dtypes=dtypes,
-            workers=check_workers(workers, client),
-            client=client,
-            progress=progress,
-            overwrite=overwrite,
-            force=force,
+        request = _asked(system, axes, axes_by_name, rows, loaded=True)
+        options = StoreOptions.of(
+            request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
+        warn_of_invalid(request.system)
+        sweep_into(place, request, options, progress)
         return open_map(store)
-    refuse_without_store(chunks=chunks, workers=workers, client=client, force=force)
-    swept, rows, passes, states, order = _read(system, axes, of, axes_by_name)
-    dtypes = check_dtypes(dtype, rows)
-    rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
+    for name, value in {
+        "chunks": chunks, "workers": workers, "client": client, "force": force or None
+    }.items():  # fmt: skip
+        if value is not None:
+            raise without_store(name, value)
     target = None if place is None else WholeTarget(place, overwrite=overwrite)
-    warn_of_invalid(swept)
-    more = inputs_of(swept, rows)
-    ds = evaluate(swept, (*rows, *more), passes, states=states, order=order, progress=progress)
+    more = () if system.rung.labels_fixed else inputs_of(system, rows)
+    if dtype is not None:
+        dtypes = check_dtypes(dtype, rows)
+        rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
+    request = _asked(system, axes, axes_by_name, (*rows, *more))
+    warn_of_invalid(request.system)
+    ds = compute(request, progress)
     if more:
         own = {dim for row in rows for dim in row.dims}
         unasked = {row.name for row in more} | {dim for row in more for dim in row.dims} - own
@@ -167,46 +163,41 @@ def plan_sweep(
     overwrite: bool = False,
 ) -> Job:
     """Return what `sweep` with a Zarr store would have to do; nothing is computed or written."""
-    layout, dtypes = _lay_out(system, axes, of, dtype, {})
-    tiles = check_chunks(chunks, layout.grid.sizes)
-    return plan_job(target_of(store), layout, chunks=tiles, dtypes=dtypes, overwrite=overwrite)
+    request = _asked(as_system(system), axes, {}, select(of), loaded=True)
+    options = StoreOptions.of(request, chunks, dtype, overwrite=overwrite)
+    return plan_job(target_of(store), request, options)
 
 
-def _lay_out(
-    system: Any,
+def _asked(
+    system: Model,
     axes: Mapping[str, Any] | None,
-    of: Any,
-    dtype: Any,
     by_name: Mapping[str, Any],
-) -> tuple[Layout, dict[str, str]]:
-    swept, rows, passes, states, order = _read(system, axes, of, by_name)
-    dtypes = check_dtypes(dtype, rows)
-    # A stored map needs its axes whole, however it is cut.
-    swept = swept.replace(**_loaded(swept.parameters))
-    return lay_out(swept, rows, passes, states=_loaded(states), order=order), dtypes
+    rows: tuple[Quantity, ...],
+    *,
+    loaded: bool = False,
+) -> Request:
+    """Return what is computed along axes, whose dims come first; chunked axes `loaded` if so."""
+    swept, states, called = _swept(system, axes, by_name, rows)
+    if loaded:
+        swept, states = swept.replace(**_loaded(swept.parameters)), _loaded(states)
+    kept = {**swept.parameters, **states}
+    order = {
+        str(dim): None
+        for name in called
+        for value in [kept[name]]
+        if not isinstance(value, float)
+        for dim in (value.dims if isinstance(value, xr.DataArray) else (name,))
+    }
+    return ask(swept, rows, states=states, order=tuple(order))
 
 
-def _read(
-    system: Any, axes: Mapping[str, Any] | None, of: Any, by_name: Mapping[str, Any]
-) -> tuple[Model, tuple[Quantity, ...], tuple[Pass, ...], dict[str, Value], list[str]]:
-    """Return the system with its axes, what to compute and how, the states, the order of dims."""
-    system = as_system(system)
-    rows = select(of)
-    if of is OFFERED:
-        rows = tuple(row for row in rows if is_offered(system, row.group))
-    along = (*rows, *inputs_of(system, rows))
-    passes = passes_of(system, along)
-    needed = {name for one in passes for name in leaves(system, one.inputs, passes)}
-    kept = _axes(system, axes, by_name, [name for name in STATES if name in needed])
-    states = {name: value for name, value in kept.items() if name in STATES}
-    order = list(dict.fromkeys(dim for name, value in kept.items() for dim in _dims(name, value)))
-    swept = system.replace(**{name: x for name, x in kept.items() if name not in STATES})
-    return swept, rows, passes_of(swept, along), states, order  # with what only the axes give
-
-
-def _axes(
-    system: Model, axes: Mapping[str, Any] | None, by_name: Mapping[str, Any], states: list[str]
-) -> dict[str, Value]:
+def _swept(
+    system: Model,
+    axes: Mapping[str, Any] | None,
+    by_name: Mapping[str, Any],
+    rows: tuple[Quantity, ...],
+) -> tuple[Model, dict[str, Value], dict[str, str]]:
+    """Return the system along its axes, the states, and what the call calls each of them."""
     if axes is not None and not isinstance(axes, Mapping):
         raise bad("axes", axes, "a mapping of parameter names to values, {'beta': [...], ...}")
     given = dict(axes or {})
@@ -214,28 +205,39 @@ def _axes(
         if name in given:
             raise ParameterError(f"{name}: got it in axes and as a keyword, wants it once")
     given.update(by_name)
-    valid = [parameter.name for parameter in system.declared] + states
-    kept: dict[str, Value] = {}
-    for key, value in given.items():
-        name = key if key in valid else _state_called(key, system)
-        if name not in valid:
-            raise _unknown_axis(system, key, valid)
-        if name in kept or (name != key and name in given):
+    declared = [parameter.name for parameter in system.declared]
+    called: dict[str, str] = {}
+    for key in given:
+        name = key if key in declared or key in STATES else _state_called(key, system)
+        if name not in declared and name not in STATES:
+            raise _unknown_axis(system, key, rows)
+        if name in called or (name != key and name in given):
             raise ParameterError(f"{key}: got it besides {name}, wants it once")
-        kept[name] = numeric(key, value, system.unit_of(name))
-        if isinstance(kept[name], float) and name not in states:
-            raise bad(
-                name,
-                value,
-                "a 1-D list, array or range of values to sweep over",
-                f"to change a fixed parameter use system.replace({name}=...)",
-            )
-    if not kept and all(isinstance(v, float) for v in system.parameters.values()):
+        called[name] = key
+    if not called and all(isinstance(v, float) for v in system.parameters.values()):
+        valid = _valid(system, rows)
         raise ParameterError(
             f"axes: got none, wants at least one of {', '.join(valid)}, "
             f"as in pk.sweep(system, {valid[0]}=[...])"
         )
-    return kept
+    if any(name in STATES for name in called):
+        valid = _valid(system, rows)
+        for name, key in called.items():
+            if name not in valid:
+                raise _unknown_axis(system, key, rows)
+    swept = system.replace(**{name: given[name] for name in called if name in declared})
+    states: dict[str, Value] = {}
+    for name, key in called.items():
+        if name not in declared:
+            states[name] = numeric(key, given[key], system.unit_of(name))
+        elif isinstance(swept.parameters.get(name, 0.0), float):
+            raise bad(
+                name,
+                given[key],
+                "a 1-D list, array or range of values to sweep over",
+                f"to change a fixed parameter use system.replace({name}=...)",
+            )
+    return swept, states, called
 
 
 def _state_called(key: Any, system: Model) -> str:
@@ -247,7 +249,16 @@ def _state_called(key: Any, system: Model) -> str:
     return "time" if stem == "t" else f"state_{stem}"
 
 
-def _unknown_axis(system: Model, name: Any, valid: list[str]) -> ParameterError:
+def _valid(system: Model, rows: tuple[Quantity, ...]) -> list[str]:
+    """The parameters and states along which rows can be swept."""
+    needs = needs_of(system, passes_of(system, (*rows, *inputs_of(system, rows))))
+    needed = {name for names in needs.values() for name in names}
+    declared = [parameter.name for parameter in system.declared]
+    return declared + [name for name in STATES if name in needed]
+
+
+def _unknown_axis(system: Model, name: Any, rows: tuple[Quantity, ...]) -> ParameterError:
+    valid = _valid(system, rows)
     if name in ("lam", "psi", "A", "B", "C"):
         other = "system.reduced()" if name in ("lam", "psi") else "system.coefficients()"
         return ParameterError(
@@ -255,12 +266,6 @@ def _unknown_axis(system: Model, name: Any, valid: list[str]) -> ParameterError:
             f"or one of {', '.join(valid)}"
         )
     return unknown(f"axis of {type(system).__name__}:", name, valid)
-
-
-def _dims(name: str, value: Value) -> tuple[str, ...]:
-    if isinstance(value, xr.DataArray):
-        return tuple(map(str, value.dims))
-    return (name,) if isinstance(value, np.ndarray) else ()
 
 
 def _loaded(values: Mapping[str, Value]) -> dict[str, Value]:

@@ -14,7 +14,7 @@ from xarray.core import indexing
 from phasekit.errors import StoreError
 from phasekit.maps.damage import Damage, at_a_glance, in_full, lost_tiles, refuse
 from phasekit.maps.marks import Marks, marks_of, read_marks
-from phasekit.maps.parts import Part
+from phasekit.maps.parts import StoredPart
 from phasekit.maps.plan import Plan
 from phasekit.maps.stored_arrays import refuse_damaged, zarr_group
 from phasekit.systems.identity import MODEL
@@ -98,7 +98,9 @@ class _Tiles(NamedTuple):
     sizes: Mapping[str, int]
 
 
-def _done(part: Part, marks: Marks, sizes: Mapping[str, int]) -> tuple[Part, list[_Tiles]]:
+def _done(
+    part: StoredPart, marks: Marks, sizes: Mapping[str, int]
+) -> tuple[StoredPart, list[_Tiles]]:
     found = [_Tiles(np.zeros(part.grid(sizes), bool), sizes)]
     for index in marks.done:
         found[0].marks[index] = True
@@ -118,7 +120,7 @@ class _Computed(BackendArray):
         self,
         dims: tuple[str, ...],
         sizes: Mapping[str, int],
-        done: list[tuple[Part, list[_Tiles]]],
+        done: list[tuple[StoredPart, list[_Tiles]]],
     ) -> None:
         self.dims = dims
         self.shape = tuple(sizes[dim] for dim in dims)

@@ -60,7 +60,8 @@ def launch(
 
     ``weight`` says how many times the usual work a cell takes.
     """
-    check_threads(threads)
+    if threads is not None:
+        check_threads(threads)
     first = _interpret(kernel, arrays, size, groups, weight)
     if first == size:
         return
@@ -100,7 +101,7 @@ def _interpret(
     return size
 
 
-def check_threads(threads: int | None) -> None:
+def check_threads(threads: int) -> None:
     """Refuse a number of threads that is none."""
-    if threads is not None and (not isinstance(threads, int) or threads < 1):
+    if not isinstance(threads, int) or threads < 1:
         raise ParameterError(f"threads: got {threads!r}, wants a number of threads >= 1, or None")

@@ -102,7 +102,7 @@ def damped_portrait(
     saddles = points[points[:, 1] == EquilibriumKind.SADDLE]
     if not len(saddles):
         raise bad("perturbed", system, "a system with a saddle", "its torque may be too large")
-    starts = starts_of_pairs(orbits)
+    starts = [] if orbits is None else starts_of_pairs(orbits)
     axes = style.axes_for(ax, legend=legend)
     curves = [*_manifolds(system, saddles, period), *_orbits(system, saddles, starts)]
     # Of one kind of manifold the speeds may grow without end: backwards in time, where damped.

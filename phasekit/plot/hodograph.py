@@ -191,8 +191,10 @@ def _draw_levels(
 ) -> list[Artist]:
     """Draw the hodographs of levels, of separatrices where nothing is asked for, of orbits."""
     land = tip.land
-    starts = starts_of(land, orbits)
-    chosen = [] if energies is None and orbits is not None else levels_of(land, energies)
+    starts = [] if orbits is None else starts_of(land, orbits)
+    chosen = [] if energies is None else levels_of(land, energies)
+    if energies is None and orbits is None:
+        chosen = land.levels()
     for level in chosen:
         for arc in land.arcs_of(level):
             look = strokes.level_look(land, arc)

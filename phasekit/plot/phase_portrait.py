@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.labels.arguments import bad, one_of, reals
-from phasekit.phase.answers import Answers, answers
+from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
 from phasekit.plot.parts.circle import Circle
@@ -107,7 +107,7 @@ def phase_portrait(
     axes = style.axes_for(ax, legend=legend)
     land, scale = picture.land, picture.scale
     curves = [(level[0], arc) for level in picture.levels for arc in land.arcs_of(level)]
-    colors = _colors(axes, picture, curves, color_by)
+    colors = _colors(axes, picture, curves, color_by) if color_by else [None] * len(curves)
     for (energy, arc), color in zip(curves, colors, strict=True):
         look = strokes.level_look(land, arc, color)
         strokes.draw_level(axes, land, energy, arc, scale, zorder=1, **look)
@@ -122,7 +122,7 @@ def phase_portrait(
     picture.coordinate_axis(axes)
     name = picture.symbol
     name = name if name[1:].isalpha() else f"{{{name}}}"  # \varphi needs no braces
-    unit = picture.units.text(picture.rate, picture.held[picture.rate])
+    unit = picture.units.text(*picture.rate)
     axes.set_ylabel(rf"$\dot{name}$" + (f" ({unit})" if unit else ""))
     if legend:
         style.legend_below(axes, handles)
@@ -140,12 +140,25 @@ class Shown:
 
 @dataclass(frozen=True)
 class Picture:
-    """What portrait and well show of a system: its level curves, levels, orbits, axis."""
+    """What portrait and well show of a system: its level curves, levels, orbits, axis.
+
+    Attributes
+    ----------
+    rate : (str, str)
+        Name of the coordinate's rate, and the unit in which it is held.
+    symbol : str
+        The coordinate for print.
+    scale : (float, float)
+        What the coordinate and its rate are multiplied by to be shown.
+    """
 
     land: LevelCurves
     levels: list[Level]
     starts: list[strokes.State]
     units: Units
+    rate: tuple[str, str]
+    symbol: str
+    scale: strokes.Scale
 
     @classmethod
     def of(
@@ -159,37 +172,23 @@ class Picture:
         """Check the arguments of a picture."""
         land = curves_of(system)
         known = land.answers
-        if style.angle_factor(shown.angles) != 1.0 and not known.is_angle:
+        place = known.coordinate, "rad" if known.is_angle else ""
+        rate = f"d{known.coordinate}", "s-1" if known.is_angle else ""
+        units = Units.of(shown.angles, shown.units, dict((place, rate)))
+        if units.angles != "rad" and not known.is_angle:
             wants = "'rad' for a coordinate that is not an angle of period 2 pi"
             raise bad("angles", shown.angles, wants)
-        units = Units.of(shown.angles, shown.units, _held(known))
+        scale = units.scale(*place), units.scale(*rate)
         if shown.cut is not None:
             if known.period is None:
                 raise bad("cut", shown.cut, "None, for the coordinate is not on a circle")
-            scale = units.scale(known.coordinate, _held(known)[known.coordinate])
-            land = LevelCurves(known, Circle.cut_at(shown.cut, scale, known.period).low)
-        return cls(land, levels_of(land, energies, density), starts_of(land, orbits), units)
-
-    @property
-    def rate(self) -> str:
-        """The name of the coordinate's rate."""
-        return f"d{self.land.answers.coordinate}"
-
-    @property
-    def held(self) -> dict[str, str]:
-        """The units in which the coordinate and its rate are held."""
-        return _held(self.land.answers)
-
-    @property
-    def scale(self) -> strokes.Scale:
-        """What the coordinate and its rate are multiplied by to be shown."""
-        first, second = (self.units.scale(*item) for item in self.held.items())
-        return first, second
-
-    @property
-    def symbol(self) -> str:
-        """The coordinate for print."""
-        return labels.coordinate_symbol(self.land.answers.coordinate)
+            land = LevelCurves(known, Circle.cut_at(shown.cut, scale[0], known.period).low)
+        chosen = (
+            land.levels(1.0 / (6.0 * density)) if energies is None else levels_of(land, energies)
+        )
+        starts = [] if orbits is None else starts_of(land, orbits)
+        symbol = labels.coordinate_symbol(known.coordinate)
+        return cls(land, chosen, starts, units, rate, symbol, scale)
 
     def reach(self, *, given: bool) -> float:
         """Return the greatest speed to show: past the separatrices, and past what was asked for."""
@@ -218,27 +217,21 @@ class Picture:
         ax.set_xlabel(labels.wrap(text, style.letters(ax, "x")))
 
 
-def _held(known: Answers) -> dict[str, str]:
-    """Return the units in which a coordinate and its rate are held, in this order."""
-    held = ("rad", "s-1") if known.is_angle else ("", "")
-    return dict(zip((known.coordinate, f"d{known.coordinate}"), held, strict=True))
-
-
 def curves_of(system: Any) -> LevelCurves:
     """Return the level curves of one system."""
     return LevelCurves(answers(*single(system)))
 
 
 def _colors(
-    ax: Axes, picture: Picture, curves: list[tuple[float, Arc]], color_by: str | None
+    ax: Axes, picture: Picture, curves: list[tuple[float, Arc]], color_by: str
 ) -> list[str | None]:
     """Return the color of each level curve, and draw the color bar."""
     land = picture.land
-    values = np.array([land.orbit(arc, energy, color_by) for energy, arc in curves if color_by])
-    held = "" if color_by is None else COLORED[color_by][land.answers.units]
-    values = values * picture.units.scale(str(color_by), held)
+    values = np.array([land.orbit(arc, energy, color_by) for energy, arc in curves])
+    held = COLORED[color_by][land.answers.units]
+    values = values * picture.units.scale(color_by, held)
     limits = color_bar.log_limits(values)
-    if color_by is None or limits is None:
+    if limits is None:
         return [None] * len(curves)
     text = labels.with_unit(color_by, picture.units.text(color_by, held))
     mappable = color_bar.log_bar(ax, limits, text)
@@ -246,10 +239,8 @@ def _colors(
     return [None if np.isnan(v) else to_hex(c) for v, c in zip(values, colors, strict=True)]
 
 
-def levels_of(land: LevelCurves, energies: ArrayLike | None, density: float = 1.0) -> list[Level]:
-    """Return the levels to draw: those asked for, or a choice."""
-    if energies is None:
-        return land.levels(1.0 / (6.0 * density))
+def levels_of(land: LevelCurves, energies: ArrayLike) -> list[Level]:
+    """Return the levels that are asked for."""
     unit = {"s-2": "s^-2"}.get(land.answers.units, land.answers.units or "the unit of V")
     array = _finite(energies, "energies", unit)
     if array.ndim > 1:
@@ -261,7 +252,7 @@ def levels_of(land: LevelCurves, energies: ArrayLike | None, density: float = 1.
     return levels
 
 
-def starts_of(land: LevelCurves, orbits: ArrayLike | None) -> list[strokes.State]:
+def starts_of(land: LevelCurves, orbits: ArrayLike) -> list[strokes.State]:
     """Return initial conditions as pairs of floats."""
     starts = starts_of_pairs(orbits)
     for start in starts:
@@ -270,10 +261,8 @@ def starts_of(land: LevelCurves, orbits: ArrayLike | None) -> list[strokes.State
     return starts
 
 
-def starts_of_pairs(orbits: ArrayLike | None) -> list[strokes.State]:
+def starts_of_pairs(orbits: ArrayLike) -> list[strokes.State]:
     """Return pairs of numbers as pairs of floats."""
-    if orbits is None:
-        return []
     pairs = _finite(orbits, "orbits", "rad and rad/s")
     if not pairs.size:
         return []

@@ -30,7 +30,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
         If it is not a system, with the way from what it is to one.
     """
     if isinstance(system, Model):
-        return stands_on(system, rung, what)
+        return system if issubclass(system.rung, rung) else stands_on(system, rung, what)
     make: Callable[..., Model] = MODELS["Coefficients"]
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
         coefficients = system.coefficients()

@@ -95,6 +95,7 @@ class Model(Lawful):
         return self.trigonometric()
 
     @classmethod
+    @functools.cache
     def trigonometric(cls) -> Trigonometric:
         """The law of all systems of this kind, for those whose law is that of (A, B, C)."""
         declared = ((p.name, p.units, p.least, p.high) for p in cls.declared)
@@ -146,12 +147,13 @@ class Model(Lawful):
         cls, parameters: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Coefficients from arrays that broadcast, NaN where a parameter leaves its domain."""
-        used = {name: parameters[name] for name in cls.formula_inputs()}
+        law = cls.trigonometric()
+        used = {name: parameters[name] for name in law.parameters}
         with np.errstate(all="ignore"):
             valid = functools.reduce(
                 np.logical_and, [p.valid(used[p.name]) for p in cls.declared if p.name in used]
             )
-            A, B, C = cls.trigonometric().coefficients(used)
+            A, B, C = law.coefficients(used)
             if not valid.all():
                 A, B, C = (np.where(valid, x, np.nan) for x in (A, B, C))
         return A, B, C

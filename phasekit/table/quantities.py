@@ -101,38 +101,44 @@ def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
     ParameterError
         If a name is unknown or nothing is named.
     """
-    offered = quantities()
+    offered = _offered()
+    groups = dict.fromkeys(row.group for row in offered.values())
     try:
         names = (of,) if isinstance(of, str) else () if isinstance(of, _NO_LISTS) else tuple(of)
     except TypeError:
         names = ()
     if not names:
         raise bad("of", of, "a name or a list of names", "pk.quantities() lists them")
-    wanted: set[str] = set()
     for name in names:
         row = ROWS.get(name) if isinstance(name, str) else None
         if row is not None and name not in offered:
             raise ParameterError(
                 f"of: got {name!r}, which needs an argument of its own; call pk.{row.group}"
             )
-        if not isinstance(name, str) or (name not in offered and name not in offered.groups):
-            valid = [*offered.groups, *offered]
+        if not isinstance(name, str) or (name not in offered and name not in groups):
+            valid = [*groups, *offered]
             raise unknown("of: the quantity", name, valid, listed="pk.quantities()")
-        wanted.update([name] if name in offered else offered.groups[name])
-    return tuple(row for row in QUANTITIES if row.name in wanted)
+    whole = {name for name in names if name not in offered}
+    return tuple(row for row in offered.values() if row.name in names or row.group in whole)
+
+
+def _offered() -> dict[str, Quantity]:
+    """The rows that passes compute, by name."""
+    computed = {group for one in PASSES for group in one.groups}
+    return {row.name: row for row in QUANTITIES if row.group in computed}
 
 
 def plan_passes(rows: Iterable[Quantity], rung: type[Law] = Trigonometric) -> tuple[Pass, ...]:
     """Return the passes that compute the rows on a rung, as few as the table has."""
     missing = {row.group for row in rows}
-    chosen: list[Pass] = []
-    for candidate in fitting(rung):
+    lines, chosen = fitting(rung), list[Pass]()
+    for candidate in lines:
         if missing.issuperset(candidate.groups):
             chosen.append(candidate)
             missing.difference_update(candidate.groups)
     for group in sorted(missing):  # its passes compute others as well, which are not wanted
-        if pass_of(group, chosen, rung) not in chosen:
-            chosen.append(pass_of(group, chosen, rung))
+        if not any(group in one.groups for one in chosen):
+            chosen.append(next(one for one in reversed(lines) if group in one.groups))
     return tuple(chosen)
 
 
@@ -158,8 +164,7 @@ class Quantities(Mapping[str, Quantity]):
     """The quantities that a sweep offers, by name; prints as a table."""
 
     def __init__(self) -> None:
-        computed = {group for one in PASSES for group in one.groups}
-        self._rows = {row.name: row for row in QUANTITIES if row.group in computed}
+        self._rows = _offered()
 
     @property
     def groups(self) -> dict[str, tuple[str, ...]]:

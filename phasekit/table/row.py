@@ -75,7 +75,8 @@ class Quantity:
     @property
     def label_shape(self) -> tuple[int, ...]:
         """Lengths of the label dims."""
-        return tuple(len(self.labels_of(dim)[0]) for dim in self.dims)
+        labels = self.labels or LABELS
+        return tuple(len(labels[dim][0]) for dim in self.dims)
 
     def labels_of(self, dim: str) -> Labels:
         """Labels of a dim, with its long name."""

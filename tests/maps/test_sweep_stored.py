@@ -73,13 +73,13 @@ def test_chunks_are_the_tiles(tmp_path, computed):
     ],
 )
 def test_chunks_by_default_are_about_even_and_hold_a_million_cells(sizes, expected):
-    from phasekit.cells.evaluate import Box
+    from phasekit.cells.request import Part
     from phasekit.maps.parts import new_part
     from phasekit.table.quantities import select
 
-    part = new_part("part0", Box(tuple(sizes), (), select(CODES), ()), sizes, {})
+    part = new_part("part0", Part(tuple(sizes), (), select(CODES), ()), sizes, {})
     assert part.chunks == expected
-    forces = new_part("part0", Box(tuple(sizes), (), select("bearing_forces"), ()), sizes, {})
+    forces = new_part("part0", Part(tuple(sizes), (), select("bearing_forces"), ()), sizes, {})
     assert np.prod(forces.chunks) * forces.cell_bytes <= 2**27
 
 
