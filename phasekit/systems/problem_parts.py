@@ -132,13 +132,13 @@ def make_field(
         if jac is not None:
             raise bad("jac", jac, "None with a compiled f, whose derivatives are compiled as well")
         return CompiledField(f, arguments, states, names), f
-    _check_call("f", f, names)
+    check_call("f", f, names)
     if jac is not None:
-        _check_call("jac", jac, names)
+        check_call("jac", jac, names)
     return PythonField(f, jac, states, names), f
 
 
-def _check_call(argument: str, function: Any, names: Sequence[str]) -> None:
+def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

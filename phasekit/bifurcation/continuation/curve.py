@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
+from phasekit.bifurcation.continuation.functions import Event
 from phasekit.bifurcation.continuation.kernels import defining, newton, trace
 from phasekit.bifurcation.continuation.kernels import state as state_places
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
@@ -82,6 +83,14 @@ class Curve:
     low, high : ndarray
         Bounds of the unknowns.
     options : ContinuationOptions
+    aux : ndarray, optional
+        The vector l of a Hopf curve.
+    conservative : bool
+        Whether energy is conserved.
+    events : tuple of Event
+        Functions whose zeros are looked for.
+    ends : tuple of str
+        Names of events, kinds and labels of special points at which the curve ends.
     """
 
     field: Field
@@ -94,6 +103,9 @@ class Curve:
     high: Array
     options: ContinuationOptions
     aux: Array | None = None
+    conservative: bool = False
+    events: tuple[Event, ...] = ()
+    ends: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:

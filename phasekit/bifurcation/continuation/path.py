@@ -36,6 +36,7 @@ class Path:
     residual: Array  # |f| beside its terms
     eigenvalues: npt.NDArray[np.complex128] | None = None  # of f_x, where slopes are kept
     messages: tuple[str, ...] = ()  # what is not certain about them
+    ends: tuple[Any, Any] = (None, None)  # special points beyond its first and last point
 
     @property
     def count(self) -> int:

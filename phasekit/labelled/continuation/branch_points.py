@@ -79,7 +79,8 @@ def points_of(
             places.append(int(mine[seen]))
             seen += 1
     for one, place in zip(specials, places, strict=True):
-        label[place] = KINDS[one.special.kind].label
+        if one.special.kind != "end" or not label[place]:  # it may end on a special point
+            label[place] = KINDS[one.special.kind].label
     kappa = np.full(total, np.nan)
     if curve.kind == HOPF:
         kappa[own] = path.u[:, -1]

@@ -31,9 +31,11 @@ class SpecialPoint:
     ----------
     kind : str
         fold, branch_point, pitchfork, transcritical, hopf, neutral_saddle, cusp,
-        bogdanov_takens, generalized_hopf, zero_hopf or end.
+        bogdanov_takens, generalized_hopf, zero_hopf, hopf_hopf, event or end.
     label : str
-        LP, BP (also pitchfork and transcritical), H, NS, CP, BT, GH, ZH or EP.
+        LP, BP (also pitchfork and transcritical), H, NS, CP, BT, GH, ZH, HH, UZ or EP.
+    name : str
+        Of an event its name; else empty.
     x : ndarray
         The state.
     parameters : mapping of str to float
@@ -118,8 +120,13 @@ class SpecialPoint:
 
     @property
     def label(self) -> str:
-        """LP, BP, H, NS, CP, BT, GH, ZH or EP."""
+        """LP, BP, H, NS, CP, BT, GH, ZH, HH, UZ or EP."""
         return KINDS[self.kind].label
+
+    @property
+    def name(self) -> str:
+        """The name of an event; else empty."""
+        return getattr(self.special, "name", "")
 
     def __getitem__(self, name: str) -> float:
         """A state or parameter by name."""
@@ -195,7 +202,8 @@ class SpecialPoint:
         notes += [f"corank={self.corank}"] if self.corank > 1 else []
         notes += [self.status] if self.status != "converged" else []
         notes += [self.message] if self.message else []
-        text = f"{self.label} {self.kind} at {', '.join(where)}"
+        what = f"{self.kind} {self.name!r}" if self.name else self.kind
+        text = f"{self.label} {what} at {', '.join(where)}"
         return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
 
 

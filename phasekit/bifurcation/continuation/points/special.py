@@ -33,6 +33,7 @@ class Special:
     others: tuple[Array, ...] = ()  # tangents of the other branches, at a branch point
     extra: Array | None = None  # the unknowns that its defining system adds
     corank: int = 0  # of f_x
+    name: str = ""  # of an event
 
     def __post_init__(self) -> None:
         """Refuse a kind that nobody knows."""
