@@ -55,7 +55,7 @@ def _ended(curve: Curve, start: Sample, track: Track) -> Track | None:
         name = ending_of(curve, one.special)
         if name is not None and curve.length(_gap(curve, one.special, start)) > START:
             count = one.index + 1
-            stop = Stop(name, f"stop: {_said(curve, one.special)}")
+            stop = Stop(name, f"stop = {name!r}: {_said(curve, one.special)}")
             return Track(track.record[:count], track.slopes[:count], track.state, stop)
     return None
 

@@ -8,6 +8,7 @@ curve itself.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,17 +59,34 @@ def events_of(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
     found: list[Placed] = []
     messages: list[str] = []
     with np.errstate(all="ignore"):
+        off = _off(curve, path)
         for event in curve.events:
-            seek = _Seek(curve, path, event)
+            seek = _Seek(curve, path, event, off)
             found += seek.found()
             messages += seek.messages
     return sorted(found, key=lambda one: (one.index, one.along)), tuple(messages)
 
 
+def _off(curve: Curve, path: Path) -> Array:
+    """By how much the middle of each step lies off the cubic through its ends."""
+    found = np.zeros((max(path.count - 1, 0), curve.m))
+    for i in range(path.count - 1):
+        a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
+        middle = between(curve, a, b, 0.5)
+        if middle is not None:
+            chord = b.u - a.u
+            ta, tb = (s.tangent / curve.length(s.tangent) for s in (a, b))
+            cubic = a.u + 0.5 * chord + 0.125 * curve.length(chord) * (ta - tb)
+            found[i] = (middle.u - cubic)[: curve.m]
+    return found
+
+
 class _Seek:
     """The search for the zeros of one function."""
 
-    def __init__(self, curve: Curve, path: Path, event: Event) -> None:
+    def __init__(
+        self, curve: Curve, path: Path, event: Event, off: Array | None = None
+    ) -> None:
         self.curve, self.path, self.event = curve, path, event
         self.of = event.function
         self.messages: list[str] = []
@@ -76,6 +94,7 @@ class _Seek:
         lengths = np.sqrt(np.sum(path.tangent**2 * curve.weight, axis=1))
         self.u, self.t = path.u[:, :m], path.tangent[:, :m] / lengths[:, None]
         self.length = np.sqrt(np.sum(np.diff(path.u, axis=0) ** 2 * curve.weight, axis=1))
+        self.off = np.zeros((path.count - 1, m)) if off is None else off
 
     def found(self) -> list[Placed]:
         """Each zero once; angles count as they are shown, in one turn."""
@@ -131,7 +150,8 @@ class _Seek:
         inward = (ends[:, 0] * rates[:, 0] < 0.0) & (ends[:, 1] * rates[:, 1] > 0.0) & ~change
         s = np.linspace(0.0, 1.0, 33)[:, None]
         lowest = np.min(sign[:, 0] * _cubic(s, ends, rates, width), axis=0)
-        dip = inward & (lowest < DIP * np.min(np.abs(ends), axis=1))
+        doubt = self._doubt(turns)[parts.step]
+        dip = inward & (lowest < DIP * np.min(np.abs(ends), axis=1) + doubt)
         placed = []
         for k in np.flatnonzero(change | dip).tolist():
             i = int(parts.step[k])
@@ -139,6 +159,14 @@ class _Seek:
                 one = parts.low[k], parts.high[k]
                 placed += self._refined(i, (float(one[0]), float(one[1])), turns[i])
         return placed
+
+    def _doubt(self, turns: Array) -> Array:
+        """What a function changes by from the cubic of each step to the curve, half of it."""
+        steps = np.arange(self.path.count - 1)
+        u, _ = self._hermite(steps, np.full(len(steps), 0.5))
+        ends = [self.of.values(self.curve, self._turned(u - part * self.off, turns[: len(u)]))
+                for part in (0.0, 1.0)]  # fmt: skip
+        return np.asarray(0.5 * np.nan_to_num(np.abs(ends[0] - ends[1])))
 
     def _looked_at(
         self, steps: npt.NDArray[np.int64], turns: Array
@@ -192,6 +220,8 @@ class _Seek:
         u = a + s * s * (3.0 - 2.0 * s) * (b - a) + s * (1.0 - s) * ((1.0 - s) * ta - s * tb)
         rate = 6.0 * s * (1.0 - s) * (b - a) + (1.0 - s) * (1.0 - 3.0 * s) * ta
         rate = rate + s * (3.0 * s - 2.0) * tb
+        u = u + 16.0 * (s * (1.0 - s)) ** 2 * self.off[i]
+        rate = rate + 32.0 * s * (1.0 - s) * (1.0 - 2.0 * s) * self.off[i]
         with np.errstate(all="ignore"):
             rate = np.where(h > 0.0, rate / h, 0.0)
         ends = (s == 0.0, s == 1.0)  # to the last bit
@@ -203,26 +233,25 @@ class _Seek:
         width = (parts.high - parts.low)[:, None] * self.length[parts.step][:, None]
         (a, ta), (b, tb) = (self._hermite(parts.step, s) for s in (parts.low, parts.high))
         corners = np.stack([a, a + width * ta / 3.0, b - width * tb / 3.0, b])
+        around = np.abs(self.off[parts.step])  # of what is no cubic
         shift = self.curve.period[: self.curve.m] * turns[parts.step]
-        return np.min(corners, axis=0) - shift, np.max(corners, axis=0) - shift
+        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+        return low - shift - around, high - shift + around
 
     def _refined(self, i: int, part: tuple[float, float], turns: Array) -> list[Placed]:
         """The zeros in a part of a step, on the curve itself."""
         curve = self.curve
-        a, b = self._sample(i), self._sample(i + 1)
-        width = part[1] - part[0]
-        low, high = max(0.0, part[0] - 0.25 * width), min(1.0, part[1] + 0.25 * width)
-        left = a if low == 0.0 else between(curve, a, b, low)
-        right = b if high == 1.0 else between(curve, a, b, high)
-        if left is None or right is None:
-            left, right = a, b
 
         def test(s: Sample) -> float:
             return self._value(s, turns)
 
+        left, right, lowest = self._around(i, part, turns)
+        if self.event.condition:
+            if test(left) == test(right):
+                return []
+            return [self._placed(i, self._bisected(left, right, test), turns)]
         pairs = [(left, right)]
         if test(left) * test(right) > 0.0:
-            lowest = self._lowest(left, right, turns)
             if lowest is None:
                 return []
             if abs(test(lowest)) <= self._noise(lowest, turns):
@@ -237,6 +266,39 @@ class _Seek:
                 continue
             placed.append(self._placed(i, best, turns))
         return placed
+
+    def _around(
+        self, i: int, part: tuple[float, float], turns: Array
+    ) -> tuple[Sample, Sample, Sample | None]:
+        """Points of the curve around a part of a step with a change of sign, or a least size.
+
+        The cubic is not the curve: what is seen on it may lie beside the part.
+        """
+        a, b = self._sample(i), self._sample(i + 1)
+        margin = 0.25 * (part[1] - part[0])
+        while True:
+            low, high = max(0.0, part[0] - margin), min(1.0, part[1] + margin)
+            left = a if low == 0.0 else between(self.curve, a, b, low)
+            right = b if high == 1.0 else between(self.curve, a, b, high)
+            left, right = left or a, right or b
+            change = self._value(left, turns) * self._value(right, turns) <= 0.0
+            lowest = None if change else self._lowest(left, right, turns)
+            if change or lowest is not None or (left is a and right is b):
+                return left, right, lowest
+            margin *= 4.0
+
+    def _bisected(self, a: Sample, b: Sample, test: Callable[[Sample], float]) -> Sample:
+        """The first of two neighbours, but for rounding, between which a condition changes."""
+        low, high, end = 0.0, 1.0, b
+        for _ in range(52):
+            middle = between(self.curve, a, b, 0.5 * (low + high))
+            if middle is None:
+                break
+            if test(middle) == test(a):
+                low = 0.5 * (low + high)
+            else:
+                high, end = 0.5 * (low + high), middle
+        return end
 
     def _lowest(self, a: Sample, b: Sample, turns: Array) -> Sample | None:
         """Where the function has its least size between two points, by the sign of its rate."""
