@@ -129,13 +129,15 @@ for _kind in (
     ),
     PointKind(
         "period_doubling", "PD", "a multiplier passes -1; orbits of twice the period begin",
-        "determinant of M + 1", "the orbit, and a multiplier -1", (), "d", 8, "ORANGE", None,
+        "determinant of M + 1", "the orbit, and a multiplier -1", ("c",), "d", 8, "ORANGE",
+        "branch_point",
         "period_doubling",
     ),
     PointKind(
         "torus", "TR", "a pair of multipliers passes the unit circle; a torus begins",
         "bialternate product of M less 1, real pairs apart",
-        "the orbit, and a pair of multipliers on the circle", (), "o", 7, "SKY", None, "torus",
+        "the orbit, and a pair of multipliers on the circle", ("d", "angle"), "o", 7, "SKY",
+        "hopf", "torus",
     ),
     PointKind(
         "cycle_branch_point", "BPC", "families of periodic orbits cross",

@@ -91,6 +91,8 @@ class Curve:
         Functions whose zeros are looked for.
     ends : tuple of str
         Names of events, kinds and labels of special points at which the curve ends.
+    discrete : bool
+        Whether the field is f(x) - x of a map f.
     """
 
     field: Field
@@ -106,6 +108,7 @@ class Curve:
     conservative: bool = False
     events: tuple[Event, ...] = ()
     ends: tuple[str, ...] = ()
+    discrete: bool = False
 
     @property
     def n(self) -> int:
@@ -246,6 +249,15 @@ class Curve:
             return np.asarray(
                 np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
             )
+
+    def linear(self, slopes: Array) -> Array:
+        """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
+        matrix = slopes[..., : self.n]
+        return matrix + np.eye(self.n) if self.discrete else matrix
+
+    def growth(self, values: npt.NDArray[np.complex128]) -> Array:
+        """What is positive of unstable eigenvalues: the real part, of a map the size less 1."""
+        return np.abs(values) - 1.0 if self.discrete else values.real
 
     def bend(self, u: Array, z: Array) -> Array:
         """The derivatives of f_u z by states and free parameters, shape (n, m)."""

@@ -48,7 +48,8 @@ class Branch:
     points : xarray.Dataset
         On the dim ``point``, in order along the curve: the free parameters and states by name,
         ``arclength`` (0 at the start, on scaled axes), ``n_unstable`` (number of eigenvalues with
-        a positive real part) or, of a conservative problem, ``kind`` (`EquilibriumKind`),
+        a positive real part, of a map of multipliers outside the unit circle) or, of a
+        conservative problem, ``kind`` (`EquilibriumKind`),
         ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
         empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
         beside that of the terms that cancel in it), and what was recorded.
@@ -195,6 +196,9 @@ class Branch:
         backward, forward = go_on(curve, self.start, self.tracks, count)
         return make_branch(problem, curve, self.start, backward, forward, self.record)
 
+    def _discrete(self) -> bool:
+        return self.problem is not None and self.problem.map
+
     def known(self) -> tuple[Curve, Problem]:
         """The curve and the problem, or the error that they are not known."""
         if self.curve is None or self.problem is None:
@@ -242,7 +246,7 @@ class Branch:
         """Write what it is, its range, its special points and why it ends."""
         u = {name: self._points[name].values for name in self.free}
         ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        of = {"equilibrium": "equilibria"}.get(self.kind, f"{self.kind} points")
+        of = {"equilibrium": "fixed points" if self._discrete() else "equilibria"}.get(self.kind, f"{self.kind} points")
         lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]

@@ -126,7 +126,8 @@ class Stored:
         with damaged(self.name, "its events"):
             events = events_of(problem, {**kept, **code})
         events = tuple(replace(one, condition=one.name in conditions) for one in events)
-        return {"events": events, "ends": ends, "conservative": problem.conservative}
+        return {"events": events, "ends": ends, "conservative": problem.conservative,
+                "discrete": problem.map}  # fmt: skip
 
     def curve(self, problem: Problem) -> Curve:
         """The curve that was traced."""

@@ -35,7 +35,7 @@ def continuation(
     stop: Any = None,
     options: ContinuationOptions | None = None,
 ) -> Branch:
-    """Follow a branch of equilibria or periodic orbits along a parameter, through its folds.
+    """Follow equilibria, fixed points of a map or periodic orbits along a parameter.
 
     Parameters
     ----------
@@ -114,6 +114,11 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
+        if problem.map:
+            raise bad(
+                "orbit", orbit, "None of a map",
+                "orbits of a map are fixed points of problem.iterated(times)",
+            )  # fmt: skip
         for name, given in (("events", events), ("stop", stop)):
             if given is not None:
                 raise bad(
@@ -179,6 +184,7 @@ def equilibrium_curve(
         high=np.array([*(pair[1] for pair in bounds), high]),
         options=options,
         conservative=problem.conservative,
+        discrete=problem.map,
     )
 
 
