@@ -25,6 +25,7 @@ FloatArray = npt.NDArray[np.float64]
 
 LONGEST = 5000  # operations of formulas that are put into one another
 
+
 class Problem:
     """A smooth system ``x' = f(x, **parameters)`` with states and parameters by name.
 
@@ -314,9 +315,7 @@ class Problem:
         else:
             f = Iterate(self.f, times)
             jac = None if self.jac is None else IterateSlopes(self.f, self.jac, times)
-        return Problem(
-            f, self.state, self.parameters, jac, periods=self.periods, map=True
-        )
+        return Problem(f, self.state, self.parameters, jac, periods=self.periods, map=True)
 
     @property
     def forcing_period(self) -> float:

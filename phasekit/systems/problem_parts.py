@@ -150,6 +150,7 @@ def make_field(
 
 
 def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
+    """Refuse a function that cannot be called as f(x, **parameters)."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

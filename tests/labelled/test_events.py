@@ -138,9 +138,7 @@ def test_branches_with_events_are_saved_pickled_extended_and_drawn(tmp_path):
 
 def test_events_on_curves_in_two_parameters_and_on_angles():
     problem = pk.Problem("mu + l*x - x**3", "x", {"mu": -1.0, "l": 1.0})
-    branch = pk.continuation(
-        problem, "mu", x0=[-1.3], span=(-1, 1), events={"x = 1/4": "x - 1/4"}
-    )
+    branch = pk.continuation(problem, "mu", x0=[-1.3], span=(-1, 1), events={"x = 1/4": "x - 1/4"})
     curve = branch.special("LP")[0].curve("l", (-1, 1))
     (point,) = curve.special("x = 1/4")  # folds: l = 3 x^2, mu = -2 x^3
     found = [point.x.item(), point["l"], point["mu"]]

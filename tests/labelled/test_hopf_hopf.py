@@ -28,7 +28,9 @@ def oscillators(change):
             f"{float(parts[2][i, j])!r})*{STATES[j]}"
             for j in range(4)
         ]
-        formulas.append(" + ".join(terms) + f" - {float(sizes[i])!r}*({STATES[i]}/{float(sizes[i])!r})**3")
+        formulas.append(
+            " + ".join(terms) + f" - {float(sizes[i])!r}*({STATES[i]}/{float(sizes[i])!r})**3"
+        )
     return pk.Problem(formulas, STATES, {"a": -0.5, "b": 0.5})
 
 

@@ -185,6 +185,8 @@ class PythonField(Field):
             if exact is not None:
                 slopes[:, :n] = self.slopes(x.copy(), p)
                 begin = n
+            if begin == m:
+                return
 
             def along(j: int) -> Callable[[float], Array]:
                 def at(h: float) -> Array:

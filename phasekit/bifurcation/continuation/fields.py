@@ -124,6 +124,7 @@ def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
 def unknowns_of(
     states: tuple[str, ...], parameters: tuple[str, ...], active: tuple[int, ...]
 ) -> tuple[list[Any], dict[Any, tuple[int, int]]]:
+    """Symbols of the unknowns, and the places of all symbols for machine code."""
     import sympy
 
     names = [*states, *(parameters[i] for i in active)]

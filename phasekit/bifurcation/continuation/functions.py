@@ -24,15 +24,24 @@ class Unknowns(Protocol):
     """What a curve says of its unknowns."""
 
     @property
-    def par(self) -> Array: ...
+    def par(self) -> Array:
+        """All parameters."""
+
     @property
-    def active(self) -> tuple[int, ...]: ...
+    def active(self) -> tuple[int, ...]:
+        """Places of the free parameters."""
+
     @property
-    def scale(self) -> Array: ...
+    def scale(self) -> Array:
+        """Sizes of the unknowns."""
+
     @property
-    def n(self) -> int: ...
+    def n(self) -> int:
+        """Number of states."""
+
     @property
-    def m(self) -> int: ...
+    def m(self) -> int:
+        """Number of states and free parameters."""
 
 
 @dataclass(frozen=True)

@@ -129,9 +129,9 @@ class Branch:
         -------
         xarray.Dataset
             `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
-            parameter and state, ``special_name`` of events, ``special_residual``, ``special_status``, ``special_corank``,
-            ``special_index`` (the point of the curve), ``special_interval`` on
-            (``special_point``, ``end``).
+            parameter and state, ``special_name`` of events, ``special_residual``,
+            ``special_status``, ``special_corank``, ``special_index`` (the point of the curve),
+            ``special_interval`` on (``special_point``, ``end``).
         """
         ds = self.points
         dim = "special_point"
@@ -246,7 +246,9 @@ class Branch:
         """Write what it is, its range, its special points and why it ends."""
         u = {name: self._points[name].values for name in self.free}
         ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        of = {"equilibrium": "fixed points" if self._discrete() else "equilibria"}.get(self.kind, f"{self.kind} points")
+        of = {"equilibrium": "fixed points" if self._discrete() else "equilibria"}.get(
+            self.kind, f"{self.kind} points"
+        )
         lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]

@@ -94,7 +94,9 @@ def points_of(
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
     """Eigenvalues of f_x at a point; NaN where f is not finite."""
-    return np.asarray(eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)[0])
+    return np.asarray(
+        eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)[0]
+    )
 
 
 def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDArray[np.int8]:
@@ -138,9 +140,7 @@ def _dataset(
         }
         data["kind"] = (dim, kinds_of(values, label, n), flags)
     else:
-        critical = np.isin(label, ["LP", "BP", "H", "NS", "PD", "TR"]) | (
-            curve.kind != EQUILIBRIUM
-        )
+        critical = np.isin(label, ["LP", "BP", "H", "NS", "PD", "TR"]) | (curve.kind != EQUILIBRIUM)
         size = np.max(np.abs(values), axis=1, keepdims=True)
         # The size of a multiplier is a rounded number, and may be exactly 1.
         kept = is_conservative(values, discrete=True) if curve.discrete else False

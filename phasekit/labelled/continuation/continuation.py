@@ -119,10 +119,10 @@ def continuation(
                 "orbit", orbit, "None of a map",
                 "orbits of a map are fixed points of problem.iterated(times)",
             )  # fmt: skip
-        for name, given in (("events", events), ("stop", stop)):
-            if given is not None:
+        for name, asked_for in (("events", events), ("stop", stop)):
+            if asked_for is not None:
                 raise bad(
-                    name, given, "None with an orbit: events are functions of one state",
+                    name, asked_for, "None with an orbit: events are functions of one state",
                     "record= keeps the least, largest and mean value of a function over each orbit",
                 )  # fmt: skip
         return continue_orbit(

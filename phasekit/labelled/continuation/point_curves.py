@@ -47,8 +47,8 @@ def point_curve(
     -------
     Branch
         Its special points are cusps (CP), Bogdanov-Takens (BT), generalized Hopf (GH),
-        zero-Hopf (ZH) and Hopf-Hopf (HH) points. A Hopf curve goes on beyond a Bogdanov-Takens point as a curve of
-        neutral saddles; ``points.kind_of_pair`` tells which.
+        zero-Hopf (ZH) and Hopf-Hopf (HH) points. A Hopf curve goes on beyond a Bogdanov-Takens
+        point as a curve of neutral saddles; ``points.kind_of_pair`` tells which.
 
     Raises
     ------

@@ -21,6 +21,10 @@ from phasekit.systems.problem_parts import check_call
 REASONS = (
     "bound", "closed", "max_points", "stuck", "not_finite", "start", "hopf", "homoclinic",
 )  # fmt: skip
+#: Where a branch may be told to end: of both, of flows, of maps.
+BOTH = ("event", "fold", "branch_point", "pitchfork", "transcritical")
+FLOW = ("hopf", "neutral_saddle", "bogdanov_takens")
+MAP = ("period_doubling", "torus")
 TAKEN = {*KINDS, *(kind.label for kind in KINDS.values()), *REASONS}
 
 
@@ -78,20 +82,22 @@ def stop_of(
             continue
         if not isinstance(one, str):
             raise bad("stop", one, wants)
-        _check_name(one, events, detect)
+        _check_name(one, events, detect, problem.map)
         names.append(one)
     return events, tuple(names)
 
 
-def _check_name(name: str, events: tuple[Event, ...], detect: Sequence[str]) -> None:
+def _check_name(
+    name: str, events: tuple[Event, ...], detect: Sequence[str], discrete: bool
+) -> None:
     if name in [event.name for event in events]:
         return
-    kinds = [kind for kind in KINDS.values() if kind.detected and "continuation" in kind.found_by]
+    kinds = [KINDS[kind] for kind in (*BOTH, *(MAP if discrete else FLOW))]
     named = [kind for kind in kinds if name in (kind.name, kind.label)]
     if not named:
         valid = [*(event.name for event in events), *(kind.name for kind in kinds)]
         raise unknown("stop: event or special point", name, valid)
-    if not any(kind.detected in detect for kind in named):
+    if not any(kind.detected in (None, *detect) for kind in named):
         raise bad(
             "stop", name, f"what is looked for: {', '.join(detect) or 'nothing'}",
             f"detect={named[0].detected!r} looks for it",

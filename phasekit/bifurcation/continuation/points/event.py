@@ -84,9 +84,7 @@ def _off(curve: Curve, path: Path) -> Array:
 class _Seek:
     """The search for the zeros of one function."""
 
-    def __init__(
-        self, curve: Curve, path: Path, event: Event, off: Array | None = None
-    ) -> None:
+    def __init__(self, curve: Curve, path: Path, event: Event, off: Array | None = None) -> None:
         self.curve, self.path, self.event = curve, path, event
         self.of = event.function
         self.messages: list[str] = []
@@ -168,9 +166,7 @@ class _Seek:
                 for part in (0.0, 1.0)]  # fmt: skip
         return np.asarray(0.5 * np.nan_to_num(np.abs(ends[0] - ends[1])))
 
-    def _looked_at(
-        self, steps: npt.NDArray[np.int64], turns: Array
-    ) -> tuple[Parts, Array, Array]:
+    def _looked_at(self, steps: npt.NDArray[np.int64], turns: Array) -> tuple[Parts, Array, Array]:
         """Parts of the steps between which the function is as a cubic; values and rates there."""
         parts = Parts(steps, np.zeros(len(steps)), np.ones(len(steps)))
         excluded = self.of.bounds(self.curve)
