@@ -38,11 +38,14 @@ def every_branch_is_checked():
 
     find = branch.find
 
-    def checked(curve, path, detect, conservative):
-        placed, eigenvalues = find(curve, path, detect, conservative)
-        if curve.kind == EQUILIBRIUM and set(detect) == {"fold", "branch_point", "hopf"}:
-            branch_invariants.check(curve, path, placed, eigenvalues, conservative)
-        return placed, eigenvalues
+    def checked(curve, path):
+        found = find(curve, path)
+        if curve.kind == EQUILIBRIUM and set(curve.options.detect) == {
+            "fold", "branch_point", "hopf",
+        }:  # fmt: skip
+            placed = [one for one in found.placed if one.special.kind != "event"]
+            branch_invariants.check(curve, path, placed, found.eigenvalues, curve.conservative)
+        return found
 
     branch.find = checked
     yield

@@ -117,6 +117,11 @@ for _kind in (
         "Hopf point and fold", (), "X", 9, "SKY", None,
     ),
     PointKind(
+        "hopf_hopf", "HH", "two pairs of eigenvalues on the imaginary axis",
+        "real part of another pair along a Hopf curve", "Hopf point, and another pair",
+        (), "H", 9, "SKY", None,
+    ),
+    PointKind(
         "fold_of_cycles", "LPC", "two periodic orbits merge and vanish",
         "derivative of the characteristic polynomial of the multipliers at 1",
         "the orbit, and a multiplier 1 beside the trivial one", (), "s", 7, "white", None,
@@ -124,13 +129,15 @@ for _kind in (
     ),
     PointKind(
         "period_doubling", "PD", "a multiplier passes -1; orbits of twice the period begin",
-        "determinant of M + 1", "the orbit, and a multiplier -1", (), "d", 8, "ORANGE", None,
+        "determinant of M + 1", "the orbit, and a multiplier -1", ("c",), "d", 8, "ORANGE",
+        "branch_point",
         "period_doubling",
     ),
     PointKind(
         "torus", "TR", "a pair of multipliers passes the unit circle; a torus begins",
         "bialternate product of M less 1, real pairs apart",
-        "the orbit, and a pair of multipliers on the circle", (), "o", 7, "SKY", None, "torus",
+        "the orbit, and a pair of multipliers on the circle", ("d", "angle"), "o", 7, "SKY",
+        "hopf", "torus",
     ),
     PointKind(
         "cycle_branch_point", "BPC", "families of periodic orbits cross",
@@ -140,6 +147,10 @@ for _kind in (
     PointKind(
         "no_force", "NF", "A = B = C = 0: every angle is an equilibrium",
         "exact zeros of A, B and C", "A = B = C = 0", (), "o", 6, "white", None, None, EXACT,
+    ),
+    PointKind(
+        "event", "UZ", "a function that was asked for is zero", "the function itself",
+        "the curve, and the function is zero", (), "v", 8, "YELLOW", None,
     ),
     PointKind(
         "end", "EP", "the end of the branch; its message says why", "", "",

@@ -27,6 +27,11 @@ SAME = 1e-8
 
 def equilibria_in_box(problem: Problem, box: Any) -> xr.Dataset:
     """All equilibria of a problem in a box of its states; see `phasekit.equilibria`."""
+    if problem.map:
+        raise bad(
+            "problem", problem, "a flow x' = f(x)",
+            "fixed points of a map x -> f(x) are the equilibria of x' = f(x) - x",
+        )  # fmt: skip
     low, high = _corners(problem, box)
     names = list(problem.state)
     found, why = _enclosed(problem, low, high)

@@ -78,6 +78,8 @@ def poincare_section(
     array([0.724, 0.527, 0.384])...
     """
     wants = "a time in s, > 0"
+    if isinstance(system, Problem) and system.map:
+        raise bad("system", system, "a flow x' = f(x): a map has no sections")
     duration = number("duration", duration, wants, "s")
     if not duration > 0.0:
         raise bad("duration", duration, wants)

@@ -11,16 +11,19 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
-from phasekit.labels.arguments import bad, flag, reals, unknown
+from phasekit.labels.arguments import bad, flag, reals, unknown, whole
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.as_system import as_system, stands_on
+from phasekit.systems.maps import Iterate, IterateSlopes
 from phasekit.systems.perturbed_problem import formulas_of
 from phasekit.systems.problem_parts import clock_of, make_field, names_of, values_of
 from phasekit.systems.system import MODELS, Model
 
 FloatArray = npt.NDArray[np.float64]
+
+LONGEST = 5000  # operations of formulas that are put into one another
 
 
 class Problem:
@@ -52,6 +55,9 @@ class Problem:
     conservative : bool, default False
         Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
+    map : bool, default False
+        Whether f is a map ``x -> f(x, **parameters)``: what is continued are its fixed points,
+        stable where all multipliers lie inside the unit circle.
 
     Raises
     ------
@@ -78,6 +84,10 @@ class Problem:
     ... )
     >>> duffing([0.0, 0.0], t=0.0).tolist(), round(duffing.replace(w=2.0).forcing_period, 9)
     ([0.0, 0.015], 3.141592654)
+    >>> logistic = Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
+    >>> branch = pk.continuation(logistic, "r", x0=[0.5], span=(2, 4))
+    >>> [(point.label, round(point["r"], 12)) for point in branch.special("PD")]
+    [('PD', 3.0)]
     >>> Problem.from_system(pk.Pendulum(length=0.5))
     Problem(phi' = -V'(phi) of Pendulum(length=0.5, g=9.80665))
     """
@@ -87,6 +97,7 @@ class Problem:
         "conservative",
         "f",
         "jac",
+        "map",
         "parameters",
         "period",
         "periods",
@@ -103,6 +114,7 @@ class Problem:
     time: str | None
     period: Any
     conservative: bool
+    map: bool
     system: Model | None
     _field: Field
 
@@ -117,6 +129,7 @@ class Problem:
         time: str | None = None,
         period: Any = None,
         conservative: bool = False,
+        map: bool = False,  # noqa: A002 - the field's word
     ) -> None:
         states = names_of("state", (state,) if isinstance(state, str) else state)
         values = values_of("parameters", parameters)
@@ -130,6 +143,11 @@ class Problem:
             if not value > 0.0:
                 raise bad(f"periods[{name!r}]", value, "a number > 0")
         flag("conservative", conservative)
+        flag("map", map)
+        for name, given in (("conservative", conservative or None), ("time", time),
+                            ("period", period)):  # fmt: skip
+            if map and given is not None:
+                raise bad(name, given, "nothing with map=True: a map has no time and no energy")
         if jac is not None and not callable(jac):
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
@@ -143,9 +161,10 @@ class Problem:
         self._set("parameters", MappingProxyType(values))
         self._set("periods", MappingProxyType(angles))
         self._set("conservative", bool(conservative))
+        self._set("map", bool(map))
         self._set("jac", jac)
         self._set("system", None)
-        field, kept = make_field(f, jac, states, (*values, *self._times()))
+        field, kept = make_field(f, jac, states, (*values, *self._times()), discrete=self.map)
         self._set("f", kept)
         self._set("_field", field)
 
@@ -164,6 +183,7 @@ class Problem:
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
         arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
         more = {"conservative": self.conservative, "time": self.time, "period": self.period}
+        more["map"] = self.map
         return _made, (type(self), *arguments, more, self.system)
 
     @property
@@ -266,6 +286,37 @@ class Problem:
         problem = self.replace(**changes) if changes else self
         return problem.derivatives(x, at)[0]
 
+    def iterated(self, times: int) -> Problem:
+        """The map applied so many times, whose fixed points are orbits of that period of this map.
+
+        Raises
+        ------
+        ParameterError
+            If it is no map, or its formulas would grow too long.
+
+        Examples
+        --------
+        >>> logistic = Problem("r*x*(1 - x)", "x", {"r": 3.2}, map=True)
+        >>> logistic.iterated(2)([0.5]).round(6).tolist()
+        [0.512]
+        """
+        times = whole("times", times, "a whole number >= 1")
+        if not self.map:
+            raise bad("problem", self, "a map, to be applied several times")
+        f: Any = self.f
+        jac: Any = None
+        if self.kind == "symbolic":
+            symbols = symbols_of(self.state)
+            for _ in range(times - 1):
+                if sum(one.count_ops() for one in f) > LONGEST:
+                    raise bad("times", times, "fewer times: the formulas grow too long")
+                at = {symbols[s]: e for s, e in zip(self.state, f, strict=True)}
+                f = tuple(one.xreplace(at) for one in self.f)
+        else:
+            f = Iterate(self.f, times)
+            jac = None if self.jac is None else IterateSlopes(self.f, self.jac, times)
+        return Problem(f, self.state, self.parameters, jac, periods=self.periods, map=True)
+
     @property
     def forcing_period(self) -> float:
         """The period of f in time; infinite if f does not depend on it."""
@@ -291,7 +342,8 @@ class Problem:
             self.field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite,
             infinite, ContinuationOptions(),
         )  # fmt: skip
-        return curve.at(x)
+        value, slopes = curve.at(x)
+        return (value + x, slopes + np.eye(n)) if self.map else (value, slopes)
 
     def specification(self) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code."""
@@ -305,6 +357,8 @@ class Problem:
         }
         if self.time is not None:
             spec.update(time=self.time, period=write_formula(self.period))
+        if self.map:
+            spec["map"] = True
         if self.system is not None:
             spec["system"] = type(self.system).__name__
             spec["system_parameters"] = self.system.arguments
@@ -321,6 +375,7 @@ class Problem:
         return cls(
             spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
             conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
+            map=bool(spec.get("map", False)),
         )  # fmt: skip
 
     def __repr__(self) -> str:
@@ -328,15 +383,16 @@ class Problem:
         if self.system is not None:
             x = self.state[0]
             return f"Problem({x}' = -V'({x}) of {self.system!r})"
+        arrow = " -> " if self.map else "' = "
         if self.kind == "symbolic":
             equations = ", ".join(
-                f"{name}' = {formula}" for name, formula in zip(self.state, self.f, strict=True)
+                f"{name}{arrow}{formula}" for name, formula in zip(self.state, self.f, strict=True)
             )
             if len(equations) > 200:
                 equations = equations[:200] + " ..."
         else:
             name = getattr(self.f, "__name__", "f")
-            equations = f"({', '.join(self.state)})' = {name}(x, **parameters), {self.kind}"
+            equations = f"({', '.join(self.state)}){arrow}{name}(x, **parameters), {self.kind}"
         notes = [f"{name}={value!r}" for name, value in self.parameters.items()]
         notes += [f"{name} modulo {value:.6g}" for name, value in self.periods.items()]
         if self.time is not None:

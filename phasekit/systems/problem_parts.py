@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refus
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, number, unknown
 from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula
+from phasekit.systems.maps import moves_of, slopes_of
 
 
 def names_of(argument: str, given: Any) -> tuple[str, ...]:
@@ -100,9 +101,13 @@ def expressions_of(
 
 
 def make_field(
-    f: Any, jac: Callable[..., Any] | None, states: tuple[str, ...], names: tuple[str, ...]
-) -> tuple[Field, Any]:
-    """The right-hand side in the form that the stepping code takes, and f as it is kept."""
+    f: Any, jac: Callable[..., Any] | None, states: tuple[str, ...], names: tuple[str, ...],
+    *, discrete: bool = False,
+) -> tuple[Field, Any]:  # fmt: skip
+    """The right-hand side in the form that the stepping code takes, and f as it is kept.
+
+    Of a map the field is f(x) - x, whose zeros are the fixed points.
+    """
     if isinstance(f, Mapping):
         for name in f:
             if name not in states:
@@ -119,6 +124,10 @@ def make_field(
         if len(given) != len(states):
             raise bad("f", given, f"{len(states)} formulas, one for each of {', '.join(states)}")
         expressions = tuple(expressions_of(given, [*states, *names], "f", states))
+        if discrete:
+            symbols = symbols_of(states)
+            moved = tuple(e - symbols[s] for e, s in zip(expressions, states, strict=True))
+            return SymbolicField(moved, states, names), expressions
         return SymbolicField(expressions, states, names), expressions
     if not callable(f):
         raise bad(
@@ -131,14 +140,17 @@ def make_field(
             raise bad("parameters", list(names), f"the arguments of f after the state: {arguments}")
         if jac is not None:
             raise bad("jac", jac, "None with a compiled f, whose derivatives are compiled as well")
-        return CompiledField(f, arguments, states, names), f
-    _check_call("f", f, names)
+        return CompiledField(f, arguments, states, names, less=discrete), f
+    check_call("f", f, names)
     if jac is not None:
-        _check_call("jac", jac, names)
+        check_call("jac", jac, names)
+    if discrete:
+        return PythonField(moves_of(f), None if jac is None else slopes_of(jac), states, names), f
     return PythonField(f, jac, states, names), f
 
 
-def _check_call(argument: str, function: Any, names: Sequence[str]) -> None:
+def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
+    """Refuse a function that cannot be called as f(x, **parameters)."""
     try:
         signature = inspect.signature(function)
     except (TypeError, ValueError):

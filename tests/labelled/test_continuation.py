@@ -791,3 +791,12 @@ def test_the_problem_of_a_potential_of_special_functions_has_their_derivatives()
     """Si' is sin(x)/x, which has machine code though Si has none."""
     problem = pk.Potential("Si(x)", "x", interval=(0.1, 3.0)).problem()
     assert problem([1.5, 0.25]) == pytest.approx([0.25, -np.sin(1.5) / 1.5], rel=1e-15)
+
+
+def test_values_of_a_function_with_its_derivatives():
+    """Of no free parameter there is nothing left to difference."""
+    problem = Problem(
+        lambda x, a: a * x**2, "x", {"a": 3.0}, lambda x, a: np.array([[2.0 * a * x[0]]])
+    )
+    value, slope = problem.derivatives([2.0])
+    assert (value.item(), slope.item()) == (12.0, 12.0)

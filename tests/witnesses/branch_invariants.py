@@ -57,8 +57,10 @@ def _no_twins(curve: Any, path: Any, placed: Any) -> None:
 
 def _every_crossing_is_said(curve: Any, path: Any, placed: Any, eigenvalues: Any) -> None:
     size = np.max(np.abs(eigenvalues), axis=1)
-    clear = np.min(np.abs(eigenvalues.real), axis=1) > NOISE * size
-    unstable = np.sum(eigenvalues.real > 0.0, axis=1)
+    # Of a map multipliers cross the unit circle.
+    growth = np.abs(eigenvalues) - 1.0 if curve.discrete else eigenvalues.real
+    clear = np.min(np.abs(growth), axis=1) > NOISE * size
+    unstable = np.sum(growth > 0.0, axis=1)
     points = np.flatnonzero(clear)
     for i, j in zip(points[:-1], points[1:], strict=True):
         if unstable[i] == unstable[j]:
@@ -75,4 +77,5 @@ def _every_crossing_is_said(curve: Any, path: Any, placed: Any, eigenvalues: Any
 
 def _crossing(special: Any) -> int:
     """How many eigenvalues cross at a special point, at most."""
-    return 2 if special.kind == "hopf" else special.corank
+    known = {"hopf": 2, "torus": 2, "period_doubling": 1}
+    return known.get(special.kind, special.corank)

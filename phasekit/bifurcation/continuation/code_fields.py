@@ -23,11 +23,15 @@ class CompiledField(Field):
     mode = PLAIN
 
     def __init__(
-        self, function: Any, names: Sequence[str], states: Sequence[str], parameters: Sequence[str]
-    ) -> None:
-        """Take the function and the names of its arguments after x, in its own order."""
+        self, function: Any, names: Sequence[str], states: Sequence[str],
+        parameters: Sequence[str], *, less: bool = False,
+    ) -> None:  # fmt: skip
+        """Take the function and the names of its arguments after x, in its own order.
+
+        With ``less`` the field is f(x) - x, of a map f.
+        """
         super().__init__(states, parameters)
-        self.function, self.names = function, tuple(names)
+        self.function, self.names, self.less = function, tuple(names), less
         self._wrapped: Any = None
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
@@ -37,6 +41,7 @@ class CompiledField(Field):
                 self.function,
                 len(self.states),
                 tuple(self.parameters.index(name) for name in self.names),
+                self.less,
             )
         return int(self._wrapped.address)
 
@@ -52,7 +57,7 @@ class CompiledField(Field):
         return out
 
 
-def _wrap(function: Any, n: int, order: tuple[int, ...]) -> Any:
+def _wrap(function: Any, n: int, order: tuple[int, ...], less: bool) -> Any:
     """Wrap f as a native function of the state and all parameters."""
     import numba
     from numba import types
@@ -68,7 +73,7 @@ def _wrap(function: Any, n: int, order: tuple[int, ...]) -> Any:
         f"    p = carray(p_, ({max(order, default=0) + 1},))",
         f"    value = f({arguments})",
     ]
-    lines += [f"    out[{i}] = value[{i}]" for i in range(n)]
+    lines += [f"    out[{i}] = value[{i}]" + f" - x[{i}]" * less for i in range(n)]
     space: dict[str, Any] = {"f": function, "carray": carray}
     pointer: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
     signature = types.void(pointer, pointer, pointer, pointer)
@@ -77,7 +82,7 @@ def _wrap(function: Any, n: int, order: tuple[int, ...]) -> Any:
         return cfunc(signature)(space["wrapped"])
     except Exception:
         if n == 1:
-            lines[-1] = "    out[0] = value"
+            lines[-1] = "    out[0] = value" + " - x[0]" * less
             try:
                 exec("\n".join(lines), space)
                 return cfunc(signature)(space["wrapped"])
@@ -180,6 +185,8 @@ class PythonField(Field):
             if exact is not None:
                 slopes[:, :n] = self.slopes(x.copy(), p)
                 begin = n
+            if begin == m:
+                return
 
             def along(j: int) -> Callable[[float], Array]:
                 def at(h: float) -> Array:

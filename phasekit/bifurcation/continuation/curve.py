@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
+from phasekit.bifurcation.continuation.functions import Event
 from phasekit.bifurcation.continuation.kernels import defining, newton, trace
 from phasekit.bifurcation.continuation.kernels import state as state_places
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
@@ -82,6 +83,16 @@ class Curve:
     low, high : ndarray
         Bounds of the unknowns.
     options : ContinuationOptions
+    aux : ndarray, optional
+        The vector l of a Hopf curve.
+    conservative : bool
+        Whether energy is conserved.
+    events : tuple of Event
+        Functions whose zeros are looked for.
+    ends : tuple of str
+        Names of events, kinds and labels of special points at which the curve ends.
+    discrete : bool
+        Whether the field is f(x) - x of a map f.
     """
 
     field: Field
@@ -94,6 +105,10 @@ class Curve:
     high: Array
     options: ContinuationOptions
     aux: Array | None = None
+    conservative: bool = False
+    events: tuple[Event, ...] = ()
+    ends: tuple[str, ...] = ()
+    discrete: bool = False
 
     @property
     def n(self) -> int:
@@ -234,6 +249,15 @@ class Curve:
             return np.asarray(
                 np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
             )
+
+    def linear(self, slopes: Array) -> Array:
+        """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
+        matrix = slopes[..., : self.n]
+        return matrix + np.eye(self.n) if self.discrete else matrix
+
+    def growth(self, values: npt.NDArray[np.complex128]) -> Array:
+        """What is positive of unstable eigenvalues: the real part, of a map the size less 1."""
+        return np.abs(values) - 1.0 if self.discrete else values.real
 
     def bend(self, u: Array, z: Array) -> Array:
         """The derivatives of f_u z by states and free parameters, shape (n, m)."""

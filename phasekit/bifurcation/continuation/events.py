@@ -15,7 +15,7 @@ from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, t
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
 ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
-TESTS = ("fold", "branch", "pair")
+TESTS = ("fold", "branch", "pair", "flip")
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def brackets(
     """All brackets of a path, in order, and the eigenvalues of f_x at its points."""
     pairs = "hopf" in detect and curve.n > 1
     tests = _all_tests(curve, path, pairs=pairs)
-    if conservative or is_conservative(tests.eigenvalues):
+    if conservative or is_conservative(tests.eigenvalues, discrete=curve.discrete):
         tests = replace(tests, pair=np.ones(path.count))
         pairs = False
     eigenvalues = tests.eigenvalues
@@ -85,7 +85,7 @@ def _on_ends(
         changes = set()
         if tests.volume[end] < tests.volume[beside] + np.log(ON_END):
             changes.add("branch")
-        for name in ("fold", "pair"):
+        for name in ("fold", "pair", "flip"):
             values = np.abs(getattr(tests, name))
             if values[end] < ON_END * values[beside]:
                 changes.add(name)
@@ -110,10 +110,13 @@ def _regular(tests: Tests) -> npt.NDArray[np.int64]:
     return np.flatnonzero(regular | (len(size) < 3))
 
 
-def nearest_is_complex(tests: Tests) -> bool:
-    """Whether the pair with the least sum is conjugate, so that it crosses the imaginary axis."""
-    values = tests.eigenvalues
-    above = np.abs(2.0 * values.real[values.imag > 0.0])
+def nearest_is_complex(curve: Curve, tests: Tests) -> bool:
+    """Whether the pair with the least sum is conjugate, so that it crosses the imaginary axis.
+
+    Of a map, that with a product next to 1, so that it crosses the unit circle.
+    """
+    values = tests.eigenvalues[tests.eigenvalues.imag > 0.0]
+    above = np.abs(np.abs(values) ** 2 - 1.0 if curve.discrete else 2.0 * values.real)
     return bool(np.min(above, initial=np.inf) <= abs(float(tests.pair)) * (1.0 + 1e-9))
 
 
@@ -177,8 +180,8 @@ class _Seek:
         one, two = self.tests(a), self.tests(b)
         changes = {n for n in TESTS if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
         jump = abs(int(two.unstable) - int(one.unstable))
-        simple = len(changes & {"fold", "branch"})
-        crosses = "pair" in changes and (nearest_is_complex(one) or nearest_is_complex(two))
+        simple = len(changes & {"fold", "branch", "flip"})
+        crosses = "pair" in changes and any(nearest_is_complex(self.curve, t) for t in (one, two))
         explained = simple + 2 * crosses
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)
         # Where the path turns at a pitchfork, both change at once: halving finds nothing between.
@@ -207,7 +210,7 @@ class _Seek:
         """
         touch = None
         for name in TESTS:
-            if name == "pair" and not self.pairs:
+            if (name == "pair" and not self.pairs) or (name == "flip" and not self.curve.discrete):
                 continue
             test = self.value(name, float(self.tests(a).volume))
             sign = np.sign(test(a))

@@ -121,9 +121,10 @@ def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
             )
 
 
-def _unknowns(
+def unknowns_of(
     states: tuple[str, ...], parameters: tuple[str, ...], active: tuple[int, ...]
 ) -> tuple[list[Any], dict[Any, tuple[int, int]]]:
+    """Symbols of the unknowns, and the places of all symbols for machine code."""
     import sympy
 
     names = [*states, *(parameters[i] for i in active)]
@@ -133,7 +134,7 @@ def _unknowns(
     return u, places
 
 
-def _slopes(expressions: Sequence[Any], u: Sequence[Any]) -> list[dict[int, Any]]:
+def slopes_of(expressions: Sequence[Any], u: Sequence[Any]) -> list[dict[int, Any]]:
     """Derivatives that do not vanish, by the places of their symbols, of each expression."""
     place = {symbol: j for j, symbol in enumerate(u)}
     return [
@@ -146,7 +147,7 @@ def _jet(expressions: Sequence[Any], u: Sequence[Any]) -> tuple[dict[int, Any], 
     """F and its derivatives, row by row, those that do not vanish by their places; how many."""
     n, m = len(expressions), len(u)
     entries = dict(enumerate(expressions))
-    for i, row in enumerate(_slopes(expressions, u)):
+    for i, row in enumerate(slopes_of(expressions, u)):
         entries.update({n + i * m + j: slope for j, slope in row.items()})
     return entries, n + n * m
 
@@ -160,7 +161,7 @@ def _first(
 ) -> int:
     from phasekit.numerics.machine_code import compile_expressions
 
-    u, places = _unknowns(states, parameters, active)
+    u, places = unknowns_of(states, parameters, active)
     entries, count = _jet(expressions, u)
     return compile_expressions(entries, places, count)
 
@@ -176,13 +177,13 @@ def _second(
 
     from phasekit.numerics.machine_code import compile_expressions
 
-    u, places = _unknowns(states, parameters, active)
+    u, places = unknowns_of(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
     entries, count = _jet(expressions, u)
     along = [
-        sympy.Add(*(slope * z[j] for j, slope in row.items())) for row in _slopes(expressions, u)
+        sympy.Add(*(slope * z[j] for j, slope in row.items())) for row in slopes_of(expressions, u)
     ]
-    for i, row in enumerate(_slopes(along, u)):
+    for i, row in enumerate(slopes_of(along, u)):
         entries.update({count + i * len(u) + j: slope for j, slope in row.items()})
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
     return compile_expressions(entries, places, count + len(expressions) * len(u))
@@ -197,11 +198,11 @@ def _terms(
 ) -> int:
     from phasekit.numerics.machine_code import compile_expressions
 
-    _, places = _unknowns(states, parameters, active)
-    return compile_expressions([*expressions, *map(_magnitude, expressions)], places)
+    _, places = unknowns_of(states, parameters, active)
+    return compile_expressions([*expressions, *map(magnitude, expressions)], places)
 
 
-def _magnitude(e: Any) -> Any:
+def magnitude(e: Any) -> Any:
     """An expression with the sizes of all terms of its sums added up, those inside functions too.
 
     Rounding of this, to first order, bounds the error with which the expression is computed.
@@ -211,11 +212,11 @@ def _magnitude(e: Any) -> Any:
     from phasekit.numerics.machine_code import DIFFERENTIABLE
 
     if e.is_Add:
-        return sympy.Add(*map(_magnitude, e.args))
+        return sympy.Add(*map(magnitude, e.args))
     if e.is_Mul:
-        return sympy.Mul(*map(_magnitude, e.args))
+        return sympy.Mul(*map(magnitude, e.args))
     if e.is_Pow and e.exp.is_Integer and e.exp.is_positive:
-        return _magnitude(e.base) ** e.exp
+        return magnitude(e.base) ** e.exp
     smooth = e.is_Pow or type(e).__name__ in DIFFERENTIABLE - KINKED
     if not smooth or not e.free_symbols:
         return abs(e)
@@ -224,7 +225,7 @@ def _magnitude(e: Any) -> Any:
     for place, argument in zip(places, e.args, strict=True):
         if argument.is_Add or argument.is_Mul or not argument.is_Atom:
             slope = e.func(*places).diff(place).subs(dict(zip(places, e.args, strict=True)))
-            terms.append(abs(slope) * _magnitude(argument))
+            terms.append(abs(slope) * magnitude(argument))
     return sympy.Add(*terms)
 
 
@@ -239,14 +240,14 @@ def _third(
 
     from phasekit.numerics.machine_code import compile_expressions
 
-    u, places = _unknowns(states, parameters, active)
+    u, places = unknowns_of(states, parameters, active)
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(3 * len(u))]
     along = list(expressions)
     for k in range(3):
         directions = z[k * len(u) : (k + 1) * len(u)]
         along = [
             sympy.Add(*(slope * directions[j] for j, slope in row.items()))
-            for row in _slopes(along, u)
+            for row in slopes_of(along, u)
         ]
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
     return compile_expressions(along, places)

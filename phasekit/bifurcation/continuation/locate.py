@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.points.branch_point import (
 )
 from phasekit.bifurcation.continuation.points.fold import fold
 from phasekit.bifurcation.continuation.points.pair import pair, pairs
+from phasekit.bifurcation.continuation.points.period_doubling import period_doubling
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -25,6 +26,7 @@ from phasekit.bifurcation.continuation.points.special import (
     interval_of,
     reach_of,
 )
+from phasekit.bifurcation.continuation.points.torus import torus
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, orientation
 
 Array = npt.NDArray[np.float64]
@@ -49,14 +51,18 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
         found.append(branch_point(curve, bracket))
     if "fold" in bracket.changes and not any(_is_turn(curve, point) for point in found):
         found.append(fold(curve, bracket))
+    if "flip" in bracket.changes:
+        found.append(period_doubling(curve, bracket))
     if "pair" in bracket.changes:
-        point = pair(curve, bracket, found)
+        point = torus(curve, bracket) if curve.discrete else pair(curve, bracket, found)
         found += [] if point is None else [point]
     if "touch" in bracket.changes:
         found += _touch(curve, bracket)
     found = _merged(curve, found)
     left = abs(bracket.jump) - sum(_explained(one) for one in found)
-    if left > 0:
+    if left > 0 and curve.discrete:
+        found.append(_several(curve, bracket, left, bracket.a.u, hopf=False))
+    elif left > 0:
         found += _together(curve, bracket, found, left)
     return found
 
@@ -79,7 +85,7 @@ def _is_turn(curve: Curve, point: Special) -> bool:
 
 def _explained(point: Special) -> int:
     """How many eigenvalues may cross at a point."""
-    return 2 if point.kind == "hopf" else point.corank
+    return {"hopf": 2, "torus": 2, "period_doubling": 1}.get(point.kind, point.corank)
 
 
 def _merged(curve: Curve, found: list[Special]) -> list[Special]:

@@ -130,6 +130,48 @@ def hopf(d: Derivatives, omega: float) -> dict[str, float]:
     }
 
 
+def period_doubling(d: Derivatives) -> dict[str, float]:
+    """Of a map next to a multiplier -1, xi -> -xi + c xi^3; c > 0: a stable orbit of period 2.
+
+    With A q = -q, A^T p = -p, <p, q> = 1: c = <p, C(q, q, q)>/6 +
+    <p, B(q, (1 - A)^-1 B(q, q))>/2 ([Kuznetsov2004] 5.4).
+    """
+    n = d.curve.n
+    rows = force_sizes(d.curve, d.u)
+    q, p = null_vectors(d.curve.linear(d.slopes) + np.eye(n), d.curve.scale[:n], rows)
+    bent = d.second(q, q)
+    inverse = np.linalg.inv(-d.slopes[:, :n])
+    fed = _fed(d, q, inverse @ bent.value, inverse, bent.error)
+    total = (1.0 / 6.0) * d.third(q, q, q) + 0.5 * fed
+    c = _known(total.dot(p), _unit(d, rows, p, q, 3))
+    return {"c": c if abs(float(p @ q) - 1.0) < 1e-9 else np.nan}
+
+
+def torus(d: Derivatives, angle: float) -> dict[str, float]:
+    """Of a map next to multipliers exp(+-i angle): |xi| -> |xi| + d |xi|^3; d < 0: supercritical.
+
+    With A q = e^(i angle) q, A^T p = e^(-i angle) p, <q, q> = <p, q> = 1:
+    d = Re{e^(-i angle) [<p, C(q, q, q*)> + 2 <p, B(q, (1 - A)^-1 B(q, q*))> +
+    <p, B(q*, (e^(2 i angle) - A)^-1 B(q, q))>]}/2 ([Kuznetsov2004] 5.4).
+    """
+    n = d.curve.n
+    A, turn = d.curve.linear(d.slopes), np.exp(1j * angle)
+    values, vectors = np.linalg.eig(A)
+    q = vectors[:, np.argmin(np.abs(values - turn))]
+    q = q / np.linalg.norm(q)
+    values, vectors = np.linalg.eig(A.T)
+    p = vectors[:, np.argmin(np.abs(values - np.conj(turn)))]
+    p = p / np.conj(np.vdot(p, q))
+    bar = np.conj(q)
+    still, double = d.second(q, bar), d.second(q, q)
+    back, twice = np.linalg.inv(np.eye(n) - A), np.linalg.inv(turn**2 * np.eye(n) - A)
+    second = _fed(d, q, (back @ still.value).real, back, still.error)
+    third = _fed(d, bar, twice @ double.value, twice, double.error)
+    total = (d.third(q, q, bar) + 2.0 * second + third) * (0.5 * np.conj(turn))
+    unit = _unit(d, force_sizes(d.curve, d.u), p, q, 3)
+    return {"d": _known(total.dot(p), unit), "angle": float(angle)}
+
+
 def _fed(d: Derivatives, q: Vector, h: Vector, inverse: Vector, error: Array) -> Estimate:
     """B(q, h), with what the error of the right side of h leaves of it."""
     found = d.second(q, h)

@@ -36,6 +36,7 @@ class Path:
     residual: Array  # |f| beside its terms
     eigenvalues: npt.NDArray[np.complex128] | None = None  # of f_x, where slopes are kept
     messages: tuple[str, ...] = ()  # what is not certain about them
+    ends: tuple[Any, Any] = (None, None)  # special points beyond its first and last point
 
     @property
     def count(self) -> int:
@@ -142,16 +143,16 @@ def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArra
     eigenvalue is zero everywhere, and its sign says nothing.
     """
     accuracy = curve.field.accuracy
-    values = eigenvalues_of(slopes, accuracy=accuracy)
+    values = eigenvalues_of(curve.linear(slopes), accuracy=accuracy)
     if curve.kind != EQUILIBRIUM:
         return slopes, values
     size = np.max(np.abs(values), axis=1)
     with np.errstate(all="ignore"):
-        doubtful = np.min(np.abs(values.real), axis=1) < DOUBTFUL * np.nanmax(size)
+        doubtful = np.min(np.abs(curve.growth(values)), axis=1) < DOUBTFUL * np.nanmax(size)
     if doubtful.any():
         for i in np.flatnonzero(doubtful):
             slopes[i] = curve.at(u[i])[1]
-        values = eigenvalues_of(slopes, accuracy=accuracy)
+        values = eigenvalues_of(curve.linear(slopes), accuracy=accuracy)
     return slopes, values
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
+from phasekit.bifurcation.continuation.points.event import events_of
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS
@@ -21,25 +23,33 @@ from phasekit.bifurcation.special_points import KINDS
 Array = npt.NDArray[np.float64]
 
 
-def find(
-    curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
-) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
-    """Special points of a path, and the eigenvalues of f_x at its points."""
+class Specials(NamedTuple):
+    """Special points of a path in order, the eigenvalues of f_x at its points, and doubts."""
+
+    placed: list[Placed]
+    eigenvalues: npt.NDArray[np.complex128]
+    messages: tuple[str, ...]
+
+
+def find(curve: Curve, path: Path) -> Specials:
+    """Special points of a path, those that the curve is asked for."""
     with np.errstate(all="ignore"):
-        return _find(curve, path, detect, conservative)
+        placed, eigenvalues = _find(curve, path)
+        events, messages = events_of(curve, path) if curve.events else ([], ())
+    every = sorted([*placed, *events], key=lambda one: (one.index, one.along))
+    return Specials(every, eigenvalues, messages)
 
 
-def _find(
-    curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
-) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
+def _find(curve: Curve, path: Path) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
     if curve.kind != EQUILIBRIUM:
         assert path.eigenvalues is not None
         return find_on(curve, path), path.eigenvalues
+    detect = curve.options.detect
     if not detect:
         if path.eigenvalues is None:  # nothing is asked for that takes long
             return [], np.full((path.count, curve.n), np.nan, dtype=complex)
         return [], path.eigenvalues
-    found, eigenvalues = brackets(curve, path, detect, conservative)
+    found, eigenvalues = brackets(curve, path, detect, curve.conservative)
     placed: list[Placed] = []
     for bracket in found:
         for special in locate(curve, bracket):

@@ -30,8 +30,10 @@ class Tests:
     pair : ndarray
         Sum of two real or two conjugate eigenvalues, the smallest in size, with the sign of the
         product of all: zero at Hopf points and neutral saddles.
+    flip : ndarray
+        Of maps: 1 + mu of the multiplier next to -1, with the sign of the product of all.
     unstable : ndarray of int
-        Number of eigenvalues with a positive real part.
+        Number of eigenvalues with a positive real part, of multipliers outside the unit circle.
     eigenvalues : ndarray
         Eigenvalues of f_x.
     """
@@ -40,6 +42,7 @@ class Tests:
     branch: Array
     volume: Array
     pair: Array
+    flip: Array
     unstable: npt.NDArray[np.int64]
     eigenvalues: npt.NDArray[np.complex128]
 
@@ -161,15 +164,37 @@ def test_functions(
     n = curve.n
     sign, log = orientation(curve, tangent, slopes)
     if values is None:
-        values = eigenvalues_of(slopes, accuracy=curve.field.accuracy)
+        values = eigenvalues_of(curve.linear(slopes), accuracy=curve.field.accuracy)
+    nothing = np.ones(slopes.shape[:-2])
+    pair = product_function if curve.discrete else pair_function
     return Tests(
         tangent[..., n] / curve.scale[n],
         sign,
         log,
-        pair_function(values) if pairs and n > 1 else np.ones(slopes.shape[:-2]),
-        np.sum(values.real > 0.0, axis=-1),
+        pair(values) if pairs and n > 1 else nothing,
+        flip_function(values) if curve.discrete else nothing,
+        np.sum(curve.growth(values) > 0.0, axis=-1),
         values,
     )
+
+
+def flip_function(values: npt.NDArray[np.complex128]) -> Array:
+    """The least 1 + mu in size, with the sign of the product of all."""
+    size = np.min(np.abs(1.0 + values), axis=-1)
+    negative = np.sum((values.imag == 0.0) & (values.real < -1.0), axis=-1)
+    return np.asarray(np.where(negative % 2 == 1, -size, size))
+
+
+def product_function(values: npt.NDArray[np.complex128]) -> Array:
+    """The least mu_i mu_j - 1 of real and conjugate pairs, with the sign of the product of all."""
+    i, j = np.triu_indices(values.shape[-1], 1)
+    a, b = values[..., i], values[..., j]
+    real = ((a.imag == 0.0) & (b.imag == 0.0)) | (a == np.conj(b))
+    excess = (a * b).real - 1.0
+    negative = np.sum(real & (excess < 0.0), axis=-1)
+    least = np.min(np.where(real, np.abs(excess), np.inf), axis=-1, initial=np.inf)
+    least = np.where(np.isfinite(least), least, 1.0)
+    return np.asarray(np.where(negative % 2 == 1, -least, least))
 
 
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -212,11 +237,20 @@ def _least_sum(values: npt.NDArray[np.complex128]) -> float:
     return -least if negative % 2 else least
 
 
-def is_conservative(values: npt.NDArray[np.complex128]) -> bool:
-    """Whether the spectrum of every point is its own mirror image: no damping anywhere."""
+def is_conservative(values: npt.NDArray[np.complex128], *, discrete: bool = False) -> bool:
+    """Whether the spectrum of every point is its own mirror image: no damping anywhere.
+
+    Of a map, whether multipliers come in pairs mu and 1/mu: it keeps areas.
+    """
     n = values.shape[-1]
     if n < 2 or n % 2 or not len(values):
         return False
+    if discrete:
+        if not np.isfinite(values).all():
+            return False
+        rows = np.array([np.poly(row).real for row in values])
+        gap = np.max(np.abs(rows - rows[:, ::-1]), axis=-1) / np.max(np.abs(rows), axis=-1)
+        return bool(np.median(gap) <= NEUTRAL and np.max(gap) < 1e-5)
     size = np.max(np.abs(values), axis=-1, initial=1e-300)
     order = np.sort_complex(values)
     mirror = np.sort_complex(-values)

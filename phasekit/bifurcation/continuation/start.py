@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve, Track, nullspace
 from phasekit.bifurcation.continuation.derivatives import Derivatives
+from phasekit.bifurcation.continuation.ending import followed
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
 from phasekit.errors import ConvergenceError
@@ -163,17 +164,28 @@ def run(curve: Curve, start: Sample, directions: str) -> tuple[Track | None, Tra
     points = curve.options.max_points
     forward = backward = None
     if directions != "backward":
-        forward = curve.follow(curve.start_state(start.u, start.tangent), points)
+        forward = followed(curve, start, curve.start_state(start.u, start.tangent), points)
     closed = forward is not None and forward.stop.reason == "closed"
     if directions != "forward" and not closed:
-        backward = curve.follow(curve.start_state(start.u, -start.tangent), points)
+        start = _turned(start)
+        backward = followed(curve, start, curve.start_state(start.u, start.tangent), points)
     return backward, forward
 
 
-def go_on(curve: Curve, track: Track | None, points: int) -> Track | None:
-    """More points of a track that ended for their number, exactly as if it had never stopped."""
-    if track is None or track.stop.reason != "max_points":
-        return track
-    more = curve.follow(track.state, points)
-    record = np.concatenate([track.record, more.record])
-    return Track(record, np.concatenate([track.slopes, more.slopes]), more.state, more.stop)
+def go_on(
+    curve: Curve, start: Sample, tracks: tuple[Track | None, Track | None], points: int
+) -> tuple[Track | None, Track | None]:
+    """More points of tracks that ended for their number, exactly as if they had never stopped."""
+    backward, forward = (
+        track
+        if track is None or track.stop.reason != "max_points"
+        else followed(curve, begin, track.state, points, track)
+        for begin, track in zip((_turned(start), start), tracks, strict=True)
+    )
+    if forward is not None and forward.stop.reason == "closed":
+        backward = None
+    return backward, forward
+
+
+def _turned(start: Sample) -> Sample:
+    return Sample(start.u, -start.tangent, start.slopes)

@@ -80,7 +80,7 @@ class _Test:
 
 
 def find_on(curve: Curve, path: Path) -> list[Placed]:
-    """Cusp, Bogdanov-Takens, zero-Hopf and generalized Hopf points of a curve."""
+    """Cusp, Bogdanov-Takens, zero-Hopf, generalized Hopf and double Hopf points of a curve."""
     found: list[Placed] = []
     m = curve.m
     for test in _tests(curve):
@@ -175,6 +175,8 @@ def _tests(curve: Curve) -> list[_Test]:
     n, m = curve.n, curve.m
     if curve.kind == FOLD:
         tests = [_Test("cusp", lambda u, slopes: _cusp(curve, u, slopes))]
+        if curve.discrete:  # what f(x) - x has besides is no point of the map
+            return tests
         if n > 1:
             tests.append(_Test("bogdanov_takens", lambda u, slopes: _zero(curve, u, slopes)))
         if n > 2:
@@ -187,6 +189,8 @@ def _tests(curve: Curve) -> list[_Test]:
         ]
         if n > 2:
             tests.append(_Test("zero_hopf", lambda u, slopes: np.linalg.det(slopes[:, :, :n])))
+        if n > 3:
+            tests.append(_Test("hopf_hopf", lambda u, slopes: _others(curve, u, slopes)))
         return tests
     return []
 
@@ -214,6 +218,32 @@ def _rest(slopes: Array) -> Array:
     return pair_function(values[keep].reshape(len(values), -1))
 
 
+def _without_pair(curve: Curve, u: Array, slopes: Array) -> npt.NDArray[np.complex128]:
+    """All eigenvalues, on scaled axes, but the pair of the Hopf point, at each point."""
+    n, m = curve.n, curve.m
+    scale = curve.scale[:n]
+    values = eigenvalues_of(slopes[:, :, :n] * scale / scale[:, None])
+    root = np.sqrt(u[:, m + n].astype(complex))[:, None]  # i omega, or r of r and -r
+    for one in (1j * root, -1j * root):
+        place = np.argmin(np.abs(values - one), axis=1)
+        keep = np.arange(values.shape[1]) != place[:, None]
+        values = values[keep].reshape(len(values), -1)
+    return values
+
+
+def _others(curve: Curve, u: Array, slopes: Array) -> Array:
+    """The pair function of all eigenvalues but the pair of the Hopf point."""
+    return pair_function(_without_pair(curve, u, slopes))
+
+
+def _other_pair(curve: Curve, s: Sample) -> bool:
+    """Whether the two others whose sum vanishes are conjugate."""
+    values = _without_pair(curve, s.u[None], s.slopes[None])[0]
+    above = values[values.imag > 0.0]
+    least = np.min(np.abs(2.0 * above.real), initial=np.inf)
+    return bool(least <= abs(float(pair_function(values))) * (1.0 + 1e-9))
+
+
 def _lyapunov(curve: Curve, u: Array, slopes: Array) -> Array:
     n, m = curve.n, curve.m
     size = np.max(np.abs(slopes[:, :, :n]), axis=(1, 2))
@@ -235,6 +265,8 @@ def _locate(curve: Curve, a: Sample, b: Sample, test: _Test) -> Special | None:
         if not np.any(rest.imag != 0.0):
             return None  # two real eigenvalues: a neutral saddle with a zero eigenvalue
     if test.kind == "zero_hopf" and curve.kind == HOPF and not best.u[m + n] > 0.0:
+        return None
+    if test.kind == "hopf_hopf" and not (best.u[m + n] > 0.0 and _other_pair(curve, best)):
         return None
     # A test function that jumps instead of passing zero is no point.
     if not value <= 1e-3 * size:

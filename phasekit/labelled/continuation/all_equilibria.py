@@ -90,7 +90,8 @@ def _critical(problem: Problem, parameter: str, span: tuple[float, float]) -> li
 
 
 def _form(problem: Problem) -> tuple[str, tuple[Any, ...]] | None:
-    return _form_of(problem.f[0], problem.state[0], bool(problem.periods), _period(problem))
+    field: Any = problem.field  # of a map f(x) - x
+    return _form_of(field.expressions[0], problem.state[0], bool(problem.periods), _period(problem))
 
 
 def _period(problem: Problem) -> float:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.ending import cut
 from phasekit.bifurcation.continuation.gaps import narrow
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.path import Path, Sample, join
@@ -47,7 +48,8 @@ class Branch:
     points : xarray.Dataset
         On the dim ``point``, in order along the curve: the free parameters and states by name,
         ``arclength`` (0 at the start, on scaled axes), ``n_unstable`` (number of eigenvalues with
-        a positive real part) or, of a conservative problem, ``kind`` (`EquilibriumKind`),
+        a positive real part, of a map of multipliers outside the unit circle) or, of a
+        conservative problem, ``kind`` (`EquilibriumKind`),
         ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
         empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
         beside that of the terms that cancel in it), and what was recorded.
@@ -55,7 +57,7 @@ class Branch:
         In order along the curve.
     stops : tuple of Stop
         Why the curve ends, at its first and at its last point: ``reason`` (bound, closed,
-        max_points, stuck, not_finite, start) and ``message``.
+        max_points, stuck, not_finite, start, or what it was to ``stop`` at) and ``message``.
     messages : tuple of str
         What is not certain about the curve as a whole; empty where nothing is in doubt.
     kind : str
@@ -127,9 +129,9 @@ class Branch:
         -------
         xarray.Dataset
             `points`, and ``special_kind``, ``special_label``, ``special_<name>`` of each free
-            parameter and state, ``special_residual``, ``special_status``, ``special_corank``,
-            ``special_index`` (the point of the curve), ``special_interval`` on
-            (``special_point``, ``end``).
+            parameter and state, ``special_name`` of events, ``special_residual``,
+            ``special_status``, ``special_corank``, ``special_index`` (the point of the curve),
+            ``special_interval`` on (``special_point``, ``end``).
         """
         ds = self.points
         dim = "special_point"
@@ -143,6 +145,8 @@ class Branch:
         ds["special_label"] = strings([s.label for s in specials])
         ds["special_status"] = strings([s.status for s in specials])
         ds["special_message"] = strings([s.message for s in specials])
+        if any(s.name for s in specials):
+            ds["special_name"] = strings([s.name for s in specials])
         for name in (*self.free, *self.problem_state):
             ds[f"special_{name}"] = (dim, np.array([s[name] for s in specials]))
         ds["special_residual"] = (dim, np.array([s.residual for s in specials]))
@@ -155,11 +159,12 @@ class Branch:
         return ds
 
     def special(self, label: str) -> tuple[SpecialPoint, ...]:
-        """The special points of one label (LP, BP, H, ...) or kind (fold, pitchfork, ...)."""
+        """The special points of a label (LP, BP, H, ...), kind (fold, ...) or event of a name."""
         labels = dict.fromkeys(kind.label for kind in SPECIAL.values())
-        if not isinstance(label, str) or label not in {*SPECIAL, *labels}:
-            raise bad("label", label, f"one of {', '.join(labels)}")
-        return tuple(s for s in self.special_points if label in (s.label, s.kind))
+        events = [] if self.curve is None else [event.name for event in self.curve.events]
+        if not isinstance(label, str) or label not in {*SPECIAL, *labels, *events}:
+            raise bad("label", label, f"one of {', '.join([*labels, *events])}")
+        return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curve with its special points: see `phasekit.plot.branch`."""
@@ -188,10 +193,11 @@ class Branch:
             )
         count = curve.options.max_points if points is None else points
         count = whole("points", count, "a whole number >= 1")
-        backward, forward = (go_on(curve, track, count) for track in self.tracks)
-        if forward is not None and forward.stop.reason == "closed":
-            backward = None
+        backward, forward = go_on(curve, self.start, self.tracks, count)
         return make_branch(problem, curve, self.start, backward, forward, self.record)
+
+    def _discrete(self) -> bool:
+        return self.problem is not None and self.problem.map
 
     def known(self) -> tuple[Curve, Problem]:
         """The curve and the problem, or the error that they are not known."""
@@ -210,8 +216,9 @@ class Branch:
 
     @staticmethod
     def load(
-        path: str | PathLike[str], *, problem: Any = None, record: Record | None = None
-    ) -> Branch:
+        path: str | PathLike[str], *, problem: Any = None, record: Record | None = None,
+        events: Mapping[str, Any] | None = None,
+    ) -> Branch:  # fmt: skip
         """Load a saved branch.
 
         Parameters
@@ -222,9 +229,11 @@ class Branch:
             Needed to go on where f is Python or compiled code, which is not saved.
         record : mapping, optional
             The functions that were recorded, needed to extend a branch that has some.
+        events : mapping, optional
+            The functions among its events, which are not saved.
         """
         module = importlib.import_module("phasekit.labelled.continuation.branch_store")
-        loaded: Branch = module.load(path, problem, record)
+        loaded: Branch = module.load(path, problem, record, events)
         return loaded
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -237,7 +246,9 @@ class Branch:
         """Write what it is, its range, its special points and why it ends."""
         u = {name: self._points[name].values for name in self.free}
         ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        of = {"equilibrium": "equilibria"}.get(self.kind, f"{self.kind} points")
+        of = {"equilibrium": "fixed points" if self._discrete() else "equilibria"}.get(
+            self.kind, f"{self.kind} points"
+        )
         lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]
@@ -263,7 +274,7 @@ def make_branch(
 ) -> Branch:
     """A branch of what was traced: special points are looked for, quantities recorded."""
     path = join(curve, start, backward, forward)
-    placed, eigenvalues = find(curve, path, curve.options.detect, problem.conservative)
+    path, (placed, eigenvalues, doubts) = cut(curve, path, find(curve, path))
     names = tuple(curve.field.parameters[i] for i in curve.active)
     specials = [*placed, *_ends(curve, path)]
     specials.sort(key=lambda one: (one.index, one.along))
@@ -271,7 +282,7 @@ def make_branch(
     branch = Branch(
         problem, names, curve.field.states, curve, start, (backward, forward), points, (),
         path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
-        (*path.messages, *narrow(curve, path)),
+        (*path.messages, *doubts, *narrow(curve, path)),
     )  # fmt: skip
     made = tuple(
         special_point(problem, curve, one.special, place, branch)
@@ -296,7 +307,8 @@ def _ends(curve: Curve, path: Path) -> list[Placed]:
         return []
     found = []
     for i, along, stop in ((0, -np.inf, path.stops[0]), (path.count - 1, np.inf, path.stops[1])):
-        u = path.u[i, : curve.m]
+        there = path.ends[0 if along < 0.0 else 1]
+        u = path.u[i, : curve.m] if there is None else there.u
         at = float(u[curve.n])
         residual = float(np.max(np.abs(curve.at(u)[0])))
         special = Special(

@@ -14,13 +14,15 @@ from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, is_conservative
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
+
+ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
 
 
 def wrap(value: FloatArray, period: float) -> FloatArray:
@@ -79,7 +81,8 @@ def points_of(
             places.append(int(mine[seen]))
             seen += 1
     for one, place in zip(specials, places, strict=True):
-        label[place] = KINDS[one.special.kind].label
+        if one.special.kind != "end" or not label[place]:  # it may end on a special point
+            label[place] = KINDS[one.special.kind].label
     kappa = np.full(total, np.nan)
     if curve.kind == HOPF:
         kappa[own] = path.u[:, -1]
@@ -91,7 +94,9 @@ def points_of(
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
     """Eigenvalues of f_x at a point; NaN where f is not finite."""
-    return np.asarray(eigenvalues_of(curve.at(u)[1][None], accuracy=curve.field.accuracy)[0])
+    return np.asarray(
+        eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)[0]
+    )
 
 
 def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDArray[np.int8]:
@@ -135,14 +140,21 @@ def _dataset(
         }
         data["kind"] = (dim, kinds_of(values, label, n), flags)
     else:
-        critical = np.isin(label, ["LP", "BP", "H", "NS"]) | (curve.kind != EQUILIBRIUM)
+        critical = np.isin(label, ["LP", "BP", "H", "NS", "PD", "TR"]) | (curve.kind != EQUILIBRIUM)
         size = np.max(np.abs(values), axis=1, keepdims=True)
-        floor = np.where(critical[:, None], 1e-6, 0.0) * size
-        unstable = np.sum(values.real > floor, axis=1).astype(np.int64)
+        # The size of a multiplier is a rounded number, and may be exactly 1.
+        kept = is_conservative(values, discrete=True) if curve.discrete else False
+        least = (1e-7 if kept else ROUNDED) if curve.discrete else 0.0
+        floor = np.where(critical[:, None], 1e-6, least) * size
+        unstable = np.sum(curve.growth(values) > floor, axis=1).astype(np.int64)
         unstable[np.isnan(values).any(axis=1)] = -1
         data["n_unstable"] = (
             dim, unstable,
-            {"long_name": "number of eigenvalues with a positive real part; -1: not known"},
+            {
+                "long_name": "number of multipliers outside the unit circle; -1: not known"
+                if curve.discrete
+                else "number of eigenvalues with a positive real part; -1: not known"
+            },
         )  # fmt: skip
     if curve.kind == HOPF:
         pair = np.where(

@@ -14,6 +14,7 @@ import xarray as xr
 from phasekit.errors import StoreError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.branch_stored import ARRAYS, Stored, damaged
+from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
 from phasekit.maps.netcdf import open_netcdf
 from phasekit.maps.stored_arrays import reason
@@ -57,13 +58,18 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
         ],
         "record": {name: function is None for name, function in branch.record.items()},
     }
+    if curve.events:
+        spec |= {"events": written(curve.events), "ends": list(curve.ends)}
+        spec["conditions"] = [event.name for event in curve.events if event.condition]
+    elif curve.ends:
+        spec["ends"] = list(curve.ends)
     ds.attrs = {
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
     target.write(ds)
 
 
-def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
+def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = None) -> Branch:
     """Read a branch and make it again of what was traced.
 
     Raises
@@ -73,8 +79,9 @@ def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
     ParameterError
         If the problem or the functions to record are needed, or are not those of the branch.
     """
-    if record is not None and not isinstance(record, Mapping):
-        raise bad("record", record, "a mapping from names to functions, or None")
+    for name, functions in (("record", record), ("events", events)):
+        if functions is not None and not isinstance(functions, Mapping):
+            raise bad(name, functions, "a mapping from names to functions, or None")
     place = _place(path)
     with _open(place) as ds:
         stored = Stored(ds, str(place), _bytes(place))
@@ -88,9 +95,9 @@ def load(path: str | PathLike[str], problem: Any, record: Any) -> Branch:
             from phasekit.labelled.continuation.cycle_store import made_again
 
             return made_again(stored, given, functions)
-        curve = stored.curve(given)
+        curve = stored.curve(given).replace(**stored.asked(given, events))
         start, tracks = stored.traces(curve)
-    if problem is not None or any(functions.values()):
+    if problem is not None or any(functions.values()) or events:
         return make_branch(given, curve, start, *tracks, functions)  # what f raises is the user's
     with damaged(str(place), "its points"):
         return make_branch(given, curve, start, *tracks, functions)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation.branch import NUMBERS
+from phasekit.labelled.continuation.user_events import events_of
 from phasekit.labels.arguments import bad
 from phasekit.systems.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.systems.problem import Problem
@@ -105,6 +107,28 @@ class Stored:
             )
         return {name: None if by_name else given[name] for name, by_name in kept.items()}
 
+    def asked(self, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:
+        """The events of the branch and where it ends, with functions that are given again."""
+        with damaged(self.name, "its events"):
+            kept = dict(_mapping("events", self.spec.get("events", {})))
+            ends = tuple(str(name) for name in self.spec.get("ends", ()))
+            conditions = list(self.spec.get("conditions", ()))
+        missing = [n for n, text in kept.items() if text is None and n not in (given or {})]
+        if missing:
+            raise ParameterError(
+                f"events: the branch looks for {', '.join(missing)} by functions, which are not "
+                "saved; wants them again: Branch.load(path, events={...})"
+            )
+        code = {n: (given or {})[n] for n, text in kept.items() if text is None}
+        for name, function in code.items():
+            if not callable(function):
+                raise bad(f"events[{name!r}]", function, "the function of the branch")
+        with damaged(self.name, "its events"):
+            events = events_of(problem, {**kept, **code})
+        events = tuple(replace(one, condition=one.name in conditions) for one in events)
+        return {"events": events, "ends": ends, "conservative": problem.conservative,
+                "discrete": problem.map}  # fmt: skip
+
     def curve(self, problem: Problem) -> Curve:
         """The curve that was traced."""
         with damaged(self.name, "its curve"):
@@ -151,7 +175,8 @@ class Stored:
         columns = 2 * size + trace.RECORDED
         state = VECTORS * size + curve.n
         reason, message = stop
-        if reason not in _REASONS or not isinstance(message, str):
+        ends = (*_REASONS, *(str(name) for name in self.spec.get("ends", ())))
+        if reason not in ends or not isinstance(message, str):
             raise ValueError(f"stops: got {reason!r:.80}, wants one of {', '.join(_REASONS)}")
         # Where f ends, derivatives and the state that is left need not be finite.
         record, slopes = self._points(name, curve, columns)

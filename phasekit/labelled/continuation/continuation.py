@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, pair, unknown
 from phasekit.systems.problem import Problem, as_problem
 
@@ -30,9 +31,11 @@ def continuation(
     orbit: Any = None,
     fix: str | None = None,
     record: Mapping[str, Callable[..., Any]] | Sequence[str] | None = None,
+    events: Mapping[str, Any] | None = None,
+    stop: Any = None,
     options: ContinuationOptions | None = None,
 ) -> Branch:
-    """Follow a branch of equilibria or periodic orbits along a parameter, through its folds.
+    """Follow equilibria, fixed points of a map or periodic orbits along a parameter.
 
     Parameters
     ----------
@@ -58,6 +61,15 @@ def continuation(
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function
         over the orbit are recorded, as ``q_min``, ``q_max`` and ``q_mean``.
+    events : mapping of str to str, sympy.Expr or callable, optional
+        Functions of the states and parameters whose zeros are special points (``event``, UZ), by
+        name: formulas, or functions ``q(x, **parameters)`` of one number. An angle counts as it is
+        shown, in one turn. They hold on branches that are switched to, and on curves in two
+        parameters.
+    stop : str, callable, or sequence of them, optional
+        Where the branch ends before: at the first event of a name, special point of a kind or
+        label, zero of a function ``q(x, **parameters)`` or change of one that says yes or no. The
+        start itself does not count.
     options : ContinuationOptions, optional
         Steps, tolerances, bounds, directions.
 
@@ -88,6 +100,12 @@ def continuation(
     >>> branch = continuation(cusp, "mu", x0=[-1.3], span=(-1.0, 1.0))
     >>> [round(point.parameters["mu"], 10) for point in branch.special("fold")]
     [0.3849001795, -0.3849001795]
+    >>> branch = continuation(
+    ...     cusp, "mu", x0=[-1.3], span=(-1.0, 1.0), events={"half": "x + 1/2"}, stop="half"
+    ... )
+    >>> (point,) = branch.special("half")
+    >>> point.label, point.x.item(), round(point["mu"], 12), branch.stops[1].reason
+    ('UZ', -0.5, 0.375, 'half')
     """
     problem = as_problem(problem)
     options = check_options(options)
@@ -96,6 +114,17 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
+        if problem.map:
+            raise bad(
+                "orbit", orbit, "None of a map",
+                "orbits of a map are fixed points of problem.iterated(times)",
+            )  # fmt: skip
+        for name, asked_for in (("events", events), ("stop", stop)):
+            if asked_for is not None:
+                raise bad(
+                    name, asked_for, "None with an orbit: events are functions of one state",
+                    "record= keeps the least, largest and mean value of a function over each orbit",
+                )  # fmt: skip
         return continue_orbit(
             problem, parameter, orbit, span, _record(problem, record), options, fix
         )
@@ -104,6 +133,10 @@ def continuation(
     low, high = _span(problem, parameter, span)
     guess = _start(problem, x0)
     curve = equilibrium_curve(problem, parameter, (low, high), options)
+    if events is not None or stop is not None:
+        asked = events_of(problem, events, guess)
+        asked, ends = stop_of(problem, stop, asked, options.detect, guess)
+        curve = curve.replace(events=asked, ends=ends)
     u = np.append(guess, problem.parameters[parameter])
     _check_values(problem, guess)
     where = ", ".join(
@@ -150,6 +183,8 @@ def equilibrium_curve(
         low=np.array([*(pair[0] for pair in bounds), low]),
         high=np.array([*(pair[1] for pair in bounds), high]),
         options=options,
+        conservative=problem.conservative,
+        discrete=problem.map,
     )
 
 

@@ -86,6 +86,11 @@ def periodic_orbit(
     7.62987448
     """
     problem = as_problem(problem)
+    if problem.map:
+        raise bad(
+            "problem", problem, "a flow x' = f(x)",
+            "orbits of a map are fixed points of problem.iterated(times)",
+        )  # fmt: skip
     options = check_options(options)
     n = len(problem.state)
     if period is not None:

@@ -46,9 +46,9 @@ def point_curve(
     Returns
     -------
     Branch
-        Its special points are cusps (CP), Bogdanov-Takens (BT), generalized Hopf (GH) and
-        zero-Hopf (ZH) points. A Hopf curve goes on beyond a Bogdanov-Takens point as a curve of
-        neutral saddles; ``points.kind_of_pair`` tells which.
+        Its special points are cusps (CP), Bogdanov-Takens (BT), generalized Hopf (GH),
+        zero-Hopf (ZH) and Hopf-Hopf (HH) points. A Hopf curve goes on beyond a Bogdanov-Takens
+        point as a curve of neutral saddles; ``points.kind_of_pair`` tells which.
 
     Raises
     ------
@@ -58,10 +58,9 @@ def point_curve(
         If there is no curve through the point: a branch point that another parameter destroys.
     """
     along = KINDS[point.kind].curve
-    if along is None:
-        raise bad(
-            "point", point.kind, f"one of {', '.join(k.name for k in KINDS.values() if k.curve)}"
-        )
+    if along not in _CURVES:
+        valid = [kind.name for kind in KINDS.values() if kind.curve in _CURVES]
+        raise bad("point", point.kind, f"one of {', '.join(valid)}")
     if point.branch.kind != "equilibrium":
         raise bad("point", point.branch.kind, "a point of a branch of equilibria")
     curve, problem = point.branch.known()
@@ -101,6 +100,27 @@ def point_curve(
     made, start = begun
     backward, forward = run(made, start, options.directions)
     return make_branch(problem, made, start, backward, forward, {})
+
+
+def doubled(point: SpecialPoint, *, options: ContinuationOptions | None = None) -> Branch:
+    """The orbit of period 2 that begins at a period doubling of a map.
+
+    Raises
+    ------
+    ParameterError
+        If the point has not converged, or the map applied twice is too long a formula.
+    """
+    curve, problem = point.branch.known()
+    if point.status != "converged" or point.special.extra is None:
+        raise bad("point", point.status, "a point that has converged", point.message)
+    options = curve.options if options is None else check_options(options)
+    twice = problem.iterated(2)
+    curve = curve.replace(options=options, field=twice.field)
+    tangent = np.append(point.special.extra, 0.0)
+    tangent = tangent / curve.length(tangent)
+    start = Sample(point.special.u, tangent, curve.at(point.special.u)[1])
+    backward, forward = run(curve, start, options.directions)
+    return make_branch(twice, curve, start, backward, forward, point.branch.record)
 
 
 def switch(

@@ -27,13 +27,17 @@ FloatArray = npt.NDArray[np.float64]
 class SpecialPoint:
     """A point of a branch where something happens.
 
+    Of a map the kinds are fold, branch_point, period_doubling (PD) and torus (TR).
+
     Attributes
     ----------
     kind : str
         fold, branch_point, pitchfork, transcritical, hopf, neutral_saddle, cusp,
-        bogdanov_takens, generalized_hopf, zero_hopf or end.
+        bogdanov_takens, generalized_hopf, zero_hopf, hopf_hopf, event or end.
     label : str
-        LP, BP (also pitchfork and transcritical), H, NS, CP, BT, GH, ZH or EP.
+        LP, BP (also pitchfork and transcritical), H, NS, CP, BT, GH, ZH, HH, UZ or EP.
+    name : str
+        Of an event its name; else empty.
     x : ndarray
         The state.
     parameters : mapping of str to float
@@ -53,9 +57,11 @@ class SpecialPoint:
         pitchfork ``xi' = d (p - p0) xi + c xi^3`` (supercritical: c < 0); Hopf: ``l1``, the first
         Lyapunov coefficient (divided by 2 omega once, see Notes), ``omega`` and ``d``, the speed
         at which the real part grows with the parameter. A coefficient that is not known is NaN,
-        and `message` says why.
+        and `message` says why. Of maps: period doubling ``xi -> -xi + c xi^3`` (c > 0: the orbit
+        of period 2 is stable), torus ``|xi| -> |xi| + d |xi|^3`` (d < 0: supercritical) and
+        ``angle``, that of the multipliers.
     eigenvalues : ndarray
-        Eigenvalues of f_x.
+        Eigenvalues of f_x; of a map its multipliers.
     corank : int
         Dimension of the null space of f_x: 1 at folds and simple branch points, more at multiple
         branch points, 0 at Hopf points and ends.
@@ -118,8 +124,13 @@ class SpecialPoint:
 
     @property
     def label(self) -> str:
-        """LP, BP, H, NS, CP, BT, GH, ZH or EP."""
+        """LP, BP, H, NS, CP, BT, GH, ZH, HH, UZ or EP."""
         return KINDS[self.kind].label
+
+    @property
+    def name(self) -> str:
+        """The name of an event; else empty."""
+        return getattr(self.special, "name", "")
 
     def __getitem__(self, name: str) -> float:
         """A state or parameter by name."""
@@ -128,7 +139,10 @@ class SpecialPoint:
         return self.parameters[name]
 
     def switch(self, *, direction: int = 0, options: Any = None) -> Branch:
-        """Another branch through a branch point, or the periodic orbits of a Hopf point.
+        """Another branch through a branch point, or the orbits that begin at a point.
+
+        Of a Hopf point the periodic orbits; of a period doubling of a map the orbit of period 2,
+        as fixed points of the map applied twice.
 
         Parameters
         ----------
@@ -172,6 +186,8 @@ class SpecialPoint:
             from phasekit.labelled.continuation.cycle_start import from_hopf
 
             return from_hopf(self, options)
+        if self.kind == "period_doubling":
+            return _module("doubled")(self, options=options)  # type: ignore[no-any-return]
         return _module("switch")(  # type: ignore[no-any-return]
             self, direction=direction, options=options
         )
@@ -195,7 +211,8 @@ class SpecialPoint:
         notes += [f"corank={self.corank}"] if self.corank > 1 else []
         notes += [self.status] if self.status != "converged" else []
         notes += [self.message] if self.message else []
-        text = f"{self.label} {self.kind} at {', '.join(where)}"
+        what = f"{self.kind} {self.name!r}" if self.name else self.kind
+        text = f"{self.label} {what} at {', '.join(where)}"
         return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,12 +11,13 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import TIGHT, Curve, nullspace
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
-from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.bifurcation.continuation.units import force_sizes, row_sizes
 from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
 
 CONVERGED, GUESS = "converged", "guess"
+STEPS = 25  # of Newton's method
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Special:
     others: tuple[Array, ...] = ()  # tangents of the other branches, at a branch point
     extra: Array | None = None  # the unknowns that its defining system adds
     corank: int = 0  # of f_x
+    name: str = ""  # of an event
 
     def __post_init__(self) -> None:
         """Refuse a kind that nobody knows."""
@@ -87,6 +90,37 @@ def polish(
     if moved > reach:
         return start, extra, residual, "the defining system led away from the bracket"
     return point.u[: curve.m], point.u[curve.m :], residual, ""
+
+
+def solved(
+    curve: Curve,
+    system: Callable[[Array], tuple[Array, Array]],
+    start: Array,
+    sizes: Array,
+    reach: float,
+) -> tuple[Array, float, str]:
+    """Newton's method on a square system of few unknowns: them, the residual, a message."""
+    z, before, m = np.array(start), np.inf, curve.m
+    for _ in range(STEPS):
+        value, matrix = system(z)
+        matrix = matrix * sizes
+        rows = row_sizes(matrix)
+        if not (np.isfinite(matrix).all() and np.isfinite(value).all()):
+            break
+        try:
+            step = np.linalg.solve(matrix / rows[:, None], -value / rows)
+        except np.linalg.LinAlgError:
+            break
+        size = float(np.max(np.abs(step)))
+        if not size < 1e3:
+            break
+        z = z + step * sizes
+        if size <= 1e-15 or (size <= 1e-9 and size >= 0.5 * before):
+            if curve.length(z[:m] - start[:m]) > reach:
+                return start, np.inf, "the defining system led away from the bracket"
+            return z, float(np.max(np.abs(system(z)[0]))), ""
+        before = size
+    return start, np.inf, "Newton's method on the defining system did not converge"
 
 
 def tangent_at(curve: Curve, u: Array, near: Array) -> Array:

@@ -1,0 +1,61 @@
+"""Period doublings of maps: a multiplier passes -1."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation import normal_form as forms
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.events import Bracket
+from phasekit.bifurcation.continuation.path import Sample, bracket_root
+from phasekit.bifurcation.continuation.points.special import (
+    CONVERGED,
+    GUESS,
+    Special,
+    interval_of,
+    reach_of,
+    solved,
+    tangent_at,
+)
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, flip_function
+
+Array = npt.NDArray[np.float64]
+
+
+def period_doubling(curve: Curve, bracket: Bracket) -> Special:
+    """The point of a bracket at which 1 + mu changes its sign."""
+    n, m, scale = curve.n, curve.m, curve.scale[: curve.n]
+
+    def test(s: Sample) -> float:
+        values = eigenvalues_of(curve.linear(s.slopes)[None], accuracy=curve.field.accuracy)
+        return float(flip_function(values)[0])
+
+    best, left, right = bracket_root(curve, bracket.a, bracket.b, test, steps=10, width=1e-4)
+    v = np.linalg.svd((curve.linear(best.slopes) + np.eye(n)) * scale / scale[:, None])[2][-1]
+
+    def system(z: Array) -> tuple[Array, Array]:
+        """The equations f = 0, (A + 1) v = 0, |v| = 1, and their derivatives."""
+        u, v = z[:m], z[m:]
+        f, slopes = curve.at(u)
+        B, A = curve.bend(u, v), curve.linear(slopes) + np.eye(n)
+        row = np.concatenate([np.zeros(m), 2.0 * v / scale**2])
+        matrix = np.block([[slopes, np.zeros((n, n))], [B, A]])
+        return np.concatenate([f, A @ v, [np.sum((v / scale) ** 2) - 1.0]]), np.vstack(
+            [matrix, row]
+        )
+
+    sizes = np.concatenate([curve.scale[:m], scale])
+    z, residual, message = solved(
+        curve, system, np.concatenate([best.u[:m], v * scale]), sizes, reach_of(curve, bracket)
+    )
+    u = z[:m]
+    if message:
+        best, _, _ = bracket_root(curve, left, right, test, steps=60, width=1e-14)
+        u = best.u
+    form = {"c": np.nan} if message else forms.period_doubling(forms.Derivatives(curve, u))
+    return Special(
+        "period_doubling", u, interval_of(curve, bracket), residual,
+        GUESS if message else CONVERGED, message or forms.unknown(form), form,
+        tangent=tangent_at(curve, u, best.tangent), others=(z[m:],), extra=z[m:],
+    )  # fmt: skip

@@ -1,0 +1,62 @@
+"""Maps that are code: their displacement f(x) - x, and their iterates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def moves_of(f: Callable[..., Any]) -> Callable[..., FloatArray]:
+    """f(x) - x, zero at fixed points."""
+
+    def moves(x: FloatArray, **parameters: float) -> FloatArray:
+        value = np.asarray(f(x.copy(), **parameters), dtype=float)
+        return value.reshape(x.shape) - x if value.size == x.size else value
+
+    return moves
+
+
+def slopes_of(jac: Callable[..., Any]) -> Callable[..., FloatArray]:
+    """The matrix of derivatives of f(x) - x."""
+
+    def slopes(x: FloatArray, **parameters: float) -> FloatArray:
+        value = np.asarray(jac(x, **parameters), dtype=float)
+        return value.reshape(x.size, x.size) - np.eye(x.size)
+
+    return slopes
+
+
+class Iterate:
+    """f(f(... f(x))), so many times."""
+
+    def __init__(self, f: Callable[..., Any], times: int) -> None:
+        self.f, self.times = f, times
+        self.__name__ = f"{getattr(f, '__name__', 'f')}_{times}_times"
+
+    def __call__(self, x: FloatArray, **parameters: float) -> FloatArray:
+        """The state after all steps."""
+        x = np.array(x, dtype=float)
+        for _ in range(self.times):
+            x = np.asarray(self.f(x.copy(), **parameters), dtype=float).reshape(x.shape)
+        return x
+
+
+class IterateSlopes:
+    """The derivatives of an iterate, by the chain rule."""
+
+    def __init__(self, f: Callable[..., Any], jac: Callable[..., Any], times: int) -> None:
+        self.f, self.jac, self.times = f, jac, times
+
+    def __call__(self, x: FloatArray, **parameters: float) -> FloatArray:
+        """The product of the matrices along the orbit."""
+        x = np.array(x, dtype=float)
+        matrix = np.eye(x.size)
+        for _ in range(self.times):
+            matrix = np.asarray(self.jac(x.copy(), **parameters)).reshape(x.size, -1) @ matrix
+            x = np.asarray(self.f(x.copy(), **parameters), dtype=float).reshape(x.shape)
+        return matrix

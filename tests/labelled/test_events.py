@@ -1,0 +1,178 @@
+"""Events: zeros of the user's own functions, at places that closed forms give."""
+
+import pickle
+
+import matplotlib
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.labelled.continuation.branch import Branch
+
+CUBIC = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
+FOLD = 2.0 / np.sqrt(27.0)
+
+
+def traced(events, stop=None, **options):
+    given = pk.ContinuationOptions(**options) if options else None
+    return pk.continuation(
+        CUBIC, "mu", x0=[-1.3], span=(-1, 1), events=events, stop=stop, options=given
+    )
+
+
+def threshold(x, mu):
+    return 1e9 * (x[0] - 0.4)
+
+
+def test_events_lie_where_they_must():
+    branch = traced(
+        {
+            "half": "x + 1/2",
+            "level": "mu - 0.3",
+            "tiny": "1e-9*(x - 0.25)",
+            "large": "1e9*(x - 0.25)",
+            "code": threshold,
+            "cubic": "(x - 0.2)**3",
+            "narrow": "1 - 2*exp(-((x - 0.123)/1e-4)**2)",
+            "edge": "mu - 1",
+        }
+    )
+    wanted = {
+        "half": [-0.5], "tiny": [0.25], "large": [0.25], "code": [0.4], "cubic": [0.2],
+        "narrow": [0.123 - 1e-4 * np.sqrt(np.log(2.0)), 0.123 + 1e-4 * np.sqrt(np.log(2.0))],
+        "level": np.sort(np.roots([1.0, 0.0, -1.0, -0.3]).real),
+        "edge": np.roots([1.0, 0.0, -1.0, -1.0])[:1].real,
+    }  # fmt: skip
+    assert {s.name for s in branch.special("UZ")} == set(wanted)
+    for name, places in wanted.items():
+        found = branch.special(name)
+        assert [s.status for s in found] == ["converged"] * len(places), name
+        at = [s.x.item() for s in found]
+        # A triple zero of rounded numbers is known to the third root of rounding.
+        np.testing.assert_allclose(at, places, rtol=0, atol=1e-5 if name == "cubic" else 1e-15)
+        np.testing.assert_allclose([s["mu"] for s in found], [x**3 - x for x in at], atol=1e-15)
+    assert branch.messages == ()
+    assert set(branch.to_dataset().special_name.values) == {"", *wanted}
+
+
+def test_events_at_a_fold_and_double_zeros():
+    events = {"fold": "x + sqrt(3)/3", "turn": "mu - 2*sqrt(3)/9", "touch": "(x - 0.2)**2"}
+    with pytest.raises(pk.ParameterError, match="no kind or label of special points"):
+        traced(events)
+    branch = traced({"at fold": events["fold"], "turn": events["turn"], "touch": events["touch"]})
+    (first, _) = branch.special("LP")
+    (same,) = branch.special("at fold")
+    assert abs(same.x.item() - first.x.item()) < 1e-15
+    double, simple = branch.special("turn")
+    assert "double zero" in double.message
+    assert not simple.message
+    # Along the curve mu - mu_fold has rounding up to its root away.
+    assert abs(double.x.item() + np.sqrt(1.0 / 3.0)) < 2e-8
+    assert abs(simple.x.item() - 2.0 * np.sqrt(1.0 / 3.0)) < 1e-15
+    (touch,) = branch.special("touch")
+    assert abs(touch.x.item() - 0.2) < 1e-8
+    assert [s.kind for s in branch.special_points].count("fold") == 2
+
+
+def test_what_is_no_zero_is_said_or_left_out():
+    branch = traced({"pole": "1/(x - 0.77)", "near": "(x - 0.2)**2 + 1e-7", "all": "x**3 - x - mu"})
+    assert branch.special("UZ") == ()
+    pole, still = branch.messages
+    assert "'pole' changes its sign without a zero at mu = -0.31" in pole
+    assert "'all' is zero all along the curve" in still
+
+
+@pytest.mark.parametrize(
+    ("stop", "reason", "x"),
+    [
+        ("half", "half", -0.5),
+        ("fold", "fold", -np.sqrt(1.0 / 3.0)),
+        ("LP", "LP", -np.sqrt(1.0 / 3.0)),
+        (lambda x, mu: x[0] - 0.1, "stop", 0.1),
+        (lambda x, **p: x[0] > 0.1, "stop", 0.1),
+        (["level", "half"], "level", np.sort(np.roots([1.0, 0.0, -1.0, -0.3]).real)[0]),
+    ],
+)
+def test_a_branch_ends_where_it_is_to(stop, reason, x):
+    branch = traced({"half": "x + 1/2", "level": "mu - 0.3"}, stop)
+    assert branch.stops[0].reason == "bound"
+    assert branch.stops[1].reason == reason
+    assert reason in branch.stops[1].message
+    assert abs(branch.points.x.values[-1] - x) < 1e-15
+    assert branch.points.special.values[-1] in ("UZ", "LP")
+    assert branch.special_points[-1].kind == "end"
+    assert np.all(np.diff(branch.points.x) > 0.0)
+    with pytest.raises(pk.ParameterError, match="other reasons"):
+        branch.extend()
+
+
+def test_both_ways_may_end_and_the_start_does_not():
+    branch = pk.continuation(
+        CUBIC.replace(mu=0.0), "mu", x0=[0.0], span=(-1, 1), stop=["LP", "zero"],
+        events={"zero": "x"},
+    )  # fmt: skip
+    assert [stop.reason for stop in branch.stops] == ["LP", "LP"]
+    np.testing.assert_allclose(np.sort(branch.points.mu.values[[0, -1]]), [-FOLD, FOLD], atol=1e-15)
+    (zero,) = branch.special("zero")
+    assert zero.x.item() == 0.0
+
+
+def test_branches_with_events_are_saved_pickled_extended_and_drawn(tmp_path):
+    branch = traced({"half": "x + 1/2", "code": threshold}, "code")
+    again = pickle.loads(pickle.dumps(branch))
+    assert again.points.identical(branch.points)
+    short = traced({"half": "x + 1/2", "code": threshold}, "code", max_points=7)
+    assert short.stops[1].reason == "max_points"
+    assert short.extend(500).points.identical(branch.points)
+    branch.save(tmp_path / "b.nc")
+    with pytest.raises(pk.ParameterError, match=r"code by functions.*load\(path, events="):
+        Branch.load(tmp_path / "b.nc")
+    loaded = Branch.load(tmp_path / "b.nc", events={"code": threshold})
+    assert loaded.points.identical(branch.points)
+    assert loaded.to_dataset().identical(branch.to_dataset())
+    assert [s.name for s in loaded.special("UZ")] == ["half", "code"]
+    ax = branch.plot()
+    assert "UZ" in [text.get_text() for text in ax.texts]
+    matplotlib.pyplot.close(ax.figure)
+
+
+def test_events_on_curves_in_two_parameters_and_on_angles():
+    problem = pk.Problem("mu + l*x - x**3", "x", {"mu": -1.0, "l": 1.0})
+    branch = pk.continuation(problem, "mu", x0=[-1.3], span=(-1, 1), events={"x = 1/4": "x - 1/4"})
+    curve = branch.special("LP")[0].curve("l", (-1, 1))
+    (point,) = curve.special("x = 1/4")  # folds: l = 3 x^2, mu = -2 x^3
+    found = [point.x.item(), point["l"], point["mu"]]
+    np.testing.assert_allclose(found, [0.25, 0.1875, -0.03125], atol=1e-15)
+    turning = pk.Problem("w - mu", "w", {"mu": 0.0}, periods={"w": 2 * np.pi})
+    turns = pk.continuation(turning, "mu", span=(-1, 9), events={"one": "w - 1", "far": "w - 4"})
+    np.testing.assert_allclose([s["mu"] for s in turns.special("one")], [1, 1 + 2 * np.pi])
+    assert turns.special("far") == ()  # angles are shown up to pi
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"events": ["x"]}, "events: got .* wants a mapping"),
+        ({"events": {"": "x"}}, "events: got ''"),
+        ({"events": {"UZ": "x"}}, "no kind or label"),
+        ({"events": {"a": "y + 1"}}, r"events\['a'\].*unknown symbol y"),
+        ({"events": {"a": "__import__('os')"}}, r"events\['a'\]"),
+        ({"events": {"a": "2"}}, "depends on the states"),
+        ({"events": {"a": 3}}, "a formula, or a function"),
+        ({"events": {"a": lambda x: 1.0}}, r"events\['a'\].*arguments"),
+        ({"events": {"a": lambda x, mu: x[:0]}}, "one real number"),
+        ({"events": {"a": lambda x, mu: x[0] > 1}}, "yes or no"),
+        ({"events": {"a": lambda x, mu: x[7]}}, "IndexError"),
+        ({"stop": "nothing"}, "stop: event or special point 'nothing' is unknown"),
+        ({"stop": 3}, "stop: got 3"),
+        ({"stop": []}, r"stop: got \[\]"),
+        ({"stop": "end"}, "is unknown"),
+        (
+            {"stop": "hopf", "options": pk.ContinuationOptions(detect=("fold",))},
+            "stop: got 'hopf', wants what is looked for",
+        ),
+    ],
+)
+def test_events_that_are_refused(arguments, message):
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.continuation(CUBIC, "mu", x0=[-1.3], span=(-1, 1), **arguments)
