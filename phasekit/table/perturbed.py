@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from phasekit.errors import EscapeRegime
-from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    PerturbedTrigonometric,
+    TiltedTrigonometric,
+)
 from phasekit.table.row import ABC, LAW, SIDES, Pass, Quantity
 
 REGION, DIRECTION = ("region",), ("direction",)
@@ -53,6 +57,12 @@ QUANTITIES: tuple[Quantity, ...] = (
              "exists", "extremes of V'(phi), where V''(phi) = 0", TORQUE),
     Quantity("critical_phi", "critical_torques", DIRECTION, "float64", "rad",
              "angle at which equilibria merge under the critical torque", "V''(phi) = 0", TORQUE),
+    Quantity("energy_per_turn", "separatrices", (), "float64", "s-2",
+             "energy that a turn forward gains under the torque", "2 pi torque", TORQUE,
+             of=TiltedTrigonometric),
+    Quantity("lobe_area_error", "separatrices", SIDES, "float64", "s-1",
+             "estimated error of the area inside the separatrix", "of its quadrature", TORQUE,
+             of=TiltedTrigonometric),
     Quantity("retrapping_torque", "retrapping", DIRECTION, "float64", "s-2",
              "least constant torque, over the inertia, that keeps a rotation going, at small "
              "damping", "(damping S + quadratic int |phi'|^3 dt)/(2 pi) of a winding separatrix",
@@ -100,6 +110,18 @@ PASSES: tuple[Pass, ...] = (
     Pass(_TORQUE + "critical_of_perturbed", (LAW,), ("critical_torques",), PerturbedTrigonometric),
     Pass(_TORQUE + "retrapping_torque", (LAW,), ("retrapping",), PerturbedTrigonometric),
     Pass(_TORQUE + "torqued_equilibria", (LAW,), ("equilibria",), PerturbedTrigonometric),
+    Pass(
+        "phasekit.perturbation.tilted:tilted_separatrices",
+        (LAW,),
+        ("separatrices",),
+        TiltedTrigonometric,
+    ),
+    Pass(
+        "phasekit.perturbation.tilted:tilted_phase_space",
+        (LAW,),
+        ("equilibria", "separatrices"),
+        TiltedTrigonometric,
+    ),
     Pass("phasekit.perturbation.escape:escape_rate", (LAW,), ("escape",), PerturbedTrigonometric),
     Pass(
         "phasekit.perturbation.resonances:resonances",
