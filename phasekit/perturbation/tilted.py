@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.laws.perturbed import PerturbedTrigonometric
-from phasekit.perturbation.torque import torqued_equilibria
+from phasekit.perturbation.torque import equilibria_under, torqued_equilibria
 from phasekit.phase.exact.equilibria import Equilibria
 from phasekit.phase.exact.potential import gradient
 from phasekit.phase.exact.separatrices import separatrices
@@ -93,7 +93,7 @@ def sine_excess(x: Any) -> Array:
     total = np.zeros(x.shape)
     for n in range(10, 0, -1):
         total = -square / ((2 * n) * (2 * n + 1)) * (1.0 + total)
-    return np.where(np.abs(x) < 1.0, x * total, np.sin(x) - x)
+    return np.asarray(np.where(np.abs(x) < 1.0, x * total, np.sin(x) - x))
 
 
 def tilted_separatrices(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Tilted:
@@ -106,6 +106,16 @@ def tilted_phase_space(
 ) -> tuple[Equilibria, Tilted]:
     """Equilibria and separatrices under a torque."""
     return tilted(law, *parameters)
+
+
+def tilted_cells(A: Array, B: Array, C: Array, N: Array) -> tuple[Equilibria, Tilted]:
+    """Equilibria and separatrices of cells in a row, each under a torque."""
+    points = equilibria_under(A, B, C, N)
+    found = [
+        _of_cells(A[i], B[i], C[i], N[i], Equilibria._make(x[i] for x in points))
+        for i in (slice(j, j + CELLS) for j in range(0, len(A), CELLS))
+    ]
+    return points, Tilted._make(np.concatenate(parts) for parts in zip(*found, strict=True))
 
 
 def tilted(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> tuple[Equilibria, Tilted]:
@@ -123,14 +133,11 @@ def tilted(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> tuple[Equ
     error = np.where(np.isnan(level.lobe_area), np.nan, nothing)
     winding = np.where(np.isnan(level.winding_area), np.nan, 0.0)
     fields: list[Any] = [np.array(x) for x in (*level, winding, error, TURN * N)]
-    flat = Equilibria._make(x.reshape(len(A), *x.shape[len(shape) :]) for x in points)
     cells = np.flatnonzero((N != 0.0) | np.isnan(N))
-    for start in range(0, len(cells), CELLS):
-        part = cells[start : start + CELLS]
-        own = Equilibria._make(x[part] for x in flat)
-        for field, one in zip(fields, _of_cells(A[part], B[part], C[part], N[part], own),
-                              strict=True):  # fmt: skip
-            field[part] = one
+    if cells.size:
+        found = tilted_cells(A[cells], B[cells], C[cells], N[cells])[1]
+        for field, one in zip(fields, found, strict=True):
+            field[cells] = one
     return points, Tilted._make(x.reshape(shape + x.shape[1:]) for x in fields)
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.perturbation.escape import depopulation
+from phasekit.perturbation.depopulation import depopulation, two_rims
 
 EIGHT = pk.Coefficients(1.0, 0.35, 0.0)
 
