@@ -161,9 +161,10 @@ def level_escape(cells: Cells, number: int) -> Escape:
     _, _, beyond, back = lobe(1 - number)
     # An arc to a saddle as high has half the area, and nothing comes back from it.
     once, beyond = np.where(arcs, 0.5 * loss, loss), np.where(arcs, np.inf, beyond)
+    height = np.where(np.isnan(lower), np.nan, rises[:, number])
     way = Exit(
         lambda scale, power: returning(scale * once * ratio**power, scale * beyond * back**power),
-        np.isfinite(ratio * back), rises[:, number], loss,
+        np.isfinite(ratio * back), height, loss,
         loops.saddle_exponent[:, 0], spatial[:, 0],
     )  # fmt: skip
     out = cells.empty()

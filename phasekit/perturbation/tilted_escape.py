@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -161,12 +162,16 @@ def _outwards(out: Escape, wells: Wells, own: Array, left: Any, right: Any, both
         which, at, start, end, np.where(both, np.nan, height), rate * loss
     )  # fmt: skip
     known = np.isfinite(ratio)
+
+    @functools.cache
+    def rims(scale: float, power: float) -> tuple[Array, Array]:
+        return two_rims(0.5 * scale * loss * np.where(known, ratio, 1.0) ** power, apart)
+
     for i, (saddle, _, _, own_height, own_rate) in enumerate(found):
         lower = low if i == 1 else ~low
 
         def factor(scale: float, power: float, lower: Any = lower) -> Array:
-            parts = two_rims(0.5 * scale * loss * np.where(known, ratio, 1.0) ** power, apart)
-            return np.where(lower, *parts)
+            return np.where(lower, *rims(scale, power))
 
         way = Exit(
             factor, known, own_height, loss, wells.k[row, saddle], wells.spatial[row, saddle]
