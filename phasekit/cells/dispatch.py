@@ -52,7 +52,9 @@ def passes_of(
     rows = tuple(rows)
     for group in dict.fromkeys(row.group for row in rows):
         if not is_offered(system, group):
-            stands_on(system, max(rungs_of(group), key=depth), group)
+            rungs = rungs_of(group)
+            plain = {one for one in rungs if not issubclass(one, PerturbedConservative)}
+            stands_on(system, max(plain or rungs, key=depth), group)
     states = {*given, *system.parameters}
     return tuple(bound(one, system, states) for one in plan_passes(rows, system.rung))
 

@@ -158,7 +158,8 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
     Parameters
     ----------
     perturbed : Perturbed
-        A system with coefficients (A, B, C), damping and a thermal energy kT, and no drive.
+        A system with coefficients (A, B, C), damping and a thermal energy kT; with a constant
+        torque, and no other drive.
     center : {"lower_center", "upper_center"}
         The center of the well.
 
@@ -168,8 +169,9 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
         On (``saddle``, ``side``): ``escape_rate`` in s^-1 and ``barrier`` in s^-2; the side is that
         of the saddle on which the well lies. Over the lower saddle it leads into the other well;
         over the upper one, which winds, out of both wells together, on either side.
-        ``escape_regime`` (`EscapeRegime`) says what limits it, ``escape_error`` the order of the
-        relative error. Absent ones, barriers below 2 kT and systems with a drive are NaN.
+        ``escape_regime`` (`EscapeRegime`) says what limits it, ``escape_error`` the relative error.
+        Under a torque both ends of a well differ; the rate is that of the end which is reached
+        first, over the higher one at low damping next to nothing. Absent ones, barriers below 2 kT and systems with a drive are NaN.
 
     Raises
     ------
@@ -180,8 +182,11 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
     -----
     Kramers' rate with the exact integral over the well, times the factors for recrossing and for
     low damping ([MelnikovMeshkov1986], [HanggiTalknerBorkovec1990]). These factors hold for high
-    barriers; the mean first passage of the diffusing energy, by exact actions and periods, corrects
-    them with a weight that falls as the damping grows.
+    barriers. In the limits of low and of strong damping the mean first passage of the energy, by
+    its exact actions, and that of the angle correct them; in between the corrections enter as far
+    as the rate follows the damping. The error is the distance to the farther one of the rates with
+    all of the corrections and with none, which simulated paths have in between. Over both ends of
+    a tilted well the equations of the swings are solved as a pair.
 
     Examples
     --------

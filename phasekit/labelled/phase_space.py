@@ -111,6 +111,12 @@ def separatrices(system: Any) -> xr.Dataset:
     or out of the interval, has an infinite turning point and area; its areas have estimates of
     their errors, ``lobe_area_error`` and ``winding_area_error``.
 
+    Under a constant torque, ``pk.Perturbed(system, torque=...)``, the energy is
+    ``phi'^2/2 + V - torque phi``: nothing winds, and the separatrix of each saddle turns back on
+    the side where this rises (`Loop` lobe), on the other it may run away (infinite turning point
+    and area). Areas are quadratures with ``lobe_area_error``; ``energy_per_turn`` is what the
+    saddles of the next turn lie lower.
+
     Examples
     --------
     >>> import phasekit as pk

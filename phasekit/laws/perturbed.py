@@ -160,3 +160,10 @@ class PerturbedTrigonometric(PerturbedConservative):
         *products, scale = self.base(used)
         dA, dB, dC = (np.imag(np.asarray(product / scale)) / step for product in products)
         return dA, dB, dC
+
+
+@dataclass(frozen=True)
+class TiltedTrigonometric(PerturbedTrigonometric):
+    """The same under a constant torque alone, which keeps an energy."""
+
+    called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"

@@ -113,6 +113,12 @@ def torqued_equilibria(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) 
     torque = values["torque"]
     shape = np.broadcast_shapes(*map(np.shape, values.values()))
     A, B, C, N = (np.array(np.broadcast_to(x, shape)).reshape(-1) for x in (A, B, C, torque))
+    found = equilibria_under(A, B, C, N)
+    return Equilibria._make(x.reshape(shape + x.shape[1:]) for x in found)
+
+
+def equilibria_under(A: Array, B: Array, C: Array, N: Array) -> Equilibria:
+    """Equilibria of cells in a row, some of them under a torque."""
     points = equilibria(A, B, C)
     fields = [np.array(x) for x in points]
     cells = np.flatnonzero((N != 0.0) | np.isnan(N))
@@ -123,7 +129,7 @@ def torqued_equilibria(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) 
         parts: tuple[Any, ...] = bent
         for field, one in zip(fields, parts, strict=True):
             field[cells] = one
-    return Equilibria._make(x.reshape(shape + x.shape[1:]) for x in fields)
+    return Equilibria._make(fields)
 
 
 def _under_torque(A: Array, B: Array, C: Array, N: Array, still: Array) -> Equilibria:

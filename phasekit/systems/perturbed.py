@@ -22,12 +22,10 @@ from phasekit.laws.ladder import Law
 from phasekit.laws.perturbed import (
     OWN,
     PerturbedConservative,
-    PerturbedTrigonometric,
     drift_name,
     forcing_names,
     modulation_names,
 )
-from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems import perturbed_parts as parts
 from phasekit.systems.bases import named_model
 from phasekit.systems.harmonic import Harmonic
@@ -146,9 +144,7 @@ class Perturbed(Model):
             "drift": drive.drift,
             "omega1": parts.prescribed(omega1, base, varying),
             "declared": (*base.declared, *declared),
-            "rung": PerturbedTrigonometric
-            if issubclass(base.rung, Trigonometric)
-            else PerturbedConservative,
+            "rung": parts.rung_of(base, own, bool(drive.declared) or omega1 is not None),
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)

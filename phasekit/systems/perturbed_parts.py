@@ -11,8 +11,17 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, describe, reals, unknown
-from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import Rate, drift_name, forcing_names, modulation_names
+from phasekit.laws.ladder import Conservative, Law
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    PerturbedTrigonometric,
+    Rate,
+    TiltedTrigonometric,
+    drift_name,
+    forcing_names,
+    modulation_names,
+)
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.disk import disk_mixing
 from phasekit.systems.as_system import as_system
 from phasekit.systems.harmonic import Harmonic
@@ -70,6 +79,14 @@ def base_of(system: Any) -> Model:
     if not issubclass(found.rung, Conservative):
         raise bad("system", found, wants, "pk.FreeGyroRotor has .simulate(..., torque2=...)")
     return found
+
+
+def rung_of(base: Model, own: Mapping[str, Any], driven: bool) -> type[Law]:
+    """Rung of the ladder of laws: the most special one that holds for all values."""
+    if not issubclass(base.rung, Trigonometric):
+        return PerturbedConservative
+    still = all(isinstance(own[n], float) and own[n] == 0.0 for n in ("damping", "quadratic"))
+    return TiltedTrigonometric if still and not driven else PerturbedTrigonometric
 
 
 class Drive:

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from phasekit.errors import EscapeRegime
-from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    PerturbedTrigonometric,
+    TiltedTrigonometric,
+)
 from phasekit.table.row import ABC, LAW, SIDES, Pass, Quantity
 
 REGION, DIRECTION = ("region",), ("direction",)
@@ -53,6 +57,12 @@ QUANTITIES: tuple[Quantity, ...] = (
              "exists", "extremes of V'(phi), where V''(phi) = 0", TORQUE),
     Quantity("critical_phi", "critical_torques", DIRECTION, "float64", "rad",
              "angle at which equilibria merge under the critical torque", "V''(phi) = 0", TORQUE),
+    Quantity("energy_per_turn", "separatrices", (), "float64", "s-2",
+             "energy that a turn forward gains under the torque", "2 pi torque", TORQUE,
+             of=TiltedTrigonometric),
+    Quantity("lobe_area_error", "separatrices", SIDES, "float64", "s-1",
+             "estimated error of the area inside the separatrix", "of its quadrature", TORQUE,
+             of=TiltedTrigonometric),
     Quantity("retrapping_torque", "retrapping", DIRECTION, "float64", "s-2",
              "least constant torque, over the inertia, that keeps a rotation going, at small "
              "damping", "(damping S + quadratic int |phi'|^3 dt)/(2 pi) of a winding separatrix",
@@ -60,18 +70,20 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("escape_rate", "escape", SIDES, "float64", "s-1",
              "rate at which noise leads out of the well on that side of the saddle, over it",
              "[sqrt(1 + (d/2k)^2) - d/2k] Y sqrt(kT/2 pi) exp(-barrier/kT)/int exp(-(V - V_c)/kT); "
-             "Y = Y(D1) Y(D2)/Y(D1 + D2), D = d S/kT; corrected by the mean passage of the energy",
+             "Y = Y(D1) Y(D2)/Y(D1 + D2), D = d S/kT; D corrected by the mean passage of the "
+             "energy, k by that of the angle",
              ESCAPE, of=PerturbedTrigonometric),
     Quantity("barrier", "escape", SIDES, "float64", "s-2",
-             "energy from the center to the saddle", "V(phi_s) - V(phi_c)", ESCAPE,
+             "energy from the center to the saddle",
+             "V(phi_s) - V(phi_c) - torque (phi_s - phi_c)", ESCAPE,
              of=PerturbedTrigonometric),
     Quantity("escape_regime", "escape", SIDES, "int8", "1",
              "what limits the escape", "damping S < kT: diffusion of the energy; damping > 2 k: "
              "diffusion in space; else the turnover between them", ESCAPE, EscapeRegime,
              of=PerturbedTrigonometric),
     Quantity("escape_error", "escape", SIDES, "float64", "1",
-             "estimated order of the relative error of the rate",
-             "of the order kT/barrier, less the higher the damping", ESCAPE,
+             "estimated relative error of the rate",
+             "to the farther one of the rates with all and with none of the corrections", ESCAPE,
              of=PerturbedTrigonometric),
     Quantity("resonance_action", "resonances", ("order",), "float64", "s-1",
              "action of the orbit in resonance with the drive", "n Omega(J) = m nu", CHIRIKOV,
@@ -100,6 +112,18 @@ PASSES: tuple[Pass, ...] = (
     Pass(_TORQUE + "critical_of_perturbed", (LAW,), ("critical_torques",), PerturbedTrigonometric),
     Pass(_TORQUE + "retrapping_torque", (LAW,), ("retrapping",), PerturbedTrigonometric),
     Pass(_TORQUE + "torqued_equilibria", (LAW,), ("equilibria",), PerturbedTrigonometric),
+    Pass(
+        "phasekit.perturbation.tilted:tilted_separatrices",
+        (LAW,),
+        ("separatrices",),
+        TiltedTrigonometric,
+    ),
+    Pass(
+        "phasekit.perturbation.tilted:tilted_phase_space",
+        (LAW,),
+        ("equilibria", "separatrices"),
+        TiltedTrigonometric,
+    ),
     Pass("phasekit.perturbation.escape:escape_rate", (LAW,), ("escape",), PerturbedTrigonometric),
     Pass(
         "phasekit.perturbation.resonances:resonances",

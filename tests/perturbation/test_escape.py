@@ -1,13 +1,19 @@
 """Escape by noise: the value of simulated paths, and the limits of Kramers."""
 
+import os
+
 import mpmath
 import numpy as np
 import pytest
+import xarray as xr
+from witnesses import langevin
 
 import phasekit as pk
-from phasekit.perturbation.escape import depopulation
+from phasekit.perturbation.depopulation import depopulation, two_rims
 
 EIGHT = pk.Coefficients(1.0, 0.35, 0.0)
+ABC = np.array([[1.0, 0.35, 0.12], [-1.0, 0.2, 0.3], [0.4, 1.0, 0.2], [1.0, -0.3, -0.2]]).T
+MORE = int(os.environ.get("PHASEKIT_ENSEMBLES", "0"))
 
 
 def rates(system, damping, kT, **options):
@@ -23,6 +29,56 @@ def test_factor_of_low_damping():
         assert depopulation(D) == pytest.approx(float(exact(D)), rel=1e-9)
     assert depopulation(1e-9) == pytest.approx(1e-9, rel=1e-4)
     assert depopulation(1e3) == 1.0
+
+
+#: Loss over kT; rate and standard error of 2,400 paths from core to core in the eight, kT = .04.
+PATHS = [(0.3, 6.37e-5, 0.19e-5), (1.0, 1.820e-4, 0.053e-4), (3.0, 3.95e-4, 0.12e-4),
+         (10.0, 5.87e-4, 0.17e-4)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("loss", "simulated", "error"), PATHS)
+def test_turnover(loss, simulated, error):
+    """Where the bracket is wide: within three standard errors, and within its own error."""
+    area = pk.separatrices(EIGHT).lobe_area.sel(saddle="lower", side="right").item()
+    at = rates(EIGHT, loss * 0.04 / area, 0.04).sel(saddle="lower", side="right")
+    assert abs(at.escape_rate.item() - simulated) < 3.0 * error
+    off = abs(at.escape_rate.item() / simulated - 1.0)
+    assert off - 2.0 * error / simulated < at.escape_error.item() < 0.3
+
+
+#: Bias, damping, side; rate and standard error of 1,500 paths from the washboard's well at a
+#: barrier of 6 kT to the next one.
+WASHBOARD = [(0.4, 1.0, "left", 2.09e-4, 0.07e-4), (0.4, 0.1, "left", 2.98e-4, 0.10e-4),
+             (0.05, 0.1, "left", 2.81e-4, 0.10e-4), (0.05, 0.1, "right", 0.67e-4, 0.05e-4)]  # fmt: skip
+
+
+@pytest.mark.parametrize(("bias", "damping", "side", "simulated", "error"), WASHBOARD)
+def test_washboard(bias, damping, side, simulated, error):
+    """Over either end of a tilted well; downhill the well lies left of its saddle."""
+    barrier = 2.0 * (np.sqrt(1.0 - bias * bias) - bias * np.arccos(bias))
+    junction = pk.JosephsonJunction(plasma_frequency=1.0)
+    at = pk.escape_rate(pk.Perturbed(junction, damping=damping, torque=bias, kT=barrier / 6.0))
+    found = at.sel(saddle="upper", side=side)
+    assert abs(found.escape_rate.item() - simulated) < 3.0 * error
+    assert 0.0 < found.escape_error.item() < 0.2
+
+
+def test_two_ends_of_a_well():
+    """Y(D) over each of equal ends, Y(2 D) over one alone."""
+    D = np.array([0.01, 0.3, 2.0, 50.0])
+    low, high = two_rims(D, 0.0)
+    assert low == pytest.approx(depopulation(D), rel=1e-14)
+    assert np.array_equal(low, high)
+    near, far = (two_rims(D[1:], x)[0] for x in (1e-9, 29.9))
+    assert near == pytest.approx(depopulation(D[1:]), rel=1e-7)
+    assert far == pytest.approx(depopulation(2.0 * D[1:]), rel=1e-9)
+    # Each end by itself: the higher the other one, the less is lost there.
+    apart = np.linspace(0.0, 6.0, 13)
+    low, high = two_rims(1.0, apart)
+    assert (np.diff(low) > 0.0).all()
+    assert (np.diff(high) < 0.0).all()
+    tiny, small = (two_rims(d, apart * d**0.5)[0] / depopulation(2.0 * d) for d in (0.001, 0.01))
+    assert tiny[1:] == pytest.approx(small[1:], rel=1e-12)  # distances count by the step
 
 
 def test_simulated_paths():
@@ -67,11 +123,88 @@ def test_the_two_wells_balance():
 
 
 def test_nothing_said_where_rates_mean_nothing():
-    for changes in ({"kT": 0.0}, {"damping": 0.0}, {"torque": 0.1}, {"kT": 0.2}):
+    for changes in ({"kT": 0.0}, {"damping": 0.0}, {"quadratic": 0.1}, {"kT": 0.2}):
         ds = pk.escape_rate(pk.Perturbed(EIGHT, **{"damping": 0.5, "kT": 0.04, **changes}))
         assert np.isnan(ds.escape_rate.sel(saddle="lower")).all()
     alone = rates(pk.Pendulum(length=1.0, g=1.0), 0.1, 0.2)
     assert np.isfinite(alone.escape_rate.sel(saddle="upper")).all()
-    assert np.isnan(alone.escape_rate.sel(saddle="lower")).all()
+    lower = alone.sel(saddle="lower")
+    assert np.isnan(lower.escape_rate).all()
+    assert np.isnan(lower.barrier).all()
+    assert (lower.escape_regime == pk.EscapeRegime.ABSENT).all()
     with pytest.raises(pk.ParameterError, match="center: got 'middle', wants one of"):
         rates(EIGHT, 0.1, 0.04, center="middle")
+
+
+def test_a_vanishing_torque():
+    system = pk.Coefficients(*(xr.DataArray(x, dims="cell") for x in ABC))
+    for center, damping in (("lower_center", 0.2), ("upper_center", 2.0)):
+        level, bent = (
+            pk.escape_rate(pk.Perturbed(system, damping=damping, kT=0.03, torque=N), center=center)
+            for N in (0.0, 1e-9)
+        )
+        assert np.isfinite(level.escape_rate).sum() >= 4
+        for name in ("escape_rate", "barrier", "escape_error"):
+            left, right = level[name].values, bent[name].values
+            assert np.array_equal(np.isnan(left), np.isnan(right))
+            assert np.allclose(left, right, rtol=1e-5, atol=0.0, equal_nan=True)
+        assert np.array_equal(level.escape_regime, bent.escape_regime)
+
+
+def test_the_washboard_in_the_limits_of_kramers():
+    """Barrier 2 (sqrt(1 - i^2) - i arccos i); strong damping by the exact double integral."""
+    junction = pk.JosephsonJunction(plasma_frequency=1.0)
+    for i in (0.1, 0.5, 0.95):
+        barrier = 2.0 * (np.sqrt(1.0 - i * i) - i * np.arccos(i))
+        omega = (1.0 - i * i) ** 0.25
+        shunt = junction.shunt(stewart_mccumber=1.0, bias=i, gamma=barrier / 40.0)
+        at = pk.escape_rate(pk.Perturbed(junction, **shunt)).sel(saddle="upper", side="left")
+        assert at.barrier.item() == pytest.approx(barrier, rel=1e-11)
+        kramers = np.hypot(omega, 0.5) - 0.5
+        want = kramers * np.exp(-40.0) / (2.0 * np.pi)
+        assert at.escape_rate.item() == pytest.approx(want, rel=0.015)
+        kT, damping = barrier / 8.0, 300.0
+        hot = pk.Perturbed(junction, damping=damping, torque=i, kT=kT)
+        at = pk.escape_rate(hot).sel(saddle="upper", side="left")
+        # from the saddle before to the next, and from center to center over the saddle
+        low, top = np.arcsin(i), np.pi - np.arcsin(i)
+        x, y = (
+            np.linspace(*ends, 100001) for ends in ((top - 2 * np.pi, top), (low, low + 2 * np.pi))
+        )
+        inner, outer = (
+            np.trapezoid(np.exp(sign * (np.cos(z) + i * z - np.cos(low) - i * low) / kT), z)
+            for sign, z in ((1.0, x), (-1.0, y))
+        )
+        assert at.escape_rate.item() == pytest.approx(kT / damping / (inner * outer), rel=1e-4)
+        assert at.escape_regime == pk.EscapeRegime.SPATIAL_DIFFUSION
+    there, mirrored = (
+        pk.escape_rate(pk.Perturbed(junction, damping=0.3, torque=N, kT=0.05)).escape_rate.values[1]
+        for N in (0.5, -0.5)
+    )
+    assert mirrored[1] == pytest.approx(there[0], rel=1e-9)
+
+
+@pytest.mark.skipif(not MORE, reason="slow: PHASEKIT_ENSEMBLES=1500 runs so many paths")
+@pytest.mark.parametrize("loss", [0.3, 1.0, 3.0, 10.0])
+@pytest.mark.parametrize("torque", [0.0, 0.02])
+def test_ensembles(loss, torque):
+    """Paths in the eight, from the core of the right well to that of the left one."""
+    kT = 0.04
+    tilted = pk.Perturbed(EIGHT, torque=torque)
+    sep = pk.separatrices(tilted).sel(saddle="lower")
+    area = sep.lobe_area.sel(side="right").item()
+    at = tilted.replace(damping=loss * kT / area, kT=kT)
+    points = pk.equilibria(tilted)
+    right, left = (points.sel(equilibrium=f"{n}_center") for n in ("lower", "upper"))
+    if right.phi < left.phi:
+        right, left = left, right
+    center = str(right.equilibrium.values)
+    found = pk.escape_rate(at, center=center).sel(saddle="lower", side="right")
+    rate = found.escape_rate.item()
+    longest = 2.0 / rate
+    ends = (sep.saddle_phi.item(), 9.0), (left.energy.item(), 0.0)
+    times = langevin.first_times(
+        1.0, 0.35, 0.0, torque, at.damping, kT, right.phi.item(), *ends, MORE, 0.06, longest, 1
+    )
+    (simulated, error), _ = langevin.rates(times, 0.5 / rate, longest)
+    assert abs(rate - simulated) < 3.0 * error + 0.3 * found.escape_error.item() * rate
