@@ -90,11 +90,15 @@ def _most(system: Model, count: Pass) -> tuple[int, int]:
     ]
     gaps = np.concatenate([open_ for *_, open_ in found])
     if len(gaps):
-        low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
+        low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0]), :2]
+        stretches = int(gaps[:, 2].sum())
+        among = "" if stretches == 1 else f", the widest of {stretches} such stretches"
         of = f", in {len(gaps)} of {prod(shape)} systems" if shape else ""
+        missing = system.law.unbounded_function
+        because = f", because no bounds of {missing} are known" if missing else ""
         warnings.warn(
             f"equilibria of {system!r}: it is not proved that there are no others between "
-            f"{low:.6g} and {high:.6g}{of}; there `complete` is False",
+            f"{low:.6g} and {high:.6g}{among}{of}{because}; there `complete` is False",
             RuntimeWarning,
             stacklevel=2,
         )
