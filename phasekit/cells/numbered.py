@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import warnings
 from collections import namedtuple
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import prod
 from typing import Any
@@ -58,7 +58,7 @@ def fitted(
     shapes = {row.name: row.label_shape for row in found}
     numbered = {row.group for row in found if set(row.dims) & {"equilibrium", "saddle"}}
     return found, [
-        replace(one, function=functools.partial(_padded, one, shapes))
+        replace(one, function=functools.partial(_padded, one, shapes, repr(system)))
         if numbered.intersection(one.groups)
         else replace(one, function=functools.partial(_told, one, repr(system)))
         if set(one.groups) & {"orbits", "motion"}
@@ -90,11 +90,15 @@ def _most(system: Model, count: Pass) -> tuple[int, int]:
     ]
     gaps = np.concatenate([open_ for *_, open_ in found])
     if len(gaps):
-        low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0])]
+        low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0]), :2]
+        stretches = int(gaps[:, 2].sum())
+        among = "" if stretches == 1 else f", the widest of {stretches} such stretches"
         of = f", in {len(gaps)} of {prod(shape)} systems" if shape else ""
+        missing = system.law.unbounded_function
+        because = f", because no bounds of {missing} are known" if missing else ""
         warnings.warn(
             f"equilibria of {system!r}: it is not proved that there are no others between "
-            f"{low:.6g} and {high:.6g}{of}; there `complete` is False",
+            f"{low:.6g} and {high:.6g}{among}{of}{because}; there `complete` is False",
             RuntimeWarning,
             stacklevel=2,
         )
@@ -112,12 +116,16 @@ def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity
 def _told(one: Pass, text: str, *arrays: Any) -> Any:
     """Call a pass, and say how many results it could not compute, and why."""
     result = one.resolved(*arrays)
-    fields = result._asdict()
-    for name in ("period", "action", "motion_phi"):
+    _tell_unknown(result._asdict(), text)
+    return result
+
+
+def _tell_unknown(fields: Mapping[str, Any], text: str) -> None:
+    for name in ("period", "action", "motion_phi", "winding_area", "lobe_area"):
         if f"{name}_error" in fields:
             error = fields[f"{name}_error"]
             unknown = np.isnan(fields[name]) & ~np.isnan(error)
-            if name == "action":  # those without period are told with it
+            if name == "action" and "period" in fields:  # those without period are told with it
                 unknown &= ~np.isnan(fields["period"])
             if unknown.any():
                 worst = np.max(error[unknown])
@@ -130,11 +138,13 @@ def _told(one: Pass, text: str, *arrays: Any) -> Any:
                     RuntimeWarning,
                     stacklevel=2,
                 )
-    return result
 
 
-def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:
-    """Call a pass and fill its label axes up to the lengths that the whole map has."""
+def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], text: str, *arrays: Any) -> Any:
+    """Call a pass and fill its label axes up to the lengths that the whole map has.
+
+    What it could not compute is said, as of orbits.
+    """
     result = one.resolved(*arrays)
     filled = []
     group: Any
@@ -143,6 +153,7 @@ def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], *arrays: Any) -> Any:
             (name,) = (row.name for row in ROWS.values() if row.group == title)
             group = namedtuple("Row", [name])(group)
         fields = {}
+        _tell_unknown(group._asdict(), text)
         for name, values in group._asdict().items():
             tail = shapes.get(name, ())
             first = values.ndim - len(tail)

@@ -20,8 +20,8 @@ from phasekit.table.quantities import ROWS
 
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
 CLUSTER = 4
-#: Energies that differ by less, relative to all, are one.
-SAME = 1e-12
+#: Energies of equilibria that differ by less, relative to the largest of them, are one.
+SAME = 16.0 * float(np.finfo(float).eps)
 
 #: The centers that an orbit goes round, by their numbers; none for a rotation.
 Wells = tuple[int, ...]
@@ -110,7 +110,7 @@ def _families(
     which wells it shares.
     """
     marks = np.unique(energy[np.isfinite(energy) & (energy < top)])
-    scale = max(abs(top), float(np.abs(marks).max(initial=0.0)))
+    scale = float(np.abs(marks).max(initial=0.0))
     marks = marks[np.diff(marks, prepend=-np.inf) > SAME * scale]
     edges = np.append(marks, top)
     found: dict[Wells, _Family] = {}

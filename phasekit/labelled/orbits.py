@@ -7,6 +7,7 @@ dims; they come back as coordinates (state_phi, state_dphi, ...).
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -22,6 +23,9 @@ from phasekit.table.quantities import select
 
 #: Families that have orbits of given action.
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
+
+#: Gaps of which some numbers on the way are no doubles any more, in some system.
+_LEAST = 1e-290
 
 
 @state_arguments
@@ -111,6 +115,7 @@ def orbits(
     if gap is not None:
         one, notes = pass_from(system, "orbits", "state_gap", saddle=saddle, side=side)
         ds = at_states(system, rows, {"gap": ("state_gap", gap)}, (one,))
+        _tell_nearest(ds)
         return noted(ds, **notes)
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
     return at_states(system, rows, states)
@@ -137,6 +142,20 @@ def _refuse_mixed(
     for name, (value, form) in belongs.items():
         if value is not None and form not in given:
             raise bad(name, value, f"it with {form}= alone", f"leave it out, or give {form}=")
+
+
+def _tell_nearest(ds: xr.Dataset) -> None:
+    """Say which gaps are so small that doubles have too few digits for them."""
+    size = abs(ds.state_gap)
+    lost = ds.period.isnull() & (size > 0.0) & (size < _LEAST)
+    if lost.any():
+        warnings.warn(
+            f"gap: {int(lost.sum())} of {lost.size} periods are NaN, because energies are so near "
+            f"to that of the saddle, by {float(size.where(lost).max()):.1e} or less, that doubles "
+            "lose their digits",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def noted(ds: xr.Dataset, **attrs: str) -> xr.Dataset:

@@ -27,6 +27,11 @@ class Law:
         """Whether equilibria may be missed, which results then say."""
         return False
 
+    @property
+    def unbounded_function(self) -> str | None:
+        """Name of a function in it of which no bounds are known, so that nothing is proved."""
+        return None
+
     def check_searchable(self) -> None:
         """Refuse to look for equilibria where they cannot all be found.
 

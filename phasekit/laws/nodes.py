@@ -17,6 +17,7 @@ from phasekit.laws.grammar import FormulaError
 
 #: Largest exponent that is a number, and most bits of a number: those of the range of doubles.
 POWER, BITS = 1000, 1024
+_LEAST = 2.3e-308  # doubles with all digits are larger
 #: Most arguments of Max and Min, levels of functions with branches, and nodes of a formula.
 ARGUMENTS, LEVELS, NODES = 16, 8, 100_000
 #: Largest constants that a special function takes: as an order, of a gamma function, else.
@@ -140,6 +141,8 @@ class Nodes:
         if make in (sp.Max, sp.Min):
             if sum(len(x.args) if type(x) is make else 1 for x in arguments) > ARGUMENTS:
                 raise FormulaError(f"{name} with more than {ARGUMENTS} arguments")
+        elif make is sp.exp:
+            arguments = [_apart(arguments[0])]
         elif make in _FAR_CLASSES or "gamma" in name:
             arguments = _near(name, arguments)
         elif name == "Rational" and not all(x.is_Integer for x in arguments):
@@ -201,6 +204,16 @@ class Nodes:
         return _JOINS[sign](*operands)
 
 
+def _apart(exponent: Any) -> Any:
+    """An exponent with large doubles as the fractions that they are.
+
+    sympy makes exp(x + 1000.0) the product of exp(x) and a number, which no double may hold.
+    """
+    large = [t for t in exponent.args if t.is_Float and abs(t) > 64] if exponent.is_Add else []
+    fractions = {t: sp.Rational(*float(t).as_integer_ratio()) for t in large}
+    return sp.Add(*(fractions.get(t, t) for t in exponent.args)) if large else exponent
+
+
 def _nonzero(text: str) -> bool:
     """Whether a number as it is written is other than zero."""
     return any(digit in "123456789" for digit in text.lower().partition("e")[0])
@@ -238,8 +251,9 @@ def checked(node: Any) -> Any:
     return node
 
 
-def foreign(expression: Any, symbols: Iterable[Any]) -> Any:
-    """Return the first node that no formula in some symbols may hold, or None."""
+def foreign(expression: Any, symbols: Iterable[Any], also: Iterable[Any] = ()) -> Any:
+    """Return the first node that no formula in some symbols, `also` of some classes, may hold."""
+    classes = CLASSES.union(also)
     known, seen, queue = set(symbols), set(), [expression]
     while queue:
         node = queue.pop()
@@ -254,7 +268,7 @@ def foreign(expression: Any, symbols: Iterable[Any]) -> Any:
             node in known
             or (isinstance(node, sp.Number) and node.is_finite)
             or node in _LEAVES
-            or (node.args and type(node) in CLASSES)
+            or (node.args and type(node) in classes)
         ):
             return node
         queue.extend(node.args)
@@ -299,10 +313,13 @@ def _approximate(constant: Any) -> Any:
             f"the constant {_short(constant)}, which is not real, where a real function belongs"
         )
     try:
-        finite = math.isfinite(float(value))
+        number = float(value)
+        held = math.isfinite(number)
+        # Next to 0 doubles have few digits or none: a term would change, or be gone.
+        held &= abs(number) > _LEAST or abs(sp.Float(number) - value) <= 1e-15 * abs(value)
     except OverflowError:
-        finite = False
-    if not finite:
+        held = False
+    if not held:
         raise FormulaError(f"the constant {_short(constant)}, which no double holds")
     return value
 

@@ -391,7 +391,8 @@ def _expression(expression: Any) -> Any:
     whole = isinstance(expression, (int, np.integer)) and not isinstance(expression, bool)
     if whole and abs(expression) < 1e308:
         return repr(int(expression))
-    raise bad("expression", expression, "a string or a sympy expression")
+    hint = "for a Python function of the state take pk.Problem" if callable(expression) else ""
+    raise bad("expression", expression, "a string or a sympy expression", hint)
 
 
 def _name(argument: str, name: Any) -> str:

@@ -318,6 +318,8 @@ def _numbers(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
             raise ParameterError(
                 f"{argument}: returned complex numbers, {str(numbers)[:80]}, wants real ones"
             )
+        if numbers.dtype == object and any(number is None for number in numbers.flat):
+            raise ValueError("None among the numbers")  # which NumPy takes for NaN
         return np.asarray(numbers, dtype=float).reshape(shape)
     except (TypeError, ValueError) as error:
         if isinstance(error, ParameterError):

@@ -279,6 +279,12 @@ def _check_values(problem: Problem, guess: FloatArray) -> None:
         found = np.asarray(value)
         if found.dtype.kind not in "biuf" and found.dtype != object:
             raise bad(argument, value, f"real numbers of shape {shape} to be returned")
+        if found.dtype == object and any(number is None for number in found.flat):
+            held = "None" if value is None else f"{value!r:.80}, with None in it"
+            raise ParameterError(
+                f"{argument}: returned {held} at x0, wants numbers of shape {shape}; a function "
+                "without a return statement returns None"
+            )
         try:
             found = np.asarray(value, dtype=float)
         except (TypeError, ValueError):

@@ -81,6 +81,13 @@ def _printer_class() -> Any:
             name = self._module_format(self._kf[type(node).__name__])
             return f"{name}({', '.join(map(self._print, node.args))})"
 
+        def _print_SphericalJ0(self, node: Any, order: int = 0) -> str:
+            name = self._module_format("scipy.special.spherical_jn")
+            return f"{name}({order}, {self._print(node.args[0])})"
+
+        def _print_SphericalJ1(self, node: Any) -> str:
+            return self._print_SphericalJ0(node, 1)
+
         def _print_loggamma(self, node: Any) -> str:
             # log|gamma|, as the machine code of continuation has it.
             return f"{self._module_format('scipy.special.gammaln')}({self._print(node.args[0])})"

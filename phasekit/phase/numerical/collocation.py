@@ -78,8 +78,8 @@ def integrate(
         length = (sign[rows] * h)[:, None]
         f, settled = _stages(rate, rows, y[rows], length)
         size = np.max(np.abs(f), axis=1)
-        tail = np.max(np.abs(np.einsum("ts,psc->ptc", TO_TAIL, f)), axis=1) / (size + 1e-300)
-        tail = np.max(tail, axis=1)
+        tail = np.max(np.abs(np.einsum("ts,psc->ptc", TO_TAIL, f)), axis=1)
+        tail = np.max(tail / np.where(size > 0.0, size, 1.0), axis=1)
         # A tail that shorter steps do not shrink is noise of the rate.
         noisy = (tail <= _NOISE) & (tail >= 0.2 * refused[rows])
         good = settled & ((tail <= _TAIL) | noisy)
@@ -121,7 +121,8 @@ def _stages(
         inner = y[going, None] + length[going, None] * np.einsum("st,ptc->psc", MATRIX, f[going])
         fresh = rate(rows[going], inner)
         size = np.max(np.abs(fresh), axis=1, keepdims=True)
-        change = np.max(np.abs(fresh - f[going]) / (size + 1e-300), axis=(1, 2))
+        size = np.where(size > 0.0, size, 1.0)
+        change = np.max(np.abs(fresh - f[going]) / size, axis=(1, 2))
         f[going] = fresh
         # It shrinks until rounding stops it.
         over = (change <= 4e-16) | ((change <= 1e-9) & (change >= 0.5 * last[going]))

@@ -25,6 +25,8 @@ def _gauss(count: int) -> tuple[Array, Array]:
 
 
 NODES, WEIGHTS = _gauss(8)
+#: How often a stretch is shortened, by 2 and later by 256, until a rule holds on it.
+_HALVINGS = 160
 _FINE_NODES, _FINE_WEIGHTS = _gauss(13)
 
 
@@ -97,7 +99,7 @@ def survey(systems: Systems, points: Equilibria | None = None) -> Ground:
     period = systems.formula.period
     with np.errstate(all="ignore"):
         # Past the neighbors, if the rule holds so far: shallow wells and low saddles need it.
-        near = np.where(np.isfinite(x), 1.0 + np.abs(x), np.nan)
+        near = np.where(np.isfinite(x), np.inf if _exact(systems) else 1.0 + np.abs(x), np.nan)
         if np.isfinite(high):
             near = np.where(np.isfinite(x), 0.25 * (high - low), np.nan)
         if x.shape[1] > 1:
@@ -117,10 +119,10 @@ def survey(systems: Systems, points: Equilibria | None = None) -> Ground:
 
 def _proved(systems: Systems, x: Array, near: Array) -> Array:
     """Shorten each stretch until two rules of Gauss agree on it."""
+    if _exact(systems):
+        return near
     formula = systems.formula
-    if formula.shape is Shape.POLYNOMIAL and systems.coefficients().shape[1] <= 2 * NODES.size:
-        return near  # where the rule is exact
-    for _ in range(40):
+    for number in range(_HALVINGS):
         worst = np.zeros(x.shape)
         for sign in (1.0, -1.0):
             u = sign * near[..., None]
@@ -139,5 +141,14 @@ def _proved(systems: Systems, x: Array, near: Array) -> Array:
             rough[cell, slot] |= ~smooth(few, np.arange(cell.size), at - reach, at + reach, size)
         if not rough.any():
             break
-        near = np.where(rough, 0.5 * near, near)
-    return near
+        # Most need a few halvings; an equilibrium on a line may be the size of any double.
+        near = np.where(rough, (0.5 if number < 40 else 2.0**-8) * near, near)
+    # What shorter stretches do not mend is rounding of V'' itself, or a zero of high order.
+    return np.where(rough & (worst > 1e-12), 0.0, near)
+
+
+def _exact(systems: Systems) -> bool:
+    """Whether the rule is exact."""
+    degree = 2 * NODES.size
+    polynomial = systems.formula.shape is Shape.POLYNOMIAL
+    return polynomial and systems.coefficients().shape[1] <= degree

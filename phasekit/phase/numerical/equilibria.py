@@ -12,7 +12,13 @@ from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.isolation import bracketed, isolate, slope_bounds
 from phasekit.phase.numerical.partition import noise_at, partition
-from phasekit.phase.numerical.series import Roots, exact_heights, of_fourier_sums, of_polynomials
+from phasekit.phase.numerical.series import (
+    Roots,
+    exact_base,
+    exact_heights,
+    of_fourier_sums,
+    of_polynomials,
+)
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
@@ -41,7 +47,10 @@ class Equilibria(NamedTuple):
     complete: Flags
     """Whether it is proved that there are these and no others."""
     gaps: npt.NDArray[np.float64]
-    """Ends (low, high) of what could not be excluded, nor stands for an equilibrium; else NaN."""
+    """Ends (low, high) of the widest stretch that could not be excluded, nor stands for an
+    equilibrium; else NaN."""
+    n_gaps: npt.NDArray[np.int64]
+    """Number of such stretches."""
 
 
 class Zeros(NamedTuple):
@@ -51,6 +60,7 @@ class Zeros(NamedTuple):
     sign: Array
     complete: Flags
     gaps: Array
+    n_gaps: npt.NDArray[np.int64]
 
 
 def equilibria(systems: Systems) -> Equilibria:
@@ -96,7 +106,8 @@ def _isolated(systems: Systems) -> Zeros:
     for i, stretches in enumerate(found.unproved):
         if stretches:
             gaps[i] = max(stretches, key=lambda stretch: stretch[1] - stretch[0])
-    return Zeros(_wrapped(systems, found.phi), found.sign, found.complete, gaps)
+    count = np.array([len(stretches) for stretches in found.unproved], np.int64)
+    return Zeros(_wrapped(systems, found.phi), found.sign, found.complete, gaps, count)
 
 
 def _of_roots(systems: Systems, roots: Roots) -> Zeros:
@@ -117,7 +128,8 @@ def _of_roots(systems: Systems, roots: Roots) -> Zeros:
             np.where(outside, np.nan, values) for values in (np.clip(phi, first, last), sign)
         )
     gaps = np.full((systems.size, 2), np.nan)
-    return Zeros(_wrapped(systems, phi), sign, roots.clear, gaps)
+    none = np.zeros(systems.size, np.int64)
+    return Zeros(_wrapped(systems, phi), sign, roots.clear, gaps, none)
 
 
 def _replaced(zeros: Zeros, rows: Index, others: Zeros) -> Zeros:
@@ -129,9 +141,10 @@ def _replaced(zeros: Zeros, rows: Index, others: Zeros) -> Zeros:
         field[rows] = np.nan
         field[rows, : other.shape[1]] = other
         fields.append(field)
-    complete, gaps = zeros.complete.copy(), zeros.gaps.copy()
-    complete[rows], gaps[rows] = others.complete, others.gaps
-    return Zeros(fields[0], fields[1], complete, gaps)
+    proofs = tuple(field.copy() for field in zeros[2:])
+    for own, other in zip(proofs, others[2:], strict=True):
+        own[rows] = other
+    return Zeros(fields[0], fields[1], *proofs)
 
 
 def _wrapped(systems: Systems, x: Array) -> Array:
@@ -149,6 +162,7 @@ def _sampled(systems: Systems) -> Zeros:
     with np.errstate(all="ignore"):
         points = _polish(systems, points)
         slope = systems.slope(points)
+        points = np.where(np.isnan(slope), np.nan, points)  # which would hide what lies beside
         sign = np.where(np.abs(slope) <= noise, 0.0, np.sign(slope))
         if systems.formula.shape is Shape.POLYNOMIAL and systems.formula.interval is None:
             # Far out only the leading power counts, which no rounding hides.
@@ -159,13 +173,16 @@ def _sampled(systems: Systems) -> Zeros:
     gaps = np.full((systems.size, 2), np.nan)
     if systems.formula.shape is Shape.GENERAL:
         gaps[:] = systems.formula.ends
-    return Zeros(_wrapped(systems, found), np.where(degenerate, 0.0, bend), unsure, gaps)
+    count = np.isfinite(gaps[:, 0]).astype(np.int64)
+    signs = np.where(degenerate, 0.0, bend)
+    return Zeros(_wrapped(systems, found), signs, unsure, gaps, count)
 
 
 def _polish(systems: Systems, points: Array) -> Array:
     """Move points to the zeros of V'' next to them; only steps that make V'' smaller are taken."""
     low, high = systems.formula.ends
-    step = 1e-4 * (1.0 if not np.isfinite(low) else high - low)
+    spread = np.nanmax(points, axis=1, keepdims=True) - np.nanmin(points, axis=1, keepdims=True)
+    step = 1e-4 * (spread if not np.isfinite(low) else high - low)
     inside = (points > low) & (points < high)
     bend = systems.bend(points)
     for _ in range(3):
@@ -253,8 +270,10 @@ def _collect(systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]) -
     curvature, energy = systems.bend(found), systems.potential(found)
     for row, coefficients in exact.items():
         at = found[row, : count[row]]
-        rise, curvature[row, : count[row]] = exact_heights(coefficients, at)
-        energy[row, : count[row]] = systems.take(np.array([row])).potential(np.zeros(1)) + rise
+        base = exact_base(systems.formula, tuple(float(p[row]) for p in systems.parameters))
+        energy[row, : count[row]], curvature[row, : count[row]] = exact_heights(
+            base, coefficients, at
+        )
     with np.errstate(invalid="ignore"):
         # The sign is proved; rounding may have turned that of a value next to 0.
         curvature = np.where(there, np.where(sign == 0.0, 0.0, sign * np.abs(curvature)), np.nan)
@@ -265,6 +284,5 @@ def _collect(systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]) -
     valid = systems.finite
     number = np.where(valid, count, -1).astype(np.int16)
     complete = zeros.complete & valid
-    return Equilibria(
-        found, kind, energy + 0.0, curvature, center, saddle, number, complete, zeros.gaps
-    )
+    proofs = complete, zeros.gaps, zeros.n_gaps
+    return Equilibria(found, kind, energy + 0.0, curvature, center, saddle, number, *proofs)

@@ -73,6 +73,13 @@ class Formula(Conservative):
         """Whether equilibria may be missed: those of polynomials and Fourier sums are not."""
         return self.shape is Shape.GENERAL
 
+    @property
+    def unbounded_function(self) -> str | None:
+        """Name of a function in it of which no bounds are known, so that nothing is proved."""
+        from phasekit.phase.numerical.isolation import without_bounds
+
+        return without_bounds(self)
+
     def check_searchable(self) -> None:
         """Refuse to look for the equilibria of a function on the whole line."""
         if self.shape is Shape.GENERAL and not self.bounded:
@@ -176,14 +183,16 @@ def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[An
     """V' and V'', if they are functions that can be computed."""
     import sympy as sp
 
-    from phasekit.laws.derivatives import derivative
+    from phasekit.laws.derivatives import DERIVED, derivative
     from phasekit.laws.nodes import foreign
 
     try:
         if derived_nodes(potential, x) > _NODES:
             raise FormulaError
         slope, bend = derivative(potential, x), derivative(potential, x, 2)
-        strange = foreign(slope, symbols.values()) or foreign(bend, symbols.values())
+        strange = next(
+            filter(None, (foreign(o, symbols.values(), DERIVED) for o in (slope, bend))), None
+        )
     except (RecursionError, FormulaError):
         raise ParameterError(
             "expression: got a formula that is nested too deeply, or too long, to differentiate"

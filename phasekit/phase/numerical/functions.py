@@ -95,12 +95,13 @@ def phase_space(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibri
 def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
     """Greatest number of equilibria, and of saddles, that any of the systems has.
 
-    Besides the ends of what could not be excluded in the systems where there is such, shape (n, 2).
+    Besides the widest stretch that could not be excluded in the systems where there is such, and
+    the number of these: low, high, number, shape (n, 3).
     """
     ground, _ = _survey(formula, parameters)
     rows, _ = loops.saddles_of(ground)
-    gaps = ground.points.gaps
-    open_ = gaps[np.isfinite(gaps[:, 0])]
+    points = ground.points
+    open_ = np.column_stack([points.gaps, points.n_gaps])[points.n_gaps > 0]
     return ground.points.phi.shape[1], int(np.bincount(rows, minlength=1).max()), open_
 
 

@@ -8,20 +8,15 @@ arrays of all stretches at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Flags = npt.NDArray[np.bool_]
-#: Lower and upper bounds, arrays of one shape.
-Interval: TypeAlias = tuple[Any, Any]
+from phasekit.phase.numerical import special_bounds
+from phasekit.phase.numerical.rounding import Flags, Interval, outward, rising, wide
 
-#: Units in the last place by which elementary functions of NumPy may be off (it promises 4).
-_ULPS = 4.0
 _EPS = float(np.finfo(float).eps)
-_MOST = float(np.finfo(float).max)
 
 
 class NoRule(Exception):
@@ -46,26 +41,13 @@ def constant_bounds(expression: Any) -> Interval:
         exact = Fraction(int(expression.p), int(expression.q))
         if Fraction(value) == exact:
             return point(value)
-        return _outward(value, value)
-    return _outward(value, value)
-
-
-def _outward(low: Any, high: Any) -> Interval:
-    return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
-
-
-def _wide(low: Array, high: Array) -> Interval:
-    """Round outward by what an elementary function may be off."""
-    low, high = np.minimum(low, _MOST), np.maximum(high, -_MOST)
-    return (
-        np.nextafter(low - _ULPS * _EPS * np.abs(low), -np.inf),
-        np.nextafter(high + _ULPS * _EPS * np.abs(high), np.inf),
-    )
+        return outward(value, value)
+    return outward(value, value)
 
 
 def add(_: Flags, a: Interval, b: Interval) -> Interval:
     """Bounds of a sum."""
-    return _outward(a[0] + b[0], a[1] + b[1])
+    return outward(a[0] + b[0], a[1] + b[1])
 
 
 def multiply(_: Flags, a: Interval, b: Interval) -> Interval:
@@ -75,17 +57,17 @@ def multiply(_: Flags, a: Interval, b: Interval) -> Interval:
             if abs(one[0]) == 1.0:  # exact
                 return other if one[0] > 0.0 else (-other[1], -other[0])
             ends = (one[0] * other[0], one[0] * other[1])
-            return _outward(*(ends if one[0] > 0.0 else ends[::-1]))
+            return outward(*(ends if one[0] > 0.0 else ends[::-1]))
     products = np.stack(np.broadcast_arrays(a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1]))
     products = np.where(np.isnan(products), 0.0, products)  # 0 times infinity
-    return _outward(products.min(axis=0), products.max(axis=0))
+    return outward(products.min(axis=0), products.max(axis=0))
 
 
 def _reciprocal(undefined: Flags, a: Interval) -> Interval:
     low, high = a
     through = (low <= 0.0) & (high >= 0.0)
     undefined |= through
-    left, right = _outward(1.0 / np.asarray(high), 1.0 / np.asarray(low))
+    left, right = outward(1.0 / np.asarray(high), 1.0 / np.asarray(low))
     left = np.where(through, np.where((low == 0.0) & (high > 0.0), left, -np.inf), left)
     right = np.where(through, np.where((high == 0.0) & (low < 0.0), right, np.inf), right)
     return left, right
@@ -105,9 +87,9 @@ def whole_power(n: int) -> Callable[..., Interval]:
             return a
         low, high = (np.power(np.asarray(end, dtype=float), m) for end in a)
         if m % 2:
-            return _wide(low, high)
+            return wide(low, high)
         through = (np.asarray(a[0]) <= 0.0) & (np.asarray(a[1]) >= 0.0)
-        least, most = _wide(np.minimum(low, high), np.maximum(low, high))
+        least, most = wide(np.minimum(low, high), np.maximum(low, high))
         return np.where(through, 0.0, np.maximum(least, 0.0)), most
 
     return power
@@ -123,25 +105,10 @@ def real_power(exponent: Interval) -> Callable[..., Interval]:
             undefined |= low == 0.0
         ends = [np.power(end, p) for end in (low, high) for p in set(exponent)]
         least, most = np.minimum.reduce(ends), np.maximum.reduce(ends)
-        least, most = _wide(least, most)
+        least, most = wide(least, most)
         return np.maximum(least, 0.0), most
 
     return power
-
-
-def _rising(
-    function: Callable[[Any], Any],
-    domain: tuple[float, float] = (-np.inf, np.inf),
-    image: tuple[float, float] = (-np.inf, np.inf),
-) -> Callable[..., Interval]:
-    def rule(undefined: Flags, a: Interval) -> Interval:
-        undefined |= (np.asarray(a[0]) < domain[0]) | (np.asarray(a[1]) > domain[1])
-        low, high = (function(np.clip(end, *domain)) for end in a)
-        undefined |= ~np.isfinite(low) & np.isfinite(a[0])
-        low, high = _wide(low, high)
-        return np.maximum(low, image[0]), np.minimum(high, image[1])
-
-    return rule
 
 
 def _falling(rule: Callable[..., Interval]) -> Callable[..., Interval]:
@@ -152,7 +119,7 @@ def _falling(rule: Callable[..., Interval]) -> Callable[..., Interval]:
 def _cosh(_: Flags, a: Interval) -> Interval:
     low, high = np.cosh(a[0]), np.cosh(a[1])
     through = (np.asarray(a[0]) <= 0.0) & (np.asarray(a[1]) >= 0.0)
-    least, most = _wide(np.minimum(low, high), np.maximum(low, high))
+    least, most = wide(np.minimum(low, high), np.maximum(low, high))
     return np.where(through, 1.0, np.maximum(least, 1.0)), most
 
 
@@ -168,7 +135,7 @@ def _wave(function: Callable[[Any], Any], top: float) -> Callable[..., Interval]
     def rule(_: Flags, a: Interval) -> Interval:
         low, high = (np.asarray(end, dtype=float) for end in a)
         ends = function(low), function(high)
-        least, most = _wide(np.minimum(*ends), np.maximum(*ends))
+        least, most = wide(np.minimum(*ends), np.maximum(*ends))
         # The number of a turn is rounded so that a maximum is rather seen than missed.
         slack = 8.0 * _EPS * (1.0 + np.maximum(np.abs(low), np.abs(high)))
         for place, bound in ((top, 1.0), (top + np.pi, -1.0)):
@@ -190,7 +157,7 @@ def _tan(undefined: Flags, a: Interval) -> Interval:
     first = np.ceil((low - 0.5 * np.pi - slack) / np.pi)
     pole = ~(first > np.floor((high - 0.5 * np.pi + slack) / np.pi))
     undefined |= pole
-    least, most = _wide(np.tan(low), np.tan(high))
+    least, most = wide(np.tan(low), np.tan(high))
     return np.where(pole, -np.inf, least), np.where(pole, np.inf, most)
 
 
@@ -207,22 +174,22 @@ def _erfc(x: Any) -> Any:
 
 
 RULES: dict[str, Callable[..., Interval]] = {
-    "exp": _rising(np.exp, image=(0.0, np.inf)),
-    "log": _rising(np.log, domain=(0.0, np.inf)),
+    "exp": rising(np.exp, image=(0.0, np.inf)),
+    "log": rising(np.log, domain=(0.0, np.inf)),
     "sin": _wave(np.sin, 0.5 * np.pi),
     "cos": _wave(np.cos, 0.0),
     "tan": _tan,
-    "sinh": _rising(np.sinh),
+    "sinh": rising(np.sinh),
     "cosh": _cosh,
-    "tanh": _rising(np.tanh, image=(-1.0, 1.0)),
-    "asin": _rising(np.arcsin, domain=(-1.0, 1.0)),
-    "acos": _falling(_rising(lambda x: np.arccos(-x), domain=(-1.0, 1.0))),
-    "atan": _rising(np.arctan),
-    "asinh": _rising(np.arcsinh),
-    "acosh": _rising(np.arccosh, domain=(1.0, np.inf)),
-    "atanh": _rising(np.arctanh, domain=(-1.0, 1.0)),
-    "erf": _rising(_erf, image=(-1.0, 1.0)),
-    "erfc": _falling(_rising(_erfc, image=(0.0, 2.0))),
+    "tanh": rising(np.tanh, image=(-1.0, 1.0)),
+    "asin": rising(np.arcsin, domain=(-1.0, 1.0)),
+    "acos": _falling(rising(lambda x: np.arccos(-x), domain=(-1.0, 1.0))),
+    "atan": rising(np.arctan),
+    "asinh": rising(np.arcsinh),
+    "acosh": rising(np.arccosh, domain=(1.0, np.inf)),
+    "atanh": rising(np.arctanh, domain=(-1.0, 1.0)),
+    "erf": rising(_erf, image=(-1.0, 1.0)),
+    "erfc": _falling(rising(_erfc, image=(0.0, 2.0))),
     "Abs": _abs,
 }
 _REWRITTEN: dict[str, Callable[[Any, Any], Any]] = {
@@ -254,7 +221,8 @@ class Bounds:
     _product: Callable[..., Any] = staticmethod(multiply)
     _whole_power: Callable[[int], Callable[..., Any]] = staticmethod(whole_power)
     _real_power: Callable[[Interval], Callable[..., Any]] = staticmethod(real_power)
-    _rules: Mapping[str, Callable[..., Any]] = RULES
+    _rules: Mapping[str, Callable[..., Any]] = {**special_bounds.RULES, **RULES}
+    _of_an_order: Mapping[str, Callable[[int], Any]] = special_bounds.OF_AN_ORDER
 
     def __init__(self, expressions: Sequence[Any], symbols: Sequence[Any]) -> None:
         self._steps: list[tuple[Callable[..., Interval], tuple[int, ...]]] = []
@@ -317,6 +285,9 @@ class Bounds:
             return self._compile(sp.exp(exponent * sp.log(base), evaluate=False))
         if name in self._rules and len(arguments) == 1:
             return self._add(self._rules[name], self._compile(arguments[0]))
+        if name in self._of_an_order and arguments[0].is_Integer and arguments[0] >= 0:
+            rule = self._of_an_order[name](int(arguments[0]))
+            return self._add(rule, self._compile(arguments[1]))
         if name in _REWRITTEN and len(arguments) == 1:
             return self._compile(_REWRITTEN[name](sp, arguments[0]))
         raise NoRule(name)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
-from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.formula import Formula, Shape
 from phasekit.phase.numerical.intervals import Bounds, NoRule, point
 from phasekit.phase.numerical.systems import Index, Systems
 
@@ -51,9 +51,23 @@ class Isolated(NamedTuple):
     """For each row the stretches that could not be excluded and stand for no equilibrium."""
 
 
-@functools.lru_cache(maxsize=128)
 def slope_bounds(formula: Formula) -> Bounds | None:
     """Bounds of V' and V'' over boxes of (x, parameters); None where a function has no rule."""
+    found = _slope_bounds(formula)
+    return found if isinstance(found, Bounds) else None
+
+
+def without_bounds(formula: Formula) -> str | None:
+    """The function of which no bounds are known, so that nothing is proved, if there is one."""
+    if formula.shape is not Shape.GENERAL:
+        return None
+    found = _slope_bounds(formula)
+    return found if isinstance(found, str) else None
+
+
+@functools.lru_cache(maxsize=128)
+def _slope_bounds(formula: Formula) -> Bounds | str:
+    """Bounds, or the function that has no rule."""
     import sympy as sp
 
     from phasekit.laws.derivatives import derivative
@@ -62,8 +76,8 @@ def slope_bounds(formula: Formula) -> Bounds | None:
     slope, bend = (derivative(formula.expression, x, order) for order in (1, 2))
     try:
         return Bounds((slope, bend), (x, *parameters))
-    except NoRule:
-        return None
+    except NoRule as missing:
+        return str(missing)
 
 
 @dataclass

@@ -27,6 +27,7 @@ Flags = npt.NDArray[np.bool_]
 _NODES = 16
 _ROUNDS = 64  # of halving
 _MOST = 1024  # panels of one half
+_DEEPEST = 540.0  # panels that shrink by 4, down to the least double
 _EPS = float(np.finfo(float).eps)
 #: Tail of V' that is as good as rounding, and tails of 1/v and v, whose rule errs by the square.
 _TIGHT, _LOOSE = 1e-14, 2e-8
@@ -114,7 +115,7 @@ class _Halves:
                 np.sqrt(2.0 * self.start / bend),
             )
             steps = np.ceil(0.5 * np.log2(self.stop / scale))
-        steps = np.where(np.isfinite(steps), np.clip(steps, 1.0, 60.0), 1.0).astype(int)
+        steps = np.where(np.isfinite(steps), np.clip(steps, 1.0, _DEEPEST), 1.0).astype(int)
         half = np.repeat(np.arange(steps.size), steps + 1)
         number = np.concatenate([np.arange(n + 1) for n in steps]) if steps.size else half
         last = steps[half]

@@ -79,7 +79,8 @@ def _reach(coefficients: Array) -> Array:
         steps = degree[:, None] - np.arange(coefficients.shape[1])
         bound = np.where(steps > 0, ratio ** (1.0 / np.maximum(steps, 1)), 0.0)
     # Not round, so that it is no point of symmetry.
-    return np.asarray(2.0625 * np.max(bound, axis=1, initial=0.0)[:, None] + 1.0)
+    bound = np.max(bound, axis=1, initial=0.0)[:, None]
+    return np.asarray(np.where(bound > 0.0, 2.0625 * bound, 1.0))
 
 
 def _polynomial_roots(coefficients: Array) -> Array:

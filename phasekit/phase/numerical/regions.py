@@ -9,7 +9,7 @@ analytic, the stretch is too long. Rectangles are pairs of the intervals of `int
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -245,6 +245,7 @@ class Regions(Bounds):
     _whole_power = staticmethod(_whole_power)
     _real_power = staticmethod(_real_power)
     _rules = _RULES
+    _of_an_order: Mapping[str, Callable[[int], Any]] = {}
 
     def _lay_out(self, expression: Any) -> int:
         import sympy as sp

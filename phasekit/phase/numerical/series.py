@@ -168,16 +168,26 @@ def _enter(
 # ------------------------------------------------------------------------- exact arithmetic
 
 
+def _of_fractions(formula: Formula) -> Any:
+    import sympy as sp
+
+    floats = formula.expression.atoms(sp.Float)
+    return formula.expression.xreplace({f: _fraction(float(f)) for f in floats})
+
+
+def _fraction(value: float) -> Any:
+    import sympy as sp
+
+    return sp.Rational(*value.as_integer_ratio())
+
+
 @functools.lru_cache(maxsize=128)
 def _symbolic(formula: Formula) -> list[Any] | None:
     """Coefficients of V', lowest first, with every number as the fraction that it is."""
     import sympy as sp
 
     x = sp.Symbol(formula.coordinate, real=True)
-    exact = {
-        f: sp.Rational(*float(f).as_integer_ratio()) for f in formula.expression.atoms(sp.Float)
-    }
-    slope = sp.diff(formula.expression.xreplace(exact), x)
+    slope = sp.diff(_of_fractions(formula), x)
     if not slope.is_polynomial(x):
         return None
     return list(sp.Poly(sp.expand(slope), x).all_coeffs()[::-1])
@@ -191,7 +201,7 @@ def exact_coefficients(formula: Formula, parameters: tuple[float, ...]) -> list[
     if symbolic is None:
         return None
     values = {
-        sp.Symbol(name, real=True): sp.Rational(*value.as_integer_ratio())
+        sp.Symbol(name, real=True): _fraction(value)
         for name, value in zip(formula.names, parameters, strict=True)
     }
     numbers = [coefficient.xreplace(values) for coefficient in symbolic]
@@ -277,9 +287,24 @@ def exact_value(numbers: list[Any], x: Fraction) -> Any:
     return value
 
 
-def exact_heights(coefficients: list[Fraction], x: Array) -> tuple[Array, Array]:
-    """V - V(0) and V'' of exact coefficients of V', rounded once."""
-    rise = [Fraction(0), *(c / (k + 1) for k, c in enumerate(coefficients))]
+def exact_base(formula: Formula, parameters: tuple[float, ...]) -> Fraction:
+    """V(0) of a polynomial; to 60 digits if it is irrational."""
+    import sympy as sp
+
+    values = {
+        sp.Symbol(name, real=True): _fraction(value)
+        for name, value in zip(
+            (formula.coordinate, *formula.names), (0.0, *parameters), strict=True
+        )
+    }
+    base = _of_fractions(formula).xreplace(values)
+    base = base if base.is_Rational else sp.Rational(base.evalf(60))
+    return Fraction(int(base.p), int(base.q))
+
+
+def exact_heights(base: Fraction, coefficients: list[Fraction], x: Array) -> tuple[Array, Array]:
+    """V and V'' of V(0) and exact coefficients of V', rounded once."""
+    height = [base, *(c / (k + 1) for k, c in enumerate(coefficients))]
     bend = [k * c for k, c in enumerate(coefficients)][1:] or [Fraction(0)]
 
     def at(numbers: list[Any]) -> Callable[[float], float]:
@@ -291,4 +316,4 @@ def exact_heights(coefficients: list[Fraction], x: Array) -> tuple[Array, Array]
 
         return value
 
-    return np.array([at(rise)(p) for p in x]), np.array([at(bend)(p) for p in x])
+    return np.array([at(height)(p) for p in x]), np.array([at(bend)(p) for p in x])

@@ -13,14 +13,18 @@ from phasekit.phase.numerical.systems import Index
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-_EXPANSIONS = 80
+#: Doublings of a first step, as many as there are between doubles.
+_EXPANSIONS = 2200
+#: Doublings after which V that falls is taken to fall for ever, though it is not proved.
+_ENOUGH = 80
 
 
 @dataclass(frozen=True, eq=False)
 class End:
     """One end of the arc of each orbit.
 
-    `offset` is the distance from the start, infinite where there is no end; there `turned` tells a
+    `offset` is the distance from the start, NaN where it is not known, infinite where there is no
+    end; there `turned` tells a
     full turn of the circle from the way to infinity or out of the interval. The turning point lies
     at ``anchor.at + u``, and `excess` is the energy above the anchor.
     """
@@ -102,12 +106,14 @@ def find_end(ground: Ground, x: Array, kinetic: Array, excess: Array, side: floa
     reaching = ~blocked & ~turned
     if reaching.any():
         high = np.where(reaching, _beyond(anchor, above, side, low, x, place), high)
-    u = _solve(anchor, above, side, low, np.where(turned, np.nan, high))
+    high = np.where(turned, np.nan, high)
+    u = _solve(anchor, above, side, low, high)
     # At rest where V rises ahead: the start is the turning point.
     resting = (kinetic == 0.0) & (side * systems.slope(x) >= 0.0) & ~turned
     offset = np.where(resting, 0.0, np.maximum(place + u, 0.0))
     u = np.where(resting, -place, u)
-    offset = np.where(np.isnan(offset) & np.isfinite(x), np.inf, offset)
+    # An end that there is but was not found is not known; without one the way has no end.
+    offset = np.where(np.isnan(high) & np.isnan(offset) & np.isfinite(x), np.inf, offset)
     return End(offset, turned, anchor, side * u, above)
 
 
@@ -116,24 +122,37 @@ def _beyond(anchor: Anchor, above: Array, side: float, low: Array, x: Array, pla
     ends = anchor.systems.formula.ends
     limit = side * (ends[1] if side > 0.0 else ends[0]) - side * x - place
     high = np.full(low.shape, np.nan)
-    step = 0.125 * (1.0 + np.abs(low))
-    for _ in range(_EXPANSIONS):
+    # The size of the orbit: how far it is from the anchor, or would be in a parabola.
+    swing = np.sqrt(2.0 * np.abs(above) / np.abs(anchor.systems.bend(anchor.at)))
+    step = np.select(
+        [place != 0.0, np.isfinite(swing) & (swing > 0.0)],
+        [np.abs(place), swing],
+        0.125 * (1.0 + np.abs(low)),
+    )
+    for number in range(_EXPANSIONS):
         there = np.minimum(low + step, limit)
-        over = anchor.rise(side * there) > above
-        high = np.where(np.isnan(high) & over, there, high)
-        if not np.any(np.isnan(high) & (there < limit)):
+        rise = anchor.rise(side * there)
+        high = np.where(np.isnan(high) & (rise > above), there, high)
+        going = np.isnan(high) & (there < limit) & np.isfinite(rise)
+        if number >= _ENOUGH:
+            going &= side * anchor.slope(side * there) > 0.0
+        if not going.any():
             break
         step = 2.0 * step
     return high
 
 
 def _solve(anchor: Anchor, above: Array, side: float, low: Array, high: Array) -> Array:
-    """Solve rise(side u) = above for u between low (inside) and high (beyond)."""
+    """Solve rise(side u) = above for u between low (inside) and high (beyond).
+
+    NaN where it is not found.
+    """
     bend = np.abs(anchor.systems.bend(anchor.at))
     guess = np.sqrt(2.0 * np.abs(above) / bend)
     guess = np.where(high <= 0.0, -guess, guess)
     u = np.where((guess > low) & (guess < high), guess, 0.5 * (low + high))
-    for _ in range(200):
+    still = np.zeros(u.shape, dtype=bool)
+    for _ in range(_EXPANSIONS):
         over = anchor.rise(side * u) - above
         outside = over > 0.0
         low, high = np.where(outside, low, u), np.where(outside, u, high)
@@ -146,4 +165,4 @@ def _solve(anchor: Anchor, above: Array, side: float, low: Array, high: Array) -
         u = fresh
         if still.all():
             break
-    return u
+    return np.where(still, u, np.nan)
