@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
 from phasekit.bifurcation.continuation.periodic.jets import Jets
-from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, logarithm, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -270,7 +270,7 @@ class Cycles:
         trivial = values[np.argmin(np.abs(values - 1.0))]
         others = multipliers(across(G, f / np.max(np.abs(f), axis=1, keepdims=True)))[0]
         whole = np.append(others, trivial.real)
-        return whole[np.argsort(-np.abs(whole), kind="stable")], log
+        return whole[np.argsort(-np.abs(whole), kind="stable")], logarithm(whole)
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""

@@ -39,7 +39,7 @@ class Point:
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
-        return bool(max(self.trivial_error, self.liouville_error) <= TRUSTED)
+        return bool(self.trivial_error <= TRUSTED and self.liouville_error <= TRUSTED)
 
 
 @dataclass(frozen=True, eq=False)
