@@ -12,7 +12,7 @@ import xarray as xr
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
-from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.bifurcation.continuation.periodic.point import Point, vertical
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -26,48 +26,28 @@ _CHECKS = {
 ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
 
 
-def critical_count(point: Point, forced: bool, label: str = "", vertical: bool = False) -> int:
+def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = False) -> int:
     """Number of multipliers outside the unit circle; -1 where they are not known."""
     values = point.multipliers
     if not np.isfinite(values).all() or not point.trusted:
         return -1
     if not forced:
         # Where energy is conserved, two are always 1.
-        trivial = np.argsort(np.abs(values - 1.0), kind="stable")[: 2 if vertical else 1]
+        trivial = np.argsort(np.abs(values - 1.0), kind="stable")[: 2 if neutral else 1]
         values = np.delete(values, trivial)
-    return int(np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label or vertical else 0.0)))
-
-
-def extremes(mesh: FloatArray, x: FloatArray, m: int) -> tuple[FloatArray, FloatArray]:
-    """Least and largest values of each column of a piecewise polynomial."""
-    value, _ = collocation.basis(m, np.linspace(0.0, 1.0, 65))
-    low, high = np.min(x, axis=0), np.max(x, axis=0)
-    parts = collocation.pieces(x, m)
-    for c in range(x.shape[1]):
-        for sign, best in ((1.0, high), (-1.0, low)):
-            tops = np.max(sign * parts[:, :, c], axis=1)
-            for j in np.argsort(-tops)[:3]:
-                fine = sign * (value @ parts[j, :, c])
-                k = int(np.argmax(fine))
-                top = float(fine[k])
-                if 0 < k < len(fine) - 1:  # a parabola through the three highest
-                    a, b, d = fine[k - 1 : k + 2]
-                    bend = a - 2.0 * b + d
-                    top = float(b - 0.125 * (d - a) ** 2 / bend) if bend < 0.0 else top
-                best[c] = max(best[c], sign * sign * top) if sign > 0 else min(best[c], -top)
-    return low, high
+    return int(np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label or neutral else 0.0)))
 
 
 def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:
     """Numbers of one orbit by name."""
     orbit, m = point.orbit, cycles.m
-    low, high = extremes(orbit.mesh, orbit.x, m)
+    low, high = collocation.extremes(orbit.mesh, orbit.x, m)
     middle = collocation.mean(orbit.mesh, orbit.x, m)
     found: dict[str, Any] = {"period": float(orbit.y[0])}
     for i, name in enumerate(problem.state):
         found[f"{name}_min"], found[f"{name}_max"] = float(low[i]), float(high[i])
         found[f"{name}_mean"] = float(middle[i])
-    found["n_unstable"] = critical_count(point, cycles.forced, label, cycles.vertical(point.dy))
+    found["n_unstable"] = critical_count(point, cycles.forced, label, vertical(cycles, point))
     for name in _CHECKS:
         found[name] = float(getattr(point, name))
     found["n_intervals"] = orbit.intervals
@@ -175,7 +155,7 @@ def _recorded(
             for k, x in enumerate(p.orbit.x):
                 time = {} if problem.time is None else {problem.time: float(at[k])}
                 series[k, 0] = float(function(x.copy(), **values, **time))
-            low, high = extremes(p.orbit.mesh, series, cycles.m)
+            low, high = collocation.extremes(p.orbit.mesh, series, cycles.m)
             middle = collocation.mean(p.orbit.mesh, series, cycles.m)
             found[i] = low[0], high[0], middle[0]
         for k, what in enumerate(("min", "max", "mean")):

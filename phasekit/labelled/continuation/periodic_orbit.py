@@ -32,6 +32,7 @@ FloatArray = npt.NDArray[np.float64]
 TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
 LONGEST = 2000  # steps of the slowest time scale that a search for a return may take
 SAMPLES = 2001
+PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
 def periodic_orbit(
@@ -138,7 +139,7 @@ def periodic_orbit(
     run = _Simulation(problem)
     if period is not None:
         start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
-        at, states = run(start, 0.0, period, SAMPLES)
+        at, states = run(start, 0.0, period, 0)
         guesses = [sampled(problem, at / period, states, period, value, options.degree)]
         return _found(problem, guesses, options, f"from x0 = {x.tolist()} with period {period:.6g}")
     return _searched(problem, x, settle, run, value, options)
@@ -224,16 +225,20 @@ class _Simulation:
     def __call__(
         self, x: FloatArray, begin: float, length: float, samples: int = 2, **keywords: Any
     ) -> tuple[FloatArray, FloatArray]:
-        """Times and states of the motion over some time."""
+        """Times and states of the motion over some time; without samples, its own steps in parts.
+
+        So they are dense where the motion is fast.
+        """
         from scipy.integrate import solve_ivp
 
-        at = np.linspace(begin, begin + length, samples)
+        at = np.linspace(begin, begin + length, samples) if samples else None
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what LSODA says is said by its status, too
             try:
                 solution = solve_ivp(
                     self.f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
-                    atol=1e-10 * max(1e-6, float(np.max(np.abs(x)))), **keywords,
+                    dense_output=not samples,
+                    atol=1e-10 * (float(np.max(np.abs(x))) or 1e-6), **keywords,
                 )  # fmt: skip
             except (ValueError, ArithmeticError) as error:
                 if isinstance(error, ParameterError):
@@ -250,6 +255,10 @@ class _Simulation:
                 f"x0: the simulation from {x.tolist()} did not reach the time {length:.6g}: "
                 f"{solution.message}"
             )
+        if at is None:
+            steps = np.arange(PARTS * (len(solution.t) - 1) + 1.0) / PARTS
+            at = np.interp(steps, np.arange(len(solution.t)), solution.t)
+            return at - begin, solution.sol(at).T
         return at - begin, solution.y.T
 
 
@@ -271,7 +280,7 @@ def _searched(
             unit = unit or _pace(run, x)
             period = _return(problem, x, run)
             unit = period if waited == 0.0 else unit
-            at, states = run(x, 0.0, period, SAMPLES)
+            at, states = run(x, 0.0, period, 0)
             guess = sampled(problem, at / period, states, period, value, options.degree)
             return _found(problem, [guess], options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
@@ -282,7 +291,7 @@ def _searched(
 def _pace(run: _Simulation, x: FloatArray) -> float:
     """A time in which the state moves by about its own size."""
     speed = float(np.linalg.norm(run.f(0.0, x)))
-    return 10.0 * max(float(np.linalg.norm(x)), 1e-3) / speed if speed > 0.0 else 0.0
+    return 10.0 * (float(np.linalg.norm(x)) or 1e-3) / speed if speed > 0.0 else 0.0
 
 
 def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:

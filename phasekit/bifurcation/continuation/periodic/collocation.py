@@ -128,6 +128,26 @@ def mean(mesh: Array, x: Array, m: int) -> Array:
     return np.asarray(np.einsum("j,i,jin->n", np.diff(mesh), c.weights, at_gauss(x, m)))
 
 
+def extremes(mesh: Array, x: Array, m: int) -> tuple[Array, Array]:
+    """Least and largest values of each column of a piecewise polynomial."""
+    value, _ = basis(m, np.linspace(0.0, 1.0, 65))
+    low, high = np.min(x, axis=0), np.max(x, axis=0)
+    parts = pieces(x, m)
+    for c in range(x.shape[1]):
+        for sign, best in ((1.0, high), (-1.0, low)):
+            tops = np.max(sign * parts[:, :, c], axis=1)
+            for j in np.argsort(-tops)[:3]:
+                fine = sign * (value @ parts[j, :, c])
+                k = int(np.argmax(fine))
+                top = float(fine[k])
+                if 0 < k < len(fine) - 1:  # a parabola through the three highest
+                    a, b, d = fine[k - 1 : k + 2]
+                    bend = a - 2.0 * b + d
+                    top = float(b - 0.125 * (d - a) ** 2 / bend) if bend < 0.0 else top
+                best[c] = max(best[c], sign * sign * top) if sign > 0 else min(best[c], -top)
+    return low, high
+
+
 def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Array:
     """Size of the derivative of order m + 1 on each interval, on scaled axes.
 

@@ -13,7 +13,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
 from phasekit.bifurcation.continuation.periodic.jets import Jets
-from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, along_flow, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -22,6 +22,8 @@ FLAT = (
     1e-7  # a Newton step that no longer shrinks counts below this, where the residual is rounding
 )
 ROUNDING = 1e-11  # of the residual, relative
+SMOOTH = 2.5  # rate times length of an interval over which variational equations are resolved
+MOST = 20_000  # intervals of a mesh that resolves them
 
 
 @dataclass(frozen=True, eq=False)
@@ -252,25 +254,45 @@ class Cycles:
             length = 1.0
         return Solution(orbit, dx / length, dy / length, steps, residual, sign, divergence, W)
 
-    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float]:
-        """Floquet multipliers and the logarithm of the size of their product.
+    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
+        """Floquet multipliers, the logarithm of the size of their product, the trivial one's error.
 
         Of an autonomous system one belongs to f along the orbit. The others are those across it,
         which stay accurate where the orbit comes near an equilibrium; it is itself a check.
         """
         n = self.n
-        G = W[:, (self.m - 1) * n :, :n]
+        G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
+        if not self.forced and n > 1:
+            with np.errstate(all="ignore"):
+                f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes) / self.scale
+            if np.isfinite(f).all() and np.all(np.any(f != 0.0, axis=1)):
+                G = G * self.scale / self.scale[:, None]
+                trivial, off = along_flow(G, f)
+                others, log = multipliers(across(G, f / np.max(np.abs(f), axis=1, keepdims=True)))
+                whole = np.append(others, trivial)
+                order = np.argsort(-np.abs(whole), kind="stable")
+                with np.errstate(all="ignore"):
+                    return whole[order], log + float(np.log(abs(trivial))), abs(trivial - 1.0) + off
         values, log = multipliers(G)
-        if self.forced or n == 1:
-            return values, log
-        with np.errstate(all="ignore"):
-            f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-        if not np.isfinite(f).all():
-            return values, log
-        trivial = values[np.argmin(np.abs(values - 1.0))]
-        others = multipliers(across(G, f / np.max(np.abs(f), axis=1, keepdims=True)))[0]
-        whole = np.append(others, trivial.real)
-        return whole[np.argsort(-np.abs(whole), kind="stable")], log
+        return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+
+    def resolving(self, orbit: Orbit) -> Array | None:
+        """A mesh on which the variational equations are smooth, too; None if it is too fine."""
+        n = self.n
+        found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        slopes = found[:, n:].reshape(orbit.intervals, self.m, n, -1)[:, :, :, :n]
+        rates = np.abs(slopes * self.scale / self.scale[:, None]).sum(axis=3).max(axis=(1, 2))
+        if not np.isfinite(rates).all():
+            return None
+        parts = np.ceil(np.diff(orbit.mesh) * orbit.y[0] * rates / SMOOTH)
+        if np.sum(parts) > MOST:
+            return None
+        counts = np.maximum(1, parts).astype(int)
+        places = [
+            np.linspace(a, b, k, endpoint=False)
+            for a, b, k in zip(orbit.mesh[:-1], orbit.mesh[1:], counts, strict=True)
+        ]
+        return np.append(np.concatenate(places), 1.0)
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""

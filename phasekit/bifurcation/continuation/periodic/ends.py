@@ -16,6 +16,8 @@ Array = npt.NDArray[np.float64]
 
 STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
 SLOW = 1e-4  # the same, where no step succeeds
+GROWS = 0.02  # part of its range by which no state grows beside a homoclinic orbit, a time e-fold
+REACH = 1e-3
 FEW = 5  # points before which a family is not asked whether it closes
 NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
@@ -79,7 +81,24 @@ def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
     if cycles.vertical(start.dy) and cycles.vertical(made.dy):
         # A conservative family: the parameter always stands still.
         return bool(made.orbit.y[0] > FAR * start.orbit.y[0])
-    return bool(still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0])
+    if not (still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0]):
+        return False
+    return _rests(cycles, made.orbit, made.dx, rate)
+
+
+def _rests(cycles: Cycles, orbit: Orbit, dx: Array, rate: float) -> bool:
+    """Whether the ranges of the states stand still while the period grows.
+
+    Where cycles explode along canards the parameter stands still as well, but their ranges grow.
+    """
+    step = REACH / float(np.max(np.abs(dx) / cycles.scale))
+    flat = orbit.x - np.outer(collocation.times(orbit.mesh, cycles.m), cycles.turns)
+    before, after = (
+        np.ptp(collocation.extremes(orbit.mesh, flat + s * step * dx, cycles.m), axis=0)
+        for s in (-1.0, 1.0)
+    )
+    growth = np.abs(after - before) / (before + after) / (step * rate)
+    return bool(np.max(growth[: cycles.own]) < GROWS)
 
 
 def when_stuck(cycles: Cycles, state: State, start: Point, stop: Stop) -> Stop:
@@ -89,6 +108,8 @@ def when_stuck(cycles: Cycles, state: State, start: Point, stop: Stop) -> Stop:
         return stop
     still = abs(state.dy[1]) / cycles.width[0] / rate
     if still > SLOW or orbit.y[0] < LONG * start.orbit.y[0]:
+        return stop
+    if not _rests(cycles, orbit, state.dx, rate):
         return stop
     name = cycles.field.parameters[cycles.active[0]]
     return Stop(

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
-from phasekit.bifurcation.continuation.periodic.point import Point, point_of
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
 
 Array = npt.NDArray[np.float64]
@@ -44,6 +44,12 @@ def nontrivial(values: Complex, forced: bool) -> Complex:
 def unstable(values: Complex, forced: bool) -> int:
     """Number of multipliers outside the unit circle."""
     return int(np.sum(np.abs(nontrivial(values, forced)) > 1.0))
+
+
+def _even(point: Point, forced: bool) -> bool:
+    """Whether the number of real multipliers beyond 1 is even, which changes at a fold."""
+    mu = nontrivial(point.multipliers, forced)
+    return int(np.sum((mu.imag == 0.0) & (mu.real > 1.0))) % 2 == 0
 
 
 def fold_test(point: Point, forced: bool) -> float:
@@ -153,10 +159,12 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     changed = [
         kind for kind, test in TESTS.items() if (test(a, forced) >= 0.0) != (test(b, forced) >= 0.0)
     ]
-    if cycles.vertical(a.dy) and cycles.vertical(b.dy):
+    if vertical(cycles, a) and vertical(cycles, b):
         # Conservative: a second multiplier is always 1, and the parameter never moves.
         changed = [kind for kind in changed if kind == DOUBLING]
         return [one for one in (refined(Stretch(cycles, a, b), kind) for kind in changed) if one]
+    if FOLD in changed and BRANCHING not in changed and _even(a, forced) == _even(b, forced):
+        changed.remove(FOLD)  # the parameter stands still to rounding, and no multiplier passes 1
     gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
     if not changed and gap == 0:
         return []
@@ -190,9 +198,10 @@ def refined(stretch: Stretch, kind: str) -> Found | None:
         k = int(np.argmin(np.abs(1.0 - mu[i] * mu[j])))
         if abs(mu[i[k]].imag) <= 1e-9 * abs(mu[i[k]]):
             return None  # two real multipliers with the product 1
-    if kind == BRANCHING:
+    critical = {BRANCHING: 1.0, DOUBLING: -1.0}.get(kind)
+    if critical is not None:
         mu = nontrivial(point.multipliers, forced)
-        if np.min(np.abs(mu - 1.0)) > 1e-2:
+        if not np.min(np.abs(mu - critical)) <= 1e-2:
             return None
     return Found(
         kind, point, -1, interval, "converged", "", _normal_form(stretch.cycles, kind, point)

@@ -91,10 +91,15 @@ class Extended(Cycles):
             target[2] = 0.0
         return rows, rows_y, target
 
-    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float]:
+    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
         """Floquet multipliers of the orbit itself."""
         n, last = self.own, (self.m - 1) * self.n
-        return multipliers(W[:, last : last + n, :n])
+        values, log = multipliers(W[:, last : last + n, :n])
+        return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+
+    def resolving(self, orbit: Orbit) -> Array | None:
+        """The orbit has no other mesh than its function."""
+        return None
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x, of which each part of the function has its own."""

@@ -13,6 +13,9 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 TRUSTED = 1e-5  # error of the trivial multiplier, or by Liouville's formula, above which no tests
+UNRESOLVED = 1e-5  # by which logarithms of the product differ where multipliers are not resolved
+ALIKE = 1e-3  # the same, beside their size, above which nothing is known of multipliers
+NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,16 @@ class Point:
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
-        return bool(max(self.trivial_error, self.liouville_error) <= TRUSTED)
+        return bool(self.trivial_error <= TRUSTED and self.liouville_error <= TRUSTED)
+
+
+def vertical(cycles: Cycles, point: Point) -> bool:
+    """Whether the parameter keeps its value since energy is conserved: one more multiplier is 1.
+
+    Where cycles explode along canards the parameter hardly moves either.
+    """
+    near = np.sum(np.abs(point.multipliers - 1.0) < NEUTRAL)
+    return cycles.vertical(point.dy) and bool(near > (0 if cycles.forced else 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,14 +69,22 @@ class State:
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
-    values, log = cycles.multipliers(s.W, s.orbit)
+    values, log, trivial = cycles.multipliers(s.W, s.orbit)
     divergence = cycles.divergence(s.divergence)
+    # An orbit may be smooth where its variational equations are stiff.
+    mesh = cycles.resolving(s.orbit) if abs(log - divergence) > UNRESOLVED else None
+    if mesh is not None:
+        orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
+        fine = cycles.looked_at(orbit, dx, s.dy)
+        values, log, error = cycles.multipliers(fine.W, orbit)
+        trivial = min(trivial, error)
+        divergence = cycles.divergence(fine.divergence)
     with np.errstate(all="ignore"):
         product, exact = np.exp(log), np.exp(divergence)
         defect = abs(product - exact) / max(1.0, exact)
-        if not np.isfinite(exact):
-            defect = abs(log - divergence)
-    trivial = 0.0 if cycles.forced else float(np.min(np.abs(values - 1.0)))
+        apart = abs(log - divergence) / (1.0 + abs(divergence))
+        if not np.isfinite(exact) or not apart <= ALIKE:
+            defect = apart
     return Point(
         s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
         float(defect), cycles.mesh_error(s.orbit),
