@@ -16,6 +16,7 @@ from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labels.arguments import bad, numeric, pair, unknown
+from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -96,9 +97,10 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
-        return continue_orbit(
-            problem, parameter, orbit, span, _record(problem, record), options, fix
-        )
+        with said(f"following periodic orbits along {parameter}"):
+            return continue_orbit(
+                problem, parameter, orbit, span, _record(problem, record), options, fix
+            )
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
@@ -120,8 +122,9 @@ def continuation(
     given = {problem.state.index(name): s for name, s in options.scales.items()}
     curve = scaled(curve, u, given)
     start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
-    backward, forward = run(curve, start, options.directions)
-    return make_branch(problem, curve, start, backward, forward, _record(problem, record))
+    with said(f"following equilibria along {parameter}"):
+        backward, forward = run(curve, start, options.directions)
+        return make_branch(problem, curve, start, backward, forward, _record(problem, record))
 
 
 def equilibrium_curve(
