@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -36,9 +37,11 @@ suppress_warnings = ["ref.citation"]
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+os.environ.pop("MPLBACKEND", None)  # else notebooks would show no pictures
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
+nb_output_stderr = "remove"  # progress bars, and that something is compiled
 
 autosummary_generate = True
 templates_path = ["_templates"]
@@ -74,6 +77,7 @@ phasekit.explore(_disk).save(_here / "auto_explorer" / "explorer_page.html")
 html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"
 html_static_path = ["_static", "auto_explorer"]
+html_css_files = ["site.css"]
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False}
 
 # Quantities, systems, special points and codes have pages that are made of the code.
