@@ -1,7 +1,10 @@
 from __future__ import annotations
 
+import os
+import re
 import sys
 from pathlib import Path
+from typing import Any
 
 import phasekit
 
@@ -36,9 +39,11 @@ suppress_warnings = ["ref.citation"]
 
 myst_enable_extensions = ["amsmath", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 3
+os.environ.pop("MPLBACKEND", None)  # else notebooks would show no pictures
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
+nb_output_stderr = "remove"  # progress bars, and that something is compiled
 
 autosummary_generate = True
 templates_path = ["_templates"]
@@ -74,7 +79,28 @@ phasekit.explore(_disk).save(_here / "auto_explorer" / "explorer_page.html")
 html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"
 html_static_path = ["_static", "auto_explorer"]
+html_css_files = ["site.css"]
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False}
+
+default_role = "py:obj"  # `flow` in a docstring leads to its page
+
+_papers = re.findall(
+    r"^\.\. \[(\w+)\]", (_here / "references.md").read_text(encoding="utf-8"), re.MULTILINE
+)
+_cited = re.compile(rf"\[({'|'.join(_papers)})\](?!_)")
+
+
+def _link_papers(app: Any, what: str, name: str, thing: Any, options: Any, lines: Any) -> None:
+    """Make links of the keys of papers in docstrings, outside examples and code."""
+    for i, line in enumerate(lines):
+        if not line.lstrip().startswith((">>>", "...")) and "``" not in line and "'" not in line:
+            lines[i] = _cited.sub(r"[\1]_", line)
+
+
+def setup(app: Any) -> None:
+    """Look at docstrings before numpydoc does."""
+    app.connect("autodoc-process-docstring", _link_papers, priority=400)
+
 
 # Quantities, systems, special points and codes have pages that are made of the code.
 tables.write(_here / "generated")

@@ -1,6 +1,7 @@
 """The command line: what it writes, what it prints, and how it refuses."""
 
 import re
+import shlex
 import subprocess
 import sys
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.cli import COMMANDS, main
+from phasekit.cli import COMMANDS, common, main
 from phasekit.cli.values import between, glue_negative_values, number, span
 
 matplotlib.use("Agg")
@@ -102,6 +103,34 @@ def test_demo(tmp_path, capsys):
     assert refused(capsys, "demo", "--out", "here").startswith("--out: here/map.png exists; choose")
     assert main(["demo", "--out", "here", "--overwrite"]) == 0
     assert (tmp_path / "here" / "map.png").read_bytes() == before
+
+
+def test_what_the_demo_tells_to_try_next_runs(tmp_path, capsys):
+    assert main(["demo", "--out", "a folder"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    commands = [shlex.split(line) for line in lines if line.startswith("  phasekit ")]
+    assert [words[1] for words in commands] == ["explore", "portrait", "info"]
+    for words in commands:
+        more = ["--no-open", "--output", "page.html"] if words[1] == "explore" else []
+        assert main([*words[1:], *more]) == 0
+    assert "axis beta: 91 values, 0 to 90 deg" in capsys.readouterr().out
+    assert (tmp_path / "a folder" / "portrait.png").is_file()
+
+
+def test_a_command_is_called_as_it_was(tmp_path, monkeypatch):
+    script = tmp_path / ".venv" / "bin" / "phasekit"
+    script.parent.mkdir(parents=True)
+    script.touch(mode=0o755)
+    monkeypatch.setattr("sys.argv", [str(script), "demo"])
+    monkeypatch.setenv("PATH", "")
+    assert common.program() == ".venv/bin/phasekit"
+    monkeypatch.chdir(script.parent)
+    assert common.program() == "./phasekit"
+    monkeypatch.setenv("PATH", str(script.parent))
+    monkeypatch.delenv("UV_RUN_RECURSION_DEPTH", raising=False)
+    assert common.program() == "phasekit"
+    monkeypatch.setattr("sys.argv", ["/somewhere/pytest"])
+    assert common.program() == "phasekit"
 
 
 def test_demo_leaves_other_files_alone(tmp_path, capsys):
@@ -250,6 +279,12 @@ def test_info(tmp_path, capsys):
         assert "  n_equilibria       int8     beta x a" in lines
         assert ("1 of 1 tiles are done, 100 %" in "".join(lines)) == (store == "map.zarr")
         assert "on the disk" in lines[-1]
+    assert main(["info", "map.zarr", "--units", "beta=deg,e=mm", "--units", "omega1=rpm"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1] == "fixed: e = 50 mm, g = 9.80665 m s-2, omega1 = 300 rpm, r = 0.2 m"
+    assert lines[2] == "axis beta: 4 values, 0 to 90 deg"
+    assert "beta" in refused(capsys, "info", "map.zarr", "--units", "beta=mm")
+    assert "phi" in refused(capsys, "info", "map.zarr", "--units", "phi=deg")
     assert "does not exist" in refused(capsys, "info", "none.zarr")
     (tmp_path / "folder").mkdir()
     assert "cannot be read" in refused(capsys, "info", "folder")

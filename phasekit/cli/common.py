@@ -5,6 +5,8 @@ from __future__ import annotations
 import inspect
 import io
 import os
+import shlex
+import shutil
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -94,6 +96,11 @@ def _fitting(units: str) -> str:
 def add_units(parser: Parser) -> None:
     """Add the options that say in which units a picture shows things."""
     parser.add_argument("--angles", choices=("rad", "deg"), default="rad", help="unit of the axes")
+    add_shown_units(parser)
+
+
+def add_shown_units(parser: Parser) -> None:
+    """Add the option that says in which units quantities and parameters are shown."""
     parser.add_argument(
         "--units",
         action="append",
@@ -185,6 +192,19 @@ def say_invalid(ds: xr.Dataset) -> None:
             f"{invalid} of {counts.size} cells are empty, for their parameters are not legal; "
             "a number without unit is in SI units and radians: write degrees as 40deg"
         )
+
+
+def program() -> str:
+    """Return how this command is called from a shell: by its name, or where it is not found."""
+    called = Path(sys.argv[0])
+    found = shutil.which("phasekit")
+    passing = "UV_RUN_RECURSION_DEPTH" in os.environ  # uv's path ends with the command
+    if called.stem != "phasekit" or (found and not passing and called.samefile(found)):
+        return "phasekit"
+    path = called.absolute()
+    here = os.path.relpath(path)
+    near = here if os.sep in here else os.path.join(os.curdir, here)
+    return shlex.quote(str(path) if here.startswith(os.pardir) else near)
 
 
 def quiet_backend() -> None:

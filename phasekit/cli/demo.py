@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -59,6 +60,18 @@ def run(argv: Sequence[str]) -> None:
     common.quiet_backend()
     common.save(draw(ds), picture, dpi=120)
     common.say(f"wrote {picture} and {store}")
+    me, rotor = common.program(), "--e 50mm --r 200mm --omega1 300rpm"
+    shown, one = shlex.quote(str(store)), folder / "portrait.png"
+    common.say(
+        f"""
+next, try
+  {me} explore --beta 40deg --a 24mm {rotor}
+      move this rotor by sliders, on a page in the browser
+  {me} portrait --beta 84deg --a 12mm {rotor} --angles deg --out {shlex.quote(str(one))}
+      draw cell (d) by itself
+  {me} info {shown} --units beta=deg,a=mm,e=mm,r=mm,omega1=rpm
+      see what the stored map holds; pk.open_map({str(store)!r}) opens it in Python"""
+    )
 
 
 def summarize(ds: xr.Dataset) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from phasekit.cli import Parser, common
 
@@ -19,12 +20,14 @@ def run(argv: Sequence[str]) -> None:
         action="store_true",
         help="read all files and compare their checksums; damage is named, and the exit code is 2",
     )
+    common.add_shown_units(parser)
     options = parser.parse_args(argv)
+    units = common.units_of(options.units)
     if "://" not in options.store:
         common.path_called("STORE", options.store)
     from phasekit.labelled.info import map_info
 
-    found = map_info(options.store, verify=options.verify)
+    found = replace(map_info(options.store, verify=options.verify), units=units)
     common.say(str(found))
     if options.verify:
         common.say(found.verdict)

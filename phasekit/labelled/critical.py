@@ -49,7 +49,8 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
 
     Notes
     -----
-    The fold is ``|B|^(2/3) + |C|^(2/3) = |A|^(2/3)``, the sign change ``A = 0``. They are solved
+    The fold, where ``V' = V'' = 0`` ([Kuznetsov2004] section 3.3) for the V of [Veljovic2015] (15),
+    is ``|B|^(2/3) + |C|^(2/3) = |A|^(2/3)``, the sign change ``A = 0``. They are solved
     in closed form for beta, e, a and omega1 of a disk and for lam and psi, and by exact isolation
     of the roots of a polynomial for all other parameters (some milliseconds a cell).
 

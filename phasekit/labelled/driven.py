@@ -22,6 +22,7 @@ from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
 from phasekit.motion.strobe import check_period, common_period
+from phasekit.numerics.waits import said
 from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
 from phasekit.table.quantities import ROWS, select
@@ -85,6 +86,13 @@ def stroboscopic(
     ParameterError
         If an argument is unusable, or nothing varies with a period of its own and none is given.
 
+    Notes
+    -----
+    The orbit of the Poincare map of a forced system, ``(phi, phi')(k T), k = skip, skip + 1, ...``
+    ([GuckenheimerHolmes1983] section 1.5), by the integration of `flow`. Frequencies whose ratio is
+    a fraction of whole numbers up to 64 have a common period T. ``rotation_number`` is
+    ``(phi(k_last T) - phi(k_first T))/(2 pi (k_last - k_first))``, NaN for n = 1.
+
     Examples
     --------
     >>> import phasekit as pk
@@ -108,7 +116,8 @@ def stroboscopic(
     function = functools.partial(_sections, system.law, **options)
     one = Pass(function, (*system.parameters, *STATE), ("stroboscopic",), PerturbedConservative)
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
-    return at_states(system, rows, states, (one,))
+    with said(f"following motions for {skip + n:,} periods"):
+        return at_states(system, rows, states, (one,))
 
 
 def _sections(law: PerturbedConservative, *arrays: Any, **options: Any) -> Any:
@@ -178,7 +187,8 @@ def lyapunov(
     states = {
         "phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "time": ("time", time)
     }  # fmt: skip
-    return at_states(system, rows, states, (one,))
+    with said("following motions and what lies beside them"):
+        return at_states(system, rows, states, (one,))
 
 
 def attractors(
@@ -211,9 +221,11 @@ def attractors(
 
     Notes
     -----
-    Motions are followed until they repeat themselves; Newton's method then finds the periodic
-    orbit, and its multipliers whether it attracts. What has come to none after 4,300 periods counts
-    as an attractor that does not repeat itself: chaotic, or a rotation in step with nothing.
+    Motions are followed until they repeat themselves; Newton's method then finds the fixed point
+    of the q-th power of the Poincare map, q up to 16, and its multipliers, all of a modulus
+    below 1, whether it attracts ([GuckenheimerHolmes1983] section 1.5). What has come to none after
+    4,300 periods counts as an attractor that does not repeat itself: chaotic, or a rotation in step
+    with nothing. An attractor to which none of the states comes is not found.
 
     Examples
     --------
@@ -274,8 +286,8 @@ def basins(
     -----
     A motion belongs to an attractor when it comes as near as states on a ring around it were seen
     to be caught, or, of an attractor that does not repeat itself, when it has been in forty of its
-    boxes in succession [DatserisWagemakers2022]. The error of a share is that of a sample of as
-    many states, and the undecided.
+    boxes in succession [DatserisWagemakers2022]. The error of a share p of n states is that of a
+    sample, ``sqrt(p (1 - p)/n)``, and the share of the undecided on top.
 
     Examples
     --------
@@ -288,7 +300,8 @@ def basins(
     """
     periods = whole("periods", periods, "a number of periods, >= 1", 1)
     system, found, grid = _searched(perturbed, phi, dphi, period)
-    result = shares.basins(found, *grid, legs=periods)
+    with said(f"following {grid[0].size * grid[1].size:,} motions to their attractors"):
+        result = shares.basins(found, *grid, legs=periods)
     data = _attractor_rows(found.result())
     dims = ("state_phi", "state_dphi")
     for name, values in result._asdict().items():
@@ -336,7 +349,8 @@ def _searched(
     every = [axis[np.linspace(0, len(axis) - 1, min(len(axis), STARTS)).round().astype(int)]
              for axis in grid]  # fmt: skip
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
-    return system, search.find(law, values, leg, states), grid
+    with said(f"looking for attractors from {len(states)} states"):
+        return system, search.find(law, values, leg, states), grid
 
 
 def _quarter(system: Perturbed) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from math import prod
 from typing import Any
 
@@ -10,6 +11,7 @@ import xarray as xr
 
 from phasekit.cells.request import ask
 from phasekit.labelled.accessor import PhasekitAccessor
+from phasekit.labels.conversion import in_units
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.memory import human
 from phasekit.maps.estimate import Estimate
@@ -35,6 +37,7 @@ class MapInfo:
     done: dict[str, tuple[int, int]]  # tiles that are done and all tiles, by part
     size: int | None  # bytes on the disk
     left: Estimate | None  # None where nothing is left
+    units: Mapping[str, str] = field(default_factory=dict)  # in which inputs are shown
 
     @property
     def complete(self) -> bool:
@@ -66,16 +69,18 @@ class MapInfo:
         made = f"phasekit {ds.attrs.get('phasekit_version', '?')}, schema {ds.attrs[SCHEMA]}"
         lines = [f"{self.name}: map of {model}, made by {made}"]
         declared = models()[model].declared if model in models() else ()
-        inputs = {p.name for p in declared} | set(STATES)
+        names = {p.name for p in declared} | set(STATES)
+        inputs = {name: coord.variable for name, coord in ds.coords.items() if name in names}
+        given = in_units(xr.Dataset(coords=inputs), self.units).coords
         fixed = [
             f"{name} = {coord.item():.6g}{_unit(coord)}"
-            for name, coord in ds.coords.items()
-            if name in inputs and not coord.dims
+            for name, coord in given.items()
+            if not coord.dims
         ]
         if fixed:
             lines.append(f"fixed: {', '.join(sorted(fixed))}")
-        for name, coord in ds.coords.items():
-            if name in inputs and coord.dims:
+        for name, coord in given.items():
+            if coord.dims:
                 lines.append(f"axis {_axis(str(name), coord)}")
         lines.append("quantities:")
         width = max((len(str(name)) for name in ds.data_vars), default=0)

@@ -16,6 +16,7 @@ from phasekit.cells.dispatch import pass_from, passes_of
 from phasekit.cells.states import at_states
 from phasekit.labelled.orbits import noted
 from phasekit.labels.arguments import NumberLike, bad, number, state_arguments
+from phasekit.numerics.waits import said
 from phasekit.systems.as_system import as_system
 from phasekit.systems.perturbed import Perturbed
 from phasekit.table.quantities import select
@@ -94,7 +95,8 @@ def flow(
         tolerances = checked_tolerances(rtol, atol)
         (one,) = passes_of(system, select("motion"))
         one = replace(one, function=functools.partial(one.resolved, **tolerances))
-        ds = at_states(system, select("motion"), states, (one,))
+        with said("following damped and driven motions"):
+            ds = at_states(system, select("motion"), states, (one,))
         if events is None:
             return ds
         from phasekit.labelled.events import with_events

@@ -243,7 +243,9 @@ def state_of(
 
     Notes
     -----
-    The inverse of `action_angle`.
+    The inverse of `action_angle`, in the variables of [LandauLifshitz1976] section 50: the energy
+    is found from the action by Newton's method, ``dh/dJ = frequency``, and the state from the time
+    ``angle/frequency`` after angle 0.
 
     Examples
     --------

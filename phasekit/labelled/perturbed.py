@@ -86,7 +86,16 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
     Raises
     ------
     ParameterError
-        If the system is not perturbed, or n is not a whole number >= 1.
+        If the system is not perturbed, n is not a whole number >= 1, or omega1 is a function of
+        time.
+
+    Notes
+    -----
+    Along a loop that returns to its saddle on the same side, the amplitude of a torque's Melnikov
+    function has the factor ``sin(nu x/k)``, where ``cosh(x + i y) = (-S + i k^2)/sqrt D``,
+    ``S = (A/2) sin 2 phi_s``, ``D = S^2 + (B cos phi_s + C sin phi_s) k^2``, and k is the saddle's
+    exponent: the two poles of the separatrix next to real time give a residue each
+    ([Melnikov1963]; [GuckenheimerHolmes1983] section 4.5). It vanishes at ``nu = order pi k/x``.
 
     Examples
     --------
@@ -222,7 +231,9 @@ def critical_torque(system: Any) -> xr.Dataset:
     Notes
     -----
     The extremes of V', exact: V'' = 0 is the equation of equilibria of another system,
-    ``V''(phi; A, B, C) = V'(phi - pi/4; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``.
+    ``V''(phi; A, B, C) = V'(phi - pi/4; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``, V being that of
+    [Veljovic2015] (15). The critical current of a Josephson junction ([Stewart1968],
+    [McCumber1968]) is that of ``A = C = 0``.
 
     Examples
     --------
@@ -254,7 +265,9 @@ def retrapping_torque(perturbed: Any) -> xr.Dataset:
     Notes
     -----
     Over one turn of the winding separatrix the torque gives what damping takes,
-    ``2 pi torque = damping S + quadratic int |phi'|^3 dt``: first order in the damping.
+    ``2 pi torque = damping S + quadratic int |phi'|^3 dt``, S being its ``winding_area``: first
+    order in the damping. Of a Josephson junction it is the current at which the voltage is lost
+    ([Stewart1968], [McCumber1968]).
 
     Examples
     --------

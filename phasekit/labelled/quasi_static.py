@@ -75,8 +75,10 @@ def quasi_static(
     -----
     No step is too large: all folds between two steps are found by exact arithmetic, as in
     `branches`, so that jumps and their places do not depend on the steps. Quasi-static change with
-    damping that is slow against nothing but the oscillation is meant. Where a pitchfork leaves the
-    choice between two wells, it is that of the limit B, C -> 0 from above.
+    damping is meant: slow against the oscillation and its decay. A center ends where
+    ``|B|^(2/3) + |C|^(2/3) = |A|^(2/3)``, a fold ([Kuznetsov2004] section 3.3), or a cusp of this
+    curve. Where a pitchfork leaves the choice between two wells, it is that of the limit B, C -> 0
+    from above.
 
     Examples
     --------

@@ -69,6 +69,13 @@ def poincare_section(
     ConvergenceError
         If the integrator cannot reach the end with the accuracy asked for.
 
+    Notes
+    -----
+    The points of the motion with ``phi = section`` ([GuckenheimerHolmes1983] section 1.5). The
+    motion is integrated by DOP853 ([HairerNorsettWanner1993]); each step is cut where the
+    coordinate turns, so that two passages in one step are not lost, and a passage is a root of the
+    step's interpolant. The state at t = 0 is none.
+
     Examples
     --------
     >>> import phasekit as pk

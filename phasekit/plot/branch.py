@@ -91,7 +91,7 @@ def branch(
     Parameters
     ----------
     branches : Branch or sequence of Branch
-        What `continuation`, `diagram`, `.switch` or `.curve` return.
+        What `continuation`, `diagram`, ``.switch`` or ``.curve`` return.
     x, y : str, optional
         Variables of ``branch.points``; default: the parameter and the first state, or the two
         parameters. Of periodic orbits a state stands for its ``_max`` and ``_min``.

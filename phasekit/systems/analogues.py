@@ -114,6 +114,10 @@ class Pendulum(Model):
     ParameterError
         If a scalar is unusable; inside arrays such cells give NaN.
 
+    Notes
+    -----
+    ``A = C = 0``, ``B = g/length`` in the equation of [Veljovic2015] (12).
+
     Examples
     --------
     >>> import phasekit as pk

@@ -36,6 +36,11 @@ class Harmonic:
     ParameterError
         If a value is unusable.
 
+    Notes
+    -----
+    Of a `Perturbed` system it is one term of ``sum F_j cos(nu_j t + alpha_j)`` on the right-hand
+    side, or of ``p(t) = p + F cos(nu t + alpha)`` ([GuckenheimerHolmes1983] section 4.5).
+
     Examples
     --------
     >>> import phasekit as pk

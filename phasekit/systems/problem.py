@@ -64,6 +64,12 @@ class Problem:
     ParameterError
         If an argument is unusable.
 
+    Notes
+    -----
+    ``x' = f(x, p)``, or ``x' = f(x, t, p)`` with f of a period in t ([Kuznetsov2004] chapter 1). f
+    has to be smooth along what is followed. Formulas hold numbers, names, ``+ - * /``, powers and
+    elementary functions; they are read by a parser of phasekit's own and never run.
+
     Examples
     --------
     >>> import phasekit as pk
@@ -260,7 +266,12 @@ class Problem:
         return problem
 
     def replace(self, **changes: float) -> Self:
-        """Return a copy with some parameters changed.
+        """Return a copy with some parameters changed, given by name.
+
+        Returns
+        -------
+        Problem
+            This one stays as it is.
 
         Raises
         ------
@@ -326,7 +337,27 @@ class Problem:
         return float(self.period.subs({symbols[k]: v for k, v in self.parameters.items()}))
 
     def derivatives(self, x: npt.ArrayLike, time: float = 0.0) -> tuple[FloatArray, FloatArray]:
-        """Value of f and its matrix of derivatives by the states, at a time if f depends on it."""
+        """Value of f and its matrix of derivatives by the states, at a time if f depends on it.
+
+        Parameters
+        ----------
+        x : array_like, shape (n,)
+            The state.
+        time : float, default 0.0
+            Of a forced system.
+
+        Returns
+        -------
+        value : ndarray, shape (n,)
+            f.
+        derivatives : ndarray, shape (n, n)
+            ``df_i/dx_j``.
+
+        Raises
+        ------
+        ParameterError
+            If x is not a number for each state.
+        """
         from phasekit.bifurcation.continuation.curve import Curve
         from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
         from phasekit.bifurcation.continuation.options import ContinuationOptions

@@ -42,6 +42,28 @@ def test_compiling_is_said_once(terminal, capfd):
     assert capfd.readouterr().err == text
 
 
+def test_many_functions_that_are_compiled_one_after_the_other_are_one_wait(
+    terminal, monkeypatch, capfd
+):
+    monkeypatch.setattr(waits, "PATIENCE", 0.4)
+    for _ in range(4):
+        compiled("phasekit.made_up", 0.2)
+    assert capfd.readouterr().err.count("compiling") == 1
+
+
+def test_what_takes_long_is_said_once_by_the_outermost(terminal, capfd):
+    with waits.said("counting sheep"), waits.said("counting legs"):
+        time.sleep(0.1)
+    with waits.said("counting wolves"):
+        pass
+    assert capfd.readouterr().err == "phasekit: counting sheep\n"
+    with pytest.raises(KeyboardInterrupt), waits.said("counting sheep"):
+        raise KeyboardInterrupt
+    with waits.said("counting again"):
+        time.sleep(0.1)
+    assert capfd.readouterr().err == "phasekit: counting again\n"
+
+
 def test_functions_of_others_and_quick_ones_are_not_said(terminal, monkeypatch, capfd):
     compiled("somebody.elses", 0.3)
     monkeypatch.setattr(waits, "PATIENCE", 60.0)

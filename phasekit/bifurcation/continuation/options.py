@@ -74,6 +74,12 @@ class ContinuationOptions:
     ParameterError
         If a value is unusable.
 
+    Notes
+    -----
+    Steps go along the tangent, by arclength, and back by Newton's method across it
+    ([AllgowerGeorg1990] chapters 4 and 6); the step grows and shrinks with the angle between
+    tangents.
+
     Examples
     --------
     >>> options = ContinuationOptions(max_step=0.01)

@@ -67,6 +67,11 @@ class Branch:
     problem : Problem or None
         None after loading a branch of a Python function without giving it.
 
+    Notes
+    -----
+    Points solve ``f(x, p) = 0``, those of curves the extended systems of their kind
+    ([Govaerts2000] chapter 4), and are traced by pseudo-arclength ([AllgowerGeorg1990] chapter 6).
+
     Examples
     --------
     >>> import matplotlib.pyplot as plt
@@ -159,7 +164,23 @@ class Branch:
         return ds
 
     def special(self, label: str) -> tuple[SpecialPoint, ...]:
-        """The special points of a label (LP, BP, H, ...), kind (fold, ...) or event of a name."""
+        """The special points of one label (LP, BP, ...), kind (fold, ...) or named event.
+
+        Parameters
+        ----------
+        label : str
+            A label, a kind, or the name of an event.
+
+        Returns
+        -------
+        tuple of SpecialPoint
+            In order along the curve; empty if there is none.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such label, kind or event.
+        """
         labels = dict.fromkeys(kind.label for kind in SPECIAL.values())
         events = [] if self.curve is None else [event.name for event in self.curve.events]
         if not isinstance(label, str) or label not in {*SPECIAL, *labels, *events}:
@@ -167,7 +188,19 @@ class Branch:
         return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
-        """Draw the curve with its special points: see `phasekit.plot.branch`."""
+        """Draw the curve with its special points.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure if left out.
+        **keywords
+            What `phasekit.plot.branch` takes: ``x``, ``y``, ``units``, ...
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
         return picture("branch")(self, ax=ax, **keywords)
 
     def extend(self, points: int | None = None) -> Branch:
@@ -179,6 +212,11 @@ class Branch:
         ----------
         points : int, optional
             How many more at most in each direction; default: the option max_points.
+
+        Returns
+        -------
+        Branch
+            The longer one; this one stays as it is.
 
         Raises
         ------
@@ -209,7 +247,22 @@ class Branch:
         return self.curve, self.problem
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-        """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""
+        """Save everything, to be loaded and extended exactly.
+
+        Parameters
+        ----------
+        path : path
+            A name that ends in ``.zarr`` or ``.nc``.
+        overwrite : bool, default False
+            Whether a branch that is there already may be replaced.
+
+        Raises
+        ------
+        ParameterError
+            If the name ends otherwise, or the problem is not known.
+        StoreError
+            If there is something under that name.
+        """
         importlib.import_module("phasekit.labelled.continuation.branch_store").save(
             self, path, overwrite
         )
@@ -231,6 +284,16 @@ class Branch:
             The functions that were recorded, needed to extend a branch that has some.
         events : mapping, optional
             The functions among its events, which are not saved.
+
+        Returns
+        -------
+        Branch
+            Equal to what was saved; of periodic orbits a `CycleBranch`.
+
+        Raises
+        ------
+        StoreError
+            If nothing that `save` wrote is there, or it is damaged.
         """
         module = importlib.import_module("phasekit.labelled.continuation.branch_store")
         loaded: Branch = module.load(path, problem, record, events)

@@ -17,6 +17,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, pair, unknown
+from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -125,9 +126,10 @@ def continuation(
                     name, asked_for, "None with an orbit: events are functions of one state",
                     "record= keeps the least, largest and mean value of a function over each orbit",
                 )  # fmt: skip
-        return continue_orbit(
-            problem, parameter, orbit, span, _record(problem, record), options, fix
-        )
+        with said(f"following periodic orbits along {parameter}"):
+            return continue_orbit(
+                problem, parameter, orbit, span, _record(problem, record), options, fix
+            )
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
@@ -153,8 +155,9 @@ def continuation(
     given = {problem.state.index(name): s for name, s in options.scales.items()}
     curve = scaled(curve, u, given)
     start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
-    backward, forward = run(curve, start, options.directions)
-    return make_branch(problem, curve, start, backward, forward, _record(problem, record))
+    with said(f"following equilibria along {parameter}"):
+        backward, forward = run(curve, start, options.directions)
+        return make_branch(problem, curve, start, backward, forward, _record(problem, record))
 
 
 def equilibrium_curve(

@@ -53,6 +53,12 @@ class CycleBranch(Branch):
     kind : str
         cycle, or fold_of_cycles, period_doubling, torus: a curve in two parameters.
 
+    Notes
+    -----
+    Points solve ``dx/ds = T f(x, p)``, ``x(1) = x(0)``, by collocation ([Doedel1991],
+    [AscherMattheijRussell1995] chapter 5), with multipliers by [Lust2001]; coefficients of normal
+    forms are those of [Iooss1988], computed as in [KuznetsovEtAl2005].
+
     Examples
     --------
     >>> import phasekit as pk
@@ -83,6 +89,16 @@ class CycleBranch(Branch):
         ----------
         i : int
             The place of the point; negative ones count from the end.
+
+        Returns
+        -------
+        xarray.Dataset
+            The states on ``time``, and the numbers of the point; what `periodic_orbit` returns.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such point, or the problem is not known.
         """
         count = len(self.path)
         at = i if isinstance(i, (int, np.integer)) and not isinstance(i, bool) else count
@@ -113,6 +129,21 @@ class CycleBranch(Branch):
         """Go on where the family ended for its number of points; a new branch.
 
         Its points are, bit for bit, those of a branch that was never interrupted.
+
+        Parameters
+        ----------
+        points : int, optional
+            How many more at most in each direction; default: the option max_points.
+
+        Returns
+        -------
+        CycleBranch
+            The longer one; this one stays as it is.
+
+        Raises
+        ------
+        ParameterError
+            If no end can be extended, or the problem is not known.
         """
         cycles, problem = self.known()
         if all(track is None or track.stop.reason != "max_points" for track in self.tracks):

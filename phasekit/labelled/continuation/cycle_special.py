@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.family import Found
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -54,12 +55,14 @@ class CyclePoint(SpecialPoint):
     def switch(self, *, direction: int = 0, options: Any = None) -> CycleBranch:
         """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
         module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
-        return module.switched(self, direction, options)  # type: ignore[no-any-return]
+        with said(f"following periodic orbits along {self.branch.parameter}"):
+            return module.switched(self, direction, options)  # type: ignore[no-any-return]
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Any:
         """The curve of such orbits in this branch's parameter and a second one."""
         module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
-        return module.point_curve(self, parameter, span, options)
+        with said(f"following {self.kind} points along {parameter}"):
+            return module.point_curve(self, parameter, span, options)
 
 
 def cycle_point(

@@ -25,6 +25,7 @@ from phasekit.labelled.continuation.cycle_start import (
     unfolded,
 )
 from phasekit.labels.arguments import bad, number, reals
+from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -74,6 +75,13 @@ def periodic_orbit(
         If an argument is unusable.
     ConvergenceError
         If no periodic orbit is found.
+
+    Notes
+    -----
+    The orbit solves ``dx/ds = T f(x)`` with ``x(1) = x(0)`` (for angles up to whole turns) and a
+    phase condition, by collocation at Gauss points on a mesh that adapts itself
+    ([AscherMattheijRussell1995] chapter 5, [Doedel1991]); of a forced system T is given. Floquet
+    multipliers come from the matrices of the intervals, never multiplied out ([Lust2001]).
 
     Examples
     --------
@@ -138,11 +146,14 @@ def periodic_orbit(
     x = x.reshape(n)
     run = _Simulation(problem)
     if period is not None:
-        start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
-        at, states = run(start, 0.0, period, 0)
-        guesses = [sampled(problem, at / period, states, period, value, options.degree)]
-        return _found(problem, guesses, options, f"from x0 = {x.tolist()} with period {period:.6g}")
-    return _searched(problem, x, settle, run, value, options)
+        with said("looking for a periodic orbit"):
+            start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
+            at, states = run(start, 0.0, period, 0)
+            guesses = [sampled(problem, at / period, states, period, value, options.degree)]
+            where = f"from x0 = {x.tolist()} with period {period:.6g}"
+            return _found(problem, guesses, options, where)
+    with said("looking for a periodic orbit"):
+        return _searched(problem, x, settle, run, value, options)
 
 
 def _whole(problem: Problem, settle: float, period: float) -> float:

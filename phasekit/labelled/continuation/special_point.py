@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch_points import eigenvalues_at, wrap
+from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -151,6 +152,11 @@ class SpecialPoint:
         options : ContinuationOptions, optional
             Default: those of the branch.
 
+        Returns
+        -------
+        Branch
+            The other branch; from a Hopf point a `CycleBranch`.
+
         Raises
         ------
         ParameterError
@@ -185,7 +191,8 @@ class SpecialPoint:
         if self.kind == "hopf":
             from phasekit.labelled.continuation.cycle_start import from_hopf
 
-            return from_hopf(self, options)
+            with said(f"following periodic orbits along {self.branch.parameter}"):
+                return from_hopf(self, options)
         if self.kind == "period_doubling":
             return _module("doubled")(self, options=options)  # type: ignore[no-any-return]
         return _module("switch")(  # type: ignore[no-any-return]
@@ -193,8 +200,41 @@ class SpecialPoint:
         )
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Branch:
-        """The curve of such points in this branch's parameter and a second one."""
-        return _module("point_curve")(self, parameter, span, options=options)  # type: ignore[no-any-return]
+        """The curve of such points in this branch's parameter and a second one.
+
+        Parameters
+        ----------
+        parameter : str
+            The second parameter.
+        span : (float, float)
+            Its range.
+        options : ContinuationOptions, optional
+            Default: those of the branch.
+
+        Returns
+        -------
+        Branch
+            Of the kind of the point (fold, hopf, branch_point), with cusps, Bogdanov-Takens and
+            other points of codimension two as its special points.
+
+        Raises
+        ------
+        ParameterError
+            If points of this kind form no curve, the parameter is unknown or the span unusable.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 1.0})
+        >>> fold = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1)).special("LP")[0]
+        >>> curve = fold.curve("l", (-1.0, 2.0))
+        >>> [point.kind for point in curve.special_points]
+        ['end', 'cusp', 'end']
+        """
+        with said(f"following {self.kind} points along {parameter}"):
+            return _module("point_curve")(  # type: ignore[no-any-return]
+                self, parameter, span, options=options
+            )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold their branch, of which they are the same point."""
