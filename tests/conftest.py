@@ -3,6 +3,7 @@
 import getpass
 import hashlib
 import os
+import sys
 import tempfile
 from pathlib import Path
 
@@ -21,6 +22,9 @@ os.environ.setdefault(
     "NUMBA_CACHE_DIR",
     f"{tempfile.gettempdir()}/phasekit-{getpass.getuser()}/{CONTENT.hexdigest()[:16]}",
 )
+
+# Hundreds of processes that tests start read the bytecode of phasekit that this one leaves.
+sys.dont_write_bytecode = False
 
 # Compiling a kernel takes seconds in the first example. Examples repeat exactly; nothing is left
 # in the working directory.

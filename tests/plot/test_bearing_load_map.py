@@ -141,8 +141,9 @@ def test_numbers_that_are_not_positive_are_absent_on_a_logarithmic_scale():
     ],
 )
 def test_wrong_arguments_are_named(dataset, options, message):
+    given = dataset()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.bearing_load_map(dataset(), **options)
+        pk.plot.bearing_load_map(given, **options)
 
 
 def test_the_accessor_draws_the_same():

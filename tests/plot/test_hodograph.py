@@ -175,8 +175,9 @@ def test_both_directions_of_a_level_are_drawn_where_they_differ():
     ],
 )
 def test_wrong_arguments_are_named(system, options, message):
+    given = system()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.hodograph(system(), **options)
+        pk.plot.hodograph(given, **options)
 
 
 def test_the_accessor_draws_cells_and_motions():

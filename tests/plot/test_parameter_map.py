@@ -209,8 +209,9 @@ def test_invalid_cells_and_cells_without_force_are_named():
     ],
 )
 def test_wrong_arguments_are_named(dataset, options, message):
+    given = dataset()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.parameter_map(dataset(), **options)
+        pk.plot.parameter_map(given, **options)
 
 
 def test_maps_in_grey_have_distinct_lightness():

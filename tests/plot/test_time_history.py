@@ -167,8 +167,9 @@ def test_falling_times():
     ],
 )
 def test_a_wrong_dataset_is_named(dataset, message):
+    given = dataset()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.time_history(dataset())
+        pk.plot.time_history(given)
     assert not plt.get_fignums()
 
 
