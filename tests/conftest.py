@@ -3,7 +3,9 @@
 import getpass
 import hashlib
 import os
+import sys
 import tempfile
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -22,10 +24,36 @@ os.environ.setdefault(
     f"{tempfile.gettempdir()}/phasekit-{getpass.getuser()}/{CONTENT.hexdigest()[:16]}",
 )
 
+# Hundreds of processes that tests start read the bytecode of phasekit that this one leaves.
+sys.dont_write_bytecode = False
+
 # Compiling a kernel takes seconds in the first example. Examples repeat exactly; nothing is left
 # in the working directory.
 settings.register_profile("phasekit", deadline=None, derandomize=True, database=None)
 settings.load_profile("phasekit")
+
+#: Files that workers begin with. Of the first four, each compiles the kernels of another subject,
+#: for all workers, while the others compile theirs; the rest take long for so few tests.
+FIRST = (
+    "phase/test_portrait_kernel.py",
+    "labelled/test_continuation.py",
+    "phase/test_phase_space_kernel.py",
+    "labelled/test_cycles.py",
+    "loads/test_functions.py",
+    "motion/test_strobe.py",
+    "maps/test_kills.py",
+    "maps/test_store_failures.py",
+    "perturbation/test_melnikov.py",
+    "test_studies.py",
+)
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_modifyitems(items):
+    """Put files in the order in which workers take them: ``FIRST``, then by number of tests."""
+    place = {Path(__file__).parent / name: i for i, name in enumerate(FIRST)}
+    tests = Counter(item.path for item in items)
+    items.sort(key=lambda item: (place.get(item.path, len(FIRST)), -tests[item.path]))
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -1,49 +1,119 @@
-"""The studies run, write their picture, and print the numbers that they should."""
+"""The studies run, write their picture, and print the numbers that they should.
+
+Those that take long are left to the gallery, which runs all of them for their pictures. Where
+``PHASEKIT_SITE`` names a built site, what they printed there is held against the same numbers.
+``PHASEKIT_STUDIES=all`` runs each study here, in a process of its own.
+"""
 
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
+import html
+import io
 import os
 import re
+import runpy
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
+import matplotlib
+import matplotlib.pyplot as plt
 import pytest
 
+matplotlib.use("Agg")
 FOLDER = Path(__file__).parents[1] / "studies"
 STUDIES = [
     path for path in sorted(FOLDER.glob("*/*.py")) if "__main__" in path.read_text(encoding="utf-8")
 ]
+#: Thousands of motions.
+LONG = {"capture_against_simulation", "response_of_a_driven_disk"}
+ALL = "PHASEKIT_STUDIES" in os.environ
+SITE = os.environ.get("PHASEKIT_SITE")
+
+
+def here(script: Path, folder: Path) -> str:
+    """Run a study in this process, warnings being errors; what it prints."""
+    printed = io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        warnings.catch_warnings(),
+        plt.rc_context(),
+        contextlib.redirect_stdout(printed),
+    ):
+        warnings.simplefilter("error")
+        patch.chdir(folder)
+        patch.setattr(sys, "argv", [str(script)])
+        patch.syspath_prepend(script.parent)
+        runpy.run_path(str(script), run_name="__main__")
+    plt.close("all")
+    return printed.getvalue()
+
+
+def alone(script: Path, folder: Path) -> str:
+    """Run a study as a user would, warnings being errors; what it prints."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", str(script)],
+        cwd=folder,
+        env={**os.environ, "MPLBACKEND": "Agg"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def on_site(name: str) -> tuple[Path, str]:
+    """The picture of a study in the gallery, and what it printed there, warnings with it."""
+    (page,) = Path(SITE).glob(f"gallery/*/{name}.html")
+    (printed,) = re.findall(
+        r'"sphx-glr-script-out.*?<pre>(.*?)</pre>', page.read_text(encoding="utf-8"), re.DOTALL
+    )
+    text = html.unescape(re.sub(r"<[^>]*>", "", printed))
+    assert "Warning" not in text
+    return Path(SITE) / "_images" / f"sphx_glr_{name}_001.png", text
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
-    """Run a study by its name as a user would, warnings being errors; its folder and output."""
+    """Run a study by its name: its picture and what it prints."""
 
     @functools.cache
     def once(name: str) -> tuple[Path, str]:
+        if SITE and not ALL:
+            return on_site(name)
         folder = tmp_path_factory.mktemp(name)
-        done = subprocess.run(
-            [sys.executable, "-W", "error", str(*FOLDER.glob(f"*/{name}.py"))],
-            cwd=folder,
-            env={**os.environ, "MPLBACKEND": "Agg"},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, done.stderr
-        return folder, done.stdout
+        text = (alone if ALL else here)(*FOLDER.glob(f"*/{name}.py"), folder)
+        assert f"wrote {name}.png" in text
+        return folder / f"{name}.png", text
 
-    return once
+    def unless_long(name: str) -> tuple[Path, str]:
+        if name in LONG and not (SITE or ALL):
+            pytest.skip("long: PHASEKIT_STUDIES=all runs it, the gallery does, see PHASEKIT_SITE")
+        return once(name)
+
+    return unless_long
 
 
 @pytest.mark.parametrize("name", [path.stem for path in STUDIES])
 def test_study_runs_and_writes_its_picture(run, name):
-    folder, text = run(name)
-    assert name in text
-    assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    picture, text = run(name)
+    assert "wrote " in text
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_study_needs_nothing_that_is_loaded_here(run, tmp_path):
+    """Nor where it stands: it is run as its users do."""
+    name = "veljovic2015_figure_5"
+    text = alone(*FOLDER.glob(f"*/{name}.py"), tmp_path)
+    numbers = text.removesuffix(f"wrote {name}.png\n")
+    assert numbers.count("\n") == 6
+    assert run(name)[1].startswith(numbers)
+    assert (tmp_path / f"{name}.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_thresholds_of_progressive_motion_are_those_of_the_paper(run):

@@ -1,5 +1,7 @@
 """Map of the bearing load: the colors are the greatest forces, found by stepping along loops."""
 
+import functools
+
 import numpy as np
 import pytest
 from witnesses import disk_forces
@@ -9,8 +11,18 @@ import phasekit as pk
 BODY = {"e": 0.05, "r": 0.2, "omega1": 31.4, "m": 2.0, "g": 9.81, "half_span": 0.2}
 DISK = pk.GyroRotorDisk(beta=1.0, a=0.0, **BODY)
 BETA, A = np.linspace(0.3, 1.5, 9), np.linspace(-0.04, 0.05, 7)
-MAP = pk.sweep(DISK, beta=BETA, a=A)
-LOADS = MAP.phasekit.bearing_forces(on="separatrix")
+
+
+@functools.cache
+def disk_map():
+    """Map over angle and distance of the disk."""
+    return pk.sweep(DISK, beta=BETA, a=A)
+
+
+@functools.cache
+def loads():
+    """The greatest forces on its separatrices."""
+    return disk_map().phasekit.bearing_forces(on="separatrix")
 
 
 def drawn(ax):
@@ -23,7 +35,7 @@ def words(ax):
 
 
 def test_returns_the_given_axes(ax):
-    assert pk.plot.bearing_load_map(MAP, ax=ax) is ax
+    assert pk.plot.bearing_load_map(disk_map(), ax=ax) is ax
     assert words(ax) == (
         "greatest force in the bearing on the separatrix, larger of A$_2$ and B$_2$ (N)"
     )
@@ -33,7 +45,7 @@ def test_returns_the_given_axes(ax):
 
 def test_the_load_is_the_greatest_on_any_separatrix():
     """Particles, at the energy of the highest saddle round the whole circle, both ways."""
-    values = drawn(pk.plot.bearing_load_map(MAP, saddle="upper"))
+    values = drawn(pk.plot.bearing_load_map(disk_map(), saddle="upper"))
     phi = np.linspace(-np.pi, np.pi, 4001)
     for i, k in ((0, 0), (4, 3), (8, 6), (7, 2)):
         disk = DISK.replace(beta=BETA[i], a=A[k])
@@ -51,21 +63,21 @@ def test_the_load_is_the_greatest_on_any_separatrix():
 @pytest.mark.parametrize("bearing", ["A2", "B2"])
 def test_a_saddle_a_side_a_bearing(saddle, side, bearing):
     options = {"saddle": saddle, "side": side, "bearing": bearing}
-    ax = pk.plot.bearing_load_map(MAP, **options)
-    np.testing.assert_array_equal(drawn(ax), LOADS.peak_force.sel(options))
+    ax = pk.plot.bearing_load_map(disk_map(), **options)
+    np.testing.assert_array_equal(drawn(ax), loads().peak_force.sel(options))
     assert words(ax).endswith(f"{saddle} saddle, {side} side, {bearing[0]}$_2$ (N)")
 
 
 def test_loads_are_taken_from_the_map_that_has_them():
-    changed = LOADS.assign(peak_force=LOADS.peak_force * 2.0)
+    changed = loads().assign(peak_force=loads().peak_force * 2.0)
     np.testing.assert_array_equal(
         drawn(pk.plot.bearing_load_map(changed)),
-        2.0 * LOADS.peak_force.max(["saddle", "side", "bearing"]),
+        2.0 * loads().peak_force.max(["saddle", "side", "bearing"]),
     )
-    one = LOADS.sel(saddle="upper", bearing="A2")
+    one = loads().sel(saddle="upper", bearing="A2")
     np.testing.assert_array_equal(
         drawn(pk.plot.bearing_load_map(one, "rms_force", side="left")),
-        LOADS.rms_force.sel(saddle="upper", bearing="A2", side="left"),
+        loads().rms_force.sel(saddle="upper", bearing="A2", side="left"),
     )
 
 
@@ -76,15 +88,15 @@ def test_the_fold_curve_is_that_of_the_map():
         contours = [c for c in ax.collections if hasattr(c, "levels")]
         return np.concatenate([path.vertices for path in contours[0].get_paths()])
 
-    want = fold(pk.plot.parameter_map(MAP, "fold_margin"))
-    for ds in (MAP, LOADS):
+    want = fold(pk.plot.parameter_map(disk_map(), "fold_margin"))
+    for ds in (disk_map(), loads()):
         np.testing.assert_allclose(fold(pk.plot.bearing_load_map(ds)), want)
 
 
 def test_the_scale_is_logarithmic_where_loads_span_decades():
     scales = [
         type(pk.plot.bearing_load_map(ds, log=log).collections[0].norm).__name__
-        for ds, log in ((MAP, None), (MAP, True), (MAP, False))
+        for ds, log in ((disk_map(), None), (disk_map(), True), (disk_map(), False))
     ]
     assert scales == ["Normalize", "LogNorm", "Normalize"]
     wide = pk.sweep(DISK, omega1=np.geomspace(1.0, 300.0, 12), a=np.linspace(0.001, 0.02, 4))
@@ -100,7 +112,9 @@ def test_the_scale_is_logarithmic_where_loads_span_decades():
 
 
 def test_numbers_that_are_not_positive_are_absent_on_a_logarithmic_scale():
-    signed = MAP.assign(curved=MAP.curvature.sel(equilibrium="upper_saddle") * [[1.0] + [-1.0] * 6])
+    signed = disk_map().assign(
+        curved=disk_map().curvature.sel(equilibrium="upper_saddle") * [[1.0] + [-1.0] * 6]
+    )
     ax = pk.plot.parameter_map(signed, "curved", log=True)
     mask = np.ma.getmaskarray(ax.collections[0].get_array()).reshape(A.size, BETA.size)
     assert not mask[1:].any()  # where -V'' > 0
@@ -111,23 +125,28 @@ def test_numbers_that_are_not_positive_are_absent_on_a_logarithmic_scale():
 @pytest.mark.parametrize(
     ("dataset", "options", "message"),
     [
-        (None, {}, "^dataset: got None"),
-        (MAP, {"variable": "peak"}, "^variable: got 'peak', wants one of peak_force"),
-        (MAP, {"bearing": "C2"}, "^bearing: got 'C2', wants one of larger, A2, B2"),
-        (MAP, {"saddle": 1}, "^saddle: got 1"),
-        (MAP, {"side": "both"}, "^side: got 'both'"),
-        (MAP.isel(a=0), {}, "^variable: got peak_force with the dims beta"),
-        (pk.sweep(pk.Reduced(0.1, 0.2), lam=BETA, psi=A), {}, "^dataset: got a map of Reduced"),
-        (pk.sweep(DISK.replace(m=None), beta=BETA, a=A), {}, "m"),
-        (MAP.drop_attrs(deep=False), {}, "^dataset: got"),
+        (lambda: None, {}, "^dataset: got None"),
+        (disk_map, {"variable": "peak"}, "^variable: got 'peak', wants one of peak_force"),
+        (disk_map, {"bearing": "C2"}, "^bearing: got 'C2', wants one of larger, A2, B2"),
+        (disk_map, {"saddle": 1}, "^saddle: got 1"),
+        (disk_map, {"side": "both"}, "^side: got 'both'"),
+        (lambda: disk_map().isel(a=0), {}, "^variable: got peak_force with the dims beta"),
+        (
+            lambda: pk.sweep(pk.Reduced(0.1, 0.2), lam=BETA, psi=A),
+            {},
+            "^dataset: got a map of Reduced",
+        ),
+        (lambda: pk.sweep(DISK.replace(m=None), beta=BETA, a=A), {}, "m"),
+        (lambda: disk_map().drop_attrs(deep=False), {}, "^dataset: got"),
     ],
 )
 def test_wrong_arguments_are_named(dataset, options, message):
+    given = dataset()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.bearing_load_map(dataset, **options)
+        pk.plot.bearing_load_map(given, **options)
 
 
 def test_the_accessor_draws_the_same():
-    ax = MAP.phasekit.plot.bearing_load_map("mean_force", side="left")
-    want = pk.plot.bearing_load_map(MAP, "mean_force", side="left")
+    ax = disk_map().phasekit.plot.bearing_load_map("mean_force", side="left")
+    want = pk.plot.bearing_load_map(disk_map(), "mean_force", side="left")
     np.testing.assert_array_equal(drawn(ax), drawn(want))

@@ -1,5 +1,6 @@
 """The circle may be cut open anywhere: what is drawn is the same, nothing is lost at the cut."""
 
+import functools
 import importlib
 import inspect
 
@@ -27,7 +28,12 @@ ANGLED = {
     "damped_portrait",
     "poincare_section",
 }
-CUBE = pk.diagram(DISK, "beta", span=(0.05, 1.5))
+
+
+@functools.cache
+def diagram():
+    """All branches of the disk over its angle."""
+    return pk.diagram(DISK, "beta", span=(0.05, 1.5))
 
 
 def same_place(angles, others, atol=1e-9):
@@ -114,7 +120,7 @@ def test_a_diagram_has_every_equilibrium_once(kind, cut):
     what = {
         "atlas": lambda: pk.branches(DISK, "beta", (0.05, 1.5)),
         "columns": lambda: pk.equilibria(DISK.replace(beta=beta)),
-        "branches": lambda: CUBE,
+        "branches": diagram,
     }[kind]()
     ax = pk.plot.bifurcation_diagram(what, cut=cut)
     assert ax.get_ylim()[1] - ax.get_ylim()[0] == pytest.approx(TURN)
@@ -197,7 +203,7 @@ def test_the_surface_begins_at_the_cut(monkeypatch):
             ),
             "^cut: got 0.0, wants None, for energy is not drawn on a circle",
         ),
-        (lambda: pk.plot.branch(CUBE, y="beta", cut=1.0), "^cut: got 1.0, wants None"),
+        (lambda: pk.plot.branch(diagram(), y="beta", cut=1.0), "^cut: got 1.0, wants None"),
     ],
 )
 def test_a_cut_that_is_none_is_refused(draw, message):

@@ -145,30 +145,39 @@ def test_both_directions_of_a_level_are_drawn_where_they_differ():
 @pytest.mark.parametrize(
     ("system", "options", "message"),
     [
-        (None, {}, "^system"),
-        (SYSTEM, {"rotator": "R3"}, "^rotator 'R3' is unknown"),
-        (SYSTEM, {"rotator": "R2"}, "^system: got .*wants a GyroRotorDisk"),
-        (SYSTEM, {"orbits": (1.0, 2.0, 3.0)}, "^orbits: got"),
-        (SYSTEM, {"energies": "low"}, "^energies: got 'low'"),
-        (SYSTEM, {"angles": 360}, "^angles: got 360"),
-        (SYSTEM, {"ax": 3}, "^ax: got 3"),
-        (DISK, {"plane": "u01"}, "^plane: got 'u01', wants a pair of"),
-        (DISK, {"plane": ("u01", "u01")}, "^plane: got "),
-        (DISK, {"plane": ("u2", "v2")}, "^plane: got "),
-        (DISK.replace(beta=[0.1, 0.2]), {}, "^system: got array parameters"),
-        (pk.equilibria(DISK), {}, "^system: got a Dataset without motions"),
-        (pk.flow(DISK, 0.5, 3.0, TIMES), {"orbits": (0.0, 1.0)}, "^orbits: got one beside motions"),
+        (lambda: None, {}, "^system"),
+        (lambda: SYSTEM, {"rotator": "R3"}, "^rotator 'R3' is unknown"),
+        (lambda: SYSTEM, {"rotator": "R2"}, "^system: got .*wants a GyroRotorDisk"),
+        (lambda: SYSTEM, {"orbits": (1.0, 2.0, 3.0)}, "^orbits: got"),
+        (lambda: SYSTEM, {"energies": "low"}, "^energies: got 'low'"),
+        (lambda: SYSTEM, {"angles": 360}, "^angles: got 360"),
+        (lambda: SYSTEM, {"ax": 3}, "^ax: got 3"),
+        (lambda: DISK, {"plane": "u01"}, "^plane: got 'u01', wants a pair of"),
+        (lambda: DISK, {"plane": ("u01", "u01")}, "^plane: got "),
+        (lambda: DISK, {"plane": ("u2", "v2")}, "^plane: got "),
+        (lambda: DISK.replace(beta=[0.1, 0.2]), {}, "^system: got array parameters"),
+        (lambda: pk.equilibria(DISK), {}, "^system: got a Dataset without motions"),
         (
-            pk.flow(DISK, 0.5, 3.0, TIMES).drop_attrs(deep=False),
+            lambda: pk.flow(DISK, 0.5, 3.0, TIMES),
+            {"orbits": (0.0, 1.0)},
+            "^orbits: got one beside motions",
+        ),
+        (
+            lambda: pk.flow(DISK, 0.5, 3.0, TIMES).drop_attrs(deep=False),
             {},
             r"^system: got a motion that does not tell its system .*pk.rotators\(disk, motion\)",
         ),
-        (pk.flow(SYSTEM, 0.5, 3.0, TIMES), {"rotator": "R1"}, "^system: got .*GyroRotorDisk"),
+        (
+            lambda: pk.flow(SYSTEM, 0.5, 3.0, TIMES),
+            {"rotator": "R1"},
+            "^system: got .*GyroRotorDisk",
+        ),
     ],
 )
 def test_wrong_arguments_are_named(system, options, message):
+    given = system()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.hodograph(system, **options)
+        pk.plot.hodograph(given, **options)
 
 
 def test_the_accessor_draws_cells_and_motions():

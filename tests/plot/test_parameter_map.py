@@ -1,5 +1,7 @@
 """Parameter maps: codes by name, values with units, and the curves where they belong."""
 
+import functools
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -9,10 +11,20 @@ import phasekit as pk
 from phasekit.plot.parts import style
 
 SQUARE = np.linspace(-1.5, 1.5, 61)
-PLANE = pk.sweep(pk.Reduced(0.1, 0.2), lam=SQUARE, psi=SQUARE)
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.05, a=0.012, r=0.2, omega1=31.4)
 BETA, A = np.linspace(0.0, np.pi / 2, 61), np.arange(-20, 21) * 3e-3
-MAP = pk.sweep(DISK, beta=BETA, a=A)
+
+
+@functools.cache
+def plane():
+    """Map over lambda and psi."""
+    return pk.sweep(pk.Reduced(0.1, 0.2), lam=SQUARE, psi=SQUARE)
+
+
+@functools.cache
+def disk_map():
+    """Map over angle and distance of the disk."""
+    return pk.sweep(DISK, beta=BETA, a=A)
 
 
 def bar(ax):
@@ -31,24 +43,24 @@ def names(ax):
 
 
 def test_returns_the_given_axes(ax):
-    assert pk.plot.parameter_map(PLANE, ax=ax) is ax
+    assert pk.plot.parameter_map(plane(), ax=ax) is ax
     assert ax.get_xlabel().startswith(r"$\lambda$")
     assert ax.get_ylabel().startswith(r"$\psi$")
 
 
 def test_topology_is_named_and_colored_by_code():
-    ax = pk.plot.parameter_map(MAP)
+    ax = pk.plot.parameter_map(disk_map())
     assert names(ax) == ["winding", "figure eight", "heteroclinic"]
     assert bar(ax).get_ylabel() == "topology of the separatrices"
     mesh = ax.collections[0]
     drawn = mesh.get_array().reshape(A.size, BETA.size)
-    codes = np.unique(MAP.topology.values)
-    np.testing.assert_array_equal(codes[drawn], MAP.topology.values.T)
+    codes = np.unique(disk_map().topology.values)
+    np.testing.assert_array_equal(codes[drawn], disk_map().topology.values.T)
 
 
 def test_a_code_keeps_its_color():
-    few = pk.plot.parameter_map(MAP.isel(beta=slice(0, 9), a=slice(0, 9)))
-    many = pk.plot.parameter_map(MAP)
+    few = pk.plot.parameter_map(disk_map().isel(beta=slice(0, 9), a=slice(0, 9)))
+    many = pk.plot.parameter_map(disk_map())
     color = {}
     for ax in (few, many):
         mesh = ax.collections[0]
@@ -63,34 +75,36 @@ def test_a_code_keeps_its_color():
     [("n_equilibria", ["2", "4"]), ("figure_eight", ["no", "yes"])],
 )
 def test_counts_and_yes_or_no(variable, expected):
-    assert names(pk.plot.parameter_map(MAP, variable)) == expected
+    assert names(pk.plot.parameter_map(disk_map(), variable)) == expected
 
 
 def test_kinds_of_one_label():
-    ax = pk.plot.parameter_map(MAP, "kind", equilibrium="lower_saddle")
+    ax = pk.plot.parameter_map(disk_map(), "kind", equilibrium="lower_saddle")
     assert names(ax) == ["absent", "saddle"]
     assert bar(ax).get_ylabel() == "kind of the equilibrium, lower saddle"
 
 
 def test_values_have_units_and_absent_cells_are_told():
-    ax = pk.plot.parameter_map(MAP, "exponent", equilibrium="lower_saddle")
+    ax = pk.plot.parameter_map(disk_map(), "exponent", equilibrium="lower_saddle")
     assert (
         bar(ax).get_ylabel().replace("\n", " ") == "exponent of the saddle, lower saddle (s$^{-1}$)"
     )
     assert "absent" in [text.get_text() for text in ax.get_legend().get_texts()]
     mesh = ax.collections[0]
-    expected = MAP.exponent.sel(equilibrium="lower_saddle").values.T
+    expected = disk_map().exponent.sel(equilibrium="lower_saddle").values.T
     np.testing.assert_array_equal(mesh.get_array().mask.reshape(expected.shape), np.isnan(expected))
 
 
 def test_a_pole_does_not_take_all_colors():
-    ax = pk.plot.parameter_map(MAP, "fold_margin")
+    ax = pk.plot.parameter_map(disk_map(), "fold_margin")
     mesh = ax.collections[0]
     low, high = mesh.get_clim()
-    assert MAP.fold_margin.min() < 2 * low < 0 < high < 1.01
+    assert disk_map().fold_margin.min() < 2 * low < 0 < high < 1.01
     assert mesh.colorbar.extend == "min"
     assert (
-        pk.plot.parameter_map(MAP, "winding_area", saddle="upper").collections[0].colorbar.extend
+        pk.plot.parameter_map(disk_map(), "winding_area", saddle="upper")
+        .collections[0]
+        .colorbar.extend
         == "neither"
     )
 
@@ -104,7 +118,7 @@ def test_infinite_cells_are_extremes_and_not_absent():
 
 
 def test_angles_in_degrees():
-    ax = pk.plot.parameter_map(MAP, "phi", equilibrium="upper_saddle", angles="deg")
+    ax = pk.plot.parameter_map(disk_map(), "phi", equilibrium="upper_saddle", angles="deg")
     assert bar(ax).get_ylabel().endswith("(°)")
     assert ax.get_xlabel().endswith("(°)")
     assert ax.get_xlim()[1] > 90.0
@@ -112,7 +126,7 @@ def test_angles_in_degrees():
 
 
 def test_the_fold_curve_is_the_astroid():
-    lam, psi = paths(pk.plot.parameter_map(PLANE)).T
+    lam, psi = paths(pk.plot.parameter_map(plane())).T
     assert lam.size > 100
     distance = np.abs(np.cbrt(lam) ** 2 + np.cbrt(psi) ** 2 - 1.0)
     assert np.median(distance) < 0.01
@@ -120,21 +134,21 @@ def test_the_fold_curve_is_the_astroid():
 
 
 def test_the_fold_curve_of_the_disk_is_the_closed_form():
-    beta, a = paths(pk.plot.parameter_map(MAP)).T
+    beta, a = paths(pk.plot.parameter_map(disk_map())).T
     for x, y in list(zip(beta, a, strict=True))[::7]:
         folds = pk.critical(DISK.replace(a=float(y)), "beta").critical_fold.values
         assert np.nanmin(np.abs(folds - x)) < 0.03
 
 
 def test_the_line_where_A_changes_sign():
-    ax = pk.plot.parameter_map(MAP)
+    ax = pk.plot.parameter_map(disk_map())
     beta, _ = paths(ax, 1).T
     np.testing.assert_allclose(beta, pk.critical(DISK, "beta").critical_sign_change, atol=2e-3)
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["fold", "$A = 0$"]
 
 
 def test_a_bare_dataset_has_no_model_and_no_sign_change():
-    bare = MAP.drop_attrs(deep=False)
+    bare = disk_map().drop_attrs(deep=False)
     ax = pk.plot.parameter_map(bare)
     assert [text.get_text() for text in ax.get_legend().get_texts()] == ["fold"]
     only = pk.plot.parameter_map(bare[["topology"]])
@@ -142,13 +156,13 @@ def test_a_bare_dataset_has_no_model_and_no_sign_change():
 
 
 def test_axes_by_name():
-    ax = pk.plot.parameter_map(MAP, x="a")
+    ax = pk.plot.parameter_map(disk_map(), x="a")
     assert ax.get_xlabel().startswith("$a$")
     assert ax.get_ylabel().startswith(r"$\beta$")
     np.testing.assert_allclose(
-        np.sort(paths(ax)[:, 1]), np.sort(paths(pk.plot.parameter_map(MAP))[:, 0])
+        np.sort(paths(ax)[:, 1]), np.sort(paths(pk.plot.parameter_map(disk_map()))[:, 0])
     )
-    other = pk.plot.parameter_map(MAP, y="beta")
+    other = pk.plot.parameter_map(disk_map(), y="beta")
     assert other.get_xlabel() == ax.get_xlabel()
 
 
@@ -170,33 +184,34 @@ def test_invalid_cells_and_cells_without_force_are_named():
 @pytest.mark.parametrize(
     ("dataset", "options", "message"),
     [
-        (None, {}, "^dataset: got None, wants a Dataset"),
+        (lambda: None, {}, "^dataset: got None, wants a Dataset"),
         (
-            MAP,
+            disk_map,
             {"variable": "topologie"},
             "^variable 'topologie' is unknown; did you mean 'topology'",
         ),
-        (MAP, {"variable": "phi"}, "^variable: got phi .* equilibrium='lower_center'"),
-        (MAP.isel(a=0), {}, "^variable: got topology with the dims beta, wants two"),
-        (MAP.isel(a=0, beta=0), {}, "^variable: got topology with no dims"),
+        (disk_map, {"variable": "phi"}, "^variable: got phi .* equilibrium='lower_center'"),
+        (lambda: disk_map().isel(a=0), {}, "^variable: got topology with the dims beta, wants two"),
+        (lambda: disk_map().isel(a=0, beta=0), {}, "^variable: got topology with no dims"),
         (
-            MAP,
+            disk_map,
             {"variable": "phi", "equilibrium": "middle"},
             "^equilibrium: got 'middle', wants one of",
         ),
-        (MAP, {"saddle": "lower"}, "^dim of topology 'saddle' is unknown"),
-        (MAP, {"x": "gamma"}, "^x 'gamma' is unknown"),
-        (MAP, {"x": "a", "y": "a"}, "^y: got 'a'"),
-        (MAP, {"y": 3}, "^y 3 is unknown"),
-        (MAP, {"angles": 360}, "^angles: got 360"),
-        (MAP, {"ax": "here"}, "^ax: got 'here'"),
-        (MAP.isel(beta=[0]), {}, "^x: got .*, wants at least two"),
-        (MAP.isel(beta=[0, 2, 1]), {}, r"^x: got .*sortby\('beta'\)"),
+        (disk_map, {"saddle": "lower"}, "^dim of topology 'saddle' is unknown"),
+        (disk_map, {"x": "gamma"}, "^x 'gamma' is unknown"),
+        (disk_map, {"x": "a", "y": "a"}, "^y: got 'a'"),
+        (disk_map, {"y": 3}, "^y 3 is unknown"),
+        (disk_map, {"angles": 360}, "^angles: got 360"),
+        (disk_map, {"ax": "here"}, "^ax: got 'here'"),
+        (lambda: disk_map().isel(beta=[0]), {}, "^x: got .*, wants at least two"),
+        (lambda: disk_map().isel(beta=[0, 2, 1]), {}, r"^x: got .*sortby\('beta'\)"),
     ],
 )
 def test_wrong_arguments_are_named(dataset, options, message):
+    given = dataset()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.parameter_map(dataset, **options)
+        pk.plot.parameter_map(given, **options)
 
 
 def test_maps_in_grey_have_distinct_lightness():
@@ -210,17 +225,17 @@ def test_maps_in_grey_have_distinct_lightness():
 
 
 def test_the_accessor_draws_the_same():
-    cell = MAP.sel(beta=1.4, a=0.012, method="nearest")
+    cell = disk_map().sel(beta=1.4, a=0.012, method="nearest")
     ax = cell.phasekit.plot.phase_portrait()
     assert len(ax.lines) == len(pk.plot.phase_portrait(cell.phasekit.system()).lines)
     well, portrait = cell.phasekit.plot.potential_well()
     assert well.figure is portrait.figure
-    assert MAP.phasekit.plot.parameter_map("topology").get_xlabel()
-    assert MAP.isel(a=3).phasekit.plot.bifurcation_diagram().get_xlabel()
-    assert isinstance(MAP, xr.Dataset)
+    assert disk_map().phasekit.plot.parameter_map("topology").get_xlabel()
+    assert disk_map().isel(a=3).phasekit.plot.bifurcation_diagram().get_xlabel()
+    assert isinstance(disk_map(), xr.Dataset)
 
 
 @pytest.mark.parametrize("variable", [["topology"], {}, None, 3])
 def test_a_variable_is_named_by_a_string(variable):
     with pytest.raises(pk.ParameterError, match="^variable .* is unknown; "):
-        pk.plot.parameter_map(PLANE, variable)
+        pk.plot.parameter_map(plane(), variable)

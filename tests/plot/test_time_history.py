@@ -1,5 +1,7 @@
 """Motions over time: the lines are the motions, in the units that the labels say."""
 
+import functools
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -9,8 +11,18 @@ import phasekit as pk
 
 SYSTEM = pk.Coefficients(3.7, 1.3, 0.4)
 TIMES = np.linspace(0.0, 12.0, 241)
-ONE = pk.flow(SYSTEM, 1.8, 0.2, TIMES)
-SEVERAL = pk.flow(SYSTEM, [1.8, 1.8, 0.2], [0.0, 1.0, 2.4], TIMES)
+
+
+@functools.cache
+def one():
+    """A motion."""
+    return pk.flow(SYSTEM, 1.8, 0.2, TIMES)
+
+
+@functools.cache
+def several():
+    """Motions from three states."""
+    return pk.flow(SYSTEM, [1.8, 1.8, 0.2], [0.0, 1.0, 2.4], TIMES)
 
 
 def legend_texts(ax):
@@ -23,10 +35,10 @@ def ticks(ax):
 
 
 def test_one_motion_is_one_line_without_legend(ax):
-    assert pk.plot.time_history(ONE, ax=ax) is ax
+    assert pk.plot.time_history(one(), ax=ax) is ax
     (line,) = ax.lines
     np.testing.assert_array_equal(line.get_xdata(), TIMES)
-    np.testing.assert_array_equal(line.get_ydata(), ONE.motion_phi)
+    np.testing.assert_array_equal(line.get_ydata(), one().motion_phi)
     assert ax.get_legend() is None
     assert ax.get_xlim() == (0.0, 12.0)
     assert ax.get_xlabel() == "$t$ (s)"
@@ -40,32 +52,32 @@ def test_a_small_oscillation_is_a_cosine():
 
 
 def test_the_angular_velocity():
-    ax = pk.plot.time_history(ONE, "motion_dphi")
-    np.testing.assert_array_equal(ax.lines[0].get_ydata(), ONE.motion_dphi)
+    ax = pk.plot.time_history(one(), "motion_dphi")
+    np.testing.assert_array_equal(ax.lines[0].get_ydata(), one().motion_dphi)
     assert ax.get_ylabel() == r"$\dot\varphi$ (rad/s)"
 
 
 @pytest.mark.parametrize(("variable", "unit"), [("motion_phi", "°"), ("motion_dphi", "°/s")])
 def test_degrees(variable, unit):
-    ax = pk.plot.time_history(ONE, variable, angles="deg")
-    np.testing.assert_allclose(ax.lines[0].get_ydata(), np.degrees(ONE[variable]))
+    ax = pk.plot.time_history(one(), variable, angles="deg")
+    np.testing.assert_allclose(ax.lines[0].get_ydata(), np.degrees(one()[variable]))
     assert ax.get_ylabel().endswith(f"({unit})")
 
 
 def test_several_motions_are_told_by_what_differs():
-    ax = pk.plot.time_history(SEVERAL)
+    ax = pk.plot.time_history(several())
     assert legend_texts(ax) == [
         "$\\varphi_0$ = 1.8\xa0rad, $\\dot\\varphi_0$ = 0\xa0rad/s",
         "$\\varphi_0$ = 1.8\xa0rad, $\\dot\\varphi_0$ = 1\xa0rad/s",
         "$\\varphi_0$ = 0.2\xa0rad, $\\dot\\varphi_0$ = 2.4\xa0rad/s",
     ]
-    for line, motion in zip(ax.lines, SEVERAL.motion_phi, strict=True):
+    for line, motion in zip(ax.lines, several().motion_phi, strict=True):
         np.testing.assert_array_equal(line.get_ydata(), motion)
     looks = {(line.get_color(), str(line.get_linestyle())) for line in ax.lines}
     assert len(looks) == 3
     ax.figure.canvas.draw()
     assert ax.get_legend().get_window_extent().y1 < ax.get_window_extent().y0
-    assert pk.plot.time_history(SEVERAL, legend=False).get_legend() is None
+    assert pk.plot.time_history(several(), legend=False).get_legend() is None
 
 
 def test_motions_of_several_systems_are_told_by_the_parameter():
@@ -113,7 +125,7 @@ def test_wide_angles_have_ticks_at_quarter_turns():
     steps = np.diff(pk.plot.time_history(turning, angles="deg").get_yticks()) / 90.0
     np.testing.assert_allclose(steps, np.round(steps))
     assert len(ax.get_yticks()) <= 12
-    assert not any(r"\pi" in text for text in ticks(pk.plot.time_history(ONE)))
+    assert not any(r"\pi" in text for text in ticks(pk.plot.time_history(one())))
 
 
 @pytest.mark.parametrize("turns", [1e2, 1e4, 1e7])
@@ -125,8 +137,8 @@ def test_many_turns_have_few_ticks(turns):
 
 
 def test_any_number_along_time_can_be_drawn():
-    ds = ONE.assign(
-        height=ONE.motion_phi.copy(data=-np.cos(ONE.motion_phi)).assign_attrs(units="m")
+    ds = one().assign(
+        height=one().motion_phi.copy(data=-np.cos(one().motion_phi)).assign_attrs(units="m")
     )
     ax = pk.plot.time_history(ds, "height")
     np.testing.assert_array_equal(ax.lines[0].get_ydata(), ds.height)
@@ -141,19 +153,23 @@ def test_falling_times():
 @pytest.mark.parametrize(
     ("dataset", "message"),
     [
-        (None, "^dataset: got .*pk.flow"),
-        (SYSTEM, "^dataset: got .*pk.flow"),
-        (pk.equilibria(SYSTEM), "^dataset: got .*pk.flow"),
-        (pk.flow(SYSTEM, 1.8, 0.2, 3.0), "^dataset: got .*pk.flow"),
-        (pk.flow(SYSTEM, 1.8, 0.2, [3.0]), "^time: got .*at least two"),
-        (pk.flow(SYSTEM, 1.8, 0.2, [3.0, 1.0, 2.0]), "^time: got .*order"),
-        (pk.flow(SYSTEM, np.zeros(21), 0.2, TIMES), r"^dataset: got 21 motions \(point: 21\)"),
-        (SEVERAL.isel(point=[]), r"^dataset: got 0 motions"),
+        (lambda: None, "^dataset: got .*pk.flow"),
+        (lambda: SYSTEM, "^dataset: got .*pk.flow"),
+        (lambda: pk.equilibria(SYSTEM), "^dataset: got .*pk.flow"),
+        (lambda: pk.flow(SYSTEM, 1.8, 0.2, 3.0), "^dataset: got .*pk.flow"),
+        (lambda: pk.flow(SYSTEM, 1.8, 0.2, [3.0]), "^time: got .*at least two"),
+        (lambda: pk.flow(SYSTEM, 1.8, 0.2, [3.0, 1.0, 2.0]), "^time: got .*order"),
+        (
+            lambda: pk.flow(SYSTEM, np.zeros(21), 0.2, TIMES),
+            r"^dataset: got 21 motions \(point: 21\)",
+        ),
+        (lambda: several().isel(point=[]), r"^dataset: got 0 motions"),
     ],
 )
 def test_a_wrong_dataset_is_named(dataset, message):
+    given = dataset()
     with pytest.raises(pk.ParameterError, match=message):
-        pk.plot.time_history(dataset)
+        pk.plot.time_history(given)
     assert not plt.get_fignums()
 
 
@@ -162,7 +178,7 @@ def test_a_wrong_dataset_is_named(dataset, message):
 )
 def test_wrong_arguments_are_named(argument, value):
     with pytest.raises(pk.ParameterError, match=f"^{argument}"):
-        pk.plot.time_history(ONE, **{argument: value})
+        pk.plot.time_history(one(), **{argument: value})
 
 
 def test_twenty_motions_can_be_told_apart():

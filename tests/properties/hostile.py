@@ -19,7 +19,11 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.cli import main
+from phasekit.explorer.explore import Explorer
 from phasekit.inputs import describe
+from phasekit.labelled.accessor import MapPlots, PhasekitAccessor
+from phasekit.mechanics.coupled_state import CoupledRotationState
+from phasekit.systems.trajectory import Trajectory
 
 #: What models share for the rest of the package, and results that only phasekit makes.
 MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
@@ -476,7 +480,10 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "PhasekitAccessor": lambda: dataset().phasekit,
     "MapPlots": lambda: dataset().isel(beta=0, a=0).phasekit.plot,
 }
-
+#: Their classes that have no public name.
+RETURNED = (CoupledRotationState, Explorer, MapPlots, PhasekitAccessor, Trajectory)
+OWNERS = {owner.__name__: owner for owner in RETURNED}
+OWNERS |= {name: getattr(pk, name) for name in INSTANCES.keys() - OWNERS.keys()}
 
 #: Calls that take longer than a test should: spans over hundreds of decades ...
 LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surface")}
@@ -503,7 +510,7 @@ def callables() -> dict[str, Callable[..., Any]]:
     for name in pk.plot.__all__:
         found[f"plot.{name}"] = getattr(pk.plot, name)
     for name, make in INSTANCES.items():
-        owner = type(make())
+        owner = OWNERS[name]
         for method in dir(owner):
             static = inspect.getattr_static(owner, method)
             plain = inspect.isfunction(static) or isinstance(static, (classmethod, staticmethod))

@@ -57,6 +57,11 @@ def attempt(function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
             hostile.plt.close("all")
 
 
+@pytest.mark.parametrize("name", hostile.INSTANCES)
+def test_instances_are_of_their_classes(name):
+    assert type(hostile.INSTANCES[name]()) is hostile.OWNERS[name]
+
+
 @pytest.mark.parametrize("name", CALLABLES)
 def test_hostile_arguments(name):
     function = CALLABLES[name]

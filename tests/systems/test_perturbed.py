@@ -57,6 +57,9 @@ def test_maps_and_back(of, tmp_path):
     assert ds.isel(damping=1).phasekit.system() == FULL.replace(damping=0.2)
     ds.to_netcdf(tmp_path / "map.nc", engine="h5netcdf")
     assert pk.open_map(tmp_path / "map.nc").phasekit.system() == FULL.replace(damping=[0.1, 0.2])
+
+
+def test_a_map_of_any_potential_and_back():
     well = pk.Perturbed(pk.Potential("m*x^4/4 - x^2/2", "x", {"m": 1.0}), damping=0.1)
     back = pk.sweep(well, m=[1.0, 2.0], of="capture").isel(m=0).phasekit.system()
     assert back == well
