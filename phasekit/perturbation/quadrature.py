@@ -25,7 +25,7 @@ Complex = npt.NDArray[np.complex128]
 #: Times up to this over the exponent; e^-REACH is below rounding.
 REACH = 36.0
 #: Points in time: as few as do, else many.
-POINTS = (1 << 8, 1 << 11)
+POINTS = (3 << 7, 1 << 11)
 #: Cells at a time, for the memory of their motions.
 CELLS = 256
 #: Greatest rounding of what is said, and difference from twice the step, relative: half the step
