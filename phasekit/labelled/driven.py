@@ -209,11 +209,17 @@ def attractors(
     ParameterError
         If an argument is unusable, or the system has no damping and so no attractors.
 
+    Warns
+    -----
+    RuntimeWarning
+        If damping is too weak to see where motions end.
+
     Notes
     -----
     Motions are followed until they repeat themselves; Newton's method then finds the periodic
-    orbit, and its multipliers whether it attracts. What has come to none after 4,300 periods counts
-    as an attractor that does not repeat itself: chaotic, or a rotation in step with nothing.
+    orbit, and its multipliers whether it attracts. What has come to none after 4,300 periods, or
+    more where damping is weak, counts as an attractor that does not repeat itself: chaotic, or a
+    rotation in step with nothing.
 
     Examples
     --------
@@ -336,7 +342,16 @@ def _searched(
     every = [axis[np.linspace(0, len(axis) - 1, min(len(axis), STARTS)).round().astype(int)]
              for axis in grid]  # fmt: skip
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
-    return system, search.find(law, values, leg, states), grid
+    found = search.find(law, values, leg, states)
+    if found.unsettled:
+        warnings.warn(
+            f"attractor_phi: {found.unsettled} of the motions that were followed are damped so "
+            f"weakly that they did not settle within {search.PATIENCE} periods or less: there may "
+            "be attractors that are not found, and states are undecided",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    return system, found, grid
 
 
 def _quarter(system: Perturbed) -> float:
