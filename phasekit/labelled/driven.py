@@ -21,6 +21,7 @@ from phasekit.labels.grid import variable
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
+from phasekit.motion.lost import tell_unsettled
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
@@ -343,14 +344,7 @@ def _searched(
              for axis in grid]  # fmt: skip
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
     found = search.find(law, values, leg, states)
-    if found.unsettled:
-        warnings.warn(
-            f"attractor_phi: {found.unsettled} of the motions that were followed are damped so "
-            f"weakly that they did not settle within {search.PATIENCE} periods or less: there may "
-            "be attractors that are not found, and states are undecided",
-            RuntimeWarning,
-            stacklevel=3,
-        )
+    tell_unsettled("attractor_phi", found.unsettled, search.PATIENCE)
     return system, found, grid
 
 

@@ -37,3 +37,15 @@ def tell(quantity: str, status: npt.NDArray[np.int64], states: npt.NDArray[np.fl
                 RuntimeWarning,
                 stacklevel=3,
             )
+
+
+def tell_unsettled(quantity: str, number: int, patience: int) -> None:
+    """Say that damping was too weak to see where some motions end."""
+    if number:
+        warnings.warn(
+            f"{quantity}: {number} of the motions that were followed are damped so weakly that "
+            f"they did not settle within {patience} periods or less: there may be attractors that "
+            "are not found, and states are undecided",
+            RuntimeWarning,
+            stacklevel=4,
+        )
