@@ -21,6 +21,7 @@ from phasekit.labels.grid import variable
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
+from phasekit.motion.lost import tell_unsettled
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import said
 from phasekit.systems.as_system import as_system, single
@@ -219,12 +220,17 @@ def attractors(
     ParameterError
         If an argument is unusable, or the system has no damping and so no attractors.
 
+    Warns
+    -----
+    RuntimeWarning
+        If damping is too weak to see where motions end.
+
     Notes
     -----
     Motions are followed until they repeat themselves; Newton's method then finds the fixed point
     of the q-th power of the Poincare map, q up to 16, and its multipliers, all of a modulus
     below 1, whether it attracts ([GuckenheimerHolmes1983] section 1.5). What has come to none after
-    4,300 periods counts as an attractor that does not repeat itself: chaotic, or a rotation in step
+    4,300 periods, or more where damping is weak, counts as an attractor that does not repeat itself: chaotic, or a rotation in step
     with nothing. An attractor to which none of the states comes is not found.
 
     Examples
@@ -350,7 +356,9 @@ def _searched(
              for axis in grid]  # fmt: skip
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
     with said(f"looking for attractors from {len(states)} states"):
-        return system, search.find(law, values, leg, states), grid
+        found = search.find(law, values, leg, states)
+    tell_unsettled("attractor_phi", found.unsettled, search.PATIENCE)
+    return system, found, grid
 
 
 def _quarter(system: Perturbed) -> float:

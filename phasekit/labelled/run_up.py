@@ -12,7 +12,7 @@ from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import NumberLike, bad
 from phasekit.labels.grid import variable
 from phasekit.motion.flow import accelerations
-from phasekit.motion.prescribed import prescribed_at, table_of
+from phasekit.motion.prescribed import prescribed_at, span, table_of
 from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
 
@@ -102,7 +102,7 @@ def run_up(
     _, parameters = single(system)
     ds = flow(system, phi0, dphi0, t, rtol=rtol, atol=atol)
     law, times = system.law, np.asarray(ds.time.values, dtype=float)
-    table = table_of(law.prescribed, float(np.min(times, initial=0)), float(times.max(initial=0)))
+    table = table_of(law.prescribed, *span(times))
     speed, change = prescribed_at(table, times)
     spread = xr.broadcast(ds.motion_phi, ds.time)[1].values
     states = ds.motion_phi.values, ds.motion_dphi.values

@@ -49,6 +49,8 @@ STATES: dict[str, tuple[str, str]] = {
     "state_angle": ("rad", "angle variable of the state"),
     "state_family": ("1", "family of the state's orbit, a code of OrbitFamily"),
     "time": ("s", "time"),
+    "box_phi": ("rad", "half of the width in angle of the box of states around rest at 0"),
+    "box_dphi": ("s-1", "half of the height in angular velocity of the box of states"),
     "level": ("1", "place of the orbit in its family, by energy from 0 to 1"),
 }
 

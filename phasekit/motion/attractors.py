@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import circle, motions
-from phasekit.motion.strobe import Strobed, Targets, strobe
+from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]
 
@@ -21,6 +21,8 @@ LONGEST = 16
 ROUNDS = (60, 240, 1000, 3000)
 #: Motions that are followed further where many have come to nothing that repeats itself.
 MOST_OPEN = 24
+#: Log of the contraction of areas after which motions count as settled, and most legs until then.
+SETTLED, PATIENCE = 30.0, 100_000
 #: Change within an orbit, of the size of the box, that Newton's method takes up.
 NEAR = 1e-4
 #: Two attractors that are closer than this part of the size of the box are one.
@@ -29,6 +31,8 @@ SAME = 1e-6
 BOXES, FILLING, VISITS = 100, 4000, 40
 #: States around a point of an attractor that are followed to see how far it catches.
 RING = 32
+#: Legs for which they are followed.
+LONGEST_RING = 20_000
 
 
 class Attractors(NamedTuple):
@@ -63,6 +67,10 @@ class Search:
     others: list[Array] = field(default_factory=list)
     """States on those that are not periodic, of shape (states, 2)."""
     drifts: list[float] = field(default_factory=list)
+    radii: dict[int, float] = field(default_factory=dict)
+    """How far around periodic ones states were seen to come to them, by place."""
+    unsettled: int = 0
+    """Motions that are damped too weakly to show where they end."""
 
     @property
     def period(self) -> float:
@@ -94,8 +102,46 @@ class Search:
             number = min(len(open_), MOST_OPEN)
             some = np.linspace(0, len(open_) - 1, number).round().astype(int)
             states = np.array(open_).reshape(-1, 2)[some]
-        for state in states:
+        if len(states):
+            self._look_longer(states)
+
+    def _look_longer(self, states: Array) -> None:
+        """Sort out motions that do not repeat themselves: on attractors of their own, or slow."""
+        kept = 2 * LONGEST + 1
+        found = self.run(states, kept, 0).states
+        strength = self._damping(found)
+        legs = SETTLED / strength if strength > 0.0 else np.inf
+        slow = [orbit[-1] for orbit in found if not self._is_sorted(orbit, legs)]
+        if legs > PATIENCE:
+            self.unsettled += len(slow)
+        elif slow and legs > ROUNDS[-1]:
+            found = self.run(np.array(slow), kept, int(legs)).states
+            slow = [orbit[-1] for orbit in found if not self._is_sorted(orbit, legs)]
+        for state in slow if legs <= PATIENCE else []:
             self._take_other(state)
+
+    def _is_sorted(self, orbit: Array, legs: float) -> bool:
+        """Whether it is known where a motion ends: at a periodic attractor, or nowhere."""
+        state = orbit[-1]
+        if not np.isfinite(state).all() or self._is_caught(state) or self._take(orbit):
+            return True
+        # A motion that spirals slowly into a point has that in its middle.
+        weak = legs > ROUNDS[-1]
+        return weak and self._refined(orbit.mean(axis=0), 1) and self._is_caught(state)
+
+    def _damping(self, found: Array) -> float:
+        """Log of the contraction of areas in a leg, the mean along motions."""
+        linear, quadratic = (float(np.mean(self.values[n])) for n in ("damping", "quadratic"))
+        speeds = np.abs(found[np.isfinite(found).all(axis=2)][:, 1])
+        speed = float(speeds.mean()) if speeds.size else 0.0
+        return (linear + 2.0 * quadratic * speed) * self.leg
+
+    def _is_caught(self, state: Array) -> bool:
+        """Whether a state is so near a periodic attractor that it comes to it."""
+        return any(
+            self.apart(orbit, state).min() < self._radius(number)
+            for number, orbit in enumerate(self.orbits)
+        )
 
     def _is_known(self, state: Array) -> bool:
         return any(
@@ -131,15 +177,25 @@ class Search:
             return False
         if self.apart(state, start) > 100.0 * NEAR * self.size:
             return False
-        multiplier = float(np.abs(np.linalg.eigvals(slope)).max())
-        if not multiplier < 1.0 - 1e-9:
-            return False
         points = self.run(state[None], q, 0).states[0]
+        for part in (part for part in range(1, q) if q % part == 0):
+            if self.apart(points[part], state) < SAME * self.size:
+                return self._refined(state, part)
+        multiplier = float(np.abs(np.linalg.eigvals(slope)).max())
+        if not (multiplier < 1.0 - 1e-9 or self._is_rest(points, slope)):
+            return False
         if not any(self.apart(known, state).min() < SAME * self.size for known in self.orbits):
             self.orbits.append(points)
             self.multipliers.append(multiplier)
-            self.windings.append(float(turns) / q)
+            self.windings.append(float(turns) / q + 0.0)
         return True
+
+    def _is_rest(self, points: Array, slope: Array) -> bool:
+        """Whether a motion at rest is a center that quadratic damping alone makes attract."""
+        turns = float(np.trace(slope) ** 2) < 4.0 * float(np.linalg.det(slope))
+        damps = float(np.min(self.values["quadratic"])) > 0.0 == float(self.values["damping"])
+        still = bool(np.abs(points[:, 1]).max() < SAME * self.size * self.scale)
+        return turns and damps and still and common_period(self.law, self.values) is None
 
     def _map(self, state: Array, q: int) -> tuple[Array, Array]:
         """State after q legs, and its derivative."""
@@ -177,12 +233,30 @@ class Search:
         )
 
     def order(self) -> None:
-        """Number the attractors by their first point."""
-        kept = sorted(
-            zip(self.orbits, self.multipliers, self.windings, strict=True),
-            key=lambda one: (len(one[0]), round(float(self.wrapped(one[0][0, 0])), 9)),
-        )
+        """Number the attractors by what they are, not by when they were found.
+
+        Periodic ones come first, by period and least angle, at which they begin; then the others,
+        by their turns and mean angle.
+        """
+        self.radii.clear()  # they go by place
+
+        def first(orbit: Array) -> tuple[float, float]:
+            return round(float(self.wrapped(orbit[0, 0])), 9), round(float(orbit[0, 1]), 9)
+
+        def begun(orbit: Array) -> Array:
+            turned = [np.roll(orbit, -i, axis=0) for i in range(len(orbit))]
+            return min(turned, key=first)
+
+        orbits = [begun(orbit) for orbit in self.orbits]
+        rows = zip(orbits, self.multipliers, self.windings, strict=True)
+        kept = sorted(rows, key=lambda one: (len(one[0]), *first(one[0])))
         self.orbits, self.multipliers, self.windings = ([one[i] for one in kept] for i in range(3))  # type: ignore[assignment]
+
+        def place(one: tuple[Array, float]) -> tuple[float, float]:
+            return round(one[1], 3), float(self.wrapped(one[0][:, 0]).mean())
+
+        rest = sorted(zip(self.others, self.drifts, strict=True), key=place)
+        self.others, self.drifts = [one for one, _ in rest], [drift for _, drift in rest]
 
     def wrapped(self, phi: Array) -> Array:
         """Angles in the half-open turn round 0."""
@@ -205,20 +279,28 @@ class Search:
 
     def _radius(self, number: int) -> float:
         """Distance up to which states around an attractor were seen to come to it."""
+        if number not in self.radii:
+            self.radii[number] = self._seen_radius(number)
+        return self.radii[number]
+
+    def _seen_radius(self, number: int) -> float:
         orbit, multiplier = self.orbits[number], self.multipliers[number]
         rest = [o for i, o in enumerate(self.orbits) if i != number] + self.others
         far = min([self.apart(orbit[:, None], o).min() for o in rest] + [self.size])
         radius = min(0.4 * far, 0.05 * self.size)
         angles = 2.0 * np.pi * np.arange(RING) / RING
         ring = np.stack([np.cos(angles), self.scale * np.sin(angles)], axis=-1)
-        legs = len(orbit) * (2 + int(np.log(1e-3) / np.log(max(multiplier, 1e-3))))
-        for _ in range(40):
+        rate = -np.log(np.clip(multiplier, 1e-3, 1.0 - 1e-6))
+        legs = len(orbit) * (2 + int(-np.log(1e-3) / rate))
+        if legs <= LONGEST_RING:
+            tries = [(0.5**i * radius, legs) for i in range(40)]
+        else:
+            tries = [(radius, LONGEST_RING // part) for part in (100, 10, 1)]
+        for radius, legs in tries:
             states = (orbit[:, None] + radius * ring).reshape(-1, 2)
-            ends = self.run(states, 1, min(legs, 20_000)).states[:, 0]
-            off = self.apart(ends[:, None], orbit).min(axis=1)
-            if np.all(off < 0.5 * radius):
+            ends = self.run(states, 1, legs).states[:, 0]
+            if np.all(self.apart(ends[:, None], orbit).min(axis=1) < 0.5 * radius):
                 return float(radius)
-            radius *= 0.5
         return 0.0
 
     def _boxes(self) -> tuple[Array, npt.NDArray[np.int16]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -16,17 +15,16 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.motion.prescribed import table_of
+from phasekit.motion.lost import MOST, judged, tell
+from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import rates_of
 
 Array = npt.NDArray[np.float64]
 
-#: Error of a step that is allowed, relative and absolute, and steps that a motion may take.
-RTOL, ATOL, MOST = 1e-10, 1e-12, 10_000_000
+#: Error of a step that is allowed, relative and absolute.
+RTOL, ATOL = 1e-10, 1e-12
 #: Work of a motion, in the cells by which `launch` counts.
 WEIGHT = 5_000
-#: States of a motion that did not come to its end.
-EXHAUSTED, FAILED = 3, 4
 
 
 class Motion(NamedTuple):
@@ -109,7 +107,7 @@ def _motions(
     still = _is_still(law, values, len(states))
     if not still.any():
         found = motions(law, values, states, times, *how)
-        _tell(found, states)
+        tell("motion_phi", found.status, states)
         return found.states
     from phasekit.phase.exact.flow import flow as exact
 
@@ -125,7 +123,7 @@ def _motions(
     if not still.all():
         rest = {name: some(value, ~still) for name, value in values.items()}
         found = motions(law, rest, states[~still], some(times, ~still), *how)
-        _tell(found, states[~still])
+        tell("motion_phi", found.status, states[~still])
         result[~still] = found.states
     return result
 
@@ -183,8 +181,7 @@ def motions(
     code, parameters = rates_of(law, values, tangents)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
-    finite = np.where(np.isfinite(times), times, 0.0)
-    table = table_of(law.prescribed, float(finite.min(initial=0)), float(finite.max(initial=0)))
+    table = table_of(law.prescribed, *span(times))
     result = np.full((count, times.shape[1], states.shape[1]), np.nan)
     status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
     for sense in (1.0, -1.0):
@@ -216,6 +213,7 @@ def motions(
         wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]
         result = np.where(wanted, out, result)
         status, steps = np.maximum(status, reached), steps + taken
+    judged(status, parameters)
     return Cells(result, status, steps)
 
 
@@ -227,24 +225,6 @@ def circle(law: PerturbedConservative) -> float:
 def unit_of(law: PerturbedConservative) -> float:
     """Value from which on a coordinate is held as closely as there: a radian; none on a line."""
     return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf
-
-
-def _tell(found: Cells, states: Array) -> None:
-    """Say how many motions did not come to their ends, and why; invalid starts are no motions."""
-    valid = np.isfinite(states).all(axis=1)
-    reasons: dict[int, Any] = {
-        EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol",
-        FAILED: "their steps become too short: they run to infinity, or the law has no value there",
-    }
-    for code, reason in reasons.items():
-        lost = valid & (found.status == code)
-        if lost.any():
-            warnings.warn(
-                f"motion_phi: {lost.sum()} of {lost.size} motions end before their last time, "
-                f"because {reason}",
-                RuntimeWarning,
-                stacklevel=3,
-            )
 
 
 def accelerations(
@@ -260,7 +240,7 @@ def accelerations(
     arrays = [np.asarray(array, dtype=float) for array in (times, phi, dphi)]
     code, parameters = rates_of(law, values)
     t, x, v = (np.array(array).reshape(-1) for array in np.broadcast_arrays(*arrays))
-    table = table_of(law.prescribed, float(np.min(t, initial=0.0)), float(np.max(t, initial=0.0)))
+    table = table_of(law.prescribed, *span(t))
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), t.size)))
     out = np.empty((t.size, 2))
     states = np.stack([x, v], axis=-1)

@@ -22,6 +22,12 @@ PIECES = 20_000
 DEGREE = 5
 
 
+def span(times: npt.ArrayLike) -> tuple[float, float]:
+    """First and last of the times that a motion from t = 0 to all finite ones comes to."""
+    finite = np.nan_to_num(np.asarray(times, dtype=float), nan=0.0, posinf=0.0, neginf=0.0)
+    return float(finite.min(initial=0.0)), float(finite.max(initial=0.0))
+
+
 def table_of(prescribed: Any, start: float, stop: float) -> Array:
     """Pieces of a function or table of time between two times.
 
@@ -83,8 +89,9 @@ def _of_function(function: Callable[[float], float], start: float, stop: float) 
             waiting += [(middle, high), (low, middle)]
         if len(rows) + len(waiting) > PIECES:
             raise ParameterError(
-                f"omega1: got a function that is not smooth in more than {PIECES} pieces, wants a "
-                "smooth function of time, or a table (times, values)"
+                f"omega1: got a function that takes more than {PIECES} pieces from {start:g} s to "
+                f"{stop:g} s, wants a smooth function of time, shorter times, or a table (times, "
+                "values)"
             )
     return np.array(rows)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from fractions import Fraction
 from typing import Any, NamedTuple
@@ -11,7 +12,8 @@ import numpy.typing as npt
 
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
-from phasekit.motion.flow import ATOL, MOST, RTOL, WEIGHT, circle, unit_of
+from phasekit.motion.flow import ATOL, RTOL, WEIGHT, circle, unit_of
+from phasekit.motion.lost import MOST, judged, tell
 from phasekit.motion.prescribed import table_of
 from phasekit.motion.rates import rates_of
 
@@ -109,7 +111,8 @@ def strobe(
     states : array, shape (cells, 2)
         States at t = 0.
     legs : array_like, shape (cells,) or ()
-        Time of a leg. Where it is the period of the law, time begins anew after each.
+        Time of a leg; NaN: there is no motion. Where it is the period of the law, time begins anew
+        after each.
     kept, skip : int
         States to keep, and legs before the first of them.
     targets : Targets
@@ -126,7 +129,9 @@ def strobe(
     legs = np.array(np.broadcast_to(np.asarray(legs, float), (count,)))
     many = max(skip + kept - 1, 0) if most_legs is None else most_legs
     period = common_period(law, values)
-    again = period is None or bool(np.all(np.abs(legs - period) <= 1e-14 * legs))
+    never = ~np.isfinite(legs)
+    again = period is None or bool(np.all((np.abs(legs - period) <= 1e-14 * legs) | never))
+    states, legs = np.where(never[:, None], np.nan, states), np.where(never, 1.0, legs)
     end = float(np.max(legs, initial=0.0)) * many
     table = table_of(law.prescribed, 0.0, end)
     out = np.full((count, kept, 2), np.nan)
@@ -140,6 +145,7 @@ def strobe(
         arrays += (targets.box, targets.boxes, targets.visits, np.array(states), parameters)
         groups: Any = (out, found, taken, status)
         launch(kernel, arrays, count, groups, threads, WEIGHT)
+        judged(status, parameters)
     return Strobed(out, found, taken, status)
 
 
@@ -196,7 +202,8 @@ def lyapunov(
     states[:, 0], states[:, 1], states[:, 2], states[:, 5] = phi, dphi, 1.0, 1.0
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     valid = np.isfinite(time) & (time > 0.0)
-    legs = np.array(np.broadcast_to(np.where(valid, time, np.nan) / PARTS, (count,)))
+    states[~np.broadcast_to(valid, (count,))] = np.nan
+    legs = np.array(np.broadcast_to(np.where(valid, time, 1.0) / PARTS, (count,)))
     table = table_of(law.prescribed, 0.0, float(np.max(np.where(valid, time, 0.0), initial=0.0)))
     out, status = np.full((count, PARTS, 2), np.nan), np.zeros(count, np.int64)
     if count:
@@ -204,6 +211,8 @@ def lyapunov(
         arguments: Any = (code.address, table, legs, *how, states, parameters)
         groups: Any = (out, status)
         launch(growth, arguments, count, groups, threads, WEIGHT)
+        judged(status, parameters)
+        tell("lyapunov_exponent", status, states)
     means = np.diff(out[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
     exponents = means.mean(axis=1)
     number = PARTS - SKIPPED
@@ -268,11 +277,20 @@ def sections(
     )
     values = law.values(*flat)
     count = int(np.prod(shape, dtype=int))
-    legs = np.asarray(
-        check_period("period", common_period(law, values)) if period is None else period
-    )
+    own = common_period(law, values) if period is None else np.asarray(period)
+    legs = check_period("period", own) if own is None or not np.isfinite(own).any() else own
+    without = int(np.sum(np.broadcast_to(~np.isfinite(legs), (count,))))
+    if without:
+        warnings.warn(
+            f"section_phi: {without} of {count} motions have no sections, because what varies has "
+            "no common period there",
+            RuntimeWarning,
+            stacklevel=2,
+        )
     states = np.stack([np.broadcast_to(x, (count,)) for x in (phi, dphi)], axis=-1)
-    found = strobe(law, values, states, legs, n, skip, rtol=rtol, atol=atol).states
+    run = strobe(law, values, states, legs, n, skip, rtol=rtol, atol=atol)
+    tell("section_phi", run.status, np.where(np.isfinite(legs).reshape(-1, 1), states, np.nan))
+    found = run.states
     times = np.broadcast_to(np.reshape(legs, (-1, 1)) * (skip + np.arange(n)), (count, n))
     turn = circle(law)
     angles = found[..., 0]

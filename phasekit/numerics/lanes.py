@@ -110,16 +110,18 @@ class LaneWriter(Writer):
     def _sine_and_cosine(self, angle: Any) -> tuple[Any, Any]:
         b = self.builder
         size = self._intrinsic("fabs", angle)
-        small = b.fcmp_ordered("<", size, self.constant(LARGE))
+        small = b.fcmp_unordered("<", size, self.constant(LARGE))  # or no number
         every = ir.Constant(ir.IntType(LANES), 2**LANES - 1)
         all_small = b.icmp_unsigned("==", b.bitcast(small, every.type), every)
-        with b.if_else(all_small, likely=True) as (then, otherwise):
-            with then:
-                near = self._reduced(angle)
-                first = b.block
-            with otherwise:
-                far = self._by_lane("sin", angle), self._by_lane("cos", angle)
-                second = b.block
+        near = self._reduced(angle)
+        first = b.block
+        with b.if_then(b.not_(all_small), likely=False):
+            # What one lane holds must not change the others by an ulp.
+            far = [
+                b.select(small, one, self._by_lane(name, angle))
+                for name, one in zip(("sin", "cos"), near, strict=True)
+            ]
+            second = b.block
         found = []
         for one, other in zip(near, far, strict=True):
             phi = b.phi(self.kind)

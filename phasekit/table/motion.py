@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from phasekit.labels.coordinates import LABELS
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.table.row import LAW, STATE, Pass, Quantity
 
@@ -11,6 +12,8 @@ RECURRENCE = "[DatserisWagemakers2022]"
 
 _OF = PerturbedConservative
 _ATTRACTOR = ("attractor",)
+#: On maps there is place for so many attractors.
+_NUMBERED = {**LABELS, "attractor": (range(8), LABELS["attractor"][1])}
 
 # fmt: off
 QUANTITIES: tuple[Quantity, ...] = (
@@ -51,14 +54,24 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("basin_time", "basins", (), "float64", "s",
              "time until the motion is near its attractor", "first state near the attractor",
              RECURRENCE, of=_OF),
-    Quantity("basin_fraction", "basins", _ATTRACTOR, "float64", "1",
-             "share of the states in the attractor's basin", "number of states over all",
-             RECURRENCE, of=_OF),
-    Quantity("basin_fraction_error", "basins", _ATTRACTOR, "float64", "1",
-             "error of the share: that of a sample of as many states, and the undecided",
-             "sqrt(f (1 - f)/N) + undecided", RECURRENCE, of=_OF),
     Quantity("boundary_fraction", "basins", (), "float64", "1",
              "share of the states beside another basin", "number of cells over all",
+             RECURRENCE, of=_OF),
+    Quantity("basin_fraction", "basin_fractions", _ATTRACTOR, "float64", "1",
+             "share of the states in the attractor's basin", "number of states over all",
+             RECURRENCE, of=_OF, labels=_NUMBERED),
+    Quantity("basin_fraction_error", "basin_fractions", _ATTRACTOR, "float64", "1",
+             "error of the share: that of a sample of as many states, and the undecided",
+             "sqrt(f (1 - f)/N) + undecided", RECURRENCE, of=_OF, labels=_NUMBERED),
+    Quantity("attractor_angle", "basin_fractions", _ATTRACTOR, "float64", "rad",
+             "angle of the attractor, once a period the least one; attractors are numbered by "
+             "period, then by it", "phi(n T), wrapped", RECURRENCE, of=_OF, labels=_NUMBERED),
+    Quantity("remaining_fraction", "basin_fractions", (), "float64", "1",
+             "share of the states that come to none of the numbered attractors: undecided, away "
+             "to infinity, or to further ones", "1 - sum of the shares", RECURRENCE, of=_OF),
+    Quantity("n_attractors", "basin_fractions", (), "int64", "1",
+             "number of attractors that were found, also beyond those that are numbered; "
+             "-1: without damping or a common period", "attractors of 1,024 states",
              RECURRENCE, of=_OF),
 )
 # fmt: on
@@ -66,4 +79,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 PASSES: tuple[Pass, ...] = (
     Pass("phasekit.motion.flow:flow", (LAW, *STATE, "time"), ("motion",), _OF),
     Pass("phasekit.motion.strobe:lyapunov", (LAW, *STATE, "time"), ("lyapunov",), _OF),
+    Pass(
+        "phasekit.motion.shares:fractions", (LAW, "box_phi", "box_dphi"), ("basin_fractions",), _OF
+    ),
 )

@@ -37,6 +37,8 @@ def packed(*sums: Array) -> tuple[Array, npt.NDArray[np.int64]]:
 WEIGHTS, PLACES = packed(*DOP853.A[1:], DOP853.B, *DOP853.A_EXTRA, DOP853.E3, DOP853.E5)
 _, MORE, THIRD, FIFTH = 11, 12, 15, 16
 
+#: Error of a tangent vector, of its length, below which rounding hides it.
+CLOSEST = 1e-14
 #: Least and greatest change of the step, and what of the step that just fits is taken.
 SHORTEST, LONGEST, SAFETY = 0.2, 10.0, 0.9
 
@@ -137,7 +139,8 @@ def errors(
     """Error of each lane's step over what is allowed.
 
     A coordinate beyond `unit` counts as `unit`, so that an angle which runs on is held as closely
-    as at first. A tangent vector is held against its length.
+    as at first. A tangent vector is held against its length, the more closely the shorter the step
+    is: the logs of lengths add up, so that what counts is the error in a second.
     """
     third, fifth = spare[0], spare[1]
     add_up(THIRD, k, third)
@@ -154,7 +157,10 @@ def errors(
             else:
                 other = m + LANES if c % 2 == 0 else m - LANES
                 scale = max(math.hypot(x[m], x[other]), math.hypot(y[m], y[other]))
-            scale = 1.0 / (atol + rtol * scale)
+            allowed = atol + rtol * scale
+            if c >= 2:
+                allowed = max(allowed * min(1.0, abs(h[lane])), CLOSEST * scale)
+            scale = 1.0 / allowed
             e3 += (third[m] * scale) ** 2
             e5 += (fifth[m] * scale) ** 2
         below = e5 + 0.01 * e3

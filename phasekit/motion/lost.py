@@ -1,0 +1,51 @@
+"""What is said of motions that did not come to their ends."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import numpy.typing as npt
+
+#: Steps that a motion may take.
+MOST = 10_000_000
+#: States of a motion that did not come to its end: too many steps, steps too short; and one that
+#: never began, because a parameter of it has no value.
+EXHAUSTED, FAILED, INVALID = 3, 4, 5
+
+REASONS = {
+    EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol",
+    FAILED: "their steps become too short: they run to infinity, or the law has no value there",
+    INVALID: "their parameters are invalid",
+}
+
+
+def judged(status: npt.NDArray[np.int64], parameters: npt.NDArray[np.float64]) -> None:
+    """Mark the motions that failed for want of a parameter, of shape (parameters, cells)."""
+    status[(status == FAILED) & ~np.isfinite(parameters).all(axis=0)] = INVALID
+
+
+def tell(quantity: str, status: npt.NDArray[np.int64], states: npt.NDArray[np.float64]) -> None:
+    """Say how many motions did not come to their ends, and why; invalid starts are no motions."""
+    valid = np.isfinite(states).all(axis=1)
+    for code, reason in REASONS.items():
+        lost = valid & (status == code)
+        if lost.any():
+            warnings.warn(
+                f"{quantity}: {lost.sum()} of {lost.size} motions end before their last time, "
+                f"because {reason}",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+
+
+def tell_unsettled(quantity: str, number: int, patience: int) -> None:
+    """Say that damping was too weak to see where some motions end."""
+    if number:
+        warnings.warn(
+            f"{quantity}: {number} of the motions that were followed are damped so weakly that "
+            f"they did not settle within {patience} periods or less: there may be attractors that "
+            "are not found, and states are undecided",
+            RuntimeWarning,
+            stacklevel=4,
+        )

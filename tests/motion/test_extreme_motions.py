@@ -1,0 +1,148 @@
+"""Motions with extreme but valid input, and what is said where a motion has no end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import phasekit as pk
+
+EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
+WELL = pk.Potential("x^4/4 - x^2/2", "x")
+RUNAWAY = pk.Potential("-x^4/4", "x")
+DRIVE = pk.Harmonic(0.3, 1.0)
+GRID = {"phi": np.linspace(-2.0, 2.0, 5), "dphi": [-0.8, 0.3]}
+
+
+def disk(omega1):
+    return pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.05, r=0.1, omega1=omega1)
+
+
+@pytest.mark.parametrize("omega1", [1e-3, 1e4])
+@pytest.mark.parametrize("damping", [-0.3, 1e-12, 1e3])
+def test_a_disk_at_any_speed_moves_as_scipy_says(omega1, damping):
+    system = disk(omega1)
+    A, B, C = system.coefficients()
+    unit = max(abs(A), abs(B), abs(C)) ** 0.5
+
+    def rates(t, x):
+        slope = (B - A * np.cos(x[0])) * np.sin(x[0]) - C * np.cos(x[0])
+        return [x[1], -slope - damping * x[1]]
+
+    times = np.linspace(0.0, 5.0 / unit, 4)
+    expected = solve_ivp(
+        rates, (0.0, times[-1]), [0.3, 0.1 * unit], "DOP853", times, rtol=1e-12, atol=1e-13 * unit
+    ).y
+    ds = pk.flow(pk.Perturbed(system, damping=damping), 0.3, 0.1 * unit, times)
+    assert np.abs(ds.motion_phi.values - expected[0]).max() < 2e-10
+    assert np.abs(ds.motion_dphi.values - expected[1]).max() < 2e-10 * unit
+
+
+@pytest.mark.parametrize("frequency", [1e-3, 1e3])
+def test_a_drive_of_any_frequency(frequency):
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.3, frequency, 0.2))
+
+    def rates(t, x):
+        slope = (0.35 - np.cos(x[0])) * np.sin(x[0]) - 0.12 * np.cos(x[0])
+        return [x[1], -slope - 0.1 * x[1] + 0.3 * np.cos(frequency * t + 0.2)]
+
+    expected = solve_ivp(rates, (0.0, 2.0), [0.3, 0.1], "DOP853", rtol=1e-12, atol=1e-13,
+                         max_step=0.3 / max(frequency, 1.0)).y[:, -1]  # fmt: skip
+    ds = pk.flow(system, 0.3, 0.1, 2.0)
+    assert abs(ds.motion_phi.item() - expected[0]) < 1e-9
+    assert abs(ds.motion_dphi.item() - expected[1]) < 1e-9
+
+
+@pytest.mark.parametrize("damping", [-0.05, 1e-12, 50.0, 1e3])
+def test_exponents_add_up_however_strong_the_damping(damping):
+    system = pk.Perturbed(EIGHT, damping=damping, forcing=DRIVE)
+    ds = pk.lyapunov(system, [0.1, 1.0], 0.0, time=2.0)
+    total = ds.lyapunov_exponent.sum("exponent").values
+    assert total.shape == (2,)
+    assert np.abs(total + damping).max() < 1e-10
+    assert np.abs(ds.lyapunov_sum.values + damping).max() < 1e-10
+
+
+def test_exponents_of_a_fast_disk_add_up():
+    ds = pk.lyapunov(pk.Perturbed(disk(1e4), damping=0.3), 0.1, 0.0, time=0.2)
+    assert abs(ds.lyapunov_sum.item() + 0.3) < 1e-9
+
+
+def test_a_time_without_value_has_no_exponent():
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=DRIVE)
+    ds = pk.lyapunov(system, 0.1, 0.0, time=[10.0, np.nan, 20.0])
+    assert np.isnan(ds.lyapunov_sum.values).tolist() == [False, True, False]
+    alone = pk.lyapunov(system, 0.1, 0.0, time=20.0)
+    assert ds.lyapunov_sum.values[2] == pytest.approx(alone.lyapunov_sum.item(), rel=1e-12)
+
+
+def test_sections_and_exponents_say_which_motions_have_no_end():
+    system = pk.Perturbed(RUNAWAY, damping=0.1, forcing=pk.Harmonic(0.0, 1.0))
+    with pytest.warns(RuntimeWarning, match="section_phi: 1 of 2 motions end .* run to infinity"):
+        ds = pk.stroboscopic(system, [1.0, 0.0], 0.0, n=2)
+    assert np.isnan(ds.section_phi.values).tolist() == [[False, True], [False, False]]
+    with pytest.warns(RuntimeWarning, match="lyapunov_exponent: 1 of 2 motions end before"):
+        ds = pk.lyapunov(system, [1.0, 0.0], 0.0, time=20.0)
+    assert np.isnan(ds.lyapunov_sum.values).tolist() == [True, False]
+
+
+def test_invalid_parameters_are_named_as_the_cause():
+    system = pk.Perturbed(EIGHT, damping=[0.1, np.nan])
+    with pytest.warns(RuntimeWarning, match="1 of 2 motions .* because their parameters are inv"):
+        ds = pk.flow(system, 0.1, 0.0, 1.0)
+    assert np.isnan(ds.motion_phi.values).tolist() == [False, True]
+
+
+def test_a_frequency_without_value_leaves_the_other_sections_alone():
+    driven = pk.Perturbed(WELL, damping=0.15, forcing=pk.Harmonic(0.2, [1.0, np.nan, 2.0]))
+    with pytest.warns(RuntimeWarning, match="1 of 3 motions have no sections"):
+        ds = pk.stroboscopic(driven, 0.1, 0.0, n=2, skip=20)
+    assert np.isnan(ds.section_phi.values[1]).all()
+    for i, frequency in ((0, 1.0), (2, 2.0)):
+        alone = pk.stroboscopic(driven.replace(forcing_frequency=frequency), 0.1, 0.0, n=2, skip=20)
+        assert np.array_equal(ds.section_phi.values[i], alone.section_phi.values)
+
+
+@pytest.mark.parametrize("neighbour", [np.nan, 1e7, 1e300])
+def test_what_stands_beside_a_motion_does_not_change_it(neighbour):
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=DRIVE)
+    pair = pk.flow(system, [0.3, neighbour], [0.1, 0.0], [5.0, 40.0])
+    alone = pk.flow(system, 0.3, 0.1, [5.0, 40.0])
+    assert np.array_equal(pair.motion_phi.values[0], alone.motion_phi.values)
+
+
+def test_a_run_up_to_a_time_without_value():
+    for omega1 in (lambda t: 5.0 * t, ([0.0, 1.0, 2.0], [0.0, 5.0, 10.0])):
+        ds = pk.run_up(disk(1.0), omega1=omega1, phi0=0.1, dphi0=0.0, t=[np.nan, 1.0], damping=1.0)
+        for name in ("motion_phi", "motion_omega1", "ddphi"):
+            assert np.isnan(ds[name].values).tolist() == [True, False]
+        assert ds.motion_omega1.values[1] == pytest.approx(5.0)
+
+
+def test_rest_has_the_period_of_one_leg():
+    soft = pk.Perturbed(pk.Potential("x^2/2 - x^4/4", "x"), damping=0.1)
+    with pytest.warns(RuntimeWarning, match="too coarse"):
+        ds = pk.basins(soft, phi=[-1.5, 0.1, 0.4], dphi=[0.0, 0.1])
+    assert ds.attractor_period.values.tolist() == [1]
+    assert ds.attractor_multiplier.values == pytest.approx([np.exp(-0.05 * np.pi / 2)], rel=1e-6)
+    assert ds.basin.values.tolist() == [[-2, -2], [0, 0], [0, 0]]
+
+
+def rests():
+    found = pk.equilibria(EIGHT).phi
+    return sorted(found.sel(equilibrium=["lower_center", "upper_center"]).values)
+
+
+@pytest.mark.parametrize("damping", [{"damping": 4e-3}, {"quadratic": 0.5}])
+def test_slow_spirals_end_at_rest(damping):
+    ds = pk.attractors(pk.Perturbed(EIGHT, **damping), **GRID)
+    assert ds.attractor_period.values.tolist() == [1, 1]
+    assert sorted(ds.attractor_phi.values[:, 0]) == pytest.approx(rests(), abs=1e-9)
+    assert (ds.attractor_multiplier <= 1.0 + 1e-9).all()
+
+
+def test_damping_too_weak_to_settle_is_announced():
+    with pytest.warns(RuntimeWarning, match="damped so weakly that they did not settle"):
+        ds = pk.attractors(pk.Perturbed(EIGHT, damping=1e-7), phi=[0.5, 1.0], dphi=[0.4])
+    assert (ds.attractor_period > 0).all()

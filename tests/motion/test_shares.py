@@ -1,0 +1,79 @@
+"""Shares of basins on maps of parameters, against basins one by one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+from phasekit.motion.attractors import find
+from phasekit.motion.shares import SIDE, SLOTS
+
+EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
+DRIVEN = pk.Perturbed(EIGHT, damping=0.3, forcing=pk.Harmonic(0.1, 1.0))
+BOX = {"box_phi": np.pi, "box_dphi": 2.0}
+
+
+def test_shares_on_a_map_are_those_of_each_system(tmp_path):
+    amplitudes = [0.0, 0.2, 0.6]
+    store, chunks = tmp_path / "map.zarr", {"forcing_amplitude": 1}
+    first = pk.sweep(
+        DRIVEN, forcing_amplitude=amplitudes[:2], of="n_attractors", store=store, chunks=chunks,
+        **BOX,
+    )  # fmt: skip
+    assert first.n_attractors.values.tolist() == [2, 2]
+    ds = pk.sweep(
+        DRIVEN, forcing_amplitude=amplitudes, of="basin_fractions", store=store, chunks=chunks,
+        **BOX,
+    )  # fmt: skip
+    assert ds.basin_fraction.sizes == {"forcing_amplitude": 3, "attractor": SLOTS}
+    assert ds.n_attractors.values.tolist() == [2, 2, 1]
+    assert ds.remaining_fraction.values.tolist() == [0.0, 0.0, 0.0]
+    middle = (2.0 * np.arange(SIDE) + 1.0) / SIDE - 1.0
+    for i, amplitude in enumerate(amplitudes):
+        system = DRIVEN.replace(forcing_amplitude=amplitude)
+        one = pk.basins(system, phi=np.pi * middle, dphi=2.0 * middle)
+        number = one.sizes["attractor"]
+        assert number == ds.n_attractors.values[i]
+        for name, whole in (("basin_fraction", ds.basin_fraction[i]),
+                            ("basin_fraction_error", ds.basin_fraction_error[i])):  # fmt: skip
+            assert whole.values[:number] == pytest.approx(one[name].values, abs=1e-12)
+            assert np.isnan(whole.values[number:]).all()
+        least = one.attractor_phi.min("crossing").values
+        assert ds.attractor_angle.values[i, :number] == pytest.approx(least, abs=1e-8)
+
+
+def test_cells_without_attractors():
+    ds = pk.sweep(DRIVEN, damping=[0.0, 0.4], of=["basin_fraction", "n_attractors"], **BOX)
+    assert ds.n_attractors.values.tolist() == [-1, 2]
+    assert np.isnan(ds.basin_fraction.values[0]).all()
+    assert np.nansum(ds.basin_fraction.values[1]) == pytest.approx(1.0)
+
+
+def test_more_attractors_than_there_is_place_for_are_counted():
+    row = pk.Perturbed(pk.Potential("1 - cos(x)", "x"), damping=0.5)
+    ds = pk.sweep(row, damping=[0.5], of="basin_fractions", box_phi=5.0 * np.pi, box_dphi=0.5)
+    assert ds.n_attractors.values.tolist() == [5]
+    wide = pk.sweep(row, damping=[0.5], of="basin_fractions", box_phi=11.0 * np.pi, box_dphi=0.5)
+    assert wide.n_attractors.values.tolist() == [11]
+    angles = wide.attractor_angle.values[0]
+    assert angles == pytest.approx(2.0 * np.pi * np.arange(-5, 3), abs=1e-8)
+    kept = wide.basin_fraction.values[0]
+    assert kept == pytest.approx(np.full(SLOTS, 1.0 / 11.0), abs=0.03)
+    assert wide.remaining_fraction.item() == pytest.approx(1.0 - kept.sum())
+    assert wide.remaining_fraction.item() > 0.2
+
+
+def test_the_numbers_of_attractors_do_not_depend_on_where_the_search_begins():
+    # Two of period one, and for a stronger drive orbits of a longer period.
+    duffing = pk.Perturbed(pk.Potential("x^4/4 - x^2/2", "x"), damping=0.3,
+                           forcing=pk.Harmonic(0.2, 1.0))  # fmt: skip
+    law = duffing.law
+    values = law.values(*duffing.parameters.values())
+    states = np.random.default_rng(5).uniform(-2.0, 2.0, (60, 2))
+    one = find(law, values, 2.0 * np.pi, states).result()
+    other = find(law, values, 2.0 * np.pi, states[::-1]).result()
+    assert len(one.attractor_phi) > 2
+    assert one.attractor_period.tolist() == other.attractor_period.tolist()
+    np.testing.assert_allclose(one.attractor_phi, other.attractor_phi, atol=1e-8)
+    np.testing.assert_allclose(one.attractor_multiplier, other.attractor_multiplier, rtol=1e-6)
