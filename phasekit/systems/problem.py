@@ -61,8 +61,7 @@ class Problem:
         Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
     map : bool, default False
-        Whether f is a map ``x -> f(x, **parameters)``: what is continued are its fixed points,
-        stable where all multipliers lie inside the unit circle.
+        Whether f is a map ``x -> f(x, **parameters)``, whose fixed points are continued.
 
     Raises
     ------
