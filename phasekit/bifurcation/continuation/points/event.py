@@ -29,6 +29,7 @@ FORETOLD = 0.02  # of its size: by how much a function may differ from the cubic
 DIP = 0.3  # part of its values at the ends to which a function falls that may touch zero
 SAME = 1e-9  # distance on scaled axes of two events that are one
 JUMP = 1e-3  # part of its values at the ends that a function keeps where it jumps
+SHARP = 1e-12  # part of its values around a zero that is left of a function there
 STILL = 3  # points in a row on which a function that vanishes has no zeros to speak of
 
 
@@ -190,7 +191,8 @@ class _Seek:
             best, inner, outer = bracket_root(curve, one, two, test, steps=60, width=1e-16)
             if self._jumps(best, inner, outer, turns):
                 continue
-            placed.append(self._placed(i, best, turns))
+            size = max(abs(test(one)), abs(test(two)))
+            placed.append(self._placed(i, best, turns, size=size))
         return placed
 
     def _around(
@@ -237,7 +239,11 @@ class _Seek:
         sign = np.sign(self._value(a, turns))
         if not sign * rate(a) < 0.0 < sign * rate(b):
             return None
-        return bracket_root(self.curve, a, b, rate, steps=60, width=1e-14)[0]
+        best = bracket_root(self.curve, a, b, rate, steps=60, width=1e-14)[0]
+        if abs(self._value(best, turns)) <= self._noise(best, turns):
+            return best
+        kink = self._bisected(a, b, lambda s: float(np.sign(rate(s))))
+        return min(best, kink, key=lambda s: sign * self._value(s, turns))
 
     def _jumps(self, best: Sample, a: Sample, b: Sample, turns: Array) -> bool:
         """Whether the sign changes without a zero, at a jump or a pole, which is said."""
@@ -278,7 +284,9 @@ class _Seek:
         k = min(i, self.path.count - 2)
         return self._placed(k, self._sample(i), self.cubics.turns(u))
 
-    def _placed(self, i: int, s: Sample, turns: Array, message: str = "") -> Placed:
+    def _placed(
+        self, i: int, s: Sample, turns: Array, message: str = "", size: float = 0.0
+    ) -> Placed:
         curve = self.curve
         n, m = curve.n, curve.m
         value = self._value(s, turns)
@@ -288,7 +296,8 @@ class _Seek:
         along = float(np.dot(curve.weight * chord, gap)) / square if square > 0.0 else 0.0
         ends = sorted((float(self.path.u[i, n]), float(self.path.u[i + 1, n])))
         residual = float(np.max(np.abs(curve.at(s.u)[0])))
-        sharp = self.event.condition or abs(value) <= 1e4 * self._noise(s, turns)
+        least = max(1e4 * self._noise(s, turns), SHARP * size)
+        sharp = self.event.condition or abs(value) <= least
         special = Special(
             "event", s.u[:m].copy(), (ends[0], ends[1]), max(abs(value), residual),
             CONVERGED if sharp else GUESS,
