@@ -103,7 +103,8 @@ class _Seek:
         s = np.linspace(0.0, 1.0, 33)[:, None]
         lowest = np.min(sign[:, 0] * cubic(s, ends, rates, width), axis=0)
         doubt = self._doubt(turns)[parts.step]
-        dip = inward & (lowest < DIP * np.min(np.abs(ends), axis=1) + doubt)
+        deepest = parts.high - parts.low <= 2.0**-DEPTH  # a kink, which is no cubic
+        dip = inward & ((lowest < DIP * np.min(np.abs(ends), axis=1) + doubt) | deepest)
         placed = []
         for k in np.flatnonzero(change | dip).tolist():
             i = int(parts.step[k])
