@@ -12,6 +12,7 @@ from phasekit.labels.arguments import bad
 
 FloatArray = npt.NDArray[np.float64]
 
+MOST = 1000  # times that a map is applied
 LONGEST = 5000  # operations of formulas that are put into one another
 
 
@@ -45,6 +46,8 @@ def iterated(
     ParameterError
         If formulas grow too long.
     """
+    if times > MOST:
+        raise bad("times", times, f"a whole number from 1 to {MOST}")
     if symbols is None:
         return Iterate(f, times), None if jac is None else IterateSlopes(f, jac, times)
     found = tuple(f)
