@@ -12,6 +12,8 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.points import curve_tests
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.perturbed_parts import RATES
 from phasekit.systems.registry import models
@@ -34,8 +36,11 @@ def registries(monkeypatch):
     known, rows, rates = dict(models()), dict(quantities.ROWS), dict(RATES)
     monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
     monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
+    kinds = dict(KINDS)
+    monkeypatch.setattr(curve_tests, "TESTS", list(curve_tests.TESTS))
     yield
-    for registry, before in ((MODELS, known), (quantities.ROWS, rows), (RATES, rates)):
+    every = ((MODELS, known), (quantities.ROWS, rows), (RATES, rates), (KINDS, kinds))
+    for registry, before in every:
         registry.clear()
         registry.update(before)
     plt.close("all")
@@ -58,6 +63,7 @@ def test_every_example_of_the_guide_is_run_here():
         "A new storage option",
         "A new picture",
         "Your own equations, with damping",
+        "A new special point",
     }
 
 
@@ -195,3 +201,13 @@ def test_damping_moves_no_fold_and_makes_centers_foci():
     center = names["damped"].derivatives([names["start"], 0.0])[1]
     np.testing.assert_allclose(np.linalg.eigvals(center).real, [-0.15, -0.15], rtol=1e-12)
     assert set(branch.points.n_unstable.values) == {0, 1}
+
+
+def test_a_special_point_is_a_kind_and_a_test_function():
+    names = run("A new special point")
+    point = names["point"]
+    assert (point.kind, point.status) == ("unit_frequency", "converged")
+    np.testing.assert_allclose([point["a"], point["b"]], [1.0, 2.0], atol=1e-14)
+    assert "UF" in [text.get_text() for text in names["ax"].texts]
+    with pytest.raises(ValueError, match="registered already"):
+        run("A new special point")

@@ -230,8 +230,9 @@ def attractors(
     Motions are followed until they repeat themselves; Newton's method then finds the fixed point
     of the q-th power of the Poincare map, q up to 16, and its multipliers, all of a modulus
     below 1, whether it attracts ([GuckenheimerHolmes1983] section 1.5). What has come to none after
-    4,300 periods, or more where damping is weak, counts as an attractor that does not repeat itself: chaotic, or a rotation in step
-    with nothing. An attractor to which none of the states comes is not found.
+    4,300 periods, or more where damping is weak, counts as an attractor that does not repeat
+    itself: chaotic, or a rotation in step with nothing. An attractor to which none of the states
+    comes is not found.
 
     Examples
     --------

@@ -21,7 +21,7 @@ from phasekit.plot.parts import style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.points import label_points
 from phasekit.plot.parts.smooth import smooth
-from phasekit.plot.parts.style import POINTS_OF
+from phasekit.plot.parts.style import look_of
 from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
@@ -160,7 +160,7 @@ def branch(
             marks.setdefault(special.kind, []).append(place)
     named: dict[tuple[float, float], str] = {}
     for kind, places in marks.items():
-        look = {**POINTS_OF[kind], "label": _key(kind, marks)}
+        look = {**look_of(kind), "label": _key(kind, marks)}
         label = KINDS[kind].label
         across, up = np.array(places).T
         if circle is not None:
@@ -309,4 +309,4 @@ def _key(kind: str, drawn: Collection[str]) -> str:
     """What the legend calls a kind: its label, and its name where another has that label too."""
     label = KINDS[kind].label
     alone = [KINDS[other].label for other in drawn].count(label) == 1
-    return label if alone else f"{label} {POINTS_OF[kind]['label']}"
+    return label if alone else f"{label} {look_of(kind)['label']}"

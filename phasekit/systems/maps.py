@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.labels.arguments import bad
+
 FloatArray = npt.NDArray[np.float64]
+
+MOST = 1000  # times that a map is applied
+LONGEST = 5000  # operations of formulas that are put into one another
 
 
 def moves_of(f: Callable[..., Any]) -> Callable[..., FloatArray]:
@@ -29,6 +34,29 @@ def slopes_of(jac: Callable[..., Any]) -> Callable[..., FloatArray]:
         return value.reshape(x.size, x.size) - np.eye(x.size)
 
     return slopes
+
+
+def iterated(
+    f: Any, jac: Any, symbols: Mapping[str, Any] | None, times: int
+) -> tuple[Any, Callable[..., FloatArray] | None]:
+    """A map applied so many times, and its derivatives: formulas of symbols, or code.
+
+    Raises
+    ------
+    ParameterError
+        If formulas grow too long.
+    """
+    if times > MOST:
+        raise bad("times", times, f"a whole number from 1 to {MOST}")
+    if symbols is None:
+        return Iterate(f, times), None if jac is None else IterateSlopes(f, jac, times)
+    found = tuple(f)
+    for _ in range(times - 1):
+        if sum(one.count_ops() for one in found) > LONGEST:
+            raise bad("times", times, "fewer times: the formulas grow too long")
+        at = dict(zip(symbols.values(), found, strict=True))
+        found = tuple(one.xreplace(at) for one in f)
+    return found, None
 
 
 class Iterate:

@@ -16,14 +16,19 @@ from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.as_system import as_system, stands_on
-from phasekit.systems.maps import Iterate, IterateSlopes
+from phasekit.systems.maps import iterated
 from phasekit.systems.perturbed_problem import formulas_of
-from phasekit.systems.problem_parts import clock_of, make_field, names_of, values_of
+from phasekit.systems.problem_parts import (
+    clock_of,
+    make_field,
+    names_of,
+    refuse_of_maps,
+    values_of,
+    written,
+)
 from phasekit.systems.system import MODELS, Model
 
 FloatArray = npt.NDArray[np.float64]
-
-LONGEST = 5000  # operations of formulas that are put into one another
 
 
 class Problem:
@@ -56,8 +61,7 @@ class Problem:
         Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
     map : bool, default False
-        Whether f is a map ``x -> f(x, **parameters)``: what is continued are its fixed points,
-        stable where all multipliers lie inside the unit circle.
+        Whether f is a map ``x -> f(x, **parameters)``, whose fixed points are continued.
 
     Raises
     ------
@@ -90,10 +94,6 @@ class Problem:
     ... )
     >>> duffing([0.0, 0.0], t=0.0).tolist(), round(duffing.replace(w=2.0).forcing_period, 9)
     ([0.0, 0.015], 3.141592654)
-    >>> logistic = Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
-    >>> branch = pk.continuation(logistic, "r", x0=[0.5], span=(2, 4))
-    >>> [(point.label, round(point["r"], 12)) for point in branch.special("PD")]
-    [('PD', 3.0)]
     >>> Problem.from_system(pk.Pendulum(length=0.5))
     Problem(phi' = -V'(phi) of Pendulum(length=0.5, g=9.80665))
     """
@@ -150,10 +150,7 @@ class Problem:
                 raise bad(f"periods[{name!r}]", value, "a number > 0")
         flag("conservative", conservative)
         flag("map", map)
-        for name, given in (("conservative", conservative or None), ("time", time),
-                            ("period", period)):  # fmt: skip
-            if map and given is not None:
-                raise bad(name, given, "nothing with map=True: a map has no time and no energy")
+        refuse_of_maps(map, conservative=conservative or None, time=time, period=period)
         if jac is not None and not callable(jac):
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
@@ -188,8 +185,7 @@ class Problem:
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
         arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
-        more = {"conservative": self.conservative, "time": self.time, "period": self.period}
-        more["map"] = self.map
+        more = {name: getattr(self, name) for name in ("conservative", "time", "period", "map")}
         return _made, (type(self), *arguments, more, self.system)
 
     @property
@@ -300,11 +296,6 @@ class Problem:
     def iterated(self, times: int) -> Problem:
         """The map applied so many times, whose fixed points are orbits of that period of this map.
 
-        Raises
-        ------
-        ParameterError
-            If it is no map, or its formulas would grow too long.
-
         Examples
         --------
         >>> logistic = Problem("r*x*(1 - x)", "x", {"r": 3.2}, map=True)
@@ -314,18 +305,8 @@ class Problem:
         times = whole("times", times, "a whole number >= 1")
         if not self.map:
             raise bad("problem", self, "a map, to be applied several times")
-        f: Any = self.f
-        jac: Any = None
-        if self.kind == "symbolic":
-            symbols = symbols_of(self.state)
-            for _ in range(times - 1):
-                if sum(one.count_ops() for one in f) > LONGEST:
-                    raise bad("times", times, "fewer times: the formulas grow too long")
-                at = {symbols[s]: e for s, e in zip(self.state, f, strict=True)}
-                f = tuple(one.xreplace(at) for one in self.f)
-        else:
-            f = Iterate(self.f, times)
-            jac = None if self.jac is None else IterateSlopes(self.f, self.jac, times)
+        symbols = symbols_of(self.state) if self.kind == "symbolic" else None
+        f, jac = iterated(self.f, self.jac, symbols, times)
         return Problem(f, self.state, self.parameters, jac, periods=self.periods, map=True)
 
     @property
@@ -411,25 +392,7 @@ class Problem:
 
     def __repr__(self) -> str:
         """Write the equations, if they are formulas, and the parameters."""
-        if self.system is not None:
-            x = self.state[0]
-            return f"Problem({x}' = -V'({x}) of {self.system!r})"
-        arrow = " -> " if self.map else "' = "
-        if self.kind == "symbolic":
-            equations = ", ".join(
-                f"{name}{arrow}{formula}" for name, formula in zip(self.state, self.f, strict=True)
-            )
-            if len(equations) > 200:
-                equations = equations[:200] + " ..."
-        else:
-            name = getattr(self.f, "__name__", "f")
-            equations = f"({', '.join(self.state)}){arrow}{name}(x, **parameters), {self.kind}"
-        notes = [f"{name}={value!r}" for name, value in self.parameters.items()]
-        notes += [f"{name} modulo {value:.6g}" for name, value in self.periods.items()]
-        if self.time is not None:
-            notes.append(f"{self.time} modulo {self.period}")
-        notes += ["conservative"] * self.conservative
-        return f"Problem({equations}{'; ' if notes else ''}{', '.join(notes)})"
+        return f"Problem({written(self)})"
 
 
 def _made(

@@ -81,6 +81,13 @@ def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str,
     return formula
 
 
+def refuse_of_maps(discrete: bool, **given: Any) -> None:
+    """Refuse what makes no sense of a map."""
+    for name, value in given.items():
+        if discrete and value is not None:
+            raise bad(name, value, "nothing with map=True: a map has no time and no energy")
+
+
 def expressions_of(
     given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str]
 ) -> list[Any]:
@@ -162,3 +169,27 @@ def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
             f"{argument}: got a function with the arguments {signature}, wants one to be called "
             f"as {argument}(x, {', '.join(f'{n}=...' for n in names)}): {error}"
         ) from None
+
+
+def written(problem: Any) -> str:
+    """The equations of a problem, if they are formulas, and its parameters."""
+    if problem.system is not None:
+        x = problem.state[0]
+        return f"{x}' = -V'({x}) of {problem.system!r}"
+    arrow = " -> " if problem.map else "' = "
+    if problem.kind == "symbolic":
+        equations = ", ".join(
+            f"{name}{arrow}{formula}"
+            for name, formula in zip(problem.state, problem.f, strict=True)
+        )
+        if len(equations) > 200:
+            equations = equations[:200] + " ..."
+    else:
+        name = getattr(problem.f, "__name__", "f")
+        equations = f"({', '.join(problem.state)}){arrow}{name}(x, **parameters), {problem.kind}"
+    notes = [f"{name}={value!r}" for name, value in problem.parameters.items()]
+    notes += [f"{name} modulo {value:.6g}" for name, value in problem.periods.items()]
+    if problem.time is not None:
+        notes.append(f"{problem.time} modulo {problem.period}")
+    notes += ["conservative"] * problem.conservative
+    return f"{equations}{'; ' if notes else ''}{', '.join(notes)}"

@@ -74,6 +74,20 @@ def test_events_at_a_fold_and_double_zeros():
     assert [s.kind for s in branch.special_points].count("fold") == 2
 
 
+def test_zeros_where_unknowns_vanish_and_at_kinks():
+    problem = pk.Problem("mu - x**2", "x", {"mu": 1.0})
+    events = {"third": "x**3", "wave": "sin(4*x)", "kink": "Abs(x - 0.2)", "begin": "mu - 1"}
+    branch = pk.continuation(problem, "mu", x0=[1.0], span=(-1, 1.4), events=events)
+    found = {name: branch.special(name) for name in events}
+    assert [len(points) for points in found.values()] == [1, 3, 1, 2]
+    assert {s.status for points in found.values() for s in points} == {"converged"}
+    assert abs(found["third"][0].x.item()) < 1e-5
+    wave = np.array([s.x.item() for s in found["wave"]])
+    np.testing.assert_allclose(np.sort(wave), np.array([-1, 0, 1]) * np.pi / 4, atol=1e-15)
+    assert abs(found["kink"][0].x.item() - 0.2) < 1e-15
+    np.testing.assert_allclose(np.sort([s.x.item() for s in found["begin"]]), [-1, 1], atol=1e-15)
+
+
 def test_what_is_no_zero_is_said_or_left_out():
     branch = traced({"pole": "1/(x - 0.77)", "near": "(x - 0.2)**2 + 1e-7", "all": "x**3 - x - mu"})
     assert branch.special("UZ") == ()

@@ -201,6 +201,10 @@ def trajectory() -> Any:
 
 
 @functools.cache
+def map_() -> Any:
+    return pk.Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
+
+
 def problem() -> Any:
     return pk.Problem("r + x**2 - 0.1*x**4", ("x",), {"r": -0.5})
 
@@ -435,6 +439,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Problem.from_potential": {"parameters": dict},
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
+    "Problem.iterated": {"times": lambda: 2},
     "SpecialPoint.curve": {"parameter": lambda: "r"},
     "Branch.save": {"path": lambda: "branch.zarr"},
     "FreeGyroRotor.poincare": {"section": lambda: 0.5},
@@ -516,6 +521,8 @@ def callables() -> dict[str, Callable[..., Any]]:
             plain = inspect.isfunction(static) or isinstance(static, (classmethod, staticmethod))
             if plain and not method.startswith("_") and method not in MACHINERY:
                 found[f"{name}.{method}"] = functools.partial(_call, make, method)
+        if method_of_maps := found.get(f"{name}.iterated"):
+            found[f"{name}.iterated"] = functools.partial(_call, map_, *method_of_maps.args[1:])
         if "__call__" in vars(owner):
             found[f"{name}.__call__"] = functools.partial(_call, make, "__call__")
     return found

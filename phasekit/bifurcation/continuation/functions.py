@@ -63,7 +63,7 @@ class Formula:
     def noise(self, curve: Unknowns, u: Array) -> Array:
         """Sizes up to which a value is but rounding: of its terms, and of the unknowns."""
         found = np.abs(self._jet(curve, u))
-        reach = np.abs(u[:, : curve.m]) + EPSILON * curve.scale[: curve.m]
+        reach = np.maximum(np.abs(u[:, : curve.m]), curve.scale[: curve.m])
         return np.asarray(EPSILON * (16.0 * found[:, 1] + 4.0 * np.sum(found[:, 2:] * reach, 1)))
 
     def bounds(self, curve: Unknowns) -> Callable[[Array, Array], Array] | None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import Curve, Track, nullspace
+from phasekit.bifurcation.continuation.curve import Curve, Track
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.ending import followed
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
+from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
 
 Array = npt.NDArray[np.float64]

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, FOLD, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.placed import Placed, unique
+from phasekit.bifurcation.continuation.points.curve_test import CurveTest
+from phasekit.bifurcation.continuation.points.curve_tests import tests_of
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
     Special,
     extended,
 )
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
 from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
@@ -67,24 +64,12 @@ def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curv
     return made, Sample(point.u, t, point.slopes[:, :m])
 
 
-@dataclass(frozen=True)
-class _Test:
-    """A test function of points of a curve (arrays of them), and the kind of its zeros."""
-
-    kind: str
-    values: Callable[[Array, Array], Array]
-
-    def value(self, s: Sample) -> float:
-        """The test function at one point."""
-        return float(self.values(s.u[None], s.slopes[None])[0])
-
-
 def find_on(curve: Curve, path: Path) -> list[Placed]:
     """Cusp, Bogdanov-Takens, zero-Hopf, generalized Hopf and double Hopf points of a curve."""
     found: list[Placed] = []
     m = curve.m
-    for test in _tests(curve):
-        values = test.values(path.u, path.slopes[:])
+    for test in tests_of(curve):
+        values = test.values(curve, path.u, path.slopes[:])
         for i in _interesting(values):
             for a, b in _changes(curve, path, values, i, test):
                 special = _locate(curve, a, b, test)
@@ -109,7 +94,7 @@ def _interesting(values: Array) -> list[int]:
 
 
 def _changes(
-    curve: Curve, path: Path, values: Array, i: int, test: _Test
+    curve: Curve, path: Path, values: Array, i: int, test: CurveTest
 ) -> list[tuple[Sample, Sample]]:
     """Where a test function changes its sign from one point to the next, or dips to it between."""
     a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
@@ -119,7 +104,7 @@ def _changes(
 
     def height(s: float) -> float:
         sample = between(curve, a, b, s)
-        return np.inf if sample is None else sign * test.value(sample)
+        return np.inf if sample is None else sign * test.value(curve, sample)
 
     # Golden section, to where the sign is another or the function is lowest.
     low, high = 0.0, 1.0
@@ -141,132 +126,16 @@ def _changes(
     return []
 
 
-def _left(curve: Curve, u: Array, slopes: Array) -> tuple[Array, Array]:
-    """Left and right null vectors of f_x at points of a fold curve; both move smoothly along it.
+def _locate(curve: Curve, a: Sample, b: Sample, test: CurveTest) -> Special | None:
+    n = curve.n
 
-    The adjugate of f_x is smooth and a multiple of v p; so p is the adjugate's transpose on v.
-    """
-    n, m = curve.n, curve.m
-    scale = curve.scale[:n]
-    v = u[:, m : m + n] / scale
-    scaled = slopes[:, :, :n] * scale
-    rows = np.max(np.abs(slopes * curve.scale[:m]), axis=2)
-    # Each row by the same number at all points, so that nothing jumps.
-    rows = np.max(rows, axis=0)
-    scaled = scaled / np.where(rows > 0.0, rows, 1.0)[:, None]
-    return np.einsum("kij,ki->kj", _adjugate(scaled), v) / np.where(rows > 0.0, rows, 1.0), v
+    def at(s: Sample) -> float:
+        return test.value(curve, s)
 
-
-def _adjugate(matrix: Array) -> Array:
-    """Adjugates of singular matrices."""
-    n = matrix.shape[-1]
-    if n == 1:
-        return np.ones_like(matrix)
-    if n == 2:
-        a, b, c, d = (matrix[:, i, j] for i in (0, 1) for j in (0, 1))
-        return np.stack([np.stack([d, -b], -1), np.stack([-c, a], -1)], -2)
-    left, values, right = np.linalg.svd(matrix)
-    sign = np.linalg.det(left) * np.linalg.det(right)
-    size = np.exp(np.mean(np.log(np.maximum(values[:, :-1], 1e-300)), axis=1))
-    return np.asarray((sign * size)[:, None, None] * right[:, -1, :, None] * left[:, None, :, -1])
-
-
-def _tests(curve: Curve) -> list[_Test]:
-    n, m = curve.n, curve.m
-    if curve.kind == FOLD:
-        tests = [_Test("cusp", lambda u, slopes: _cusp(curve, u, slopes))]
-        if curve.discrete:  # what f(x) - x has besides is no point of the map
-            return tests
-        if n > 1:
-            tests.append(_Test("bogdanov_takens", lambda u, slopes: _zero(curve, u, slopes)))
-        if n > 2:
-            tests.append(_Test("zero_hopf", lambda u, slopes: _rest(slopes)))
-        return tests
-    if curve.kind == HOPF:
-        tests = [
-            _Test("bogdanov_takens", lambda u, slopes: u[:, m + n]),
-            _Test("generalized_hopf", lambda u, slopes: _lyapunov(curve, u, slopes)),
-        ]
-        if n > 2:
-            tests.append(_Test("zero_hopf", lambda u, slopes: np.linalg.det(slopes[:, :, :n])))
-        if n > 3:
-            tests.append(_Test("hopf_hopf", lambda u, slopes: _others(curve, u, slopes)))
-        return tests
-    return []
-
-
-def _cusp(curve: Curve, u: Array, slopes: Array) -> Array:
-    n, m = curve.n, curve.m
-    p, _ = _left(curve, u, slopes)
-    v = u[:, m : m + n]
-    z = np.zeros((len(u), m))
-    z[:, :n] = v
-    bent = curve.bend_all(u, z)[:, :, :n]
-    return np.asarray(np.einsum("ki,kij,kj->k", p, bent, v))
-
-
-def _zero(curve: Curve, u: Array, slopes: Array) -> Array:
-    p, v = _left(curve, u, slopes)
-    return np.asarray(np.sum(p * v * curve.scale[: curve.n], axis=1))
-
-
-def _rest(slopes: Array) -> Array:
-    """The pair function of all eigenvalues but the one that is zero."""
-    values = eigenvalues_of(slopes)
-    place = np.argmin(np.abs(values), axis=1)
-    keep = np.arange(values.shape[1]) != place[:, None]
-    return pair_function(values[keep].reshape(len(values), -1))
-
-
-def _without_pair(curve: Curve, u: Array, slopes: Array) -> npt.NDArray[np.complex128]:
-    """All eigenvalues, on scaled axes, but the pair of the Hopf point, at each point."""
-    n, m = curve.n, curve.m
-    scale = curve.scale[:n]
-    values = eigenvalues_of(slopes[:, :, :n] * scale / scale[:, None])
-    root = np.sqrt(u[:, m + n].astype(complex))[:, None]  # i omega, or r of r and -r
-    for one in (1j * root, -1j * root):
-        place = np.argmin(np.abs(values - one), axis=1)
-        keep = np.arange(values.shape[1]) != place[:, None]
-        values = values[keep].reshape(len(values), -1)
-    return values
-
-
-def _others(curve: Curve, u: Array, slopes: Array) -> Array:
-    """The pair function of all eigenvalues but the pair of the Hopf point."""
-    return pair_function(_without_pair(curve, u, slopes))
-
-
-def _other_pair(curve: Curve, s: Sample) -> bool:
-    """Whether the two others whose sum vanishes are conjugate."""
-    values = _without_pair(curve, s.u[None], s.slopes[None])[0]
-    above = values[values.imag > 0.0]
-    least = np.min(np.abs(2.0 * above.real), initial=np.inf)
-    return bool(least <= abs(float(pair_function(values))) * (1.0 + 1e-9))
-
-
-def _lyapunov(curve: Curve, u: Array, slopes: Array) -> Array:
-    n, m = curve.n, curve.m
-    size = np.max(np.abs(slopes[:, :, :n]), axis=(1, 2))
-    found = np.full(len(u), np.nan)
-    for i in np.flatnonzero(u[:, m + n] > 1e-8 * np.maximum(1e-300, size**2)):
-        d = forms.Derivatives(curve, u[i])
-        found[i] = forms.hopf(d, float(np.sqrt(u[i, m + n])))["l1"]
-    return found
-
-
-def _locate(curve: Curve, a: Sample, b: Sample, test: _Test) -> Special | None:
-    n, m = curve.n, curve.m
-    best, _, _ = bracket_root(curve, a, b, test.value, steps=60, width=1e-15)
-    value = abs(test.value(best))
-    size = max(abs(test.value(a)), abs(test.value(b)))
-    if test.kind == "zero_hopf" and curve.kind == FOLD:
-        rest = eigenvalues_of(best.slopes)
-        rest = np.delete(rest, np.argmin(np.abs(rest)))
-        if not np.any(rest.imag != 0.0):
-            return None  # two real eigenvalues: a neutral saddle with a zero eigenvalue
-    if test.kind == "zero_hopf" and curve.kind == HOPF and not best.u[m + n] > 0.0:
-        return None
-    if test.kind == "hopf_hopf" and not (best.u[m + n] > 0.0 and _other_pair(curve, best)):
+    best, _, _ = bracket_root(curve, a, b, at, steps=60, width=1e-15)
+    value = abs(at(best))
+    size = max(abs(at(a)), abs(at(b)))
+    if not test.holds(curve, best):
         return None
     # A test function that jumps instead of passing zero is no point.
     if not value <= 1e-3 * size:
@@ -277,7 +146,7 @@ def _locate(curve: Curve, a: Sample, b: Sample, test: _Test) -> Special | None:
     return Special(
         test.kind, best.u[: curve.m], ends, residual, CONVERGED if sharp else GUESS,
         "" if sharp else "the test function was not brought to zero", tangent=best.tangent,
-        extra=best.u[m:],
+        extra=best.u[curve.m :],
     )  # fmt: skip
 
 

@@ -32,3 +32,13 @@ def force_sizes(curve: Curve, u: Array) -> Array:
 def accuracy_of(curve: Curve) -> float:
     """Relative accuracy of the derivatives of f, by differences where f comes alone."""
     return max(curve.field.accuracy, 1e-11 if curve.field.mode == PLAIN else 0.0)
+
+
+def nullspace(slopes: Array, scale: Array, *, tolerance: float = 1e-9) -> Array:
+    """Unit tangents (rows, on the scaled axes) of the kernel of f_u, least singular value last."""
+    scaled = slopes * scale
+    rows = np.max(np.abs(scaled), axis=1, keepdims=True)
+    _, values, vectors = np.linalg.svd(scaled / np.where(rows > 0.0, rows, 1.0))
+    n = slopes.shape[0]
+    rank = int(np.sum(values > tolerance * max(1e-300, values[0]))) if n else 0
+    return np.asarray(vectors[rank:] * scale)

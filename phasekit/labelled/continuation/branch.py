@@ -64,8 +64,8 @@ class Branch:
         equilibrium, fold, hopf or branch_point.
     parameter : str
         The free parameter; ``free`` holds all of them.
-    problem : Problem or None
-        None after loading a branch of a Python function without giving it.
+    problem : Problem
+        What was followed.
 
     Notes
     -----
@@ -99,10 +99,10 @@ class Branch:
     True
     """
 
-    problem: Problem | None
+    problem: Problem
     free: tuple[str, ...]
     problem_state: tuple[str, ...]
-    curve: Curve | None
+    curve: Curve
     start: Sample
     tracks: tuple[Track | None, Track | None]
     _points: xr.Dataset
@@ -182,7 +182,7 @@ class Branch:
             If there is no such label, kind or event.
         """
         labels = dict.fromkeys(kind.label for kind in SPECIAL.values())
-        events = [] if self.curve is None else [event.name for event in self.curve.events]
+        events = [event.name for event in getattr(self.curve, "events", ())]
         if not isinstance(label, str) or label not in {*SPECIAL, *labels, *events}:
             raise bad("label", label, f"one of {', '.join([*labels, *events])}")
         return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
@@ -221,7 +221,7 @@ class Branch:
         Raises
         ------
         ParameterError
-            If no end can be extended, or the problem is not known.
+            If no end can be extended.
         """
         curve, problem = self.known()
         if all(track is None or track.stop.reason != "max_points" for track in self.tracks):
@@ -235,15 +235,10 @@ class Branch:
         return make_branch(problem, curve, self.start, backward, forward, self.record)
 
     def _discrete(self) -> bool:
-        return self.problem is not None and self.problem.map
+        return self.problem.map
 
     def known(self) -> tuple[Curve, Problem]:
-        """The curve and the problem, or the error that they are not known."""
-        if self.curve is None or self.problem is None:
-            raise ParameterError(
-                "problem: the branch was loaded without its problem, which is Python code; "
-                "use Branch.load(path, problem=...)"
-            )
+        """The curve and the problem."""
         return self.curve, self.problem
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:

@@ -76,7 +76,7 @@ class CycleBranch(Branch):
     True
     """
 
-    curve: Cycles | None  # type: ignore[assignment]
+    curve: Cycles  # type: ignore[assignment]
     start: Point  # type: ignore[assignment]
     tracks: Tracks  # type: ignore[assignment]
     path: tuple[Point, ...] = ()
@@ -109,12 +109,7 @@ class CycleBranch(Branch):
         return orbit_dataset(problem, cycles, self.path[at], label)
 
     def known(self) -> tuple[Cycles, Problem]:  # type: ignore[override]
-        """The family and the problem, or the error that they are not known."""
-        if self.curve is None or self.problem is None:
-            raise ParameterError(
-                "problem: the branch was loaded without its problem, which is Python code; "
-                "use Branch.load(path, problem=...)"
-            )
+        """The family and the problem."""
         return self.curve, self.problem
 
     def to_dataset(self) -> xr.Dataset:

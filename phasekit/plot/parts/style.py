@@ -83,18 +83,21 @@ BRANCHES: Mapping[EquilibriumKind, Look] = {
     },
 }
 
-#: Special points, by kind: as the registry has them.
-POINTS_OF: Mapping[str, Look] = {
-    kind.name: {
+
+def look_of(name: str) -> Look:
+    """The look of a kind of special point, as the registry has it."""
+    kind = KINDS[name]
+    return {
         "marker": kind.marker,
         "markersize": kind.size,
         "markerfacecolor": PALETTE.get(kind.face, kind.face),
         "markeredgecolor": BLACK,
         "label": kind.name.replace("_", " "),
     }
-    for kind in KINDS.values()
-    if kind.marker
-}
+
+
+#: Special points of phasekit, by kind.
+POINTS_OF: Mapping[str, Look] = {name: look_of(name) for name in KINDS if KINDS[name].marker}
 
 # Points where equilibria meet.
 MERGERS: Mapping[str, Look] = {

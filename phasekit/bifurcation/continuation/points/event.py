@@ -9,12 +9,11 @@ curve itself.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.cubics import Cubics, Parts, cubic
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.functions import Event
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
@@ -30,28 +29,8 @@ FORETOLD = 0.02  # of its size: by how much a function may differ from the cubic
 DIP = 0.3  # part of its values at the ends to which a function falls that may touch zero
 SAME = 1e-9  # distance on scaled axes of two events that are one
 JUMP = 1e-3  # part of its values at the ends that a function keeps where it jumps
+SHARP = 1e-12  # part of its values around a zero that is left of a function there
 STILL = 3  # points in a row on which a function that vanishes has no zeros to speak of
-
-
-@dataclass(frozen=True)
-class Parts:
-    """Parts of the steps of a path, in order: which step, from where to where in it."""
-
-    step: npt.NDArray[np.int64]
-    low: Array
-    high: Array
-
-    def take(self, places: Any) -> Parts:
-        """Some of them."""
-        return Parts(self.step[places], self.low[places], self.high[places])
-
-    def halved(self) -> Parts:
-        """Both halves of each."""
-        middle = 0.5 * (self.low + self.high)
-        return Parts(
-            np.repeat(self.step, 2), np.stack([self.low, middle], 1).ravel(),
-            np.stack([middle, self.high], 1).ravel(),
-        )  # fmt: skip
 
 
 def events_of(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
@@ -59,50 +38,36 @@ def events_of(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
     found: list[Placed] = []
     messages: list[str] = []
     with np.errstate(all="ignore"):
-        off = _off(curve, path)
+        cubics = Cubics(curve, path)
         for event in curve.events:
-            seek = _Seek(curve, path, event, off)
+            seek = _Seek(cubics, event)
             found += seek.found()
             messages += seek.messages
     return sorted(found, key=lambda one: (one.index, one.along)), tuple(messages)
 
 
-def _off(curve: Curve, path: Path) -> Array:
-    """By how much the middle of each step lies off the cubic through its ends."""
-    found = np.zeros((max(path.count - 1, 0), curve.m))
-    for i in range(path.count - 1):
-        a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in (i, i + 1))
-        middle = between(curve, a, b, 0.5)
-        if middle is not None:
-            chord = b.u - a.u
-            ta, tb = (s.tangent / curve.length(s.tangent) for s in (a, b))
-            cubic = a.u + 0.5 * chord + 0.125 * curve.length(chord) * (ta - tb)
-            found[i] = (middle.u - cubic)[: curve.m]
-    return found
-
-
 class _Seek:
     """The search for the zeros of one function."""
 
-    def __init__(self, curve: Curve, path: Path, event: Event, off: Array | None = None) -> None:
-        self.curve, self.path, self.event = curve, path, event
+    def __init__(self, cubics: Cubics, event: Event) -> None:
+        self.cubics, self.curve, self.path, self.event = cubics, cubics.curve, cubics.path, event
         self.of = event.function
         self.messages: list[str] = []
-        m = curve.m
-        lengths = np.sqrt(np.sum(path.tangent**2 * curve.weight, axis=1))
-        self.u, self.t = path.u[:, :m], path.tangent[:, :m] / lengths[:, None]
-        self.length = np.sqrt(np.sum(np.diff(path.u, axis=0) ** 2 * curve.weight, axis=1))
-        self.off = np.zeros((path.count - 1, m)) if off is None else off
+        self.still = np.zeros(self.path.count, dtype=bool)
+        self.u, self.length = cubics.u, cubics.length
 
     def found(self) -> list[Placed]:
         """Each zero once; angles count as they are shown, in one turn."""
         if self.path.count < 2:
             return []
-        at = self.of.values(self.curve, self._turned(self.u, self._turns(self.u)))
-        zero = np.abs(at) <= self.of.noise(self.curve, self._turned(self.u, self._turns(self.u)))
+        shown = self.cubics.turned(self.u, self.cubics.turns(self.u))
+        at = self.of.values(self.curve, shown)
+        zero = np.abs(at) <= self.of.noise(
+            self.curve, self.cubics.turned(self.u, self.cubics.turns(self.u))
+        )
         zero = self._without_runs(zero)
         placed = [self._at_point(i) for i in np.flatnonzero(zero).tolist()]
-        turns = self._turns(self.u)
+        turns = self.cubics.turns(self.u)
         steps = np.arange(self.path.count - 1)
         placed += self._between(steps, turns[:-1])
         other = np.flatnonzero(np.any(turns[1:] != turns[:-1], axis=1))
@@ -110,22 +75,11 @@ class _Seek:
             placed += self._between(other, turns[1:])
         return self._once(placed)
 
-    def _turns(self, u: Array) -> Array:
-        """What brings angles to the turn in which they are shown."""
-        period = self.curve.period[: self.curve.m]
-        with np.errstate(all="ignore"):
-            turns = np.where(period > 0.0, np.ceil(u / period - 0.5), 0.0)
-        return np.asarray(turns)
-
-    def _turned(self, u: Array, turns: Array) -> Array:
-        return np.asarray(u - self.curve.period[: self.curve.m] * turns)
-
     def _without_runs(self, zero: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Leave out stretches on which the function vanishes throughout, and say so."""
         ends = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]]).astype(int)))
         single = zero.copy()
         n = self.curve.n
-        self.still = np.zeros(len(zero), dtype=bool)
         for first, after in ends.reshape(-1, 2).tolist():
             if after - first >= STILL:
                 single[first:after] = False
@@ -147,9 +101,10 @@ class _Seek:
         # The least value of the cubic between both ends, where it falls towards its middle.
         inward = (ends[:, 0] * rates[:, 0] < 0.0) & (ends[:, 1] * rates[:, 1] > 0.0) & ~change
         s = np.linspace(0.0, 1.0, 33)[:, None]
-        lowest = np.min(sign[:, 0] * _cubic(s, ends, rates, width), axis=0)
+        lowest = np.min(sign[:, 0] * cubic(s, ends, rates, width), axis=0)
         doubt = self._doubt(turns)[parts.step]
-        dip = inward & (lowest < DIP * np.min(np.abs(ends), axis=1) + doubt)
+        deepest = parts.high - parts.low <= 2.0**-DEPTH  # a kink, which is no cubic
+        dip = inward & ((lowest < DIP * np.min(np.abs(ends), axis=1) + doubt) | deepest)
         placed = []
         for k in np.flatnonzero(change | dip).tolist():
             i = int(parts.step[k])
@@ -161,10 +116,12 @@ class _Seek:
     def _doubt(self, turns: Array) -> Array:
         """What a function changes by from the cubic of each step to the curve, half of it."""
         steps = np.arange(self.path.count - 1)
-        u, _ = self._hermite(steps, np.full(len(steps), 0.5))
-        ends = [self.of.values(self.curve, self._turned(u - part * self.off, turns[: len(u)]))
-                for part in (0.0, 1.0)]  # fmt: skip
-        return np.asarray(0.5 * np.nan_to_num(np.abs(ends[0] - ends[1])))
+        u, _ = self.cubics.at(steps, np.full(len(steps), 0.5))
+        on, off = (
+            self.of.values(self.curve, self.cubics.turned(one, turns))
+            for one in (u, u - self.cubics.off)
+        )
+        return np.asarray(0.5 * np.nan_to_num(np.abs(on - off)))
 
     def _looked_at(self, steps: npt.NDArray[np.int64], turns: Array) -> tuple[Parts, Array, Array]:
         """Parts of the steps between which the function is as a cubic; values and rates there."""
@@ -176,10 +133,10 @@ class _Seek:
             width = (parts.high - parts.low) * self.length[parts.step]
             at = self._middles(parts, turns)
             size = np.max(np.abs(np.column_stack([ends, at])), axis=1)
-            off = np.abs(at - _cubic(0.5, ends, rates, width))
+            off = np.abs(at - cubic(0.5, ends, rates, width))
             split = ~(off <= FORETOLD * size)
             if excluded is not None:
-                split |= excluded(*self._hull(parts, turns))
+                split |= excluded(*self.cubics.hull(parts, turns))
             if level < LEAST:
                 split[:] = True
             if level == DEPTH or len(parts.step) > MOST:
@@ -198,41 +155,16 @@ class _Seek:
         """Values at both ends of each part, and their rates by the length along the step."""
         values, rates = [], []
         for s in (parts.low, parts.high):
-            u, along = self._hermite(parts.step, s)
-            u = self._turned(u, turns[parts.step])
+            u, along = self.cubics.at(parts.step, s)
+            u = self.cubics.turned(u, turns[parts.step])
             values.append(self.of.values(self.curve, u))
             rates.append(self.of.rates(self.curve, u, along))
         return np.stack(values, axis=1), np.stack(rates, axis=1)
 
     def _middles(self, parts: Parts, turns: Array) -> Array:
         """Values in the middle of each part."""
-        u, _ = self._hermite(parts.step, 0.5 * (parts.low + parts.high))
-        return self.of.values(self.curve, self._turned(u, turns[parts.step]))
-
-    def _hermite(self, i: npt.NDArray[np.int64], s: Array) -> tuple[Array, Array]:
-        """Points on the cubics of steps, and their derivatives by length."""
-        h, s = self.length[i][:, None], s[:, None]
-        a, b, ta, tb = self.u[i], self.u[i + 1], h * self.t[i], h * self.t[i + 1]
-        u = a + s * s * (3.0 - 2.0 * s) * (b - a) + s * (1.0 - s) * ((1.0 - s) * ta - s * tb)
-        rate = 6.0 * s * (1.0 - s) * (b - a) + (1.0 - s) * (1.0 - 3.0 * s) * ta
-        rate = rate + s * (3.0 * s - 2.0) * tb
-        u = u + 16.0 * (s * (1.0 - s)) ** 2 * self.off[i]
-        rate = rate + 32.0 * s * (1.0 - s) * (1.0 - 2.0 * s) * self.off[i]
-        with np.errstate(all="ignore"):
-            rate = np.where(h > 0.0, rate / h, 0.0)
-        ends = (s == 0.0, s == 1.0)  # to the last bit
-        u = np.where(ends[0], a, np.where(ends[1], b, u))
-        return np.asarray(u), np.asarray(rate)
-
-    def _hull(self, parts: Parts, turns: Array) -> tuple[Array, Array]:
-        """Boxes around parts of the cubics: around the control points of Bezier's form."""
-        width = (parts.high - parts.low)[:, None] * self.length[parts.step][:, None]
-        (a, ta), (b, tb) = (self._hermite(parts.step, s) for s in (parts.low, parts.high))
-        corners = np.stack([a, a + width * ta / 3.0, b - width * tb / 3.0, b])
-        around = np.abs(self.off[parts.step])  # of what is no cubic
-        shift = self.curve.period[: self.curve.m] * turns[parts.step]
-        low, high = np.min(corners, axis=0), np.max(corners, axis=0)
-        return low - shift - around, high - shift + around
+        u, _ = self.cubics.at(parts.step, 0.5 * (parts.low + parts.high))
+        return self.of.values(self.curve, self.cubics.turned(u, turns[parts.step]))
 
     def _refined(self, i: int, part: tuple[float, float], turns: Array) -> list[Placed]:
         """The zeros in a part of a step, on the curve itself."""
@@ -260,7 +192,8 @@ class _Seek:
             best, inner, outer = bracket_root(curve, one, two, test, steps=60, width=1e-16)
             if self._jumps(best, inner, outer, turns):
                 continue
-            placed.append(self._placed(i, best, turns))
+            size = max(abs(test(one)), abs(test(two)))
+            placed.append(self._placed(i, best, turns, size=size))
         return placed
 
     def _around(
@@ -300,14 +233,18 @@ class _Seek:
         """Where the function has its least size between two points, by the sign of its rate."""
 
         def rate(s: Sample) -> float:
-            u = self._turned(s.u[None, : self.curve.m], turns)
+            u = self.cubics.turned(s.u[None, : self.curve.m], turns)
             t = s.tangent[None] / self.curve.length(s.tangent)
             return float(self.of.rates(self.curve, u, t)[0])
 
         sign = np.sign(self._value(a, turns))
         if not sign * rate(a) < 0.0 < sign * rate(b):
             return None
-        return bracket_root(self.curve, a, b, rate, steps=60, width=1e-14)[0]
+        best = bracket_root(self.curve, a, b, rate, steps=60, width=1e-14)[0]
+        if abs(self._value(best, turns)) <= self._noise(best, turns):
+            return best
+        kink = self._bisected(a, b, lambda s: float(np.sign(rate(s))))
+        return min(best, kink, key=lambda s: sign * self._value(s, turns))
 
     def _jumps(self, best: Sample, a: Sample, b: Sample, turns: Array) -> bool:
         """Whether the sign changes without a zero, at a jump or a pole, which is said."""
@@ -325,7 +262,9 @@ class _Seek:
     @property
     def _size(self) -> float:
         """The median size of the function at the points of the path."""
-        values = np.abs(self.of.values(self.curve, self._turned(self.u, self._turns(self.u))))
+        values = np.abs(
+            self.of.values(self.curve, self.cubics.turned(self.u, self.cubics.turns(self.u)))
+        )
         values = values[np.isfinite(values)]
         return float(np.median(values)) if len(values) else 0.0
 
@@ -333,20 +272,22 @@ class _Seek:
         return Sample(self.path.u[i], self.path.tangent[i], self.path.slopes[i])
 
     def _value(self, s: Sample, turns: Array) -> float:
-        u = self._turned(s.u[None, : self.curve.m], turns)
+        u = self.cubics.turned(s.u[None, : self.curve.m], turns)
         return float(self.of.values(self.curve, u)[0])
 
     def _noise(self, s: Sample, turns: Array) -> float:
-        u = self._turned(s.u[None, : self.curve.m], turns)
+        u = self.cubics.turned(s.u[None, : self.curve.m], turns)
         return float(self.of.noise(self.curve, u)[0])
 
     def _at_point(self, i: int) -> Placed:
         """A zero at a point of the path itself."""
         u = self.u[i]
         k = min(i, self.path.count - 2)
-        return self._placed(k, self._sample(i), self._turns(u))
+        return self._placed(k, self._sample(i), self.cubics.turns(u))
 
-    def _placed(self, i: int, s: Sample, turns: Array, message: str = "") -> Placed:
+    def _placed(
+        self, i: int, s: Sample, turns: Array, message: str = "", size: float = 0.0
+    ) -> Placed:
         curve = self.curve
         n, m = curve.n, curve.m
         value = self._value(s, turns)
@@ -356,7 +297,8 @@ class _Seek:
         along = float(np.dot(curve.weight * chord, gap)) / square if square > 0.0 else 0.0
         ends = sorted((float(self.path.u[i, n]), float(self.path.u[i + 1, n])))
         residual = float(np.max(np.abs(curve.at(s.u)[0])))
-        sharp = self.event.condition or abs(value) <= 1e4 * self._noise(s, turns)
+        least = max(1e4 * self._noise(s, turns), SHARP * size)
+        sharp = self.event.condition or abs(value) <= least
         special = Special(
             "event", s.u[:m].copy(), (ends[0], ends[1]), max(abs(value), residual),
             CONVERGED if sharp else GUESS,
@@ -388,24 +330,15 @@ class _Seek:
         if np.max(np.abs(gap / self.curve.scale[:m])) < SAME:
             return True
         middle = (other.special.u + 0.5 * gap)[None]
-        middle = self._turned(middle, self._turns(middle))
+        middle = self.cubics.turned(middle, self.cubics.turns(middle))
         value = np.abs(self.of.values(self.curve, middle))
         return bool(value[0] <= self.of.noise(self.curve, middle)[0])
 
     def _shown(self, one: Placed) -> bool:
         """Whether it is a zero of the angles as they are shown, not in another turn only."""
         u = one.special.u[None]
-        here = self._turned(u, self._turns(u))
+        here = self.cubics.turned(u, self.cubics.turns(u))
         if self.event.condition or np.array_equal(here, u):
             return True
         value = np.abs(self.of.values(self.curve, here))
         return bool(value[0] <= 1e8 * self.of.noise(self.curve, here)[0])
-
-
-def _cubic(s: Any, ends: Array, rates: Array, width: Array) -> Array:
-    """Values at s in [0, 1] of the cubics with given values and rates at both ends."""
-    a, b = ends[:, 0], ends[:, 1]
-    ta, tb = width * rates[:, 0], width * rates[:, 1]
-    return np.asarray(
-        a + s * s * (3.0 - 2.0 * s) * (b - a) + s * (1.0 - s) * ((1.0 - s) * ta - s * tb)
-    )

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import TIGHT, Curve, nullspace
+from phasekit.bifurcation.continuation.curve import TIGHT, Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
-from phasekit.bifurcation.continuation.units import force_sizes, row_sizes
+from phasekit.bifurcation.continuation.units import force_sizes, nullspace, row_sizes
 from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]

@@ -1,0 +1,46 @@
+"""Test functions along curves in two parameters: what a special point on them is known by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.path import Sample
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class CurveTest:
+    """A function along curves of a kind, and the kind of special point that its zeros are.
+
+    Attributes
+    ----------
+    kind : str
+        A kind of the registry of special points.
+    curve : int
+        FOLD, HOPF or BRANCH.
+    values : callable
+        Its values at points (rows of unknowns, with the derivatives of f at each).
+    states : int
+        The least number of states with which there are such points.
+    holds : callable
+        Whether a zero is such a point.
+    discrete : bool
+        Whether there are such points of maps, too.
+    """
+
+    kind: str
+    curve: int
+    values: Callable[[Curve, Array, Array], Array]
+    states: int = 1
+    holds: Callable[[Curve, Sample], bool] = lambda curve, s: True
+    discrete: bool = False
+
+    def value(self, curve: Curve, s: Sample) -> float:
+        """The function at one point."""
+        return float(self.values(curve, s.u[None], s.slopes[None])[0])

@@ -1,0 +1,50 @@
+"""All test functions along curves in two parameters; one's own are added."""
+
+from __future__ import annotations
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.points import (
+    bogdanov_takens,
+    cusp,
+    generalized_hopf,
+    hopf_hopf,
+    zero_hopf,
+)
+from phasekit.bifurcation.continuation.points.curve_test import CurveTest
+from phasekit.bifurcation.special_points import KINDS
+
+TESTS: list[CurveTest] = [
+    *cusp.TESTS, *bogdanov_takens.TESTS, *generalized_hopf.TESTS, *zero_hopf.TESTS,
+    *hopf_hopf.TESTS,
+]  # fmt: skip
+
+
+def add(test: CurveTest) -> CurveTest:
+    """Look for the zeros of one more function along curves.
+
+    Raises
+    ------
+    ValueError
+        If its kind is not registered.
+
+    Examples
+    --------
+    >>> add(CurveTest("swallowtail", 1, lambda curve, u, slopes: u[:, 0]))
+    Traceback (most recent call last):
+    ValueError: no special point is a 'swallowtail'
+    """
+    if test.kind not in KINDS:
+        raise ValueError(f"no special point is a {test.kind!r}")
+    TESTS.append(test)
+    return test
+
+
+def tests_of(curve: Curve) -> list[CurveTest]:
+    """Those of a curve."""
+    return [
+        test
+        for test in TESTS
+        if test.curve == curve.kind
+        and curve.n >= test.states
+        and (test.discrete or not curve.discrete)
+    ]
