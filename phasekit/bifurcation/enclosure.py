@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.numerical.intervals import Bounds, Interval
+from phasekit.phase.numerical.intervals import Bounds
+from phasekit.phase.numerical.rounding import Interval
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

@@ -150,3 +150,18 @@ def test_all_that_was_not_excluded_is_told():
     odd = pk.Potential("Piecewise((cos(x), x < 20), (1, True))", "x", interval=(1.0, 9.0))
     with pytest.warns(RuntimeWarning, match="because no bounds of Piecewise are known"):
         np.testing.assert_allclose(pk.equilibria(odd).phi, [np.pi, 2.0 * np.pi])
+
+
+def test_functions_that_return_none_are_named():
+    def nothing(x, mu):
+        mu - x[0]
+
+    def one(x, mu):
+        return [mu - x[0]]
+
+    for f, jac, name in ((nothing, None, "f"), (one, nothing, "jac")):
+        problem = pk.Problem(f, ["x"], {"mu": 1.0}, jac=jac)
+        with pytest.raises(ParameterError, match=f"^{name}: returned None at x0, wants numbers"):
+            pk.continuation(problem, "mu", x0=[1.0], span=(-1.0, 1.0))
+    with pytest.raises(ParameterError, match="of type function, wants .* take pk.Problem"):
+        pk.Potential(one, "x")

@@ -46,7 +46,7 @@ def system(seed):
 
 
 def common_roots(f, g):
-    """All real (x, p) in the box with f = g = 0, to 30 digits."""
+    """All real (x, p) in the box with f = g = 0, to 15 digits or more."""
     eliminated = sp.Poly(sp.resultant(f, g, x), p)
     if eliminated.is_zero:
         return None
@@ -55,10 +55,9 @@ def common_roots(f, g):
         if abs(sp.im(value)) > 1e-20 or abs(value) > BOX:
             continue
         at = sp.re(value)
-        for root in sp.Poly(f.subs(p, at), x).nroots(n=50, maxsteps=2000):
+        for root in sp.Poly(f.subs(p, at), x).nroots(n=20, maxsteps=2000):
             there = {x: sp.re(root), p: at}
-            # A root that is double in x is known to half the digits.
-            if abs(sp.im(root)) < 1e-15 and abs(g.subs(there)) < 1e-12 * (1 + abs(root)) ** 9:
+            if abs(sp.im(root)) < 1e-10 and abs(g.subs(there)) < 1e-12 * (1 + abs(root)) ** 9:
                 points.append((float(sp.re(root)), float(at)))
     return points
 

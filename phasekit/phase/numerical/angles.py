@@ -76,8 +76,8 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
             here, rate, *_ = at(rows, time)
             push = -ground.systems.slope(here)
             off = (pace * (x - here), target - rate)
-            size = np.hypot(pace * rate, push)  # whose square may not be a double
-            step = off[0] / size * (pace * rate / size) + off[1] / size * (push / size)
+            pull = np.hypot(pace * rate, push)  # whose square may not be a double
+            step = off[0] / pull * (pace * rate / pull) + off[1] / pull * (push / pull)
             step = np.nan_to_num(step)
             time = np.clip(time + step, low, high)
             if np.max(np.abs(pace * step)) <= 4e-15:

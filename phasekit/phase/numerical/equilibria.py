@@ -141,10 +141,9 @@ def _replaced(zeros: Zeros, rows: Index, others: Zeros) -> Zeros:
         field[rows] = np.nan
         field[rows, : other.shape[1]] = other
         fields.append(field)
-    proofs = tuple(field.copy() for field in zeros[2:])
-    for own, other in zip(proofs, others[2:], strict=True):
-        own[rows] = other
-    return Zeros(fields[0], fields[1], *proofs)
+    complete, gaps, n_gaps = zeros.complete.copy(), zeros.gaps.copy(), zeros.n_gaps.copy()
+    complete[rows], gaps[rows], n_gaps[rows] = others.complete, others.gaps, others.n_gaps
+    return Zeros(fields[0], fields[1], complete, gaps, n_gaps)
 
 
 def _wrapped(systems: Systems, x: Array) -> Array:

@@ -121,6 +121,8 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
             found[:, rows] = librations(
                 ground.take(rows), x[rows], states.excess[rows], left.take(rows), right.take(rows)
             )
+            lost = rows[np.isnan(left.offset[rows] + right.offset[rows])]
+            found[:2, lost], found[2:, lost] = np.nan, np.inf
             # The double next to a center: no arc is left, and the period is that of the center.
             still = rows[~(left.offset[rows] + right.offset[rows] > 0.0)]
             bend = ground.systems.take(still).bend(x[still])

@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from phasekit.phase.numerical import intervals as real
 from phasekit.phase.numerical.formula import Formula, Shape
-from phasekit.phase.numerical.intervals import Bounds, Interval, NoRule, point
+from phasekit.phase.numerical.intervals import Bounds, NoRule, point
+from phasekit.phase.numerical.rounding import Interval
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]

@@ -1,9 +1,9 @@
 """Bounds of special functions over stretches: of those that rise, and by bounds of their slopes.
 
 A function whose slope is at most L in size differs over a stretch by no more than L times half of
-it from its value in the middle. The bounds of slopes follow from integrals ([DLMF] 6.2, 7.2, 10.9,
-10.54), from Nicholson's J^2 + Y^2, which falls (10.9.30), and from Ai'^2 - x Ai^2, which changes by
--Ai^2 (9.2.1).
+it from its value in the middle. The bounds of slopes follow from integrals ([DLMF2024] 6.2, 7.2,
+10.9, 10.54), from Nicholson's J^2 + Y^2, which falls (10.9.30), and from Ai'^2 - x Ai^2, which
+changes by -Ai^2 (9.2.1).
 """
 
 from __future__ import annotations

@@ -161,7 +161,8 @@ def _solve(anchor: Anchor, above: Array, side: float, low: Array, high: Array) -
         good = (step >= low) & (step <= high) & (np.abs(step - u) <= 0.5 * (high - low))
         small = np.abs(step - u) <= 2.0 * np.spacing(np.abs(u))
         fresh = np.where(over == 0.0, u, np.where(good | small, step, middle))
-        still = (np.abs(fresh - u) <= np.spacing(np.abs(u))) | np.isnan(fresh)
+        # Rounding may turn steps of two units to and fro.
+        still = small | (np.abs(fresh - u) <= np.spacing(np.abs(u))) | np.isnan(fresh)
         u = fresh
         if still.all():
             break
