@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -134,8 +134,7 @@ def periodic_orbit(
     run = _Simulation(problem)
     if period is not None:
         start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
-        at, states = run(start, 0.0, period, 0)
-        guesses = [sampled(problem, at / period, states, period, value, options.degree)]
+        guesses = _turns(problem, run, start, period, value, options)
         return _found(problem, guesses, options, f"from x0 = {x.tolist()} with period {period:.6g}")
     return _searched(problem, x, settle, run, value, options)
 
@@ -157,7 +156,16 @@ def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
     return ds.isel(time=inside).assign(period=period)
 
 
-def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr.Dataset:
+def _turns(
+    problem: Problem, run: _Simulation, x: FloatArray, period: float, value: float, options: Any
+) -> Iterator[Any]:
+    """Guesses from one turn: even in time, then denser where the motion is fast."""
+    for samples in (SAMPLES, 0):
+        at, states = run(x, 0.0, period, samples)
+        yield sampled(problem, at / period, states, period, value, options.degree)
+
+
+def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -> xr.Dataset:
     """The orbit that the first of some guesses leads to."""
     free = UNFOLDING in problem.parameters
     name = UNFOLDING if free else next(iter(problem.parameters))
@@ -275,9 +283,8 @@ def _searched(
             unit = unit or _pace(run, x)
             period = _return(problem, x, run)
             unit = period if waited == 0.0 else unit
-            at, states = run(x, 0.0, period, 0)
-            guess = sampled(problem, at / period, states, period, value, options.degree)
-            return _found(problem, [guess], options, f"after a return in {period:.6g}")
+            guesses = _turns(problem, run, x, period, value, options)
+            return _found(problem, guesses, options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
             said = said or error
     raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said
