@@ -134,8 +134,8 @@ def periodic_orbit(
     run = _Simulation(problem)
     if period is not None:
         start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
-        guesses = _turns(problem, run, start, period, value, options)
-        return _found(problem, guesses, options, f"from x0 = {x.tolist()} with period {period:.6g}")
+        turns = _turns(problem, run, start, period, value, options)
+        return _found(problem, turns, options, f"from x0 = {x.tolist()} with period {period:.6g}")
     return _searched(problem, x, settle, run, value, options)
 
 
