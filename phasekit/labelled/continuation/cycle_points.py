@@ -141,6 +141,30 @@ def parameters_at(problem: Problem, cycles: Cycles, orbit: Orbit) -> dict[str, f
     return values
 
 
+def _along(
+    function: Any, x: FloatArray, values: Mapping[str, float], time: str | None, at: FloatArray
+) -> FloatArray:
+    """A function of the state at all places of an orbit: at once, where that gives the same."""
+
+    def one(k: int) -> float:
+        moment = {} if time is None else {time: float(at[k])}
+        return float(function(x[k].copy(), **values, **moment))
+
+    count = len(x)
+    some = {k: one(k) for k in (0, count // 2, count - 1)}
+    try:
+        moment = {} if time is None else {time: at.copy()}
+        whole = np.asarray(function(x.T.copy(), **values, **moment), dtype=float)
+    except Exception:  # noqa: BLE001 - a function of single states; it is called one by one
+        whole = np.empty(0)
+    alike = whole.shape == (count,) and all(
+        np.isclose(whole[k], v, rtol=1e-12, atol=0.0, equal_nan=True) for k, v in some.items()
+    )
+    if alike and count > len(x[0]):
+        return whole
+    return np.array([some[k] if k in some else one(k) for k in range(count)])
+
+
 def _recorded(
     problem: Problem, cycles: Cycles, points: Sequence[Point], record: Mapping[str, Any]
 ) -> dict[str, Any]:
@@ -151,10 +175,7 @@ def _recorded(
         for i, p in enumerate(points):
             values = parameters_at(problem, cycles, p.orbit)
             at = collocation.times(p.orbit.mesh, cycles.m) * p.orbit.y[0]
-            series = np.empty((len(at), 1))
-            for k, x in enumerate(p.orbit.x):
-                time = {} if problem.time is None else {problem.time: float(at[k])}
-                series[k, 0] = float(function(x.copy(), **values, **time))
+            series = _along(function, p.orbit.x, values, problem.time, at)[:, None]
             low, high = collocation.extremes(p.orbit.mesh, series, cycles.m)
             middle = collocation.mean(p.orbit.mesh, series, cycles.m)
             found[i] = low[0], high[0], middle[0]

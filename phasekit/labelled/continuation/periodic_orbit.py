@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -148,10 +148,9 @@ def periodic_orbit(
     if period is not None:
         with said("looking for a periodic orbit"):
             start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
-            at, states = run(start, 0.0, period, 0)
-            guesses = [sampled(problem, at / period, states, period, value, options.degree)]
+            turns = _turns(problem, run, start, period, value, options)
             where = f"from x0 = {x.tolist()} with period {period:.6g}"
-            return _found(problem, guesses, options, where)
+            return _found(problem, turns, options, where)
     with said("looking for a periodic orbit"):
         return _searched(problem, x, settle, run, value, options)
 
@@ -173,7 +172,16 @@ def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
     return ds.isel(time=inside).assign(period=period)
 
 
-def _found(problem: Problem, guesses: list[Any], options: Any, where: str) -> xr.Dataset:
+def _turns(
+    problem: Problem, run: _Simulation, x: FloatArray, period: float, value: float, options: Any
+) -> Iterator[Any]:
+    """Guesses from one turn: even in time, then denser where the motion is fast."""
+    for samples in (SAMPLES, 0):
+        at, states = run(x, 0.0, period, samples)
+        yield sampled(problem, at / period, states, period, value, options.degree)
+
+
+def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -> xr.Dataset:
     """The orbit that the first of some guesses leads to."""
     free = UNFOLDING in problem.parameters
     name = UNFOLDING if free else next(iter(problem.parameters))
@@ -291,9 +299,8 @@ def _searched(
             unit = unit or _pace(run, x)
             period = _return(problem, x, run)
             unit = period if waited == 0.0 else unit
-            at, states = run(x, 0.0, period, 0)
-            guess = sampled(problem, at / period, states, period, value, options.degree)
-            return _found(problem, [guess], options, f"after a return in {period:.6g}")
+            guesses = _turns(problem, run, x, period, value, options)
+            return _found(problem, guesses, options, f"after a return in {period:.6g}")
         except ConvergenceError as error:
             said = said or error
     raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said

@@ -287,7 +287,7 @@ class Cycles:
         parts = np.ceil(np.diff(orbit.mesh) * orbit.y[0] * rates / SMOOTH)
         if np.sum(parts) > MOST:
             return None
-        counts = np.maximum(1, parts).astype(int)
+        counts = np.maximum(2, parts).astype(int)
         places = [
             np.linspace(a, b, k, endpoint=False)
             for a, b, k in zip(orbit.mesh[:-1], orbit.mesh[1:], counts, strict=True)

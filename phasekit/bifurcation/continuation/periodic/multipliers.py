@@ -43,6 +43,8 @@ def multipliers(G: Array) -> tuple[Complex, float]:
         here = slice(first, last)
         top = float(np.max(log[here]))
         block = turn[here, here] @ (np.exp(log[here] - top)[:, None] * R[here, here])
+        if not np.isfinite(block).all():
+            return np.full(n, np.nan, dtype=complex), np.nan
         found = block[0] if last - first == 1 else np.linalg.eigvals(block)
         with np.errstate(all="ignore"):
             values.append(np.asarray(found, dtype=complex) * np.exp(top))

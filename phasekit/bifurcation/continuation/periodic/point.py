@@ -12,8 +12,9 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Sol
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-TRUSTED = 1e-5  # error of the trivial multiplier, or by Liouville's formula, above which no tests
-UNRESOLVED = 1e-5  # by which logarithms of the product differ where multipliers are not resolved
+TRUSTED = 1e-5  # error by Liouville's formula above which no tests
+NEAR = 5e-7  # the same of the trivial multiplier
+UNRESOLVED = 1e-7  # by which logarithms of the product differ where multipliers are not resolved
 ALIKE = 1e-3  # the same, beside their size, above which nothing is known of multipliers
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
@@ -42,7 +43,8 @@ class Point:
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
-        return bool(self.trivial_error <= TRUSTED and self.liouville_error <= TRUSTED)
+        known = np.isfinite(self.multipliers).all()
+        return bool(known and self.trivial_error <= NEAR and self.liouville_error <= TRUSTED)
 
 
 def vertical(cycles: Cycles, point: Point) -> bool:
@@ -75,8 +77,10 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
     mesh = cycles.resolving(s.orbit) if abs(log - divergence) > UNRESOLVED else None
     if mesh is not None:
         orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
-        fine = cycles.looked_at(orbit, dx, s.dy)
-        values, log, error = cycles.multipliers(fine.W, orbit)
+        fine = cycles.correct(orbit, *cycles.rows(orbit, dx, s.dy))
+        if not fine.converged:
+            fine = cycles.looked_at(orbit, dx, s.dy)
+        values, log, error = cycles.multipliers(fine.W, fine.orbit)
         trivial = min(trivial, error)
         divergence = cycles.divergence(fine.divergence)
     with np.errstate(all="ignore"):
