@@ -192,7 +192,7 @@ def level_escape(cells: Cells, number: int) -> Escape:
 
 
 def _rate(cells: Cells, height: Array, at: Array, start: Array, end: Array) -> Array:
-    """Rate of transition-state theory out of a well."""
+    """Rate of transition-state theory out of a well, times exp(height/kT)."""
     a, b, c = (x[:, None] for x in (cells.A, cells.B, cells.C))
     top = potential(cells.A, cells.B, cells.C, at) + height
 
@@ -200,7 +200,7 @@ def _rate(cells: Cells, height: Array, at: Array, start: Array, end: Array) -> A
         return np.asarray(top[:, None] - potential(a, b, c, phi))
 
     return transition(
-        cells.kT, height, configuration(depth, height, at, start, end, cells.kT)
+        cells.kT, configuration(depth, height, at, start, end, cells.kT)
     )  # fmt: skip
 
 
@@ -237,7 +237,7 @@ def combined(cells: Cells, first: Array, way: Exit) -> tuple[Array, Array, Any, 
         follows = half / np.sqrt(1.0 + half * half)
         recrossing = np.arcsinh(half)
         wide = np.arcsinh(0.5 * damping / way.spatial) - recrossing
-        rate = first * plain * np.exp(order * span - recrossing - follows * wide)
+        rate = first * plain * np.exp(order * span - recrossing - follows * wide - height / kT)
         error = np.maximum(order, 1.0 - order) * np.abs(span) + 0.25 * low * low
         error = error + np.maximum(follows, 1.0 - follows) * np.abs(wide)
         error = np.where(way.known, error, error + UNKNOWN * low * order)
