@@ -18,7 +18,7 @@ from phasekit.perturbation.diffusion import (
     spatial_exponent,
     transition,
 )
-from phasekit.perturbation.escape import (
+from phasekit.perturbation.rates import (
     Cells,
     Escape,
     Exit,
