@@ -205,3 +205,13 @@ def test_a_driven_disk_jumps_at_two_frequencies(run):
     assert len(jumps) == 2
     assert 0.8 * natural < jumps[1] < jumps[0] < natural
     assert float(re.search(r"exp\(-damping T\) to (\S+)", text)[1]) < 1e-6
+
+
+def test_the_junction_leaves_at_the_rate_of_simulated_phases(run):
+    _, text = run("escape_of_a_junction")
+    medians = dict(re.findall(r"noise (\S+): half .* at (\S+)", text))
+    assert medians == {"0.001": "0.978", "0.01": "0.886", "0.03": "0.747"}
+    pairs = re.findall(r"rate (\S+) .*simulated (\S+) \+- (\S+)", text)
+    assert len(pairs) == 2
+    for rate, found, spread in (map(float, one) for one in pairs):
+        assert abs(rate - found) < 3.0 * spread

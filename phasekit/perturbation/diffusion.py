@@ -56,14 +56,14 @@ def spatial_exponent(saddle: Saddle, left: Array, right: Array, kT: Array) -> Ar
         return np.asarray(np.sqrt(2.0 * np.pi * kT) / total)
 
 
-def transition(kT: Array, height: Array, well: Array) -> Array:
-    """Rate of transition-state theory, with the integral over the well."""
+def transition(kT: Array, well: Array) -> Array:
+    """Rate of transition-state theory with the integral over the well, times exp(height/kT)."""
     with np.errstate(all="ignore"):
-        return np.asarray(np.sqrt(kT / (2.0 * np.pi)) * np.exp(-height / kT) / well)
+        return np.asarray(np.sqrt(kT / (2.0 * np.pi)) / well)
 
 
 def passage(action: Callable[[Any, Array], Array], height: Array, damping: Array, kT: Array) -> Any:
-    """Mean time in which the energy, diffusing, first comes to the saddle's.
+    """Mean time in which the energy, diffusing, first comes to the saddle's, over exp(height/kT).
 
     ``1/(damping kT) int dE exp(E/kT)/S(E) int_0^E T(E') exp(-E'/kT) dE'`` with S' = T; the action
     S of cells at parts of the height is given.
@@ -87,7 +87,7 @@ def passage(action: Callable[[Any, Array], Array], height: Array, damping: Array
         inner = (before[..., None] + half[:, None] * (by_panel @ within.T)).reshape(len(part), -1)
         with np.errstate(all="ignore"):
             top = (flow + cold * inner) * np.exp(cold * (x - 1.0)) / S
-            scale = height[part] * np.exp(cold[:, 0]) / (damping[part] * kT[part])
+            scale = height[part] / (damping[part] * kT[part])
         out[part] = scale * (top @ weight)
     return out
 

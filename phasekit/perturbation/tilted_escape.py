@@ -18,7 +18,7 @@ from phasekit.perturbation.diffusion import (
     spatial_exponent,
     transition,
 )
-from phasekit.perturbation.escape import (
+from phasekit.perturbation.rates import (
     Cells,
     Escape,
     Exit,
@@ -57,14 +57,14 @@ class Wells:
         )
 
     def rate(self, which: Any, at: Array, start: Array, end: Array) -> tuple[Array, Array]:
-        """Barrier, and rate of transition-state theory, out of a well over a saddle.
+        """Barrier over a saddle, and rate of transition-state theory times exp(barrier/kT).
 
         Angles are from that saddle.
         """
         saddle = self.saddle(which)
         height = saddle.depth(at)
         well = configuration(saddle.spread().depth, height, at, start, end, self.cells.kT)
-        return height, transition(self.cells.kT, height, well)
+        return height, transition(self.cells.kT, well)
 
     def correction(
         self, which: Any, at: Array, start: Array, end: Array, height: Array, high: Array

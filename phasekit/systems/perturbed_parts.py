@@ -77,7 +77,12 @@ def base_of(system: Any) -> Model:
     if type(found).__name__ == "Perturbed":
         raise bad("system", found, wants, "it is perturbed already; use .replace(...)")
     if not issubclass(found.rung, Conservative):
-        raise bad("system", found, wants, "pk.FreeGyroRotor has .simulate(..., torque2=...)")
+        hint = (
+            "it has two degrees of freedom, and separatrices of one only at a constant momentum: "
+            "simulate it with .simulate(..., torque1=..., torque2=...), or perturb the disk of a "
+            "prescribed omega1"
+        )
+        raise bad("system", found, wants, hint)
     return found
 
 

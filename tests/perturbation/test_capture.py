@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+from witnesses import braked
 
 import phasekit as pk
 
@@ -56,6 +57,22 @@ def test_capture_from_rotation():
         assert found[1 if torque > 0.0 else 0] == 0.0
     both = odds(pk.Perturbed(EIGHT, damping=0.01, torque=0.02), start="rotation")
     assert both[0] / both[1] == pytest.approx(0.280550 / 0.719450, abs=1e-5)
+
+
+@pytest.mark.parametrize("ratio", [3.0, 6.0])
+def test_rotations_that_are_braked(ratio):
+    """Orbits from a band of speeds: captured, or on backwards, in the shares of the formula."""
+    number, damping = max(ORBITS, 300), 0.0005 if ORBITS else 0.002
+    torque = -ratio * damping
+    rng = np.random.default_rng(1)
+    speeds, phases = rng.uniform(2.3, 2.7, number), rng.uniform(0.0, 2.0 * np.pi, number)
+    longest = 2.0 / abs(torque) + 3.0 / damping
+    found = braked.captured(torque, damping, speeds, phases, longest, 0.05)
+    assert (found != 0).mean() > 0.99
+    pendulum = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=damping, torque=torque)
+    want = 1.0 - odds(pendulum, start="rotation")[2]
+    error = np.sqrt(want * (1.0 - want) / number)
+    assert abs((found == 1).mean() - want) < 3.0 * error + 4.0 * damping
 
 
 def test_mercury():

@@ -48,8 +48,12 @@ def test_turnover(loss, simulated, error):
 
 #: Bias, damping, side; rate and standard error of 1,500 paths from the washboard's well at a
 #: barrier of 6 kT to the next one.
-WASHBOARD = [(0.4, 1.0, "left", 2.09e-4, 0.07e-4), (0.4, 0.1, "left", 2.98e-4, 0.10e-4),
-             (0.05, 0.1, "left", 2.81e-4, 0.10e-4), (0.05, 0.1, "right", 0.67e-4, 0.05e-4)]  # fmt: skip
+WASHBOARD = [
+    (0.4, 1.0, "left", 2.09e-4, 0.07e-4),
+    (0.4, 0.1, "left", 2.98e-4, 0.10e-4),
+    (0.05, 0.1, "left", 2.81e-4, 0.10e-4),
+    (0.05, 0.1, "right", 0.67e-4, 0.05e-4),
+]
 
 
 @pytest.mark.parametrize(("bias", "damping", "side", "simulated", "error"), WASHBOARD)
@@ -182,6 +186,18 @@ def test_the_washboard_in_the_limits_of_kramers():
         for N in (0.5, -0.5)
     )
     assert mirrored[1] == pytest.approx(there[0], rel=1e-9)
+
+
+def test_cold_wells_are_left_at_the_least_rates_that_there_are():
+    """Where exp(-barrier/kT) is subnormal the rate is, and nowhere NaN."""
+    kT = np.geomspace(2.6e-3, 3.2e-3, 25)
+    pendulum = pk.Pendulum(length=1.0, g=1.0)
+    for torque in (0.0, 1e-3):
+        cold = pk.Perturbed(pendulum, damping=0.1, torque=torque, kT=kT)
+        rate = pk.escape_rate(cold).escape_rate.sel(saddle="upper", side="left").values
+        assert np.isfinite(rate).all()
+        assert (np.diff(rate) >= 0.0).all()
+        assert rate[0] == 0.0 < rate[-1]
 
 
 @pytest.mark.skipif(not MORE, reason="slow: PHASEKIT_ENSEMBLES=1500 runs so many paths")
