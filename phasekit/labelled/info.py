@@ -69,8 +69,8 @@ class MapInfo:
         made = f"phasekit {ds.attrs.get('phasekit_version', '?')}, schema {ds.attrs[SCHEMA]}"
         lines = [f"{self.name}: map of {model}, made by {made}"]
         declared = models()[model].declared if model in models() else ()
-        names = {p.name for p in declared} | set(STATES)
-        inputs = {name: coord.variable for name, coord in ds.coords.items() if name in names}
+        known = {p.name for p in declared} | set(STATES)
+        inputs = {name: coord.variable for name, coord in ds.coords.items() if name in known}
         given = in_units(xr.Dataset(coords=inputs), self.units).coords
         fixed = [
             f"{name} = {coord.item():.6g}{_unit(coord)}"

@@ -49,7 +49,8 @@ class Summary:
     def html(self) -> str:
         """Write it for a notebook."""
         rows = "".join(
-            f"<tr><th>{html.escape(name)}</th><td>{html.escape(value)}</td>"
+            f"<tr><th>{html.escape(name)}</th>"
+            f"<td style='padding-right: 1em; white-space: nowrap'>{html.escape(value)}</td>"
             f"<td style='text-align: left'>{html.escape(meaning)}</td></tr>"
             for name, value, meaning in self.parameters
         )

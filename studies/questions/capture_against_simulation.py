@@ -62,6 +62,8 @@ def main() -> None:
     axes[1].errorbar(DAMPINGS, shares, errors, fmt="o", label="share of the motions")
     axes[1].axhline(predicted, color="black", linestyle="--", label="odds in closed form")
     axes[1].set_xscale("log")
+    axes[1].set_xticks(DAMPINGS, [f"{damping:g}" for damping in DAMPINGS])
+    axes[1].minorticks_off()
     axes[1].set_xlabel("damping (1/s)")
     axes[1].set_ylabel("right rest")
     axes[1].legend(frameon=False)

@@ -55,6 +55,7 @@ def main() -> None:
     print(f"product of the multipliers: exp(-damping T) to {off:.0e}")
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.0), layout="constrained")
     pk.plot.branch(response, y="phi_max", ax=axes[0])
+    axes[0].set(xlabel="frequency of the torque (1/s)", ylabel="greatest angle (rad)")
     pk.plot.multipliers(response, ax=axes[1])
     path = sys.argv[1] if len(sys.argv) > 1 else "response_of_a_driven_disk.png"
     figure.savefig(path, dpi=100)
