@@ -122,6 +122,12 @@ class Model(ModelValue):
         return {}
 
     @property
+    def parameters(self) -> dict[str, Value]:
+        """The parameters by name, those that are None left out."""
+        values = {p.name: getattr(self, p.name) for p in self.declared}
+        return {name: value for name, value in values.items() if value is not None}
+
+    @property
     def arguments(self) -> dict[str, Any]:
         """What makes it again, by keyword."""
         return dict(self.parameters)

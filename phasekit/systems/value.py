@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from phasekit.labels.arguments import Value, brief, same
+from phasekit.labels.arguments import brief, same
 from phasekit.laws.ladder import Lawful
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.summary import summary
@@ -18,12 +18,6 @@ class ModelValue(Lawful):
     __slots__ = ()
 
     declared: ClassVar[tuple[Parameter, ...]]
-
-    @property
-    def parameters(self) -> dict[str, Value]:
-        """The parameters by name, those that are None left out."""
-        values = {p.name: getattr(self, p.name) for p in self.declared}
-        return {name: value for name, value in values.items() if value is not None}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore a pickled model; its arrays are read-only again."""
