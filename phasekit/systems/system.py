@@ -19,6 +19,7 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import (
     FloatArray,
     NumberLike,
+    Value,
     bad,
     brief,
     describe,
