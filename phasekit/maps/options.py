@@ -34,7 +34,9 @@ class StoreOptions:
         dtype: Any = None,
         workers: Any = None,
         client: Any = None,
-        **flags: bool,
+        *,
+        overwrite: bool = False,
+        force: bool = False,
     ) -> StoreOptions:
         """Check what a call asks for.
 
@@ -44,7 +46,8 @@ class StoreOptions:
         """
         dtypes = check_dtypes(dtype, request.rows)
         tiles = check_chunks(chunks, request.grid.sizes)
-        return cls(tiles, dtypes, check_workers(workers, client), client, **flags)
+        number = check_workers(workers, client)
+        return cls(tiles, dtypes, number, client, overwrite, force)
 
 
 #: What numbers can be stored as.

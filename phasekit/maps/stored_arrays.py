@@ -274,7 +274,8 @@ def codec(compressor: str = "lz4") -> Any:
     """Return the codec that compresses stored results; it reads what any compressor wrote."""
     from zarr.codecs import BloscCodec
 
-    return BloscCodec(cname=compressor, clevel=5, shuffle="shuffle")
+    known: Any = compressor
+    return BloscCodec(cname=known, clevel=5, shuffle="shuffle")
 
 
 def codecs(compressor: str = "lz4") -> list[Any]:

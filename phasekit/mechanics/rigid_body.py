@@ -1,4 +1,4 @@
-"""Rigid bodies by mass, center and inertia, and their mass moment vectors."""
+"""Rigid bodies by mass, center and inertia: made, shifted and rotated."""
 
 from __future__ import annotations
 
@@ -10,13 +10,11 @@ import numpy.typing as npt
 
 from phasekit.inputs import bad
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
+from phasekit.mechanics.mass_moments import MassMoments
 from phasekit.mechanics.vectors import (
     Array,
-    Frozen,
     apply,
     common_shape,
-    cross,
-    directions,
     dot,
     numbers,
     quiet,
@@ -31,7 +29,7 @@ TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RigidBody(Frozen):
+class RigidBody(MassMoments):
     """Rigid body, or a batch of them, by its mass, mass center and inertia at a pole.
 
     The mass moment vectors at the pole for an axis through it say how the body resists a
@@ -204,170 +202,6 @@ class RigidBody(Frozen):
         inertia = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
         return cls._make(mass, center, inertia, valid)
 
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Shape of the batch; () for a single body."""
-        return np.shape(self.mass)
-
-    @quiet
-    def linear_moment(self, n: npt.ArrayLike) -> Array:
-        """Linear mass moment vector ``S_n = M [n, rho_C]`` in kg m.
-
-        [HedrihVeljovic2011] (2.1); perpendicular to n and to the vector to the center.
-
-        Examples
-        --------
-        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 0.0]]).linear_moment([0, 0, 1]).tolist()
-        [0.0, 6.0, 0.0]
-        """
-        return times(self.mass, cross(self._axis(n), self.center))
-
-    @quiet
-    def inertia_moment(self, n: npt.ArrayLike) -> Array:
-        """Mass inertia moment vector ``J_n = sum m [rho, [n, rho]]`` in kg m^2.
-
-        The inertia tensor applied to n; [HedrihVeljovic2011] (2.2).
-
-        Examples
-        --------
-        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).inertia_moment([0, 0, 1]).tolist()
-        [-6.0, 0.0, 18.0]
-        """
-        return apply(self.inertia, self._axis(n))
-
-    @quiet
-    def deviation_moment(self, n: npt.ArrayLike) -> Array:
-        """Deviation moment vector ``D_n = [n, [J_n, n]]``, the part of J_n across n, in kg m^2.
-
-        [HedrihVeljovic2011] (2.5), (2.6); it is zero for principal axes.
-
-        Examples
-        --------
-        >>> RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).deviation_moment([0, 0, 1]).tolist()
-        [-6.0, 0.0, 0.0]
-        """
-        n = self._axis(n)
-        return cross(n, cross(apply(self.inertia, n), n))
-
-    @quiet
-    def axial_moment(self, n: npt.ArrayLike) -> Array:
-        """Moment of inertia ``(n, J_n)`` about the axis, in kg m^2.
-
-        Examples
-        --------
-        >>> float(RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).axial_moment([0, 0, 1]))
-        18.0
-        """
-        n = self._axis(n)
-        return dot(n, apply(self.inertia, n))
-
-    @quiet
-    def polar_moment(self) -> Array:
-        """Polar moment ``J_O = sum m rho^2`` of the pole, half the trace of the tensor, in kg m^2.
-
-        Examples
-        --------
-        >>> float(RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).polar_moment())
-        20.0
-        """
-        return np.asarray(0.5 * np.trace(self.inertia, axis1=-2, axis2=-1))[()]
-
-    @quiet
-    def spherical_moment(self, n: npt.ArrayLike) -> Array:
-        """Spherical part ``(2/3) J_O n`` of the inertia moment vector, in kg m^2.
-
-        Examples
-        --------
-        >>> RigidBody.from_points([3.0], [[2.0, 0.0, 0.0]]).spherical_moment([0, 0, 1]).tolist()
-        [0.0, 0.0, 8.0]
-        """
-        return times(self.polar_moment() / 1.5, self._axis(n))
-
-    @quiet
-    def deviatoric_moment(self, n: npt.ArrayLike) -> Array:
-        """Deviatoric part ``J_n - (2/3) J_O n`` of the inertia moment vector, in kg m^2.
-
-        Examples
-        --------
-        >>> RigidBody.from_points([3.0], [[2.0, 0.0, 0.0]]).deviatoric_moment([0, 0, 1]).tolist()
-        [0.0, 0.0, 4.0]
-        """
-        return self.inertia_moment(n) - self.spherical_moment(n)
-
-    @quiet
-    def linear_moment_rate(
-        self,
-        n: npt.ArrayLike,
-        angular_velocity: npt.ArrayLike,
-        axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    ) -> Array:
-        """Rate of change of S_n while the body turns about the pole, in kg m/s.
-
-        ``dS_n/dt = [omega, S_n] + M [[Omega - omega, n], rho_C]``, with ``omega`` of the body and
-        ``Omega`` of the axis ([HedrihVeljovic2011] section 3, where ``Omega = omega1 n1``).
-
-        Parameters
-        ----------
-        n : array_like
-            Direction of the axis now.
-        angular_velocity, axis_velocity : array_like
-            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s; by default
-            the axis keeps its direction.
-
-        Examples
-        --------
-        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 0.0]])
-        >>> body.linear_moment_rate([0, 0, 1], [0, 0, 5]).tolist()
-        [-30.0, 0.0, 0.0]
-        """
-        n, turning, slip = self._turning(n, angular_velocity, axis_velocity)
-        first = cross(turning, cross(n, self.center)) + cross(slip, self.center)
-        return times(self.mass, first)
-
-    @quiet
-    def inertia_moment_rate(
-        self,
-        n: npt.ArrayLike,
-        angular_velocity: npt.ArrayLike,
-        axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    ) -> Array:
-        """Rate of change of J_n while the body turns about the pole, in kg m^2/s.
-
-        ``dJ_n/dt = [omega, J_n] + I [Omega - omega, n]``, I being the inertia tensor; arguments as
-        of `linear_moment_rate`.
-
-        Examples
-        --------
-        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]])
-        >>> body.inertia_moment_rate([0, 0, 1], [0, 0, 5]).tolist()
-        [0.0, -30.0, 0.0]
-        """
-        n, turning, slip = self._turning(n, angular_velocity, axis_velocity)
-        return cross(turning, apply(self.inertia, n)) + apply(self.inertia, slip)
-
-    @quiet
-    def deviation_moment_rate(
-        self,
-        n: npt.ArrayLike,
-        angular_velocity: npt.ArrayLike,
-        axis_velocity: npt.ArrayLike = (0.0, 0.0, 0.0),
-    ) -> Array:
-        """Rate of change of D_n while the body turns about the pole, in kg m^2/s.
-
-        That of ``D_n = J_n - n (n, J_n)``; arguments as of `linear_moment_rate`.
-
-        Examples
-        --------
-        >>> body = RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]])
-        >>> body.deviation_moment_rate([0, 0, 1], [0, 0, 5]).tolist()
-        [0.0, -30.0, 0.0]
-        """
-        rate = self.inertia_moment_rate(n, angular_velocity, axis_velocity)
-        axis, moment = self._axis(n), self.inertia_moment(n)
-        turning = cross(vectors("axis_velocity", axis_velocity), axis)
-        along = dot(turning, moment) + dot(axis, rate)
-        return rate - times(dot(axis, moment), turning) - times(along, axis)
-
     @quiet
     def shifted(self, vector: npt.ArrayLike) -> Self:
         """Return the body with another pole, at `vector` from this one, in m.
@@ -428,27 +262,6 @@ class RigidBody(Frozen):
         center, inertia = apply(turn, self.center), turn @ self.inertia @ across
         inertia = 0.5 * (inertia + np.swapaxes(inertia, -1, -2))
         return self._make(np.asarray(self.mass), center, inertia, orthogonal)
-
-    def _axis(self, n: npt.ArrayLike) -> Array:
-        """Unit vectors along n, of a batch that goes with the body's."""
-        along = directions("n", n)
-        common_shape(body=self.shape, n=along.shape[:-1])
-        return along
-
-    def _turning(
-        self, n: npt.ArrayLike, angular_velocity: npt.ArrayLike, axis_velocity: npt.ArrayLike
-    ) -> tuple[Array, Array, Array]:
-        """Direction of an axis, angular velocity, and the axis's velocity relative to the body."""
-        n = self._axis(n)
-        omega = vectors("angular_velocity", angular_velocity)
-        axis = vectors("axis_velocity", axis_velocity)
-        common_shape(
-            body=self.shape,
-            n=n.shape[:-1],
-            angular_velocity=omega.shape[:-1],
-            axis_velocity=axis.shape[:-1],
-        )
-        return n, omega, cross(axis - omega, n)
 
     def __repr__(self) -> str:
         """Write a single body to six digits, a batch by its shape and masses."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 
@@ -17,16 +16,14 @@ from phasekit.labels.arguments import (
     bad,
     brief,
     named_arguments,
-    number,
     numeric,
-    pair,
     same,
     unknown,
 )
 from phasekit.labels.coordinates import LABELS, STATES
-from phasekit.laws.formulas import NAME, is_name, read_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
+from phasekit.systems import potential_parts as parts
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import MODELS, Model
 from phasekit.table.numerical import NUMERICAL_ROWS
@@ -125,10 +122,10 @@ class Potential(Model):
         *,
         interval: Sequence[float] | None = None,
     ) -> None:
-        name = _name("coordinate", coordinate)
+        name = parts.name("coordinate", coordinate)
         if parameters is not None and not isinstance(parameters, Mapping):
             raise bad("parameters", parameters, "a mapping of names to values, {'mu': 1.0}")
-        given = {_name("parameters", key): value for key, value in (parameters or {}).items()}
+        given = {parts.name("parameters", key): value for key, value in (parameters or {}).items()}
         for key in given:
             if key == name:
                 raise bad("parameters", key, "names other than the coordinate's")
@@ -140,11 +137,11 @@ class Potential(Model):
         )
         values = {p.name: p.check(numeric(p.name, given[p.name], None)) for p in declared}
         formula = make_formula(
-            _expression(expression),
+            parts.expression(expression),
             name,
             tuple(given),
-            _period(period),
-            _interval(interval, period),
+            parts.period(period),
+            parts.interval(interval, period),
         )
         check_period(formula, tuple(values.values()))
         for key, value in (("declared", declared), ("_values", values), ("formula", formula)):
@@ -300,7 +297,7 @@ class Potential(Model):
                 "use ds.phasekit.system()"
             )
         expression, coordinate, names, period, ends = (
-            _attribute(ds, name)
+            parts.attribute(ds, name)
             for name in ("expression", "coordinate", "parameters", "period", "interval")
         )
         declared = [Parameter(name=name, units="1", long_name=name) for name in names.split()]
@@ -325,15 +322,15 @@ class Potential(Model):
 
     def __repr__(self) -> str:
         """Write the potential and its parameters, long arrays by their ends."""
-        parts = [repr(self.formula.text), repr(self.coordinate)]
+        written = [repr(self.formula.text), repr(self.coordinate)]
         if self._values:
             shown = ", ".join(f"{name!r}: {brief(value)}" for name, value in self._values.items())
-            parts.append(f"{{{shown}}}")
+            written.append(f"{{{shown}}}")
         if self.period is not None:
-            parts.append(f"period={self.period!r}")
+            written.append(f"period={self.period!r}")
         if self.interval is not None:
-            parts.append(f"interval={self.interval!r}")
-        return f"Potential({', '.join(parts)})"
+            written.append(f"interval={self.interval!r}")
+        return f"Potential({', '.join(written)})"
 
     def _key(self) -> tuple[Any, ...]:
         formula = self.formula
@@ -366,65 +363,3 @@ def _rebuild(
     text: str, coordinate: str, values: dict[str, Value], period: Any, interval: Any
 ) -> Potential:
     return Potential(text, coordinate, values, period, interval=interval)
-
-
-def _attribute(ds: Any, name: str) -> str:
-    value = ds.attrs.get(f"phasekit_{name}")
-    if not isinstance(value, str):
-        raise bad(
-            f"ds: attribute phasekit_{name}", value, "the string that phasekit stored there",
-            "the Dataset is damaged: make the map again",
-        )  # fmt: skip
-    return value
-
-
-def _expression(expression: Any) -> Any:
-    if isinstance(expression, str):
-        return expression
-    import sympy as sp
-
-    if isinstance(expression, sp.Expr):
-        return expression
-    # Numbers as text, for the formula of 1.0 is not that of 1.
-    if isinstance(expression, (float, np.floating)):
-        return repr(float(expression))
-    whole = isinstance(expression, (int, np.integer)) and not isinstance(expression, bool)
-    if whole and abs(expression) < 1e308:
-        return repr(int(expression))
-    hint = "for a Python function of the state take pk.Problem" if callable(expression) else ""
-    raise bad("expression", expression, "a string or a sympy expression", hint)
-
-
-def _name(argument: str, name: Any) -> str:
-    text = str(name) if type(name).__module__.startswith("sympy") else name
-    if isinstance(text, str) and keyword.iskeyword(text):
-        raise bad(argument, name, "a name that Python does not use itself", f"such as {text[:3]!r}")
-    if not isinstance(text, str) or not is_name(text):
-        raise bad(argument, name, f"a name, such as 'x', of at most {NAME} letters and digits")
-    return text
-
-
-def _period(period: Any) -> float | None:
-    if period is None:
-        return None
-    wants = "a number > 0, the length of the circle, or None for a line"
-    if isinstance(period, str):
-        period = read_formula(period, {}, "period")
-    if getattr(period, "is_number", False) and period.is_real:  # a sympy number
-        period = float(period)
-    value = number("period", period, wants)
-    if not value > 0.0:
-        raise bad("period", period, wants)
-    return value
-
-
-def _interval(interval: Any, period: Any) -> tuple[float, float] | None:
-    if interval is None:
-        return None
-    if period is not None:
-        raise bad("interval", interval, "None on a circle, which is looked at as a whole")
-    wants = "two finite numbers (low, high), low < high"
-    low, high = pair("interval", interval, wants)
-    if not low < high:
-        raise bad("interval", interval, wants)
-    return low, high

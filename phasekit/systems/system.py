@@ -29,12 +29,12 @@ from phasekit.labels.arguments import (
 )
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import combine
-from phasekit.laws.ladder import Law, Lawful
+from phasekit.laws.ladder import Law
 from phasekit.laws.trigonometric import Trigonometric, Values
 from phasekit.laws.trigonometric import law as make_law
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter, attrs_of
-from phasekit.systems.summary import summary
+from phasekit.systems.value import ModelValue
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,7 @@ MODELS: dict[str, type[Model]] = {}
 ModelType = TypeVar("ModelType", bound="Model")
 
 
-class Model(Lawful):
+class Model(ModelValue):
     """Base of the systems: frozen, compared by value, rebuilt from any map that they made.
 
     Examples
@@ -68,7 +68,6 @@ class Model(Lawful):
 
     __slots__ = ()
 
-    declared: ClassVar[tuple[Parameter, ...]]
     #: Parameters for which folds are known in closed form, with the function that solves for each.
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     #: The rung of its law, which says what can be computed of it.
@@ -214,13 +213,6 @@ class Model(Lawful):
             )
         return Reduced(*values)
 
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Restore a pickled model; its arrays are read-only again."""
-        for name, value in state.items():
-            if isinstance(value, np.ndarray):
-                value.flags.writeable = False
-            object.__setattr__(self, name, value)
-
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed.
 
@@ -252,36 +244,6 @@ class Model(Lawful):
         """
         refuse_another(ds, cls.__name__)
         return cls(**parameter_values(ds, cls.declared))
-
-    def __repr__(self) -> str:
-        """Write the parameters, long arrays by their ends."""
-        shown = ", ".join(f"{name}={brief(value)}" for name, value in self.parameters.items())
-        return f"{type(self).__name__}({shown})"
-
-    def __str__(self) -> str:
-        """Say what it is: parameters in everyday units, equilibria, the nearest folds."""
-        return str(summary(self))
-
-    def _repr_pretty_(self, printer: Any, cycle: bool) -> None:
-        """Say so in IPython, where the representation alone would be meant for programs."""
-        printer.text(str(self))
-
-    def _repr_html_(self) -> str:
-        """Say so in a notebook."""
-        return summary(self).html
-
-    def __eq__(self, other: object) -> bool:
-        """Whether it is the same model with equal parameters; NaN equals NaN."""
-        if type(self) is not type(other) or not isinstance(other, Model):
-            return NotImplemented
-        return all(same(getattr(self, p.name), getattr(other, p.name)) for p in self.declared)
-
-    def __hash__(self) -> int:
-        """Hash of the parameters; a model that holds DataArrays has none."""
-        values = (getattr(self, p.name) for p in self.declared)
-        # 0.0 is added because -0.0 equals it
-        keys = ((v + 0.0).tobytes() if isinstance(v, np.ndarray) else v for v in values)
-        return hash((type(self).__name__, *keys))
 
 
 def _of_parameters(products: Callable[[Values], Any]) -> Callable[[Values], Any]:

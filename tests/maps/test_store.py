@@ -146,7 +146,7 @@ def test_unusable_places_are_refused_before_the_work(tmp_path, monkeypatch):
     def work(*_, **__):
         raise AssertionError("worked")
 
-    monkeypatch.setattr("phasekit.maps.sweep.evaluate", work)
+    monkeypatch.setattr("phasekit.maps.sweep.compute", work)
     monkeypatch.setattr("phasekit.maps.tile.compute_cells", work)
     for store, error, message in (
         (tmp_path / "no" / "map.zarr", pk.StoreError, "does not exist; make it first"),

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from phasekit.numerics.compile import inline
+from phasekit.numerics.compile import inline, routine
 from phasekit.numerics.elementary import inverse_cbrt
 
 SLIGHTLY_LESS = 1.0 - 2.0**-48
@@ -136,3 +136,25 @@ def inner_root(
     slope = f * along - s * across
     folding = t < 0.125 * s0 and t < 0.125 * f0
     return (s1 if folding else s), (f1 if folding else f), (slope1 if folding else slope)
+
+
+@routine
+def largest_root(e: float, k2: float, m: float, n: float, c2: float, s2: float) -> float:
+    """The largest -x of the cubic of a rotation in `shape`, whose roots are all real."""
+    # From above, so that Newton comes down to it.
+    p2 = k2 - 2.0 * e
+    p1 = -2.0 * e * (m + n)
+    p0 = -2.0 * e * m * n
+    # 2 E = z^2 (c2/(m + z) + s2/(n + z)), so z is below what either term gives alone.
+    z = e + np.sqrt(e) * np.sqrt(e + 2.0 * max(m, n))
+    if c2 > 0.0:
+        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * m * c2)) / c2)
+    if s2 > 0.0:
+        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * n * s2)) / s2)
+    for _ in range(100):
+        q1 = p1 / z  # so that nothing underflows
+        step = z * ((z + p2) + q1 + p0 / z / z) / (3.0 * z + 2.0 * p2 + q1)
+        z -= step
+        if not step > 1e-15 * z:
+            break
+    return z

@@ -49,6 +49,7 @@ from phasekit.phase.exact.kernels.levels import (
     SWING,
     TURN,
 )
+from phasekit.phase.exact.kernels.roots import largest_root
 from phasekit.phase.exact.kernels.system import (
     CURVATURE,
     PHI,
@@ -100,6 +101,30 @@ def refer(w: Array) -> None:
 
 
 @routine
+def span(slow: float, fast: float, w: Array) -> None:
+    """The Moebius map between the slow and the fast point of a rotation, by their cotangents."""
+    o_slow = 2.0 * angle_half(1.0, slow)
+    o_fast = 2.0 * angle_half(1.0, fast)
+    w[Z_LOW], w[TAU] = unit_vector(slow)
+    w[Z_HIGH], w[REST_R] = unit_vector(fast)
+    if o_fast < o_slow:
+        o_fast += TWO_PI
+        w[Z_HIGH] = -w[Z_HIGH]
+        w[REST_R] = -w[REST_R]
+    if slow < 0.0:  # the slow point is near the reference on its left
+        o_slow = -2.0 * angle_half(1.0, -slow)
+        o_fast -= TWO_PI
+        for i in (Z_LOW, TAU, Z_HIGH, REST_R):
+            w[i] = -w[i]
+    w[SPAN] = o_slow
+    w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
+    if abs(slow) < math.inf:
+        w[U] = tan_half(abs(slow - fast), (1.0 + slow * fast) * (1.0 if slow > fast else -1.0))
+    else:
+        w[U] = tan_half(1.0, fast)
+
+
+@routine
 def turn(w: Array) -> None:
     """A rotation: roots and Moebius map. The reference is the upper saddle, E > 0."""
     e = w[GAP]
@@ -107,24 +132,9 @@ def turn(w: Array) -> None:
     m = max(-w[M], 0.0)
     n = max(w[N], 0.0)
     size = abs(w[A])
-    # x0 = -z, from above: all roots are real and z is the largest, so Newton comes down to it.
-    p2 = k2 - 2.0 * e
-    p1 = -2.0 * e * (m + n)
-    p0 = -2.0 * e * m * n
     c2 = w[COS] * w[COS] if w[A] >= 0.0 else w[SIN] * w[SIN]
     s2 = w[SIN] * w[SIN] if w[A] >= 0.0 else w[COS] * w[COS]
-    # 2 E = z^2 (c2/(m + z) + s2/(n + z)), so z is below what either term gives alone.
-    z = e + np.sqrt(e) * np.sqrt(e + 2.0 * max(m, n))
-    if c2 > 0.0:
-        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * m * c2)) / c2)
-    if s2 > 0.0:
-        z = min(z, (e + np.sqrt(e) * np.sqrt(e + 2.0 * n * s2)) / s2)
-    for _ in range(100):
-        q1 = p1 / z  # so that nothing underflows
-        step = z * ((z + p2) + q1 + p0 / z / z) / (3.0 * z + 2.0 * p2 + q1)
-        z -= step
-        if not step > 1e-15 * z:
-            break
+    z = largest_root(e, k2, m, n, c2, s2)
     # The others: mu_1 = -q <= 0 <= mu_2, where q mu_2 = product and q - mu_2 = excess.
     b2 = w[B] * w[B] if w[A] >= 0.0 else w[C] * w[C]
     g2 = w[C] * w[C] if w[A] >= 0.0 else w[B] * w[B]
@@ -173,25 +183,7 @@ def turn(w: Array) -> None:
         if (first * first) * weight - 2.0 - weight - 2.0 * first * skew < 0.0:
             slow = second
             fast = first
-    o_slow = 2.0 * angle_half(1.0, slow)
-    o_fast = 2.0 * angle_half(1.0, fast)
-    w[Z_LOW], w[TAU] = unit_vector(slow)
-    w[Z_HIGH], w[REST_R] = unit_vector(fast)
-    if o_fast < o_slow:
-        o_fast += TWO_PI
-        w[Z_HIGH] = -w[Z_HIGH]
-        w[REST_R] = -w[REST_R]
-    if slow < 0.0:  # the slow point is near the reference on its left
-        o_slow = -2.0 * angle_half(1.0, -slow)
-        o_fast -= TWO_PI
-        for i in (Z_LOW, TAU, Z_HIGH, REST_R):
-            w[i] = -w[i]
-    w[SPAN] = o_slow
-    w[SIGMA] = w[PHI_S] + 0.5 * (o_slow + o_fast)
-    if abs(slow) < math.inf:
-        w[U] = tan_half(abs(slow - fast), (1.0 + slow * fast) * (1.0 if slow > fast else -1.0))
-    else:
-        w[U] = tan_half(1.0, fast)
+    span(slow, fast, w)
     # Ratio of the speeds at both ends: (n1 + n0)/sqrt(n1^2 - n0^2), times sqrt(q) throughout, with
     # n0^2 = y1 y2/(low high) and n1^2 = y1 (y2 - y1)/(q (size + q)).
     if q > 0.0:
@@ -206,34 +198,13 @@ def turn(w: Array) -> None:
 
 
 @routine
-def swing(w: Array) -> None:
-    """A libration: roots, turning points and Moebius map."""
+def factors(x: float, product: float, others: float, w: Array) -> tuple[float, float, float]:
+    """Return tau, r1 and r2 of a libration, by x, and sum and product of the other two roots."""
     e = w[GAP]
     slope = w[SLOPE]
     m = w[M]
     n = w[N]
     size = abs(w[A])
-    place = int(w[PLACE])
-    c2 = slope + 2.0 * e
-    c1 = 2.0 * e * (m - n)
-    c0 = -2.0 * e * m * n
-    x = least_root(c2, c1, c0, w)
-    g = (3.0 * x + 2.0 * c2) * x + c1
-    total = -c2 - 3.0 * x
-    product = 2.0 * e * m * n / x if x != 0.0 else g
-    others = -c2 - x
-    if abs(others) < 0.1 * abs(x):
-        others = (c1 - product) / x
-    g = max(g, 0.0)
-    root = np.sqrt(g)
-    if total >= 0.0:
-        square = 0.25 * (total + 2.0 * root)
-    else:
-        square = 0.25 * (4.0 * product - others * others) / (2.0 * root - total)
-    w[X0] = x
-    w[Y_PRODUCT] = g
-    w[FIRST] = np.sqrt(root)
-    w[SECOND] = np.sqrt(max(square, 0.0))
     # mu_0 and A - mu_0, from the product of the roots where the sum cancels.
     b2 = w[B] * w[B] if w[A] >= 0.0 else w[C] * w[C]
     g2 = w[C] * w[C] if w[A] >= 0.0 else w[B] * w[B]
@@ -268,6 +239,38 @@ def swing(w: Array) -> None:
         r2 = both / r1
     elif abs(r2) > 0.0:
         r1 = both / r2
+    return tau, r1, r2
+
+
+@routine
+def swing(w: Array) -> None:
+    """A libration: roots, turning points and Moebius map."""
+    e = w[GAP]
+    slope = w[SLOPE]
+    m = w[M]
+    n = w[N]
+    place = int(w[PLACE])
+    c2 = slope + 2.0 * e
+    c1 = 2.0 * e * (m - n)
+    c0 = -2.0 * e * m * n
+    x = least_root(c2, c1, c0, w)
+    g = (3.0 * x + 2.0 * c2) * x + c1
+    total = -c2 - 3.0 * x
+    product = 2.0 * e * m * n / x if x != 0.0 else g
+    others = -c2 - x
+    if abs(others) < 0.1 * abs(x):
+        others = (c1 - product) / x
+    g = max(g, 0.0)
+    root = np.sqrt(g)
+    if total >= 0.0:
+        square = 0.25 * (total + 2.0 * root)
+    else:
+        square = 0.25 * (4.0 * product - others * others) / (2.0 * root - total)
+    w[X0] = x
+    w[Y_PRODUCT] = g
+    w[FIRST] = np.sqrt(root)
+    w[SECOND] = np.sqrt(max(square, 0.0))
+    tau, r1, r2 = factors(x, product, others, w)
     lobe = e < 0.0 and (place == LEFT or place == RIGHT)
     second = place == RIGHT if lobe else r2 < r1
     sum_ = tau if second else -tau  # of the zeros
@@ -310,9 +313,8 @@ def swing(w: Array) -> None:
     w[SIGMA_LOW] = 0.0
     if e < 0.0 and place == AROUND and z_big > 0.0:  # opposite to the reference, all but exactly
         shift = 0.5 * o_low - angle_half(1.0, -z_small)
-        w[SIGMA], rest = two_sum(w[PHI_S], 0.5 * TWO_PI)
-        w[SIGMA], rest = dd_add(w[SIGMA], rest, shift, 0.5 * TWO_PI_LOW + w[PHI_S_LOW])
-        w[SIGMA_LOW] = rest
+        w[SIGMA], low = two_sum(w[PHI_S], 0.5 * TWO_PI)
+        w[SIGMA], w[SIGMA_LOW] = dd_add(w[SIGMA], low, shift, 0.5 * TWO_PI_LOW + w[PHI_S_LOW])
     # V' at both turning points, but for a common factor.
     force_high = e + x / (1.0 + z_high * z_high)
     force_low = e + x / (1.0 + z_low * z_low)
