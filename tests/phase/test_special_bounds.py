@@ -71,6 +71,33 @@ def test_bounds_of_special_functions_hold(formula, exact, start, stop):
     assert np.all(width <= 20.0 * (slope + 2.0 + np.abs(least[narrow])) * 1e-5)
 
 
+#: Where SciPy leaves few digits: next to poles and branch points, under- and overflow, exp(x^2).
+HARD = [
+    (sp.erfi(X), mpmath.erfi, [-26.148781397254947, -19.586119426811667, 14.77424291637037]),
+    (sp.erfc(X), mpmath.erfc, [19.78872820160791, 21.746641520010392, 26.9, 27.177982085386006]),
+    (sp.polygamma(0, X), mpmath.digamma, [-21.998814910768793, -333.999999, -1000.0000001, -7.3]),
+    (sp.LambertW(X), FUNCTIONS[-3][1], [-0.36787944117144, -0.367879441171, -0.3678794, -0.36]),
+    (sp.besseli(1, X), lambda x: mpmath.besseli(1, x), [2.66e-172, 5e-200, -9.1e-301]),
+    (sp.besseli(4, X), lambda x: mpmath.besseli(4, x), [3.307132250910179e-68, 1e-9]),
+    (sp.besselj(1, X), lambda x: mpmath.besselj(1, x), [3.517512617068197e-263, 5.9e-242]),
+    (sp.besselk(0, X), lambda x: mpmath.besselk(0, x), [800.0, 3403.909085206491]),
+    (sp.Ei(X), mpmath.ei, [-8254.131918441177, -800.0, 0.37250741078136663]),
+    (SphericalJ1(X), lambda x: x / 3, [-3.954805517150386e-114, 4.0104824036799614e-122]),
+]
+
+
+@pytest.mark.parametrize(("formula", "exact", "places"), HARD, ids=lambda value: str(value)[:20])
+def test_bounds_hold_where_digits_are_lost(formula, exact, places):
+    x = np.array(places)
+    ((least, most),), undefined = Bounds((formula,), (X,))((x, x))
+    assert not undefined.any()
+    with mpmath.workdps(60):
+        for low, high, place in zip(least, most, x, strict=True):
+            value = exact(mpmath.mpf(place))
+            assert mpmath.mpf(low) <= value <= mpmath.mpf(high)
+            assert high - low <= 1e-5 * abs(value) + 1e-12
+
+
 def test_the_slope_of_a_sine_integral_has_no_gap_at_0():
     x = np.array([-700.0, -3.0, -1e-9, 0.0, 1e-300, 1e-4, 0.5, 12.0, 3e5])
     for formula, exact in ((SphericalJ0(X), mpmath.sinc), (SphericalJ1(X), lambda u: (

@@ -189,7 +189,7 @@ RULES: dict[str, Callable[..., Interval]] = {
     "acosh": rising(np.arccosh, domain=(1.0, np.inf)),
     "atanh": rising(np.arctanh, domain=(-1.0, 1.0)),
     "erf": rising(_erf, image=(-1.0, 1.0)),
-    "erfc": _falling(rising(_erfc, image=(0.0, 2.0))),
+    "erfc": _falling(special_bounds.of_squares(_erfc, 0.0, 2.0)),
     "Abs": _abs,
 }
 _REWRITTEN: dict[str, Callable[[Any, Any], Any]] = {

@@ -22,6 +22,10 @@ Rule = Callable[..., Interval]
 #: By how many units SciPy's special functions may be off, of the value and of the argument.
 _ULPS = 64.0
 _EPS = float(np.finfo(float).eps)
+#: Values that SciPy may return as 0, or with few digits.
+_LEAST = 1e-150
+#: Units by which exp(x^2) may be off, up to its overflow, where x^2 is rounded.
+_OF_SQUARES = 512.0
 #: Where gamma is least on the right half of the line.
 _TURN = 1.4616321449683623
 _INF = np.inf
@@ -44,7 +48,7 @@ def _second(name: str, which: int) -> Callable[[Any], Any]:
 
 
 def _blurred(low: Any, high: Any, size: Any) -> Interval:
-    blur = _ULPS * _EPS * (np.maximum(np.abs(low), np.abs(high)) + size)
+    blur = _ULPS * _EPS * (np.maximum(np.abs(low), np.abs(high)) + size) + _LEAST
     return low - blur, high + blur
 
 
@@ -83,7 +87,9 @@ def _sloped(
         middle = low + 0.5 * (high - low)
         half = np.maximum(middle - low, high - middle) * (1.0 + 4.0 * _EPS)
         value, steep = function(middle), slope(low, high) * (1.0 + _ULPS * _EPS)
-        away = steep * (half + _ULPS * _EPS * np.abs(middle))
+        distance = np.abs(middle)
+        # Powers of what is next to 0 are made of logarithms, which leave fewer digits.
+        away = steep * (half + _ULPS * _EPS * np.where(distance < 1e-10, 8.0, 1.0) * distance)
         least, most = _blurred(value - away, value + away, 0.0)
         unknown = outside | np.isnan(least) | np.isnan(most)
         return (
@@ -111,6 +117,18 @@ def _monotone(
         first, last = _blurred(*(ends[::-1] if falls else ends), 0.0)
         first, last = np.maximum(first, least), np.minimum(last, most)
         return np.where(outside, least, first), np.where(outside, most, last)
+
+    return rule
+
+
+def of_squares(function: Callable[[Any], Any], least: float = -_INF, most: float = _INF) -> Rule:
+    """Rule for an error function that rises, made of exp(x^2) or exp(-x^2)."""
+
+    def rule(_: Flags, a: Interval) -> Interval:
+        low, high = function(a[0]), function(a[1])
+        low = low - _OF_SQUARES * _EPS * np.abs(low) - _LEAST
+        high = high + _OF_SQUARES * _EPS * np.abs(high) + _LEAST
+        return np.maximum(low, least), np.minimum(high, most)
 
     return rule
 
@@ -173,13 +191,20 @@ def _trigamma(sine: Interval, part: Interval, _: Array) -> Interval:
     return (np.pi / sine[1]) ** 2 - part[1], (np.pi / sine[0]) ** 2 - part[0]
 
 
+def _psi(x: Array) -> Any:
+    """Digamma, by its reflection with the distance from the nearest pole where x < 0."""
+    psi = _special("psi")
+    near = np.where(x < 0.0, x - np.rint(x), 0.25)
+    return np.where(x < 0.0, psi(1.0 - np.minimum(x, 0.0)) - np.pi / np.tan(np.pi * near), psi(x))
+
+
 def _digamma(undefined: Flags, a: Interval) -> Interval:
     """It rises between its poles."""
     low, high = np.asarray(a[0], dtype=float), np.asarray(a[1], dtype=float)
     floor = np.floor(low)
     pole = (low <= 0.0) & ((high >= floor + 1.0) | (low == floor))
     undefined |= pole
-    least, most = _blurred(_special("psi")(low), _special("psi")(high), 1.0)
+    least, most = _blurred(_psi(low), _psi(high), 1.0)
     return np.where(pole, -_INF, least), np.where(pole, _INF, most)
 
 
@@ -198,8 +223,20 @@ def _ei(undefined: Flags, a: Interval) -> Interval:
     through = (low <= 0.0) & (high >= 0.0)
     undefined |= through
     ends = _special("expi")(low), _special("expi")(high)
-    least, most = _blurred(np.minimum(*ends), np.maximum(*ends), 0.0)
+    # Its zero is where x > 0.
+    least, most = _blurred(np.minimum(*ends), np.maximum(*ends), np.where(low > 0.0, 1.0, 0.0))
     return np.where(through, -_INF, least), np.where(through, _INF, most)
+
+
+def _lambertw(undefined: Flags, a: Interval) -> Interval:
+    """It rises from -1, where its slope is infinite: w e^w is what rounding leaves of x."""
+    branch = -np.exp(-1.0)
+    undefined |= np.asarray(a[0]) < branch
+    w = [np.real(_special("lambertw")(np.maximum(end, branch))) for end in a]
+    blur = [
+        _ULPS * _EPS * (np.abs(x) + 1.0 / np.maximum(1.0 + x, np.sqrt(_EPS))) + _LEAST for x in w
+    ]
+    return np.maximum(w[0] - blur[0], -1.0), w[1] + blur[1]
 
 
 def _envelope(order: int, low: Array) -> Any:
@@ -259,9 +296,9 @@ RULES: Mapping[str, Rule] = {
             0.615 * np.abs(np.minimum(low, 0.0)), high * _second("airy", 2)(np.maximum(high, 0.0))
         ),
     ),
-    "erfi": rising(_special("erfi")),
+    "erfi": of_squares(_special("erfi")),
     "erfinv": rising(_special("erfinv"), domain=(-1.0, 1.0)),
-    "LambertW": rising(lambda x: np.real(_special("lambertw")(x)), domain=(-np.exp(-1.0), _INF)),
+    "LambertW": _lambertw,
 }
 
 #: Rules of functions of a whole order and one argument, by what makes them of the order >= 0.
