@@ -27,8 +27,14 @@ def in_notebook() -> bool:
 
 def watched() -> bool:
     """Whether somebody looks: standard error is a terminal, or this is a notebook."""
-    terminal = sys.stderr is not None and sys.stderr.isatty()
-    return (terminal or in_notebook()) and multiprocessing.parent_process() is None
+    return (_in_terminal() or in_notebook()) and multiprocessing.parent_process() is None
+
+
+def _in_terminal() -> bool:
+    try:
+        return sys.stderr.isatty()
+    except (AttributeError, ValueError):  # there is none, it cannot tell, or it is closed
+        return False
 
 
 def _tell(text: str) -> None:

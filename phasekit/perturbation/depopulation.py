@@ -77,11 +77,13 @@ def two_rims(D: npt.ArrayLike, apart: npt.ArrayLike) -> tuple[Array, Array]:
         one, gap = float(D[at]), float(apart[at])
         if gap == 0.0:
             low[at] = high[at] = depopulation(one)
-        elif np.isfinite(one) and 0.0 < gap < FAR and one > 0.0:
+        elif np.isfinite(one) and one > 0.0:
             loss = min(max(one, LEAST), MOST)
-            scale = low[at] / depopulation(2.0 * loss)
-            found = _solved(loss, gap * max(1.0, float(np.sqrt(LEAST / one))))
-            low[at], high[at] = (scale * x for x in found)
+            with np.errstate(over="ignore"):
+                steps = gap * np.sqrt(max(1.0, LEAST / one))
+            if 0.0 < steps < FAR:  # else there is not even memory for all energies in between
+                scale = low[at] / depopulation(2.0 * loss)
+                low[at], high[at] = (scale * x for x in _solved(loss, float(steps)))
     unknown = ~np.isfinite(D + apart)
     return np.where(unknown, np.nan, low), np.where(unknown, np.nan, high)
 

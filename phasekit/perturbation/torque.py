@@ -144,7 +144,7 @@ def _under_torque(A: Array, B: Array, C: Array, N: Array, still: Array) -> Equil
     a, b, c, n = (x[:, None] for x in (A, B, C, N))
     low, high = ends, following
     at_low, at_high = gradient(a, b, c, low) - n, gradient(a, b, c, high) - n
-    crossed = at_low * at_high < 0.0
+    crossed = np.sign(at_low) * np.sign(at_high) < 0.0  # their product may underflow
     # A torque at an end of what V' takes, within rounding, merges both neighbors there.
     size = np.abs(a) + np.abs(b) + np.abs(c) + np.abs(n)
     touches = np.abs(at_low) <= ROUNDINGS * size

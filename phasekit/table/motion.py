@@ -71,7 +71,7 @@ QUANTITIES: tuple[Quantity, ...] = (
              "to infinity, or to further ones", "1 - sum of the shares", RECURRENCE, of=_OF),
     Quantity("n_attractors", "basin_fractions", (), "int64", "1",
              "number of attractors that were found, also beyond those that are numbered; "
-             "-1: without damping or a common period", "attractors of 1,024 states",
+             "-1: without damping or a common period", "attractors of 256 states",
              RECURRENCE, of=_OF),
 )
 # fmt: on

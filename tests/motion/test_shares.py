@@ -50,6 +50,17 @@ def test_cells_without_attractors():
     assert np.nansum(ds.basin_fraction.values[1]) == pytest.approx(1.0)
 
 
+def test_motions_that_do_not_settle_are_told(monkeypatch):
+    def without_patience(*arguments):
+        search = find(*arguments)
+        search.unsettled = 3
+        return search
+
+    monkeypatch.setattr("phasekit.motion.shares.find", without_patience)
+    with pytest.warns(RuntimeWarning, match="n_attractors: 3 of the motions .* damped so weakly"):
+        pk.sweep(DRIVEN, damping=[0.4], of="n_attractors", **BOX)
+
+
 def test_more_attractors_than_there_is_place_for_are_counted():
     row = pk.Perturbed(pk.Potential("1 - cos(x)", "x"), damping=0.5)
     ds = pk.sweep(row, damping=[0.5], of="basin_fractions", box_phi=5.0 * np.pi, box_dphi=0.5)

@@ -1,5 +1,6 @@
 """Whoever waits for more than two seconds is told why."""
 
+import os
 import sys
 import time
 import types
@@ -76,6 +77,14 @@ def test_nothing_is_said_where_nobody_looks(monkeypatch, capfd):
     assert not waits.watched()
     compiled("phasekit.made_up", 0.1)
     assert capfd.readouterr().err == ""
+
+
+def test_what_is_no_stream_is_no_terminal(monkeypatch):
+    closed = open(os.devnull, "w")
+    closed.close()
+    for stream in (None, closed, object()):
+        monkeypatch.setattr(sys, "stderr", stream)
+        assert not waits.watched()
 
 
 def notebook(monkeypatch, config):

@@ -106,6 +106,19 @@ def test_a_small_torque_opens_the_eight_as_little():
     assert area == pytest.approx(2.0 * level.sel(saddle="upper").winding_area.item(), rel=1e-3)
 
 
+@pytest.mark.parametrize("scale", [1e-200, 1e150])
+def test_separatrices_do_not_depend_on_the_unit_of_energy(scale):
+    values = np.array([1.0, 0.35, 0.12, 0.1])
+    ds, want = (
+        pk.separatrices(pk.Perturbed(pk.Coefficients(A, B, C), torque=N))
+        for A, B, C, N in (scale * values, values)
+    )
+    assert want.loop.values.tolist() == [pk.Loop.LOBES, pk.Loop.LOBE]
+    assert np.array_equal(ds.loop, want.loop)
+    assert ds.turning_offset.values == pytest.approx(want.turning_offset.values, rel=1e-14)
+    assert (ds.lobe_area / np.sqrt(scale)).values == pytest.approx(want.lobe_area.values, rel=1e-13)
+
+
 def test_maps_and_refusals(tmp_path):
     pendulum = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0))
     ds = pk.sweep(
