@@ -180,8 +180,8 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
         over the upper one, which winds, out of both wells together, on either side.
         ``escape_regime`` (`EscapeRegime`) says what limits it, ``escape_error`` the relative error.
         Under a torque both ends of a well differ; the rate is that of the end which is reached
-        first, over the higher one at low damping next to nothing. Absent ones, barriers below 2 kT
-        and systems with a drive are NaN.
+        first, over the higher one at low damping next to nothing. Absent ones, barriers below 2 kT,
+        rates that are not known within their own size and systems with a drive are NaN.
 
     Raises
     ------

@@ -26,6 +26,8 @@ Array = npt.NDArray[np.float64]
 FEW = 1.0
 #: Barriers over kT below which a rate means nothing.
 LOWEST = 2.0
+#: Relative errors from which on it does not either.
+WORST = 1.0
 #: Step of the logarithmic derivative.
 STEP = 0.02
 #: Corrections of losses, in kT over the barrier, of wells that hold a saddle: as of single ones.
@@ -110,7 +112,7 @@ def combined(cells: Cells, first: Array, way: Exit) -> tuple[Array, Array, Any, 
         error = np.maximum(order, 1.0 - order) * np.abs(span) + 0.25 * low * low
         error = error + np.maximum(follows, 1.0 - follows) * np.abs(wide)
         error = np.where(way.known, error, error + UNKNOWN * low * order)
-    sure = np.isfinite(rate) & (height > LOWEST * kT)
+    sure = np.isfinite(rate) & (height > LOWEST * kT) & ~(error > WORST)
     regime = np.select(
         [~sure, way.loss < FEW, damping > 2.0 * way.k],
         [EscapeRegime.NOT_COMPUTED, EscapeRegime.ENERGY_DIFFUSION, EscapeRegime.SPATIAL_DIFFUSION],

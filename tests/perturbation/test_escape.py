@@ -85,6 +85,28 @@ def test_two_ends_of_a_well():
     assert tiny[1:] == pytest.approx(small[1:], rel=1e-12)  # distances count by the step
 
 
+def test_far_rims_take_no_memory():
+    """Next to no damping the energies between two rims are more steps than there is room for."""
+    for D in (1e-12, 1e-300, 5e-324):
+        low, high = two_rims(D, 1.0)
+        assert low == pytest.approx(2.0 * D, rel=1e-3)
+        assert high == 0.0
+    tilted = pk.Perturbed(EIGHT, torque=0.05, damping=[1e-300, 1e-12], kT=0.04)
+    over = pk.escape_rate(tilted).sel(saddle="lower", side="right").escape_rate.values
+    assert over[0] * 1e288 == pytest.approx(over[1], rel=1e-6)
+
+
+def test_a_rate_that_is_not_known_is_none():
+    """Over the higher end of a well whose lower one holds nothing back."""
+    shallow = pk.Coefficients(1.1432336266295944, -0.019878981274646115, 0.4325042444657452)
+    tilted = pk.Perturbed(shallow, torque=0.2649666843134663, damping=0.1, kT=0.02)
+    found = pk.escape_rate(tilted, center="upper_center")
+    high = found.sel(saddle="lower", side="right")
+    assert high.barrier > 25.0 * 0.02
+    assert np.isnan([high.escape_rate, high.escape_error]).all()
+    assert high.escape_regime == pk.EscapeRegime.NOT_COMPUTED
+
+
 def test_simulated_paths():
     """1,500 Langevin paths: 5.32(14)e-4; the formula of a high barrier is 19 % high at 0.02."""
     at = [rates(EIGHT, damping, 0.04).sel(saddle="lower", side="right") for damping in (0.5, 0.02)]
