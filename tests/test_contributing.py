@@ -50,7 +50,7 @@ def run(heading):
     """The names that the example of a section makes."""
     (block,) = re.findall(r"```python\n(.*?)```", SECTIONS[heading], re.DOTALL)
     names = {"__name__": "example"}
-    exec(compile(block, f"{GUIDE.name}: {heading}", "exec"), names)
+    exec(compile(block, f"{GUIDE.name}: {heading}", "exec", dont_inherit=True), names)
     return names
 
 

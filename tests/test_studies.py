@@ -30,7 +30,7 @@ STUDIES = [
     path for path in sorted(FOLDER.glob("*/*.py")) if "__main__" in path.read_text(encoding="utf-8")
 ]
 #: Thousands of motions.
-LONG = {"capture_against_simulation", "response_of_a_driven_disk"}
+LONG = {"capture_against_simulation", "doublings_of_a_cycle", "response_of_a_driven_disk"}
 ALL = "PHASEKIT_STUDIES" in os.environ
 SITE = os.environ.get("PHASEKIT_SITE")
 
@@ -215,3 +215,13 @@ def test_the_junction_leaves_at_the_rate_of_simulated_phases(run):
     assert len(pairs) == 2
     for rate, found, spread in (map(float, one) for one in pairs):
         assert abs(rate - found) < 3.0 * spread
+
+
+def test_doublings_of_a_cycle_approach_feigenbaums_ratio(run):
+    """The first two places were refined elsewhere, to 12 digits."""
+    _, text = run("doublings_of_a_cycle")
+    places = re.findall(r"doubling \d: c = (\S+), period (\S+)", text)
+    assert places[0] == ("2.832445028", "5.769820")
+    assert places[1][0] == "3.837358168"
+    first, second = (float(x) for x in re.search(r"distances: (\S+), (\S+)", text).groups())
+    assert abs(second - 4.669202) < 0.11 < abs(first - 4.669202)

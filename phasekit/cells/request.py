@@ -13,7 +13,6 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import Grid, make_grid
-from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS, pass_of
 from phasekit.table.row import Pass, Quantity
@@ -75,8 +74,7 @@ def ask(
         If nothing computes a row, an input is missing, or dims disagree.
     """
     passes = passes or passes_of(system, rows)
-    if not issubclass(system.rung, Trigonometric):  # of which the table is
-        rows, passes = fitted(system, rows, passes)
+    rows, passes = fitted(system, rows, passes)
     inputs = {**system.parameters, **(states or {})}
     grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = needs_of(system, passes)

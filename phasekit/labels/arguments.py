@@ -11,7 +11,7 @@ import difflib
 import functools
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias, TypeVar, cast
+from typing import Any, TypeAlias, TypeVar, Union, cast
 
 import numpy as np
 import xarray as xr
@@ -34,10 +34,11 @@ __all__ += [
     "whole",
 ]
 
+# Not written with |, for which xarray, as yet a module to be loaded later, would be loaded.
 #: What a user may pass for a number: a scalar, a 1-D list or array, or a DataArray.
-NumberLike: TypeAlias = "float | Sequence[float] | NDArray[Any] | xr.DataArray"
+NumberLike: TypeAlias = Union[float, Sequence[float], NDArray[Any], "xr.DataArray"]  # noqa: UP007
 #: What is kept of it: a float, a read-only 1-D array, or a DataArray of float64.
-Value: TypeAlias = "float | FloatArray | xr.DataArray"
+Value: TypeAlias = Union[float, FloatArray, "xr.DataArray"]  # noqa: UP007
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 

@@ -575,7 +575,8 @@ def test_tiles_need_no_list():
     assert (job.cells, job.count) == (10**12, 10**10)
     assert next(job.tiles()).index == (0, 0)
     assert job.left[0].at(10**10 - 1) == (10**5 - 1, 10**5 - 1)
-    assert [tile.index for tile in job.shares(2)[0].samples] == [(0, 0), (10**5 - 1, 10**5 - 1)]
+    samples = job.left[0].samples(job.place, job.request, 2)
+    assert [tile.index for tile in samples] == [(0, 0), (10**5 - 1, 10**5 - 1)]
 
 
 def test_tiles_that_are_left_are_found_between_those_that_are_done(tmp_path):

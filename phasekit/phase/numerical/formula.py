@@ -76,9 +76,12 @@ class Formula(Conservative):
     @property
     def unbounded_function(self) -> str | None:
         """Name of a function in it of which no bounds are known, so that nothing is proved."""
-        from phasekit.phase.numerical.isolation import without_bounds
+        from phasekit.phase.numerical.intervals import bounds_of_slopes
 
-        return without_bounds(self)
+        if self.shape is not Shape.GENERAL:
+            return None
+        found = bounds_of_slopes(self.expression, (self.coordinate, *self.names))
+        return found if isinstance(found, str) else None
 
     def check_searchable(self) -> None:
         """Refuse to look for the equilibria of a function on the whole line."""

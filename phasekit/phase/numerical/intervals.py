@@ -7,6 +7,7 @@ arrays of all stretches at once.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -291,3 +292,21 @@ class Bounds:
         if name in _REWRITTEN and len(arguments) == 1:
             return self._compile(_REWRITTEN[name](sp, arguments[0]))
         raise NoRule(name)
+
+
+@functools.lru_cache(maxsize=128)
+def bounds_of_slopes(potential: Any, names: tuple[str, ...]) -> Bounds | str:
+    """Bounds of V' and V'' of an expression in the named variables, the coordinate being the first.
+
+    Where a function in it has no rule, its name.
+    """
+    import sympy as sp
+
+    from phasekit.laws.derivatives import derivative
+
+    symbols = [sp.Symbol(name, real=True) for name in names]
+    slopes = [derivative(potential, symbols[0], order) for order in (1, 2)]
+    try:
+        return Bounds(slopes, symbols)
+    except NoRule as missing:
+        return str(missing)

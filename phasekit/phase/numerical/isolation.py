@@ -8,7 +8,6 @@ proved, and is reported as such.
 
 from __future__ import annotations
 
-import functools
 import itertools
 from dataclasses import dataclass
 from typing import NamedTuple, TypeAlias
@@ -17,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
-from phasekit.phase.numerical.formula import Formula, Shape
-from phasekit.phase.numerical.intervals import Bounds, NoRule, point
+from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.intervals import Bounds, bounds_of_slopes, point
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
@@ -53,31 +52,8 @@ class Isolated(NamedTuple):
 
 def slope_bounds(formula: Formula) -> Bounds | None:
     """Bounds of V' and V'' over boxes of (x, parameters); None where a function has no rule."""
-    found = _slope_bounds(formula)
+    found = bounds_of_slopes(formula.expression, (formula.coordinate, *formula.names))
     return found if isinstance(found, Bounds) else None
-
-
-def without_bounds(formula: Formula) -> str | None:
-    """The function of which no bounds are known, so that nothing is proved, if there is one."""
-    if formula.shape is not Shape.GENERAL:
-        return None
-    found = _slope_bounds(formula)
-    return found if isinstance(found, str) else None
-
-
-@functools.lru_cache(maxsize=128)
-def _slope_bounds(formula: Formula) -> Bounds | str:
-    """Bounds, or the function that has no rule."""
-    import sympy as sp
-
-    from phasekit.laws.derivatives import derivative
-
-    x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
-    slope, bend = (derivative(formula.expression, x, order) for order in (1, 2))
-    try:
-        return Bounds((slope, bend), (x, *parameters))
-    except NoRule as missing:
-        return str(missing)
 
 
 @dataclass
