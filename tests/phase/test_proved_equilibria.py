@@ -327,7 +327,7 @@ def test_a_narrow_well_on_the_way_is_not_stepped_over(width):
     assert abs(got.period / float(want) - 1.0) < 1e-14
     x, v = functions.flow(formula, 8.0, 0.0, np.array([0.5, 1.0, 7.5]) * float(want))
     np.testing.assert_allclose(x, [-8.0, 8.0, -8.0], rtol=1e-14)
-    # Two units in the last place of the period are 7.5 times as much time, in which v gains 8 times.
+    # Two units in the last place of the period, 7.5 times, in which v gains 8 times as much.
     late = 7.5 * float(want) * 2 * np.finfo(float).eps
     np.testing.assert_allclose(v, 0.0, atol=8.0 * late)
 
