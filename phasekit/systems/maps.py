@@ -1,4 +1,4 @@
-"""Maps that are code: their displacement f(x) - x, and their iterates."""
+"""Maps that are applied several times: formulas put into one another, and code."""
 
 from __future__ import annotations
 
@@ -8,32 +8,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.code_fields import numbers_of
 from phasekit.labels.arguments import bad
 
 FloatArray = npt.NDArray[np.float64]
 
 MOST = 1000  # times that a map is applied
 LONGEST = 5000  # operations of formulas that are put into one another
-
-
-def moves_of(f: Callable[..., Any]) -> Callable[..., FloatArray]:
-    """f(x) - x, zero at fixed points."""
-
-    def moves(x: FloatArray, **parameters: float) -> FloatArray:
-        value = np.asarray(f(x.copy(), **parameters), dtype=float)
-        return value.reshape(x.shape) - x if value.size == x.size else value
-
-    return moves
-
-
-def slopes_of(jac: Callable[..., Any]) -> Callable[..., FloatArray]:
-    """The matrix of derivatives of f(x) - x."""
-
-    def slopes(x: FloatArray, **parameters: float) -> FloatArray:
-        value = np.asarray(jac(x, **parameters), dtype=float)
-        return value.reshape(x.size, x.size) - np.eye(x.size)
-
-    return slopes
 
 
 def iterated(
@@ -70,7 +51,7 @@ class Iterate:
         """The state after all steps."""
         x = np.array(x, dtype=float)
         for _ in range(self.times):
-            x = np.asarray(self.f(x.copy(), **parameters), dtype=float).reshape(x.shape)
+            x = numbers_of("f", self.f(x.copy(), **parameters), x.shape)
         return x
 
 
@@ -85,6 +66,6 @@ class IterateSlopes:
         x = np.array(x, dtype=float)
         matrix = np.eye(x.size)
         for _ in range(self.times):
-            matrix = np.asarray(self.jac(x.copy(), **parameters)).reshape(x.size, -1) @ matrix
-            x = np.asarray(self.f(x.copy(), **parameters), dtype=float).reshape(x.shape)
+            matrix = numbers_of("jac", self.jac(x.copy(), **parameters), matrix.shape) @ matrix
+            x = numbers_of("f", self.f(x.copy(), **parameters), x.shape)
         return matrix

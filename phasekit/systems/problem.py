@@ -12,17 +12,20 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labels.arguments import bad, flag, reals, unknown, whole
-from phasekit.laws.formulas import symbols_of, take_formula, write_formula
+from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.as_system import as_system, stands_on
 from phasekit.systems.maps import iterated
 from phasekit.systems.perturbed_problem import formulas_of
 from phasekit.systems.problem_parts import (
+    angles_of,
     clock_of,
+    jet_of,
     make_field,
     names_of,
     refuse_of_maps,
+    specified,
     values_of,
     written,
 )
@@ -99,18 +102,9 @@ class Problem:
     """
 
     __slots__ = (
-        "_field",
-        "conservative",
-        "f",
-        "jac",
-        "map",
-        "parameters",
-        "period",
-        "periods",
-        "state",
-        "system",
-        "time",
-    )
+        "_field", "_own", "conservative", "f", "jac", "map", "parameters", "period", "periods",
+        "state", "system", "time",
+    )  # fmt: skip
 
     f: Any
     jac: Callable[..., Any] | None
@@ -123,6 +117,7 @@ class Problem:
     map: bool
     system: Model | None
     _field: Field
+    _own: Field  # f itself, where that of a map is f(x) - x
 
     def __init__(
         self,
@@ -142,12 +137,7 @@ class Problem:
         for name in values:
             if name in states:
                 raise bad("parameters", list(values), f"names that are no states; {name!r} is one")
-        angles = values_of("periods", {} if periods is None else periods)
-        for name, value in angles.items():
-            if name not in states:
-                raise unknown("periods: state", name, states)
-            if not value > 0.0:
-                raise bad(f"periods[{name!r}]", value, "a number > 0")
+        angles = angles_of(periods, states)
         flag("conservative", conservative)
         flag("map", map)
         refuse_of_maps(map, conservative=conservative or None, time=time, period=period)
@@ -167,9 +157,12 @@ class Problem:
         self._set("map", bool(map))
         self._set("jac", jac)
         self._set("system", None)
-        field, kept = make_field(f, jac, states, (*values, *self._times()), discrete=self.map)
+        names = (*values, *self._times())
+        own, kept = make_field(f, jac, states, names)
+        field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
         self._set("f", kept)
         self._set("_field", field)
+        self._set("_own", own)
 
     def _times(self) -> tuple[str, ...]:
         """The name of time, if f depends on it."""
@@ -339,42 +332,17 @@ class Problem:
         ParameterError
             If x is not a number for each state.
         """
-        from phasekit.bifurcation.continuation.curve import Curve
-        from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
-        from phasekit.bifurcation.continuation.options import ContinuationOptions
-
         n = len(self.state)
         wants = f"{n} numbers: {', '.join(self.state)}"
         x = np.atleast_1d(reals("x", x, wants))
         if x.shape != (n,):
             raise bad("x", x, wants)
-        infinite = np.full(n, np.inf)
         par = np.array([*self.parameters.values(), *(time for _ in self._times())])
-        curve = Curve(
-            self.field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite,
-            infinite, ContinuationOptions(),
-        )  # fmt: skip
-        value, slopes = curve.at(x)
-        return (value + x, slopes + np.eye(n)) if self.map else (value, slopes)
+        return jet_of(self._own, par, x)
 
     def specification(self) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code."""
-        formulas = [write_formula(e) for e in self.f] if self.kind == "symbolic" else None
-        spec: dict[str, Any] = {
-            "f": formulas,
-            "state": list(self.state),
-            "parameters": dict(self.parameters),
-            "periods": dict(self.periods),
-            "conservative": self.conservative,
-        }
-        if self.time is not None:
-            spec.update(time=self.time, period=write_formula(self.period))
-        if self.map:
-            spec["map"] = True
-        if self.system is not None:
-            spec["system"] = type(self.system).__name__
-            spec["system_parameters"] = self.system.arguments
-        return spec
+        return specified(self)
 
     @classmethod
     def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:

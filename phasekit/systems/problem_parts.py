@@ -7,13 +7,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, number, unknown
-from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula
-from phasekit.systems.maps import moves_of, slopes_of
+from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula, write_formula
+
+Array = npt.NDArray[np.float64]
 
 
 def names_of(argument: str, given: Any) -> tuple[str, ...]:
@@ -45,6 +47,17 @@ def values_of(argument: str, given: Any) -> dict[str, float]:
     for name, value in given.items():
         values[name] = number(f"{argument}[{name!r}]", value, "a number, finite", None)
     return values
+
+
+def angles_of(periods: Any, states: Sequence[str]) -> dict[str, float]:
+    """The periods of the states that are angles."""
+    angles = values_of("periods", {} if periods is None else periods)
+    for name, value in angles.items():
+        if name not in states:
+            raise unknown("periods: state", name, states)
+        if not value > 0.0:
+            raise bad(f"periods[{name!r}]", value, "a number > 0")
+    return angles
 
 
 def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str, float]) -> Any:
@@ -151,9 +164,7 @@ def make_field(
     check_call("f", f, names)
     if jac is not None:
         check_call("jac", jac, names)
-    if discrete:
-        return PythonField(moves_of(f), None if jac is None else slopes_of(jac), states, names), f
-    return PythonField(f, jac, states, names), f
+    return PythonField(f, jac, states, names, less=discrete), f
 
 
 def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
@@ -193,3 +204,38 @@ def written(problem: Any) -> str:
         notes.append(f"{problem.time} modulo {problem.period}")
     notes += ["conservative"] * problem.conservative
     return f"{equations}{'; ' if notes else ''}{', '.join(notes)}"
+
+
+def specified(problem: Any) -> dict[str, Any]:
+    """What is needed to make a problem again, as plain values; f is None if it is code."""
+    formulas = [write_formula(e) for e in problem.f] if problem.kind == "symbolic" else None
+    spec: dict[str, Any] = {
+        "f": formulas,
+        "state": list(problem.state),
+        "parameters": dict(problem.parameters),
+        "periods": dict(problem.periods),
+        "conservative": problem.conservative,
+    }
+    if problem.time is not None:
+        spec.update(time=problem.time, period=write_formula(problem.period))
+    if problem.map:
+        spec["map"] = True
+    if problem.system is not None:
+        spec["system"] = type(problem.system).__name__
+        spec["system_parameters"] = problem.system.arguments
+    return spec
+
+
+def jet_of(field: Field, par: Array, x: Array) -> tuple[Array, Array]:
+    """The value of a right-hand side and its derivatives by the states, at one state."""
+    from phasekit.bifurcation.continuation.curve import Curve
+    from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+    from phasekit.bifurcation.continuation.options import ContinuationOptions
+
+    n = len(x)
+    infinite = np.full(n, np.inf)
+    curve = Curve(
+        field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite, infinite,
+        ContinuationOptions(),
+    )  # fmt: skip
+    return curve.at(x)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.points import event
 from phasekit.labelled.continuation.branch import Branch
 
 CUBIC = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
@@ -190,3 +191,49 @@ def test_events_on_curves_in_two_parameters_and_on_angles():
 def test_events_that_are_refused(arguments, message):
     with pytest.raises(pk.ParameterError, match=message):
         pk.continuation(CUBIC, "mu", x0=[-1.3], span=(-1, 1), **arguments)
+
+
+def test_a_branch_ends_at_the_first_of_two_events_in_one_step():
+    near = {"near": "(x - 0.1)*(x - 0.1001)*(x + 0.1)*(x + 0.1001)"}
+    branch = pk.continuation(
+        CUBIC.replace(mu=0.0), "mu", x0=[0.0], span=(-1, 1), events=near, stop="near"
+    )
+    assert [stop.reason for stop in branch.stops] == ["near", "near"]
+    np.testing.assert_allclose(np.sort(branch.points.x.values[[0, -1]]), [-0.1, 0.1], atol=1e-14)
+
+
+def test_many_zeros_at_even_distances_are_all_found():
+    branch = traced({"wave": "sin(300*x)"})
+    end = np.max(np.roots([1.0, 0.0, -1.0, -1.0]).real[:1])
+    count = int(300 * end / np.pi)
+    found = np.sort([s.x.item() for s in branch.special("wave")])
+    np.testing.assert_allclose(found, np.arange(-count, count + 1) * np.pi / 300, atol=1e-14)
+    assert branch.messages == ()
+
+
+def test_zeros_that_may_be_missing_and_values_that_are_none_are_said(monkeypatch):
+    monkeypatch.setattr(event, "MOST", 16)
+    branch = traced(
+        {
+            "fast": lambda x, mu: 2.0 + np.sin(1e8 * x[0]),
+            "none": "log(x - 10)",
+            "half": lambda x, mu: np.sqrt(x[0]) + 1.0,
+        }
+    )
+    assert branch.special("UZ") == ()
+    fast, none, half = branch.messages
+    assert "'fast' changes so often between mu = -1 and 1 that zeros there may be missing" in fast
+    assert "'none' has no value at" in none
+    assert "'half' has no value at" in half
+
+
+@pytest.mark.parametrize("value", [1j, None, "abc", [1.0, 2.0]])
+def test_what_an_event_returns_later_is_checked(value):
+    with pytest.raises(pk.ParameterError, match="events: returned"):
+        traced({"e": lambda x, mu: x[0] - 0.2 if x[0] < 0 else value})
+
+
+def test_functions_that_are_given_again_are_checked(tmp_path):
+    traced({"code": threshold}).save(tmp_path / "b.nc")
+    with pytest.raises(pk.ParameterError, match=r"events\['code'\].*arguments"):
+        Branch.load(tmp_path / "b.nc", events={"code": lambda x: 1.0})

@@ -244,3 +244,44 @@ def test_maps_are_saved_pickled_drawn_and_have_events(tmp_path):
 def test_what_makes_no_sense_of_maps_is_refused(call, message):
     with pytest.raises(pk.ParameterError, match=message):
         call()
+
+
+def test_area_preserving_maps_have_no_points_from_rounding():
+    standard = pk.Problem(["x + y + k*sin(x)", "y + k*sin(x)"], ("x", "y"), {"k": -1.0}, map=True)
+    branch = pk.continuation(standard, "k", x0=[0.0, 0.0], span=(-5.0, 1.0))
+    inner = [s for s in branch.special_points if s.kind != "end"]
+    assert [s.kind for s in inner] == ["period_doubling", "pitchfork"]
+    assert inner[0].message == "c not known: two multipliers are -1"
+    henon = pk.Problem(["1 - a*x**2 - y", "x"], ("x", "y"), {"a": 0.5}, map=True)
+    branch = pk.continuation(henon, "a", x0=[0.5, 0.5], span=(-2.0, 5.0))
+    inner = [s for s in branch.special_points if s.kind != "end"]
+    assert [s.kind for s in inner] == ["fold", "period_doubling"]
+    np.testing.assert_allclose([s["a"] for s in inner], [-1.0, 3.0], atol=1e-7)
+
+
+def test_what_is_not_looked_for_is_no_other_point():
+    options = pk.ContinuationOptions(detect=("fold", "branch_point"))
+    branch = pk.continuation(DELAYED, "r", x0=[0.3, 0.3], span=(0.5, 3.0), options=options)
+    assert [s.kind for s in branch.special_points] == ["end", "transcritical", "end"]
+
+
+def test_values_of_maps_are_those_of_f_to_the_last_digit():
+    for f in ("1e-20*x", lambda x, a: 1e-20 * x, numba.njit(lambda x, a: np.array([1e-20 * x[0]]))):
+        value, slope = pk.Problem(f, "x", {"a": 0.5}, map=True).derivatives([1.0])
+        np.testing.assert_allclose([value[0], slope[0, 0]], [1e-20, 1e-20], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("f", "jac", "message"),
+    [
+        (lambda x, a: None, None, "f: returned None"),
+        (lambda x, a: "x", None, "f: returned x, wants numbers"),
+        (lambda x, a: [a, 1.0], None, "f: returned .* of shape"),
+        (lambda x, a: np.sqrt(np.array(x - 0.5, dtype=complex)), None, "f: returned complex"),
+        (lambda x, a: a * x, lambda x, a: [1.0, 2.0], "jac: returned"),
+        (lambda x, a: a * x, lambda x, a: None, "jac: returned None"),
+    ],
+)
+def test_what_a_map_returns_is_checked(f, jac, message):
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.Problem(f, "x", {"a": 0.5}, jac, map=True).derivatives([0.1])

@@ -172,3 +172,26 @@ def test_a_driven_disk_doubles_its_period_and_its_peak_load_is_recorded():
     peak = load(states, at.time.values, float(at.forcing_amplitude)).max().item()
     assert np.isclose(branch.points.load_max[i], peak, rtol=2e-4)
     assert float(branch.points.load_max[i]) >= peak
+
+
+def test_a_state_that_rests_does_not_hide_a_homoclinic_orbit():
+    """Periodic orbits next to a Bogdanov-Takens point, beside a state that stays zero."""
+    system = pk.Problem(["y", "a + b*y + x**2 + x*y", "-z"], ("x", "y", "z"), {"a": -1.0, "b": 0.9})
+    (hopf,) = pk.continuation(system, "b", x0=[-1.0, 0.0, 0.0], span=(0.3, 2.0)).special("H")
+    branch = hopf.switch()
+    assert [stop.reason for stop in branch.stops] == ["hopf", "homoclinic"]
+    assert abs(float(branch.points.b[-1]) - 0.74344426632) < 1e-9
+
+
+def test_a_family_that_begins_at_its_fold_holds_it():
+    square = "(x**2 + y**2)"
+    problem = pk.Problem(
+        [f"x*(m + {square} - {square}**2) - y", f"y*(m + {square} - {square}**2) + x"],
+        ("x", "y"), {"m": -0.1},
+    )  # fmt: skip
+    orbit = pk.periodic_orbit(problem, [1.0, 0.0])
+    (fold,) = pk.continuation(problem, "m", orbit=orbit, span=(-0.5, 0.5)).special("LPC")
+    begin = problem.replace(m=fold["m"])
+    again = pk.continuation(begin, "m", orbit=fold.orbit, span=(-0.5, 0.5))
+    (same,) = again.special("LPC")
+    assert abs(same["m"] + 0.25) < 1e-10

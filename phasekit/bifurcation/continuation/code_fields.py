@@ -107,9 +107,12 @@ class PythonField(Field):
         jacobian: Callable[..., Any] | None,
         states: Sequence[str],
         parameters: Sequence[str],
+        *,
+        less: bool = False,
     ) -> None:
+        """Take f and its derivatives by the states; with ``less`` the field is f(x) - x."""
         super().__init__(states, parameters)
-        self.function, self.jacobian = function, jacobian
+        self.function, self.jacobian, self.less = function, jacobian, less
         self.scale = np.ones(len(states) + len(parameters))
         self.sizes: list[float] = self.scale.tolist()
 
@@ -121,11 +124,12 @@ class PythonField(Field):
     def value(self, x: Array, p: Mapping[str, float]) -> Array:
         """F as an array of its own; NaN where it has no value. Warnings are the caller's."""
         try:
-            result = self.function(x, **p)
+            result = self.function(x.copy() if self.less else x, **p)
         except (ArithmeticError, ValueError) as error:
             self.failure = error
             return np.full(len(self.states), np.nan)
-        return _numbers("f", result, (len(self.states),))
+        value = numbers_of("f", result, (len(self.states),))
+        return value - x if self.less else value
 
     def slopes(self, x: Array, p: Mapping[str, float]) -> Array:
         """The given derivatives by the states; NaN where they have no value."""
@@ -136,7 +140,8 @@ class PythonField(Field):
         except (ArithmeticError, ValueError) as error:
             self.failure = error
             return np.full((n, n), np.nan)
-        return _numbers("jac", result, (n, n))
+        slopes = numbers_of("jac", result, (n, n))
+        return slopes - np.eye(n) if self.less else slopes
 
     def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
         """F at many points, the rows of u."""
@@ -308,7 +313,7 @@ def _slope(
     return slope
 
 
-def _numbers(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
+def numbers_of(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
     """What a function returned as an array of its own, of real numbers."""
     try:
         numbers = np.array(result)

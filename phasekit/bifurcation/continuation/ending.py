@@ -64,11 +64,18 @@ def cut(curve: Curve, path: Path, specials: Specials) -> tuple[Path, Specials]:
     """A path that ends on the special points at which it is to end, and what is left on it."""
     placed, first, last = list(specials.placed), 0, path.count
     ends: list[Special | None] = [None, None]
+    start = Sample(path.u[path.start], path.tangent[path.start], path.slopes[path.start])
     for side, stop in enumerate(path.stops):
-        there = [one for one in placed if stop.reason in names_of(one.special)]
+        there = [
+            one
+            for one in placed
+            if (one.index >= path.start) == bool(side)
+            and stop.reason in names_of(one.special)
+            and curve.length(_gap(curve, one.special, start)) > START
+        ]
         if stop.reason not in curve.ends or not there or path.closed:
             continue
-        one = there[-side]
+        one = there[side - 1]  # the one next to the start
         ends[side] = one.special
         if side:
             last, placed = one.index + 1, placed[: placed.index(one) + 1]

@@ -10,7 +10,12 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.path import Path, Sample, between
-from phasekit.bifurcation.continuation.spectrum import Tests, is_conservative, test_functions
+from phasekit.bifurcation.continuation.spectrum import (
+    Tests,
+    is_conservative,
+    test_functions,
+    unstable_of,
+)
 
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
@@ -38,13 +43,15 @@ def brackets(
     """All brackets of a path, in order, and the eigenvalues of f_x at its points."""
     pairs = "hopf" in detect and curve.n > 1
     tests = _all_tests(curve, path, pairs=pairs)
-    if conservative or is_conservative(tests.eigenvalues, discrete=curve.discrete):
-        tests = replace(tests, pair=np.ones(path.count))
+    neutral = conservative or is_conservative(tests.eigenvalues, discrete=curve.discrete)
+    if neutral:
+        unstable = unstable_of(curve, tests.eigenvalues, neutral=True)
+        tests = replace(tests, pair=np.ones(path.count), unstable=unstable)
         pairs = False
     eigenvalues = tests.eigenvalues
     keep = _regular(tests)
     tests = Tests(*(getattr(tests, f.name)[keep] for f in fields(tests)))
-    seek = _Seek(curve, pairs, detect)
+    seek = _Seek(curve, pairs, detect, neutral)
     found: list[Bracket] = []
     signs = {name: np.sign(getattr(tests, name)) for name in TESTS}
     for i in seek.interesting(tests, signs):
@@ -62,9 +69,13 @@ def brackets(
 def _all_tests(curve: Curve, path: Path, *, pairs: bool) -> Tests:
     """The test functions of all points; of many states, of some at a time."""
     if isinstance(path.slopes, np.ndarray):
-        return test_functions(curve, path.tangent, path.slopes, path.eigenvalues, pairs=pairs)
+        return test_functions(
+            curve, path.tangent, path.slopes, path.eigenvalues, pairs=pairs, neutral=False
+        )
     parts = [
-        test_functions(curve, path.tangent[some], path.slopes[some], None, pairs=pairs)
+        test_functions(
+            curve, path.tangent[some], path.slopes[some], None, pairs=pairs, neutral=False
+        )
         for some in path.slopes.chunks()
     ]
     return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
@@ -121,8 +132,8 @@ def nearest_is_complex(curve: Curve, tests: Tests) -> bool:
 
 
 class _Seek:
-    def __init__(self, curve: Curve, pairs: bool, detect: tuple[str, ...]) -> None:
-        self.curve, self.pairs, self.detect = curve, pairs, detect
+    def __init__(self, curve: Curve, pairs: bool, detect: tuple[str, ...], neutral: bool) -> None:
+        self.curve, self.pairs, self.detect, self.neutral = curve, pairs, detect, neutral
         self.seen: dict[int, tuple[Sample, Tests]] = {}  # the sample itself keeps its id alive
 
     def interesting(self, tests: Tests, signs: dict[str, np.ndarray]) -> list[int]:
@@ -160,8 +171,9 @@ class _Seek:
         key = id(sample)
         if key not in self.seen:
             tests = test_functions(
-                self.curve, sample.tangent, sample.slopes, None, pairs=self.pairs
-            )
+                self.curve, sample.tangent, sample.slopes, None, pairs=self.pairs,
+                neutral=self.neutral,
+            )  # fmt: skip
             self.seen[key] = (sample, tests)
         return self.seen[key][1]
 

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.code_fields import numbers_of
 from phasekit.bifurcation.continuation.fields import magnitude, slopes_of, unknowns_of
 from phasekit.numerics import differences
 
@@ -119,9 +120,9 @@ class Code:
                 p.update(zip(free, point[n : curve.m].tolist(), strict=True))
                 try:
                     value = self.function(point[:n].copy(), **p)
-                    out[k] = _number(value)
                 except (ArithmeticError, ValueError):
                     continue
+                out[k] = _number(value)
         return out
 
     def rates(self, curve: Unknowns, u: Array, along: Array) -> Array:
@@ -153,7 +154,7 @@ def _number(value: Any) -> float:
     """A value as a number; yes and no are 1 and -1."""
     if isinstance(value, (bool, np.bool_)):
         return 1.0 if value else -1.0
-    return float(np.asarray(value, dtype=float).reshape(()))
+    return float(numbers_of("events", value, ()))
 
 
 @dataclass(frozen=True)

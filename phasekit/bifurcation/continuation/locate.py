@@ -61,7 +61,9 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     found = _merged(curve, found)
     left = abs(bracket.jump) - sum(_explained(one) for one in found)
     if left > 0 and curve.discrete:
-        found.append(_several(curve, bracket, left, bracket.a.u, hopf=False))
+        found.append(
+            _several(curve, bracket, left, bracket.a.u, hopf=_complex_cross(curve, bracket))
+        )
     elif left > 0:
         found += _together(curve, bracket, found, left)
     return found
@@ -109,6 +111,16 @@ def _merged(curve: Curve, found: list[Special]) -> list[Special]:
     return kept
 
 
+def _complex_cross(curve: Curve, bracket: Bracket) -> bool:
+    """Whether pairs of multipliers cross the unit circle."""
+    counts = [
+        np.sum((v.imag > 0.0) & (curve.growth(v) > 0.0))
+        for s in (bracket.a, bracket.b)
+        for v in eigenvalues_of(curve.linear(s.slopes)[None], accuracy=curve.field.accuracy)
+    ]
+    return bool(counts[0] != counts[1])
+
+
 def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -> list[Special]:
     """Eigenvalues that cross together, without a change of sign that would tell."""
     ends = [
@@ -138,8 +150,9 @@ def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -
 
 def _several(curve: Curve, bracket: Bracket, count: int, u: Array, *, hopf: bool) -> Special:
     """Eigenvalues that cross, and it is not known how: said, not refined."""
+    kind = ("torus" if curve.discrete else "hopf") if hopf else "branch_point"
     return Special(
-        "hopf" if hopf else "branch_point", u, interval_of(curve, bracket),
+        kind, u, interval_of(curve, bracket),
         float(np.max(np.abs(curve.at(u)[0]))), GUESS,
         f"{count} eigenvalues cross together: a multiple point, which is not refined",
         tangent=bracket.a.tangent,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,8 @@ from phasekit.bifurcation.continuation.curve import Curve
 
 Array = npt.NDArray[np.float64]
 OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding
+ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
+KEPT = 1e-7  # the same where areas are kept: multipliers that meet part with the root of rounding
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
 
 
@@ -159,6 +162,7 @@ def test_functions(
     values: npt.NDArray[np.complex128] | None,
     *,
     pairs: bool,
+    neutral: bool,
 ) -> Tests:
     """The test functions of points with their tangents, derivatives of f and eigenvalues."""
     n = curve.n
@@ -173,9 +177,21 @@ def test_functions(
         log,
         pair(values) if pairs and n > 1 else nothing,
         flip_function(values) if curve.discrete else nothing,
-        np.sum(curve.growth(values) > 0.0, axis=-1),
+        unstable_of(curve, values, neutral=neutral),
         values,
     )
+
+
+def unstable_of(
+    curve: Curve, values: npt.NDArray[np.complex128], *, neutral: bool, blur: Any = 0.0
+) -> npt.NDArray[np.int64]:
+    """Number of unstable eigenvalues; ``blur`` is the part of the largest that tells no sign.
+
+    The size of a multiplier is a rounded number, and may be exactly 1.
+    """
+    least = (KEPT if neutral else ROUNDED) if curve.discrete else 0.0
+    floor = np.maximum(least, blur) * np.max(np.abs(values), axis=-1)
+    return np.asarray(np.sum(curve.growth(values) > floor[..., None], axis=-1))
 
 
 def flip_function(values: npt.NDArray[np.complex128]) -> Array:

@@ -14,15 +14,17 @@ from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, is_conservative
+from phasekit.bifurcation.continuation.spectrum import (
+    eigenvalues_of,
+    is_conservative,
+    unstable_of,
+)
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
-
-ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
 
 
 def wrap(value: FloatArray, period: float) -> FloatArray:
@@ -141,12 +143,9 @@ def _dataset(
         data["kind"] = (dim, kinds_of(values, label, n), flags)
     else:
         critical = np.isin(label, ["LP", "BP", "H", "NS", "PD", "TR"]) | (curve.kind != EQUILIBRIUM)
-        size = np.max(np.abs(values), axis=1, keepdims=True)
-        # The size of a multiplier is a rounded number, and may be exactly 1.
-        kept = is_conservative(values, discrete=True) if curve.discrete else False
-        least = (1e-7 if kept else ROUNDED) if curve.discrete else 0.0
-        floor = np.where(critical[:, None], 1e-6, least) * size
-        unstable = np.sum(curve.growth(values) > floor, axis=1).astype(np.int64)
+        neutral = curve.discrete and is_conservative(values, discrete=True)
+        blur = np.where(critical, 1e-6, 0.0)
+        unstable = unstable_of(curve, values, neutral=neutral, blur=blur).astype(np.int64)
         unstable[np.isnan(values).any(axis=1)] = -1
         data["n_unstable"] = (
             dim, unstable,

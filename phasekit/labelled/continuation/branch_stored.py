@@ -124,7 +124,12 @@ class Stored:
             if not callable(function):
                 raise bad(f"events[{name!r}]", function, "the function of the branch")
         with damaged(self.name, "its events"):
-            events = events_of(problem, {**kept, **code})
+            formulas = {
+                one.name: one
+                for one in events_of(problem, {n: t for n, t in kept.items() if t is not None})
+            }
+        functions = {one.name: one for one in events_of(problem, code)}
+        events = tuple((formulas | functions)[name] for name in kept)
         events = tuple(replace(one, condition=one.name in conditions) for one in events)
         return {"events": events, "ends": ends, "conservative": problem.conservative,
                 "discrete": problem.map}  # fmt: skip

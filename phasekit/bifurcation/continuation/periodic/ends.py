@@ -17,7 +17,8 @@ Array = npt.NDArray[np.float64]
 STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
 SLOW = 1e-4  # the same, where no step succeeds
 GROWS = 0.02  # part of its range by which no state grows beside a homoclinic orbit, a time e-fold
-REACH = 1e-3
+REACH = 1e-3  # length along the family, on scaled axes, over which ranges are compared
+STEADY = 1e-6  # range, beside its scale, of a state that rests
 FEW = 5  # points before which a family is not asked whether it closes
 NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
@@ -97,7 +98,8 @@ def _rests(cycles: Cycles, orbit: Orbit, dx: Array, rate: float) -> bool:
         np.ptp(collocation.extremes(orbit.mesh, flat + s * step * dx, cycles.m), axis=0)
         for s in (-1.0, 1.0)
     )
-    growth = np.abs(after - before) / (before + after) / (step * rate)
+    sizes = np.maximum(before + after, STEADY * cycles.scale)
+    growth = np.abs(after - before) / sizes / (step * rate)
     return bool(np.max(growth[: cycles.own]) < GROWS)
 
 

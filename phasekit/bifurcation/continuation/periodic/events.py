@@ -25,6 +25,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
+CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 NODES = 9  # points of the family through which a branch point is interpolated
 FOLD, DOUBLING, TORUS, BRANCHING = (
     "fold_of_cycles",
@@ -46,10 +47,18 @@ def unstable(values: Complex, forced: bool) -> int:
     return int(np.sum(np.abs(nontrivial(values, forced)) > 1.0))
 
 
-def _even(point: Point, forced: bool) -> bool:
-    """Whether the number of real multipliers beyond 1 is even, which changes at a fold."""
-    mu = nontrivial(point.multipliers, forced)
-    return int(np.sum((mu.imag == 0.0) & (mu.real > 1.0))) % 2 == 0
+def _none_passes(a: Point, b: Point, forced: bool) -> bool:
+    """Whether the number of real multipliers beyond 1 stays odd or even, unlike at a fold.
+
+    Nothing is known of it next to a fold, where one is 1 but for errors.
+    """
+    beyond = 0
+    for point in (a, b):
+        mu = nontrivial(point.multipliers, forced)
+        if np.min(np.abs(mu - 1.0), initial=np.inf) < CRITICAL:
+            return False
+        beyond += int(np.sum((mu.imag == 0.0) & (mu.real > 1.0)))
+    return beyond % 2 == 0
 
 
 def fold_test(point: Point, forced: bool) -> float:
@@ -163,7 +172,7 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
         # Conservative: a second multiplier is always 1, and the parameter never moves.
         changed = [kind for kind in changed if kind == DOUBLING]
         return [one for one in (refined(Stretch(cycles, a, b), kind) for kind in changed) if one]
-    if FOLD in changed and BRANCHING not in changed and _even(a, forced) == _even(b, forced):
+    if FOLD in changed and BRANCHING not in changed and _none_passes(a, b, forced):
         changed.remove(FOLD)  # the parameter stands still to rounding, and no multiplier passes 1
     gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
     if not changed and gap == 0:

@@ -80,8 +80,7 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
         fine = cycles.correct(orbit, *cycles.rows(orbit, dx, s.dy))
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
-        values, log, error = cycles.multipliers(fine.W, fine.orbit)
-        trivial = min(trivial, error)
+        values, log, trivial = cycles.multipliers(fine.W, fine.orbit)
         divergence = cycles.divergence(fine.divergence)
     with np.errstate(all="ignore"):
         product, exact = np.exp(log), np.exp(divergence)

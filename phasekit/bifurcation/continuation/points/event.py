@@ -24,7 +24,8 @@ from phasekit.bifurcation.continuation.same_path import turned
 Array = npt.NDArray[np.float64]
 
 LEAST, DEPTH = 2, 12  # times that a step is halved to look at a function: always, and at most
-MOST = 4096  # parts of one path
+MOST = 4096  # parts of one path, beside the least of each step
+BETWEEN = (0.23, 0.5, 0.79)  # places between two zeros that are one; no parts of each other
 FORETOLD = 0.02  # of its size: by how much a function may differ from the cubic through its ends
 DIP = 0.3  # part of its values at the ends to which a function falls that may touch zero
 SAME = 1e-9  # distance on scaled axes of two events that are one
@@ -62,10 +63,8 @@ class _Seek:
             return []
         shown = self.cubics.turned(self.u, self.cubics.turns(self.u))
         at = self.of.values(self.curve, shown)
-        zero = np.abs(at) <= self.of.noise(
-            self.curve, self.cubics.turned(self.u, self.cubics.turns(self.u))
-        )
-        zero = self._without_runs(zero)
+        self._say_undefined(at)
+        zero = self._without_runs(np.abs(at) <= self.of.noise(self.curve, shown))
         placed = [self._at_point(i) for i in np.flatnonzero(zero).tolist()]
         turns = self.cubics.turns(self.u)
         steps = np.arange(self.path.count - 1)
@@ -74,6 +73,21 @@ class _Seek:
         if len(other):
             placed += self._between(other, turns[1:])
         return self._once(placed)
+
+    def _say_undefined(self, values: Array) -> None:
+        """Say where on the path the function has no value."""
+        missing = np.flatnonzero(~np.isfinite(values))
+        if len(missing):
+            p = self.path.u[missing, self.curve.n]
+            self.messages.append(
+                f"the event {self.event.name!r} has no value at {len(missing)} of "
+                f"{len(values)} points, between {self._parameter} = {np.min(p):.6g} and "
+                f"{np.max(p):.6g}"
+            )
+
+    @property
+    def _parameter(self) -> str:
+        return self.curve.field.parameters[self.curve.active[0]]
 
     def _without_runs(self, zero: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
         """Leave out stretches on which the function vanishes throughout, and say so."""
@@ -84,10 +98,10 @@ class _Seek:
             if after - first >= STILL:
                 single[first:after] = False
                 self.still[first:after] = True
-                name = self.curve.field.parameters[self.curve.active[0]]
                 p = self.path.u[first, n], self.path.u[after - 1, n]
                 self.messages.append(
-                    f"the event {self.event.name!r} is zero all along the curve between {name} = "
+                    f"the event {self.event.name!r} is zero all along the curve between "
+                    f"{self._parameter} = "
                     f"{p[0]:.6g} and {p[1]:.6g}: no points of it are kept there"
                 )
         return single
@@ -126,7 +140,7 @@ class _Seek:
     def _looked_at(self, steps: npt.NDArray[np.int64], turns: Array) -> tuple[Parts, Array, Array]:
         """Parts of the steps between which the function is as a cubic; values and rates there."""
         parts = Parts(steps, np.zeros(len(steps)), np.ones(len(steps)))
-        excluded = self.of.bounds(self.curve)
+        excluded, most = self.of.bounds(self.curve), MOST + 2**LEAST * len(steps)
         done: list[tuple[Parts, Array, Array]] = []
         for level in range(DEPTH + 1):
             ends, rates = self._values(parts, turns)
@@ -135,11 +149,16 @@ class _Seek:
             size = np.max(np.abs(np.column_stack([ends, at])), axis=1)
             off = np.abs(at - cubic(0.5, ends, rates, width))
             split = ~(off <= FORETOLD * size)
-            if excluded is not None:
-                split |= excluded(*self.cubics.hull(parts, turns))
+            may = split if excluded is None else excluded(*self.cubics.hull(parts, turns))
+            split |= may
+            split &= np.isfinite(at) | np.isfinite(ends).any(axis=1)
+            split &= ~(self.still[parts.step] | self.still[parts.step + 1])
             if level < LEAST:
                 split[:] = True
-            if level == DEPTH or len(parts.step) > MOST:
+            if len(parts.step) + np.sum(split) > most and level < DEPTH:
+                self._say_unresolved(parts.take(split & may))
+                split[:] = False
+            if level == DEPTH:
                 split[:] = False
             done.append((parts.take(~split), ends[~split], rates[~split]))
             parts = parts.take(split).halved()
@@ -150,6 +169,16 @@ class _Seek:
         order = np.lexsort([every.low, every.step])
         ends, rates = (np.concatenate([one[k] for one in done])[order] for k in (1, 2))
         return every.take(order), ends, rates
+
+    def _say_unresolved(self, parts: Parts) -> None:
+        """Say where the function changes too often to be looked at."""
+        if not len(parts.step):
+            return
+        p = self.path.u[np.concatenate([parts.step, parts.step + 1]), self.curve.n]
+        self.messages.append(
+            f"the event {self.event.name!r} changes so often between {self._parameter} = "
+            f"{np.min(p):.6g} and {np.max(p):.6g} that zeros there may be missing"
+        )
 
     def _values(self, parts: Parts, turns: Array) -> tuple[Array, Array]:
         """Values at both ends of each part, and their rates by the length along the step."""
@@ -252,9 +281,8 @@ class _Seek:
             JUMP * self._size, 1e4 * self._noise(best, turns)
         ):
             return False
-        name = self.curve.field.parameters[self.curve.active[0]]
         self.messages.append(
-            f"the event {self.event.name!r} changes its sign without a zero at {name} = "
+            f"the event {self.event.name!r} changes its sign without a zero at {self._parameter} = "
             f"{best.u[self.curve.n]:.9g}"
         )
         return True
@@ -329,10 +357,10 @@ class _Seek:
         gap = turned(self.curve, one.special.u - other.special.u)
         if np.max(np.abs(gap / self.curve.scale[:m])) < SAME:
             return True
-        middle = (other.special.u + 0.5 * gap)[None]
-        middle = self.cubics.turned(middle, self.cubics.turns(middle))
-        value = np.abs(self.of.values(self.curve, middle))
-        return bool(value[0] <= self.of.noise(self.curve, middle)[0])
+        inner = other.special.u + np.array(BETWEEN)[:, None] * gap
+        inner = self.cubics.turned(inner, self.cubics.turns(inner))
+        value = np.abs(self.of.values(self.curve, inner))
+        return bool(np.all(value <= self.of.noise(self.curve, inner)))
 
     def _shown(self, one: Placed) -> bool:
         """Whether it is a zero of the angles as they are shown, not in another turn only."""

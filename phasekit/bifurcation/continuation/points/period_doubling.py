@@ -22,6 +22,8 @@ from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, flip_func
 
 Array = npt.NDArray[np.float64]
 
+DOUBLE = 1e-6  # distance from -1 of multipliers that are both -1: the root of rounding
+
 
 def period_doubling(curve: Curve, bracket: Bracket) -> Special:
     """The point of a bracket at which 1 + mu changes its sign."""
@@ -54,8 +56,12 @@ def period_doubling(curve: Curve, bracket: Bracket) -> Special:
         best, _, _ = bracket_root(curve, left, right, test, steps=60, width=1e-14)
         u = best.u
     form = {"c": np.nan} if message else forms.period_doubling(forms.Derivatives(curve, u))
+    if not message:
+        values = eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)
+        double = np.isnan(form["c"]) and np.sum(np.abs(values + 1.0) < DOUBLE) > 1
+        note = "c not known: two multipliers are -1" if double else forms.unknown(form)
     return Special(
         "period_doubling", u, interval_of(curve, bracket), residual,
-        GUESS if message else CONVERGED, message or forms.unknown(form), form,
+        GUESS if message else CONVERGED, message or note, form,
         tangent=tangent_at(curve, u, best.tangent), others=(z[m:],), extra=z[m:],
     )  # fmt: skip
