@@ -39,6 +39,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.asymptotics import near_center as near_center
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
     from phasekit.labelled.atlas import branches as branches
+    from phasekit.labelled.basins import attractors as attractors
+    from phasekit.labelled.basins import basins as basins
     from phasekit.labelled.bifurcation_set import bifurcation_set as bifurcation_set
     from phasekit.labelled.continuation.branch import Branch as Branch
     from phasekit.labelled.continuation.continuation import continuation as continuation
@@ -47,8 +49,6 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.periodic_orbit import periodic_orbit as periodic_orbit
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
-    from phasekit.labelled.driven import attractors as attractors
-    from phasekit.labelled.driven import basins as basins
     from phasekit.labelled.driven import lyapunov as lyapunov
     from phasekit.labelled.driven import stroboscopic as stroboscopic
     from phasekit.labelled.energy import curvature as curvature
@@ -128,7 +128,8 @@ _MODULES = {
     "phasekit.systems.harmonic": ("Harmonic",),
     "phasekit.systems.perturbed": ("Perturbed",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
-    "phasekit.labelled.driven": ("attractors", "basins", "lyapunov", "stroboscopic"),
+    "phasekit.labelled.basins": ("attractors", "basins"),
+    "phasekit.labelled.driven": ("lyapunov", "stroboscopic"),
     "phasekit.labelled.energy": (
         "curvature",
         "energy",

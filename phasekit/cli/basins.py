@@ -29,7 +29,7 @@ def run(argv: Sequence[str]) -> None:
     }
     common.quiet_backend()
     from phasekit import plot
-    from phasekit.labelled.driven import basins
+    from phasekit.labelled.basins import basins
     from phasekit.systems.harmonic import Harmonic
     from phasekit.systems.perturbed import Perturbed
 

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.motion.attractors import Search
+from phasekit.motion.lost import FAILED
 from phasekit.motion.strobe import strobe
 
 Array = npt.NDArray[np.float64]
@@ -58,7 +59,7 @@ def basins(
         targets=search.targets(), most_legs=legs, threads=threads,
     )  # fmt: skip
     code = found.code.astype(np.int16)
-    lost = (code < 0) & (found.status > 2)
+    lost = (code < 0) & (found.status == FAILED)
     code[lost] = ESCAPED
     time = np.where(code >= 0, found.taken * search.leg, np.nan)
     number = len(search.orbits) + len(search.others)

@@ -7,6 +7,7 @@ import pytest
 
 import phasekit as pk
 from phasekit.motion.attractors import find
+from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.shares import SIDE, SLOTS
 
 EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
@@ -88,3 +89,20 @@ def test_the_numbers_of_attractors_do_not_depend_on_where_the_search_begins():
     assert one.attractor_period.tolist() == other.attractor_period.tolist()
     np.testing.assert_allclose(one.attractor_phi, other.attractor_phi, atol=1e-8)
     np.testing.assert_allclose(one.attractor_multiplier, other.attractor_multiplier, rtol=1e-6)
+
+
+def test_motions_that_take_too_many_steps_are_undecided_and_not_away(monkeypatch):
+    from phasekit.motion import basins
+
+    law = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.2)
+    search = find(law.law, law.law.values(*law.parameters.values()), 1.0, np.array([[1.0, 0.0]]))
+    original = basins.strobe
+
+    def worn(*arguments, **keywords):
+        found = original(*arguments, **keywords)
+        status = np.array([EXHAUSTED, FAILED])
+        return found._replace(code=np.array([-1, -1]), status=status)
+
+    monkeypatch.setattr(basins, "strobe", worn)
+    found = basins.basins(search, np.array([0.5]), np.array([0.0, 0.1]))
+    assert found.basin.tolist() == [[basins.UNDECIDED, basins.ESCAPED]]

@@ -1,0 +1,247 @@
+"""Attractors of damped and driven systems, and their basins, labelled."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.labelled.driven import perturbed_of
+from phasekit.labels.arguments import FloatArray, NumberLike, bad, number, numeric, whole
+from phasekit.labels.coordinates import LABELS
+from phasekit.labels.grid import variable
+from phasekit.motion import attractors as search
+from phasekit.motion import basins as shares
+from phasekit.motion.lost import tell_unsettled
+from phasekit.motion.strobe import check_period, common_period
+from phasekit.numerics.waits import said
+from phasekit.systems.as_system import single
+from phasekit.systems.perturbed import Perturbed
+from phasekit.table.quantities import ROWS
+from phasekit.table.row import Quantity
+
+#: Start states of a search along each axis, where none are given.
+STARTS = 16
+
+
+def attractors(
+    perturbed: Any, *, phi: NumberLike, dphi: NumberLike, period: float | None = None
+) -> xr.Dataset:
+    """Attractors to which the motions from a grid of states come, seen once a period.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        One system with damping.
+    phi, dphi : 1-D array_like or xarray.DataArray
+        Angles in rad and angular velocities in s^-1 of the grid; of a large one a part is used.
+    period : float, optional
+        Time from state to state in s; default: the common period of all that varies, of a system
+        without such a quarter of the period of small oscillations.
+
+    Returns
+    -------
+    xarray.Dataset
+        On (``attractor``, ``crossing``): ``attractor_phi``, ``attractor_dphi``, the states of a
+        periodic orbit, or the first of a motion that does not repeat itself; on ``attractor``:
+        ``attractor_period``, after so many periods it repeats itself (0: it does not),
+        ``attractor_multiplier``, < 1, and ``attractor_rotation``, the turns in a period.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or the system has no damping and so no attractors.
+
+    Warns
+    -----
+    RuntimeWarning
+        If damping is too weak to see where motions end.
+
+    Notes
+    -----
+    Motions are followed until they repeat themselves; Newton's method then finds the fixed point
+    of the q-th power of the Poincare map, q up to 16, and its multipliers, all of a modulus
+    below 1, whether it attracts ([GuckenheimerHolmes1983] section 1.5). What has come to none after
+    4,300 periods, or more where damping is weak, counts as an attractor that does not repeat
+    itself: chaotic, or a rotation in step with nothing. An attractor to which none of the states
+    comes is not found.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import phasekit as pk
+    >>> well = pk.Potential("x^4/4 - x^2/2", "x")
+    >>> driven = pk.Perturbed(well, damping=0.15, forcing=pk.Harmonic(0.2, 1.0))
+    >>> ds = pk.attractors(driven, phi=np.linspace(-2, 2, 5), dphi=[-1.0, 1.0])
+    >>> ds.attractor_phi.values.round(6).ravel().tolist()
+    [-0.779055, 1.210091]
+    """
+    system, found, _ = _searched(perturbed, phi, dphi, period)
+    return _dataset(system, _attractor_rows(found.result()), {"period": found.leg})
+
+
+def basins(
+    perturbed: Any,
+    *,
+    phi: NumberLike,
+    dphi: NumberLike,
+    period: float | None = None,
+    periods: int = shares.LEGS,
+) -> xr.Dataset:
+    """Basins of the attractors over a grid of states, and their shares.
+
+    Parameters
+    ----------
+    perturbed : Perturbed
+        One system with damping.
+    phi, dphi : 1-D array_like or xarray.DataArray
+        Angles in rad and angular velocities in s^-1 of the grid at t = 0.
+    period : float, optional
+        As in `attractors`.
+    periods : int, default 10000
+        Periods after which a motion that came to no attractor is undecided.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``basin`` on (``state_phi``, ``state_dphi``): the number of the attractor, -1 where a
+        motion is undecided, -2 where it runs to infinity; ``basin_time`` in s until the motion is
+        near its attractor; on ``attractor``: ``basin_fraction`` and ``basin_fraction_error``;
+        ``boundary_fraction``, the share of the cells beside another basin; and what `attractors`
+        gives.
+
+    Raises
+    ------
+    ParameterError
+        As `attractors`.
+
+    Warns
+    -----
+    RuntimeWarning
+        If more than half of the cells lie beside another basin: the grid is too coarse to show
+        the basins.
+
+    Notes
+    -----
+    A motion belongs to an attractor when it comes as near as states on a ring around it were seen
+    to be caught, or, of an attractor that does not repeat itself, when it has been in forty of its
+    boxes in succession [DatserisWagemakers2022]. The error of a share p of n states is that of a
+    sample, ``sqrt(p (1 - p)/n)``, and the share of the undecided on top.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import phasekit as pk
+    >>> damped = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.2)
+    >>> ds = pk.basins(damped, phi=np.linspace(-3.0, 3.0, 31), dphi=np.linspace(-1.0, 1.0, 21))
+    >>> ds.attractor_phi.values.round(3).ravel().tolist(), float(ds.basin_fraction.sum())
+    ([-1.156, 1.255], 1.0)
+    """
+    periods = whole("periods", periods, "a number of periods, >= 1", 1)
+    system, found, grid = _searched(perturbed, phi, dphi, period)
+    with said(f"following {grid[0].size * grid[1].size:,} motions to their attractors"):
+        result = shares.basins(found, *grid, legs=periods)
+    data = _attractor_rows(found.result())
+    dims = ("state_phi", "state_dphi")
+    for name, values in result._asdict().items():
+        own = dims if np.ndim(values) == 2 else ROWS[name].dims
+        data[name] = (own, values)
+    coords = dict(zip(dims, grid, strict=True))
+    ds = _dataset(system, data, {"period": found.leg}, coords)
+    if result.boundary_fraction > shares.COARSE:
+        warnings.warn(
+            f"basin: {result.boundary_fraction:.0%} of the cells lie beside another basin: a grid "
+            f"of {len(grid[0])} x {len(grid[1])} states is too coarse to show the basins; their "
+            "fractions hold as those of a sample",
+            RuntimeWarning,
+            stacklevel=2,
+        )
+    return ds
+
+
+def _searched(
+    perturbed: Any, phi: NumberLike, dphi: NumberLike, period: float | None
+) -> tuple[Perturbed, search.Search, tuple[FloatArray, FloatArray]]:
+    """The attractors of one system, and the grid."""
+    system = perturbed_of(perturbed)
+    grid = (
+        _axis("phi", phi, system.unit_of("state_phi")),
+        _axis("dphi", dphi, system.unit_of("state_dphi")),
+    )
+    _, parameters = single(system)
+    law = system.law
+    if not (parameters["damping"] > 0.0 or parameters["quadratic"] > 0.0):
+        raise bad(
+            "damping", parameters["damping"], "a system with damping > 0 or quadratic > 0",
+            "without damping there are no attractors",
+        )  # fmt: skip
+    values = law.values(*parameters.values())
+    own = common_period(law, values)
+    if period is not None:
+        leg = number("period", period, "a time in s, > 0", "s")
+        if not leg > 0.0:
+            raise bad("period", period, "a time in s, > 0")
+    elif own is None:
+        leg = _quarter(system)
+    else:
+        leg = float(check_period("period", own))
+    every = [axis[np.linspace(0, len(axis) - 1, min(len(axis), STARTS)).round().astype(int)]
+             for axis in grid]  # fmt: skip
+    states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
+    with said(f"looking for attractors from {len(states)} states"):
+        found = search.find(law, values, leg, states)
+    tell_unsettled("attractor_phi", found.unsettled, search.PATIENCE)
+    return system, found, grid
+
+
+def _quarter(system: Perturbed) -> float:
+    """A quarter of the period of small oscillations about the center of greatest curvature."""
+    from phasekit.labelled.phase_space import equilibria
+
+    frequency = equilibria(system.system).natural_frequency.values
+    if not np.isfinite(frequency).any():
+        return 1.0
+    return float(0.5 * np.pi / np.nanmax(frequency))
+
+
+def _axis(name: str, values: NumberLike, units: str | None) -> FloatArray:
+    wants = "a 1-D array of finite, increasing values"
+    kept = numeric(name, values, units, wants)
+    axis = np.atleast_1d(np.asarray(kept, dtype=float))
+    if axis.ndim != 1 or not np.isfinite(axis).all() or not (np.diff(axis) > 0.0).all():
+        raise bad(name, values, wants)
+    return axis
+
+
+def _attractor_rows(found: search.Attractors) -> dict[str, tuple[tuple[str, ...], Any]]:
+    fields = found._asdict()
+    fields["attractor_rotation"] = fields.pop("rotation_number")
+    return {name: (ROWS[name].dims, values) for name, values in fields.items()}
+
+
+def _dataset(
+    system: Perturbed,
+    data: Mapping[str, tuple[tuple[str, ...], Any]],
+    more: Mapping[str, float],
+    coords: Mapping[str, FloatArray] | None = None,
+) -> xr.Dataset:
+    """Rows of one system with their attributes, and its parameters as coordinates."""
+    variables: dict[str, xr.Variable] = {}
+    named: dict[str, xr.Variable] = {}
+    for name, (dims, values) in data.items():
+        row: Quantity = ROWS[name]
+        words = {**row.attrs, **system.law.words(name, row.units, row.long_name)}
+        variables[name] = variable(dims, np.asarray(values, row.dtype), words)
+        for dim, size in zip(dims, np.shape(values), strict=True):
+            if dim in LABELS and dim not in named:
+                named[dim] = variable((dim,), np.arange(size), {"long_name": LABELS[dim][1]})
+    for name, axis in (coords or {}).items():
+        named[name] = variable((name,), axis, input_attrs(system, name))
+    for name, value in system.parameters.items():
+        named[name] = variable((), value, input_attrs(system, name))
+    attrs: dict[str, Any] = {**dataset_attrs(system), "period": repr(more["period"])}
+    return xr.Dataset(variables, named, attrs)
