@@ -225,3 +225,11 @@ def test_doublings_of_a_cycle_approach_feigenbaums_ratio(run):
     assert places[1][0] == "3.837358168"
     first, second = (float(x) for x in re.search(r"distances: (\S+), (\S+)", text).groups())
     assert abs(second - 4.669202) < 0.11 < abs(first - 4.669202)
+
+
+def test_curves_of_a_driven_saddle_cross_at_the_threshold(run):
+    _, text = run("threshold_of_irregular_motion")
+    seen = re.findall(r"threshold (\S+) 1/s2, seen (\S+)", text)
+    assert len(seen) == 3
+    for expected, simulated in seen:
+        assert float(simulated) == pytest.approx(float(expected), rel=1e-4)
