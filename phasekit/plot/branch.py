@@ -150,18 +150,19 @@ def branch(
                 up, across = circle.unrolled(up, across)
             (line,) = axes.plot(across * stretch[0], up * stretch[-1], **style.inked(look))
             handles.setdefault(str(look["label"]), line)
-    marks: dict[str, list[tuple[float, float]]] = {}
+    marks: dict[tuple[str, str], list[tuple[float, float]]] = {}  # by kind and name of an event
     for one, pair in zip(several, columns, strict=True):
         across, up = (column.values for column in pair)
         for special in one.special_points:
             if special.kind == "end":
                 continue
             place = (float(across[special.index]), float(up[special.index]))
-            marks.setdefault(special.kind, []).append(place)
+            marks.setdefault((special.kind, special.name), []).append(place)
     named: dict[tuple[float, float], str] = {}
-    for kind, places in marks.items():
-        look = {**look_of(kind), "label": _key(kind, marks)}
-        label = KINDS[kind].label
+    kinds = dict.fromkeys(kind for kind, _ in marks)
+    for (kind, name), places in marks.items():
+        look = {**look_of(kind), "label": name or _key(kind, kinds)}
+        label = name or KINDS[kind].label
         across, up = np.array(places).T
         if circle is not None:
             up, across = circle.points(up, across)
@@ -170,7 +171,7 @@ def branch(
             before = named.get(point, label)
             named[point] = before if label in before.split(", ") else f"{before}, {label}"
         axes.plot(across, up, linestyle="none", zorder=3 if kind == "neutral_saddle" else 4, **look)
-        handles[kind] = Line2D([], [], linestyle="none", **look)
+        handles[kind + name] = Line2D([], [], linestyle="none", **look)
     if circle is not None:
         style.circle_axis(axes, "y", shown, circle)
     if labels:

@@ -79,3 +79,14 @@ def test_names_of_points_that_touch_are_one():
     texts = [text.get_text() for text in ax.texts]
     assert "BP" in texts
     assert len(texts) == len(set(texts))
+
+
+def test_events_are_called_by_their_names():
+    branch = pk.continuation(
+        CUBIC, "mu", x0=[-1.3], span=(-2.0, 2.0), events={"half": "x - 1/2", "top": "x - 9/8"}
+    )
+    assert [one.name for one in branch.special("event")] == ["half", "top"]
+    ax = branch.plot()
+    assert {"half", "top", "LP"} <= {text.get_text() for text in ax.texts}
+    shown = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert {"half", "top"} <= set(shown)
