@@ -211,3 +211,14 @@ def test_a_special_point_is_a_kind_and_a_test_function():
     assert "UF" in [text.get_text() for text in names["ax"].texts]
     with pytest.raises(ValueError, match="registered already"):
         run("A new special point")
+
+
+def test_every_larger_sample_is_named():
+    """Benchmarks say themselves what theirs are."""
+    folder = Path(__file__).parent
+    texts = [path.read_text(encoding="utf-8") for path in folder.rglob("*.py")
+             if path.parent.name != "benchmarks"]  # fmt: skip
+    asked = re.compile(r"environ(?:\.get\(|\[)\"(PHASEKIT_\w+)")
+    found = {name for text in texts for name in asked.findall(text)} - {"PHASEKIT_BROWSER"}
+    assert len(found) > 10
+    assert found <= set(re.findall(r"PHASEKIT_\w+", GUIDE.read_text(encoding="utf-8")))
