@@ -34,6 +34,10 @@ PIECE = 1 << 14
 #: Seconds at most to wait for files that are being written.
 WRITING = 2.0
 
+#: Bytes of a block whose release makes glibc keep what is freed after it. Otherwise temporary
+#: arrays of a piece are given back to the system, page by page, and asked for again.
+KEPT = 1 << 25
+
 _local = threading.local()
 
 
@@ -117,7 +121,10 @@ def compute_cells(
 
 
 def _buffer(name: str, shape: tuple[int, ...], dtype: str) -> Any:
-    buffers: dict[str, Any] = _local.__dict__.setdefault("buffers", {})
+    if "buffers" not in _local.__dict__:
+        np.empty(KEPT - (1 << 16), np.uint8)
+        _local.buffers = {}
+    buffers: dict[str, Any] = _local.buffers
     size = prod(shape)
     kept = buffers.get(name)
     if kept is None or kept.size < size or kept.dtype != dtype:
