@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from typing import Any
 
 from phasekit.labels.arguments import FloatArray
+from phasekit.numerics.waits import watched
 
 #: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
 TILE_CELLS = 1 << 16
@@ -82,8 +83,6 @@ def progress_bar(cells: int, progress: bool | None, done: int = 0) -> Any:
     """
     if progress is False:
         return _NoBar()
-    from phasekit.numerics.waits import watched  # here, because it loads numba
-
     # A log gets a line in a while.
     quick = watched()
     if progress is None and not quick:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ from phasekit.mechanics.rigid_body import RigidBody
 from phasekit.mechanics.vectors import Array, Frozen, apply, cross, dot, quiet, times
 
 
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class CoupledMomentum(Frozen):
     """Momentum of a body with its pole O2, by its axes and their angular velocities."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,6 @@ import numpy.typing as npt
 from phasekit.inputs import bad
 from phasekit.mechanics.coupled_momentum import CoupledMomentum
 from phasekit.mechanics.coupled_rotators import AXES, base_rates, lead_rate, rotator_bases
-from phasekit.mechanics.rigid_body import RigidBody
 from phasekit.mechanics.vectors import (
     ROUNDING,
     Array,
@@ -78,15 +77,6 @@ class CoupledRotationState(CoupledMomentum):
     >>> state.rotators["R01"].tolist(), state.angular_velocities()["R01"].item()
     ([0.0, -9.0, 0.0], 3.0)
     """
-
-    body: RigidBody
-    n1: Any
-    n2: Any
-    r0: Any
-    omega1: Any
-    domega1: Any
-    omega2: Any
-    domega2: Any
 
     @property
     @quiet

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from numba import njit
 from numba.extending import overload
 
-from phasekit.numerics import waits as waits  # says that something is compiled
+from phasekit.numerics import compiling as compiling  # says so to who waits for it
 
 Array = npt.NDArray[np.float64]
 Outputs = tuple[npt.NDArray[Any], ...]

@@ -6,16 +6,11 @@ import contextlib
 import multiprocessing
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from typing import Any
 
-from numba.core import event
-
 #: Seconds that nobody is told about.
 PATIENCE = 2.0
-#: Seconds between two functions that are compiled for one and the same wait.
-PAUSE = 0.5
 
 
 def in_notebook() -> bool:
@@ -37,12 +32,14 @@ def _in_terminal() -> bool:
         return False
 
 
-def _tell(text: str) -> None:
+def tell(text: str) -> None:
+    """Say it to who waits."""
     print(f"phasekit: {text}", file=sys.stderr, flush=True)
 
 
-def _later(seconds: float, tell: Any, *arguments: Any) -> threading.Timer:
-    timer = threading.Timer(seconds, tell, arguments)
+def later(seconds: float, action: Any, *arguments: Any) -> threading.Timer:
+    """Call something after a while, unless that is cancelled."""
+    timer = threading.Timer(seconds, action, arguments)
     timer.daemon = True
     timer.start()
     return timer
@@ -65,51 +62,10 @@ def said(what: str) -> Iterator[None]:
     if _saying or not watched():
         yield
         return
-    timer = _later(PATIENCE, _tell, what)
+    timer = later(PATIENCE, tell, what)
     _saying = True
     try:
         yield
     finally:
         _saying = False
         timer.cancel()
-
-
-class _Compiling(event.Listener):
-    """Says that kernels are compiled, if that takes long."""
-
-    def __init__(self) -> None:
-        self.depth = 0  # compiling one function compiles those that it calls
-        self.began = self.ended = -PAUSE  # of functions that follow each other closely
-        self.timer: threading.Timer | None = None
-        self.told = False  # once a process is enough
-        self.lock = threading.Lock()
-
-    def on_start(self, started: Any) -> None:
-        with self.lock:
-            self.depth += 1
-            if self.depth == 1 and not self.told and _is_ours(started) and watched():
-                now = time.monotonic()
-                if now - self.ended > PAUSE:
-                    self.began = now
-                self.timer = _later(max(0.0, self.began + PATIENCE - now), self.tell)
-
-    def on_end(self, ended: Any) -> None:
-        with self.lock:
-            self.depth -= 1
-            if self.depth == 0 and self.timer is not None:
-                self.timer.cancel()
-                self.timer = None
-                self.ended = time.monotonic()
-
-    def tell(self) -> None:
-        self.told = True
-        _tell("compiling once for this machine, which takes some seconds")
-
-
-def _is_ours(started: Any) -> bool:
-    function = getattr(started.data.get("dispatcher"), "py_func", None)
-    return str(getattr(function, "__module__", "")).startswith("phasekit.")
-
-
-_COMPILING = _Compiling()
-event.register("numba:compile", _COMPILING)  # type: ignore[no-untyped-call]

@@ -10,14 +10,14 @@ import pytest
 from numba.core import event
 
 from phasekit.cells import tiling
-from phasekit.numerics import waits
+from phasekit.numerics import compiling, waits
 
 
 @pytest.fixture
 def terminal(monkeypatch):
     monkeypatch.setattr(waits, "watched", lambda: True)
     monkeypatch.setattr(waits, "PATIENCE", 0.01)
-    monkeypatch.setattr(waits._COMPILING, "told", False)
+    monkeypatch.setattr(compiling._COMPILING, "told", False)
 
 
 def compiled(module, seconds=0.0):

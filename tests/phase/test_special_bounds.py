@@ -132,7 +132,9 @@ def test_equilibria_of_special_functions_are_proved(text, interval, at):
     got = functions.equilibria(make_formula(text, "x", (), None, interval))
     np.testing.assert_allclose(got.phi, at, atol=2e-8)
     assert got.complete
-    assert np.all(np.diff(got.kind) != 0)
+    assert len(got.kind) == len(at)
+    assert set(got.kind) <= {EquilibriumKind.CENTER, EquilibriumKind.SADDLE}
+    assert np.all(np.diff(got.kind) != 0)  # they take turns
 
 
 def test_poles_of_special_functions_are_refused():

@@ -59,6 +59,7 @@ def test_normal_forms_in_any_coordinates(seed):
     assert [stop.reason for stop in branch.stops] == ["hopf", "bound"]
     assert [one.kind for one in branch.special_points] == ["end", "end"]
     points = branch.points
+    assert points.sizes["point"] > 5
     r = np.sqrt(np.maximum((points.l.values - p) / s / (side * a), 0.0))
     speed = 1.0 + b * r**2
     assert np.allclose(points.period.values * w * speed, 2 * np.pi, rtol=1e-9)
@@ -165,6 +166,7 @@ def test_a_driven_disk_doubles_its_period_and_its_peak_load_is_recorded():
     assert np.min(np.abs(np.linalg.eigvals(end[2:].reshape(2, 2)) + 1.0)) < 1e-7
     doubled = doubling.switch()
     assert doubled.stops[0].reason == "period_doubling"
+    assert doubled.points.sizes["point"] > 5
     assert np.allclose(doubled.points.period, 4 * np.pi / w, rtol=1e-12)
     i = len(branch.path) // 2
     at = branch.orbit(i)

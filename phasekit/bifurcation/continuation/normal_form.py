@@ -144,6 +144,7 @@ def period_doubling(d: Derivatives) -> dict[str, float]:
     fed = _fed(d, q, inverse @ bent.value, inverse, bent.error)
     total = (1.0 / 6.0) * d.third(q, q, q) + 0.5 * fed
     c = _known(total.dot(p), _unit(d, rows, p, q, 3))
+    # Where two multipliers are -1, `null_vectors` makes another product 1.
     return {"c": c if abs(float(p @ q) - 1.0) < 1e-9 else np.nan}
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from os import PathLike
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -203,7 +203,7 @@ class Branch:
         """
         return picture("branch")(self, ax=ax, **keywords)
 
-    def extend(self, points: int | None = None) -> Branch:
+    def extend(self, points: int | None = None) -> Self:
         """Go on where the curve ended for its number of points; a new branch.
 
         Its points are, bit for bit, those of a branch that was never interrupted.
@@ -221,18 +221,22 @@ class Branch:
         Raises
         ------
         ParameterError
-            If no end can be extended.
+            If no end can be extended, or the problem is not known.
         """
-        curve, problem = self.known()
+        curve, _ = self.known()
         if all(track is None or track.stop.reason != "max_points" for track in self.tracks):
             reasons = "; ".join(stop.message for stop in self.stops)
             raise ParameterError(
                 f"extend: the branch ended for other reasons than max_points: {reasons}"
             )
         count = curve.options.max_points if points is None else points
-        count = whole("points", count, "a whole number >= 1")
+        return self._longer(whole("points", count, "a whole number >= 1"))
+
+    def _longer(self, count: int) -> Self:
+        curve, problem = self.known()
         backward, forward = go_on(curve, self.start, self.tracks, count)
-        return make_branch(problem, curve, self.start, backward, forward, self.record)
+        made = make_branch(problem, curve, self.start, backward, forward, self.record)
+        return cast(Self, made)
 
     def _discrete(self) -> bool:
         return self.problem.map

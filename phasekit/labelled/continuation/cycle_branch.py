@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from os import PathLike
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self, cast
 
 import numpy as np
 import xarray as xr
@@ -18,11 +18,10 @@ from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, go_on, join
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.special_points import KINDS
-from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, points_of
 from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
-from phasekit.labels.arguments import bad, whole
+from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
 NO_START = Stop("start", "the start; this direction was not asked for")
@@ -120,39 +119,14 @@ class CycleBranch(Branch):
         )  # fmt: skip
         return ds
 
-    def extend(self, points: int | None = None) -> CycleBranch:
-        """Go on where the family ended for its number of points; a new branch.
-
-        Its points are, bit for bit, those of a branch that was never interrupted.
-
-        Parameters
-        ----------
-        points : int, optional
-            How many more at most in each direction; default: the option max_points.
-
-        Returns
-        -------
-        CycleBranch
-            The longer one; this one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If no end can be extended, or the problem is not known.
-        """
+    def _longer(self, count: int) -> Self:
         cycles, problem = self.known()
-        if all(track is None or track.stop.reason != "max_points" for track in self.tracks):
-            reasons = "; ".join(stop.message for stop in self.stops)
-            raise ParameterError(
-                f"extend: the branch ended for other reasons than max_points: {reasons}"
-            )
-        count = cycles.options.max_points if points is None else points
-        count = whole("points", count, "a whole number >= 1")
         backward, forward = (go_on(cycles, t, count, self.start) for t in self.tracks)
         if forward is not None and forward.stop.reason == "closed":
             backward = None
         made = (backward, forward)
-        return make_cycles(problem, cycles, self.start, made, self.record, self.origin, self.kind)
+        longer = make_cycles(problem, cycles, self.start, made, self.record, self.origin, self.kind)
+        return cast(Self, longer)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""

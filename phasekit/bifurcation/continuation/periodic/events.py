@@ -26,6 +26,7 @@ Complex = npt.NDArray[np.complex128]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
+ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
 NODES = 9  # points of the family through which a branch point is interpolated
 FOLD, DOUBLING, TORUS, BRANCHING = (
     "fold_of_cycles",
@@ -210,7 +211,7 @@ def refined(stretch: Stretch, kind: str) -> Found | None:
     critical = {BRANCHING: 1.0, DOUBLING: -1.0}.get(kind)
     if critical is not None:
         mu = nontrivial(point.multipliers, forced)
-        if not np.min(np.abs(mu - critical)) <= 1e-2:
+        if not np.min(np.abs(mu - critical)) <= ASTRAY:
             return None
     return Found(
         kind, point, -1, interval, "converged", "", _normal_form(stretch.cycles, kind, point)

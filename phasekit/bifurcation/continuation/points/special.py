@@ -115,6 +115,7 @@ def solved(
         if not size < 1e3:
             break
         z = z + step * sizes
+        # In units of the unknowns' scales; from the root of rounding on, until it stops to shrink.
         if size <= 1e-15 or (size <= 1e-9 and size >= 0.5 * before):
             if curve.length(z[:m] - start[:m]) > reach:
                 return start, np.inf, "the defining system led away from the bracket"
