@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING, Any
 import xarray as xr
 
 from phasekit.errors import ParameterError
+from phasekit.labelled.described import completeness, described
 from phasekit.labelled.pictures import picture
 from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
-from phasekit.systems.identity import model_name
+from phasekit.systems.identity import MODEL, model_name
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import Model
 
@@ -38,6 +39,13 @@ class PhasekitAccessor:
 
     def __init__(self, ds: xr.Dataset) -> None:
         self._ds = ds
+
+    def __repr__(self) -> str:
+        """Say whose map this is, along what, what it holds and how complete it is."""
+        ds = self._ds
+        if MODEL not in ds.attrs:
+            return f"a Dataset without the attribute {MODEL!r}: not a map that phasekit made"
+        return "\n".join([f"map of {ds.attrs[MODEL]}", *described(ds), completeness(ds)])
 
     def system(self) -> Model:
         """Rebuild the system of this map, or of the selected cells.

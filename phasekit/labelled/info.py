@@ -11,7 +11,7 @@ import xarray as xr
 
 from phasekit.cells.request import ask
 from phasekit.labelled.accessor import PhasekitAccessor
-from phasekit.labels.conversion import in_units
+from phasekit.labelled.described import described
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.memory import human
 from phasekit.maps.estimate import Estimate
@@ -24,7 +24,6 @@ from phasekit.maps.stored_arrays import read_plan
 from phasekit.maps.unfinished import COMPUTED
 from phasekit.maps.whole import open_map
 from phasekit.systems.identity import SCHEMA
-from phasekit.systems.registry import models
 
 
 @dataclass(frozen=True)
@@ -68,26 +67,7 @@ class MapInfo:
         model = str(ds.attrs["phasekit_model"])
         made = f"phasekit {ds.attrs.get('phasekit_version', '?')}, schema {ds.attrs[SCHEMA]}"
         lines = [f"{self.name}: map of {model}, made by {made}"]
-        declared = models()[model].declared if model in models() else ()
-        known = {p.name for p in declared} | set(STATES)
-        inputs = {name: coord.variable for name, coord in ds.coords.items() if name in known}
-        given = in_units(xr.Dataset(coords=inputs), self.units).coords
-        fixed = [
-            f"{name} = {coord.item():.6g}{_unit(coord)}"
-            for name, coord in given.items()
-            if not coord.dims
-        ]
-        if fixed:
-            lines.append(f"fixed: {', '.join(sorted(fixed))}")
-        for name, coord in given.items():
-            if coord.dims:
-                lines.append(f"axis {_axis(str(name), coord)}")
-        lines.append("quantities:")
-        width = max((len(str(name)) for name in ds.data_vars), default=0)
-        for name, variable in ds.data_vars.items():
-            if name != COMPUTED:
-                dims = " x ".join(map(str, variable.dims)) or "one value"
-                lines.append(f"  {name!s:<{width}}  {variable.dtype.name:<8} {dims}")
+        lines += described(ds, self.units)
         for part in self.plan.parts if self.plan else ():
             done, tiles = self.done[part.name]
             chunks = " x ".join(f"{d} {n}" for d, n in zip(part.dims, part.chunks, strict=True))
@@ -141,15 +121,3 @@ def _job(place: Place, ds: xr.Dataset, plan: Plan, left: list[Left]) -> Job:
     values = {name: float(x) if not x.dims else x.load() for name, x in states.items()}
     request = ask(system, rows, states=values, order=list(plan.sizes))
     return Job(place, request, plan, plan, tuple(left))
-
-
-def _axis(name: str, coord: xr.DataArray) -> str:
-    values = coord.values
-    dims = "" if coord.dims == (name,) else f" along {' x '.join(map(str, coord.dims))}"
-    low, high = (f"{value:.6g}" for value in (values.flat[0], values.flat[-1]))
-    return f"{name}: {values.size} values{dims}, {low} to {high}{_unit(coord)}"
-
-
-def _unit(coord: xr.DataArray) -> str:
-    units = coord.attrs.get("units", "1")
-    return "" if units == "1" else f" {units}"

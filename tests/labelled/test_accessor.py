@@ -44,6 +44,22 @@ def test_accessor_is_stateless():
     assert list(vars(accessor)) == ["_ds"]
 
 
+def test_it_says_what_a_map_holds_and_how_complete_it_is():
+    lines = repr(MAP.phasekit.to(beta="deg").phasekit).splitlines()
+    assert lines[0] == "map of GyroRotorDisk"
+    assert lines[-1] == "all cells are computed"
+    beta = np.degrees(MAP.beta.values)
+    assert f"axis beta: {beta.size} values, {beta[0]:.6g} to {beta[-1]:.6g} deg" in lines
+    shown = {line.split()[0] for line in lines[lines.index("quantities:") + 1 : -1]}
+    assert shown == set(MAP.data_vars)
+    part = pk.sweep(pk.Reduced(0.1, 0.2), psi=[0.1, 0.2, 0.3])
+    part = part.assign(computed=("psi", [True, False, False]))
+    assert repr(part.phasekit).endswith("1 of 3 cells are computed: 'computed' says which")
+    text = repr(pk.equilibria(pk.Potential("m*x**2/2 - x**4", "x", {"m": [1.0, 2.0]})).phasekit)
+    assert "axis m: 2 values, 1 to 2" in text
+    assert "not a map that phasekit made" in repr(xr.Dataset().phasekit)
+
+
 def test_datasets_of_others_are_refused_when_asked():
     other = xr.Dataset({"x": ("t", [1.0, 2.0])})
     with pytest.raises(pk.ParameterError, match="without the attribute 'phasekit_model'"):
