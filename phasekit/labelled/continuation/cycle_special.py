@@ -11,6 +11,7 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.family import Found
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -31,7 +32,7 @@ class CyclePoint(SpecialPoint[Of]):
     @property
     def corank(self) -> int:
         """Number of critical multipliers besides the one that is always 1; 0 at ends."""
-        return {"end": 0, "torus": 2}.get(self.kind, 1)
+        return KINDS[self.kind].crossing or 0
 
     @property
     def period(self) -> float:
