@@ -1,9 +1,7 @@
 """What every system shares: declared parameters, validation, copies, equality, rebuilding.
 
-A system is a set of parameters and a formula that turns them into the coefficients (A, B, C) of
-``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``. A model declares its parameters once, as
-a tuple of `Parameter`; validation, sweeps, coordinates of maps and rebuilding from a map all
-follow from that declaration.
+A model declares its parameters once, as a tuple of `Parameter`; validation, sweeps, coordinates of
+maps and rebuilding from a map all follow from that declaration.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ from phasekit.labels.arguments import (
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import combine
 from phasekit.laws.ladder import Law
-from phasekit.laws.trigonometric import Trigonometric, Values
+from phasekit.laws.trigonometric import Trigonometric, Values, check_products
 from phasekit.laws.trigonometric import law as make_law
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter, attrs_of
@@ -74,10 +72,12 @@ class Model(ModelValue):
     rung: ClassVar[type[Law]] = Trigonometric
 
     def __init_subclass__(cls, **keywords: Any) -> None:
-        """Let a law that is asked for no parameters say so."""
+        """Refuse what is no law, and let one that is asked for no parameters say so."""
         super().__init_subclass__(**keywords)
         own = cls.__dict__.get("products")
         if own is not None:
+            units = {parameter.name: parameter.units for parameter in getattr(cls, "declared", ())}
+            check_products(cls.__name__, own.__func__, units)
             cls.products = staticmethod(_of_parameters(own.__func__))  # type: ignore[assignment, method-assign]
 
     @staticmethod
