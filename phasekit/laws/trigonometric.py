@@ -21,6 +21,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import describe
 from phasekit.laws.factors import Atom, Name, Product, entries, named
 from phasekit.laws.ladder import Conservative
 
@@ -202,13 +203,13 @@ def _product(value: Any) -> Product:
     return value if isinstance(value, Product) else Product(value)
 
 
-def check_products(model: str, products: Products, units: Mapping[str, str]) -> None:
-    """Refuse what is no law of the parameters that have these units.
+def checked_products(model: str, products: Products, units: Mapping[str, str]) -> Products:
+    """Return a law of the parameters that have these units, which refuses other arguments.
 
     Raises
     ------
     ParameterError
-        If A N, B N, C N and N are no polynomials of them, or of unequal degrees in an angle.
+        If A N, B N, C N and N are no polynomials of them, or A N, B N and C N of unequal degrees in an angle.
     """
     wants = (
         "A N, B N, C N and N as polynomials of the declared parameters, an angle as its sine, "
@@ -223,13 +224,25 @@ def check_products(model: str, products: Products, units: Mapping[str, str]) -> 
     if not any(product.powers for product in (A, B, C, N)):
         raise ParameterError(f"products of {model}: got numbers alone, wants {wants}")
     for angle in angles:
-        degrees = set().union(*(product.degrees(angle) for product in (A, B, C, N)))
+        degrees = set().union(*(product.degrees(angle) for product in (A, B, C)))
         if len(degrees) > 1:
             raise ParameterError(
                 f"products of {model}: got terms of the degrees {sorted(degrees)} in the sine, "
                 f"cosine and radius of {angle}, wants all of one degree; multiply those of a lower "
                 "degree by the radius"
             )
+
+    @functools.wraps(products)
+    def checked(v: Values) -> Any:
+        try:
+            return products(v)
+        except Exception as error:
+            raise ParameterError(
+                f"v: got {describe(v)}, wants the parameters by name, angles as (sine, cosine, "
+                f"radius): {type(error).__name__}: {error}"
+            ) from error
+
+    return checked
 
 
 @functools.cache
