@@ -209,7 +209,7 @@ def checked_products(model: str, products: Products, units: Mapping[str, str]) -
     Raises
     ------
     ParameterError
-        If A N, B N, C N and N are no polynomials of them, or A N, B N and C N of unequal degrees in an angle.
+        If they are no polynomials, or A N, B N and C N of unequal degrees in an angle.
     """
     wants = (
         "A N, B N, C N and N as polynomials of the declared parameters, an angle as its sine, "
