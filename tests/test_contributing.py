@@ -15,7 +15,6 @@ import phasekit as pk
 from phasekit.bifurcation.continuation.points import curve_tests
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.laws.ladder import Conservative
-from phasekit.systems.perturbed_parts import RATES
 from phasekit.systems.registry import models
 from phasekit.systems.system import MODELS
 from phasekit.table import quantities
@@ -33,13 +32,13 @@ SECTIONS = dict(
 @pytest.fixture(autouse=True)
 def registries(monkeypatch):
     """The tables and registries as they were before."""
-    known, rows, rates = dict(models()), dict(quantities.ROWS), dict(RATES)
+    known, rows = dict(models()), dict(quantities.ROWS)
     monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
     monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
     kinds = dict(KINDS)
     monkeypatch.setattr(curve_tests, "TESTS", list(curve_tests.TESTS))
     yield
-    every = ((MODELS, known), (quantities.ROWS, rows), (RATES, rates), (KINDS, kinds))
+    every = ((MODELS, known), (quantities.ROWS, rows), (KINDS, kinds))
     for registry, before in every:
         registry.clear()
         registry.update(before)

@@ -36,6 +36,8 @@ class PointKind:
     #: The curve of its kind in two parameters.
     curve: Curve | None = None
     found_by: tuple[str, ...] = ("continuation",)
+    #: How many eigenvalues or multipliers cross; None: as many as f_x has null vectors there.
+    crossing: int | None = None
 
 
 KINDS: dict[str, PointKind] = {}
@@ -88,7 +90,7 @@ for _kind in (
     PointKind(
         "hopf", "H", "a pair of eigenvalues crosses the imaginary axis; periodic orbits begin",
         "real part of the complex pair next to the axis", "f = 0, (f_x^2 + k) v = 0, |v| = 1",
-        ("l1", "omega", "d"), "o", 7, "GREEN", "hopf", "hopf",
+        ("l1", "omega", "d"), "o", 7, "GREEN", "hopf", "hopf", crossing=2,
     ),
     PointKind(
         "neutral_saddle", "NS",
@@ -124,25 +126,25 @@ for _kind in (
     PointKind(
         "fold_of_cycles", "LPC", "two periodic orbits merge and vanish",
         "derivative of the characteristic polynomial of the multipliers at 1",
-        "the orbit, and a multiplier 1 beside the trivial one", (), "s", 7, "white", None,
-        "fold_of_cycles",
+        "the orbit, and a multiplier 1 beside the trivial one", ("a", "b"), "s", 7, "white", None,
+        "fold_of_cycles", crossing=1,
     ),
     PointKind(
         "period_doubling", "PD", "a multiplier passes -1; orbits of twice the period begin",
         "determinant of M + 1", "the orbit, and a multiplier -1", ("c",), "d", 8, "ORANGE",
         "branch_point",
-        "period_doubling",
+        "period_doubling", crossing=1,
     ),
     PointKind(
         "torus", "TR", "a pair of multipliers passes the unit circle; a torus begins",
         "bialternate product of M less 1, real pairs apart",
         "the orbit, and a pair of multipliers on the circle", ("d", "angle"), "o", 7, "SKY",
-        "hopf", "torus",
+        "hopf", "torus", crossing=2,
     ),
     PointKind(
         "cycle_branch_point", "BPC", "families of periodic orbits cross",
         "determinant of the collocation equations, bordered", "as of a fold of cycles, with one "
-        "null vector more", (), "^", 8, "white", None,
+        "null vector more", (), "^", 8, "white", None, crossing=1,
     ),
     PointKind(
         "no_force", "NF", "A = B = C = 0: every angle is an equilibrium",

@@ -22,8 +22,7 @@ from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords, own_
 from phasekit.cells.tiling import cut, run_tasks, tiles
 from phasekit.labels.arguments import FloatArray
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.grid import variable
-from phasekit.labels.memory import refuse_too_large
+from phasekit.labels.grid import refuse_too_large, variable
 from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS, pass_of
 from phasekit.table.row import Pass, Quantity
@@ -89,14 +88,8 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
     ParameterError
         If the result would not fit into memory.
     """
-    data = _lazy(request) if request.grid.lazy else _eager(request, progress)
-    return assemble(request, data)
-
-
-# ------------------------------------------------------------------------------ in memory
-
-
-def _eager(request: Request, progress: bool | None) -> dict[str, xr.Variable]:
+    if request.grid.lazy:
+        return assemble(request, _lazy(request))
     sizes, grid = request.grid.sizes, request.grid
     refuse_too_large(
         {
@@ -120,7 +113,7 @@ def _eager(request: Request, progress: bool | None) -> dict[str, xr.Variable]:
         for row in part.rows:
             out[row.name] = variable((*part.dims, *row.dims), results[row.name], row.attrs)
     run_tasks(tasks, progress)
-    return {row.name: out[row.name] for row in request.rows}
+    return assemble(request, {row.name: out[row.name] for row in request.rows})
 
 
 def fill(

@@ -13,11 +13,20 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
+from phasekit.cells.request import bound, depth
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import Value, numeric
-from phasekit.labels.coordinates import AXES
-from phasekit.systems.as_system import as_system
+from phasekit.labels.arguments import Value, bad, numeric, one_of
+from phasekit.labels.coordinates import AXES, LABELS
+from phasekit.systems.as_system import as_system, stands_on
+from phasekit.systems.system import Model
+from phasekit.table import quantities
 from phasekit.table.row import Pass, Quantity
+
+CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
+SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
+
+#: A pass, and what is noted of the arguments that it was made from.
+Noted = tuple[Pass, dict[str, str]]
 
 
 def at_states(
@@ -65,3 +74,55 @@ def at_states(
         axis={name: "point" for name in kept if name not in AXES},
         called={name: argument for argument, (name, _) in states.items()},
     )
+
+
+def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
+    """Return the pass that computes a group from a state of another kind, and from options.
+
+    Parameters
+    ----------
+    system : Model
+        The system.
+    group : str
+        What to compute.
+    start : str
+        The state that is given.
+    **options : str, int or None
+        What else the call says: center, saddle, side.
+
+    Raises
+    ------
+    ParameterError
+        If an option is not a label that the system has, or nothing computes the group from this.
+    """
+    fitting = [
+        one
+        for one in quantities.PASSES
+        if group in one.groups and start in one.inputs and set(one.options) == set(options)
+    ]
+    rungs = [one.of for one in fitting if issubclass(system.rung, one.of)]
+    if not rungs:
+        stands_on(system, fitting[0].of, f"{group} from {start}")
+    best = max(rungs, key=depth)
+    (one,) = (one for one in fitting if one.of is best)
+    chosen = {name: _option(system, name, value) for name, value in options.items()}
+    notes = {
+        name: str(system.rung.default[name] if value is None else value)
+        for name, value in options.items()
+    }
+    return bound(one, system, set(), chosen), notes
+
+
+def _option(system: Model, name: str, value: Any) -> int | None:
+    """Return an option as the number that array functions take; None where nothing is said."""
+    if name == "side":
+        return one_of(name, value, SIDES)
+    if value is None:
+        return None
+    if system.rung.labels_fixed:
+        return one_of(name, value, {"center": CENTERS, "saddle": SADDLES}[name])
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 0:
+        dim = {"center": "equilibrium", "saddle": "saddle"}[name]
+        wants = f"a {name}'s number on the dim {dim}, 0 or more, for a {type(system).__name__}"
+        raise bad(name, value, wants)
+    return int(value)

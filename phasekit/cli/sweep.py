@@ -127,7 +127,7 @@ def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], optio
 
 
 def _say_estimate(job: Any, workers: Any) -> None:
-    from phasekit.labels.memory import human
+    from phasekit.labels.grid import human
     from phasekit.numerics.launch import cpus
 
     if not job.count:

@@ -33,7 +33,7 @@ def facts_of(system: Model, values: dict[str, float]) -> dict[str, Any]:
         "angle": is_angle,
         "parameters": [_parameter(p, values, system) for p in system.declared],
         "used": list(system.formula_inputs()),
-        "machine": hasattr(system, "half_span"),
+        "machine": any(parameter.name == "half_span" for parameter in system.declared),
         "python": _python(system),
     }
 

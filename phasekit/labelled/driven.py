@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import passes_of
+from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
 from phasekit.labels.arguments import NumberLike, bad, number, numeric, whole

@@ -12,8 +12,7 @@ import xarray as xr
 from phasekit.errors import ParameterError
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad, pair, unknown, whole
-from phasekit.labels.grid import LABEL_DTYPE, variable
-from phasekit.labels.memory import refuse_too_large
+from phasekit.labels.grid import LABEL_DTYPE, refuse_too_large, variable
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
 

@@ -13,7 +13,7 @@ from phasekit.cells.request import ask
 from phasekit.labelled.accessor import PhasekitAccessor
 from phasekit.labelled.described import described
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.memory import human
+from phasekit.labels.grid import human
 from phasekit.maps.estimate import Estimate
 from phasekit.maps.job import Job
 from phasekit.maps.left import Left

@@ -13,7 +13,7 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.cells.dispatch import passes_of
+from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import NumberLike, bad, numeric, one_of, state_arguments

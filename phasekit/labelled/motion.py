@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import pass_from, passes_of
-from phasekit.cells.states import at_states
+from phasekit.cells.request import passes_of
+from phasekit.cells.states import at_states, pass_from
 from phasekit.labelled.orbits import noted
 from phasekit.labels.arguments import NumberLike, bad, number, state_arguments
 from phasekit.numerics.waits import said

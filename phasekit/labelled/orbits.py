@@ -14,8 +14,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import SIDES, pass_from
-from phasekit.cells.states import at_states
+from phasekit.cells.states import SIDES, at_states, pass_from
 from phasekit.errors import OrbitFamily, ParameterError
 from phasekit.labels.arguments import NumberLike, bad, describe, numeric, one_of, state_arguments
 from phasekit.systems.as_system import as_system

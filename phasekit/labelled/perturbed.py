@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.dispatch import CENTERS, passes_of
 from phasekit.cells.evaluate import evaluate
+from phasekit.cells.request import passes_of
+from phasekit.cells.states import CENTERS
 from phasekit.labelled.orbits import FAMILIES, noted
 from phasekit.labels.arguments import bad, named, one_of, whole
 from phasekit.labels.coordinates import LABELS

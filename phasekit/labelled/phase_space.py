@@ -10,9 +10,9 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
-from phasekit.cells.invalid import warn_of_invalid
 from phasekit.labels.arguments import bad
 from phasekit.systems.as_system import as_system
+from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import Model
 from phasekit.table.quantities import select
 
@@ -129,5 +129,5 @@ def separatrices(system: Any) -> xr.Dataset:
 
 def _of_system(group: str, system: Any) -> xr.Dataset:
     system, rows = as_system(system), select(group)
-    warn_of_invalid(system, stacklevel=3)
+    warn_of_invalid(system.declared, system.parameters, stacklevel=3)
     return evaluate(system, rows)

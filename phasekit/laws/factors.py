@@ -14,6 +14,9 @@ from typing import Any
 
 Number = int | float | Fraction
 
+#: Why some are refused.
+NO_QUOTIENTS = "a polynomial has whole powers >= 0; multiply all four by what is divided by"
+
 
 @dataclass(frozen=True)
 class Name:
@@ -32,6 +35,10 @@ class Name:
         if name != self.name:
             return 0
         return 1 if self.entry is None else 2
+
+    def degrees(self, angle: str) -> set[int]:
+        """Degrees in an angle's sine, cosine and radius together, of each term."""
+        return {int(self.name == angle and self.entry is not None)}
 
     def names(self) -> Iterator[str]:
         """Names of the parameters."""
@@ -54,6 +61,10 @@ class Sum:
     def degree(self, name: str) -> int:
         """Degree in a parameter, in an angle's half-angle tangent."""
         return max(term.degree(name) for term in self.terms)
+
+    def degrees(self, angle: str) -> set[int]:
+        """Degrees in an angle's sine, cosine and radius together, of each term."""
+        return set().union(*(term.degrees(angle) for term in self.terms))
 
     def names(self) -> Iterator[str]:
         """Names of the parameters."""
@@ -88,6 +99,14 @@ class Product:
         """Degree in a parameter, in an angle's half-angle tangent."""
         return sum(power * atom.degree(name) for atom, power in self.powers)
 
+    def degrees(self, angle: str) -> set[int]:
+        """Degrees in an angle's sine, cosine and radius together, of each term; none of zero."""
+        found = {0} if self.number else set()
+        for atom, power in self.powers:
+            for _ in range(power):
+                found = {before + more for before in found for more in atom.degrees(angle)}
+        return found
+
     def names(self) -> Iterator[str]:
         """Names of the parameters."""
         for atom in self.atoms:
@@ -109,8 +128,20 @@ class Product:
         """Return the negative."""
         return self * -1
 
+    def __truediv__(self, other: Product | Number) -> Product:
+        """Quotient by a number."""
+        if isinstance(other, Product):
+            raise TypeError(NO_QUOTIENTS)
+        return self * (Fraction(1, other) if isinstance(other, int) else 1 / other)
+
+    def __rtruediv__(self, other: Number) -> Product:
+        """Refuse what is no polynomial."""
+        raise TypeError(NO_QUOTIENTS)
+
     def __pow__(self, power: int) -> Product:
         """Return a power with a whole exponent >= 0."""
+        if not isinstance(power, int) or power < 0:
+            raise TypeError(f"power {power}: {NO_QUOTIENTS}")
         return Product(self.number**power, tuple((a, p * power) for a, p in self.powers if power))
 
     def __add__(self, other: Product | Number) -> Product:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import cmath
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -20,6 +20,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from phasekit.errors import ParameterError
+from phasekit.inputs import describe
 from phasekit.laws.factors import Atom, Name, Product, entries, named
 from phasekit.laws.ladder import Conservative
 
@@ -129,12 +131,8 @@ class Trigonometric(Conservative):
     @cached_property
     def symbolic(self) -> tuple[Product, Product, Product, Product]:
         """The products as what remembers its factors."""
-        values = {
-            name: entries(name) if name in self.angles else named(name) for name in self.domains
-        }
-        parts = [x if isinstance(x, Product) else Product(x) for x in self.products(values)]
-        A, B, C, N = parts
-        return A, B, C, N
+        A, B, C, N = self.products(_factors(self.domains, self.angles))
+        return _product(A), _product(B), _product(C), _product(N)
 
     @cached_property
     def parameters(self) -> tuple[str, ...]:
@@ -195,6 +193,56 @@ def exact(values: Values) -> dict[str, Any]:
         name: tuple(map(Fraction, value)) if isinstance(value, tuple) else Fraction(value)
         for name, value in values.items()
     }
+
+
+def _factors(names: Iterable[str], angles: Container[str]) -> dict[str, Any]:
+    return {name: entries(name) if name in angles else named(name) for name in names}
+
+
+def _product(value: Any) -> Product:
+    return value if isinstance(value, Product) else Product(value)
+
+
+def checked_products(model: str, products: Products, units: Mapping[str, str]) -> Products:
+    """Return a law of the parameters that have these units, which refuses other arguments.
+
+    Raises
+    ------
+    ParameterError
+        If they are no polynomials, or A N, B N and C N of unequal degrees in an angle.
+    """
+    wants = (
+        "A N, B N, C N and N as polynomials of the declared parameters, an angle as its sine, "
+        "cosine and radius"
+    )
+    angles = [name for name, unit in units.items() if unit == "rad"]
+    try:
+        A, B, C, N = map(_product, products(_factors(units, angles)))
+    except Exception as error:
+        text = f"products of {model}: got {type(error).__name__}: {error}; wants {wants}"
+        raise ParameterError(text) from error
+    if not any(product.powers for product in (A, B, C, N)):
+        raise ParameterError(f"products of {model}: got numbers alone, wants {wants}")
+    for angle in angles:
+        degrees = set().union(*(product.degrees(angle) for product in (A, B, C)))
+        if len(degrees) > 1:
+            raise ParameterError(
+                f"products of {model}: got terms of the degrees {sorted(degrees)} in the sine, "
+                f"cosine and radius of {angle}, wants all of one degree; multiply those of a lower "
+                "degree by the radius"
+            )
+
+    @functools.wraps(products)
+    def checked(v: Values) -> Any:
+        try:
+            return products(v)
+        except Exception as error:
+            raise ParameterError(
+                f"v: got {describe(v)}, wants the parameters by name, angles as (sine, cosine, "
+                f"radius): {type(error).__name__}: {error}"
+            ) from error
+
+    return checked
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from typing import Any
 
 from phasekit.cells.tiling import cut
 from phasekit.errors import StoreError
-from phasekit.labels.memory import human
+from phasekit.labels.grid import human
 from phasekit.maps.left import Left
 from phasekit.maps.place import Place
 from phasekit.maps.stored_arrays import codecs

@@ -11,8 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.cells.dispatch import passes_of
-from phasekit.cells.request import Request, needs_of
+from phasekit.cells.request import Request, needs_of, passes_of
 from phasekit.cells.tiling import cut
 from phasekit.errors import StoreError
 from phasekit.maps.marks import Index, Inputs, Marks

@@ -8,7 +8,7 @@ from math import prod
 
 from phasekit.cells.request import Part
 from phasekit.errors import ParameterError
-from phasekit.labels.memory import SHARE, available_memory, human
+from phasekit.labels.grid import SHARE, available_memory, human
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 

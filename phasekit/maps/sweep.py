@@ -9,18 +9,17 @@ from typing import Any
 
 import xarray as xr
 
-from phasekit.cells.dispatch import inputs_of, is_offered, passes_of
 from phasekit.cells.evaluate import compute
-from phasekit.cells.invalid import warn_of_invalid
-from phasekit.cells.request import Request, ask, needs_of
+from phasekit.cells.request import Request, ask, inputs_of, is_offered, needs_of, passes_of
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.memory import refuse_too_large
+from phasekit.labels.grid import refuse_too_large
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.options import StoreOptions, check_dtypes, without_store
 from phasekit.maps.whole import WholeTarget, open_map, target_of
 from phasekit.systems.as_system import as_system
+from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import Model
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
@@ -127,7 +126,7 @@ def sweep(
         options = StoreOptions.of(
             request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
-        warn_of_invalid(request.system)
+        warn_of_invalid(request.system.declared, request.system.parameters)
         sweep_into(place, request, options, progress)
         return open_map(store)
     for name, value in {
@@ -141,7 +140,7 @@ def sweep(
         dtypes = check_dtypes(dtype, rows)
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     request = _asked(system, axes, axes_by_name, (*rows, *more))
-    warn_of_invalid(request.system)
+    warn_of_invalid(request.system.declared, request.system.parameters)
     ds = compute(request, progress)
     if more:
         own = {dim for row in rows for dim in row.dims}

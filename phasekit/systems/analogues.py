@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -9,9 +10,19 @@ import numpy as np
 
 from phasekit.constants import STANDARD_GRAVITY
 from phasekit.labels.arguments import NumberLike
+from phasekit.laws.perturbed import Rate
 from phasekit.laws.trigonometric import Values
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import Model, model
+
+
+def _particle_euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+    """The Euler force of omega' on a particle, along the circle.
+
+    The normal of the circle's plane points to the side to which omega turns its horizontal.
+    """
+    sine = np.sin(v["tilt"])
+    return sine, v["offset"] * sine / v["radius"], v["normal_offset"] / v["radius"]
 
 
 @model
@@ -83,6 +94,8 @@ class ParticleOnCircle(Model):
         ),
         Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
     )
+
+    frame_rate: ClassVar[Rate | None] = Rate("omega", _particle_euler)
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:

@@ -14,7 +14,8 @@ from phasekit.constants import STANDARD_GRAVITY
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, NumberLike, Value, bad
 from phasekit.labels.grid import combine
-from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_products
+from phasekit.laws.perturbed import Rate
+from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_mixing, disk_products
 from phasekit.systems.parameter import Parameter, attrs_of
 from phasekit.systems.system import Model, model
 
@@ -24,6 +25,11 @@ INERTIA_NAMES = (
     "moment of inertia about n2",
     "deviation moment of v2 and n2",
 )
+
+
+def _euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
+    """The torque of omega1' on a disk, ``-kappa cos phi``: Lagrange's equations."""
+    return 0.0, 0.0, -disk_mixing(v["r"], v["e"], v["beta"])
 
 
 def _eccentricity(e: FloatArray, beta: FloatArray) -> tuple[FloatArray]:
@@ -138,6 +144,7 @@ class GyroRotorDisk(Model):
             )
 
     products = staticmethod(disk_products)
+    frame_rate: ClassVar[Rate | None] = Rate("omega1", _euler)
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {
         name: functools.partial(critical_disk, name) for name in ("beta", "e", "a", "omega1")
     }

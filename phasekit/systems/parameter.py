@@ -1,18 +1,27 @@
-"""One declared parameter of a model; validation and coordinates follow from the declaration."""
+"""One declared parameter of a model; validation and coordinates follow from the declaration.
+
+Of cells whose parameters are not legal it is said how many there are, why, and the way out.
+"""
 
 from __future__ import annotations
 
 import math
+import warnings
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phasekit.labels.arguments import Value, bad, numeric
+from phasekit.errors import InvalidCellsWarning
+from phasekit.labels.arguments import FloatArray, Value, bad, describe, numeric
 
 if TYPE_CHECKING:
     import xarray as xr
+
+#: Share of the cells from which on it is said: maps may touch what is not legal at their edges.
+MANY = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,3 +105,63 @@ class Parameter:
 def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:
     """Attributes of the coordinates or results that are named as these parameters."""
     return {p.name: {"long_name": p.long_name, "units": p.units} for p in parameters}
+
+
+def warn_of_invalid(
+    declared: Sequence[Parameter], parameters: Mapping[str, Value], stacklevel: int = 2
+) -> None:
+    """Warn of many cells that stay empty, once a call; of lazy parameters none are looked at.
+
+    Parameters
+    ----------
+    declared : sequence of Parameter
+        What the values have to be.
+    parameters : mapping of str to Value
+        The values by name; the arrays span the cells.
+    stacklevel : int
+        As `warnings.warn` has it, counted from the caller.
+    """
+    import xarray as xr
+
+    valid: list[xr.Variable] = []
+    reasons = []
+    for parameter in declared:
+        value = parameters.get(parameter.name)
+        if not isinstance(value, (np.ndarray, xr.DataArray)) or getattr(value, "chunks", None):
+            continue
+        inside = parameter.valid(np.asarray(value))
+        if inside.all():
+            continue
+        dims = value.dims if isinstance(value, xr.DataArray) else (parameter.name,)
+        valid.append(xr.Variable(dims, inside))
+        reasons.append(_reason(parameter, np.asarray(value), inside))
+    if not reasons:
+        return
+    share = _share_inside(valid)
+    if share <= 1.0 - MANY:
+        text = f"{100.0 * (1.0 - share):.3g} % of the cells are empty: {'; '.join(reasons)}"
+        warnings.warn(text, InvalidCellsWarning, stacklevel=stacklevel + 1)
+
+
+def _reason(parameter: Parameter, value: FloatArray, inside: NDArray[np.bool_]) -> str:
+    example = value[~inside].flat[0]
+    text = (
+        f"{parameter.name}: {np.count_nonzero(~inside)} of {inside.size} values are not legal, "
+        f"such as {describe(example)}; wants {parameter.wants}"
+    )
+    with np.errstate(all="ignore"):
+        in_degrees = parameter.units == "rad" and parameter.valid(value * np.pi / 180.0).all()
+    return f"{text}; if they are in degrees: {parameter.name} * pk.deg" if in_degrees else text
+
+
+def _share_inside(valid: list[xr.Variable]) -> float:
+    """Return the share of cells that are valid in all; dims that are shared count once."""
+    share = 1.0
+    while valid:
+        joint = valid.pop()
+        while near := [other for other in valid if set(other.dims) & set(joint.dims)]:
+            valid = [other for other in valid if not any(other is one for one in near)]
+            for other in near:
+                joint = joint & other
+        share *= float(joint.mean())
+    return share

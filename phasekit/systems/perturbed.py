@@ -185,7 +185,7 @@ class Perturbed(Model):
             harmonics=len(self.forcing),
             modulated=tuple(self.modulation),
             drifting=tuple(self.drift),
-            rate=parts.RATES.get(type(self.system).__name__),
+            rate=self.system.frame_rate,
             prescribed=self.omega1,
             unit=self._driven_unit(),
         )

@@ -15,14 +15,12 @@ from phasekit.laws.ladder import Conservative, Law
 from phasekit.laws.perturbed import (
     PerturbedConservative,
     PerturbedTrigonometric,
-    Rate,
     TiltedTrigonometric,
     drift_name,
     forcing_names,
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.mechanics.disk import disk_mixing
 from phasekit.systems.as_system import as_system
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.parameter import Parameter
@@ -43,27 +41,6 @@ DRIVES = {
 }
 
 
-def disk_euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
-    """The torque of omega1' on a disk, ``-kappa cos phi``: Lagrange's equations."""
-    return 0.0, 0.0, -disk_mixing(v["r"], v["e"], v["beta"])
-
-
-def particle_euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
-    """The Euler force of omega' on a particle, along the circle.
-
-    The normal of the circle's plane points to the side to which omega turns its horizontal.
-    """
-    sine = np.sin(v["tilt"])
-    return sine, v["offset"] * sine / v["radius"], v["normal_offset"] / v["radius"]
-
-
-#: Angular velocities of the frame, by model: their change is felt as a torque.
-RATES: dict[str, Rate] = {
-    "GyroRotorDisk": Rate("omega1", disk_euler),
-    "ParticleOnCircle": Rate("omega", particle_euler),
-}
-
-
 def base_of(system: Any) -> Model:
     """Return the system that is perturbed.
 
@@ -74,7 +51,7 @@ def base_of(system: Any) -> Model:
     """
     found = as_system(system)
     wants = "a system in a potential: a disk, an analogue, a pk.Potential"
-    if type(found).__name__ == "Perturbed":
+    if issubclass(found.rung, PerturbedConservative):
         raise bad("system", found, wants, "it is perturbed already; use .replace(...)")
     if not issubclass(found.rung, Conservative):
         hint = (

@@ -1,9 +1,7 @@
 """What every system shares: declared parameters, validation, copies, equality, rebuilding.
 
-A system is a set of parameters and a formula that turns them into the coefficients (A, B, C) of
-``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``. A model declares its parameters once, as
-a tuple of `Parameter`; validation, sweeps, coordinates of maps and rebuilding from a map all
-follow from that declaration.
+A model declares its parameters once, as a tuple of `Parameter`; validation, sweeps, coordinates of
+maps and rebuilding from a map all follow from that declaration.
 """
 
 from __future__ import annotations
@@ -30,7 +28,8 @@ from phasekit.labels.arguments import (
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import combine
 from phasekit.laws.ladder import Law
-from phasekit.laws.trigonometric import Trigonometric, Values
+from phasekit.laws.perturbed import Rate
+from phasekit.laws.trigonometric import Trigonometric, Values, checked_products
 from phasekit.laws.trigonometric import law as make_law
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter, attrs_of
@@ -72,13 +71,17 @@ class Model(ModelValue):
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     #: The rung of its law, which says what can be computed of it.
     rung: ClassVar[type[Law]] = Trigonometric
+    #: The angular velocity of its frame: a change of it is felt as a torque.
+    frame_rate: ClassVar[Rate | None] = None
 
     def __init_subclass__(cls, **keywords: Any) -> None:
-        """Let a law that is asked for no parameters say so."""
+        """Refuse what is no law, and let one that is asked for no parameters say so."""
         super().__init_subclass__(**keywords)
         own = cls.__dict__.get("products")
         if own is not None:
-            cls.products = staticmethod(_of_parameters(own.__func__))  # type: ignore[assignment, method-assign]
+            units = {parameter.name: parameter.units for parameter in getattr(cls, "declared", ())}
+            law = checked_products(cls.__name__, own.__func__, units)
+            cls.products = staticmethod(law)  # type: ignore[assignment, method-assign]
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -244,20 +247,6 @@ class Model(ModelValue):
         """
         refuse_another(ds, cls.__name__)
         return cls(**parameter_values(ds, cls.declared))
-
-
-def _of_parameters(products: Callable[[Values], Any]) -> Callable[[Values], Any]:
-    @functools.wraps(products)
-    def checked(v: Values) -> Any:
-        try:
-            return products(v)
-        except Exception as error:
-            raise ParameterError(
-                f"v: got {describe(v)}, wants the parameters by name, angles as (sine, cosine, "
-                f"radius): {type(error).__name__}: {error}"
-            ) from error
-
-    return checked
 
 
 def model(cls: type[ModelType]) -> type[ModelType]:

@@ -31,7 +31,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 ROWS = REGISTERED
 ROWS.update({row.name: row for row in QUANTITIES})
 
-#: Passes over the cells; `phasekit.cells.dispatch` finds the one for a system.
+#: Passes over the cells; `phasekit.cells.request` finds the one for a system.
 PASSES: tuple[Pass, ...] = (
     *phase_space.PASSES,
     *orbits.PASSES,

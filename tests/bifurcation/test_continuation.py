@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.kernels import defining
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.kernels.newton import refine
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.points import branch_point, fold, pair
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
     orientation,
@@ -271,7 +272,7 @@ def test_lyapunov_coefficient_of_the_hopf_normal_form(l1, omega):
     d = derivatives(
         [f"mu*x - {omega}*y + x*{cubic}", f"{omega}*x + mu*y + y*{cubic}"], "mu", [0, 0, 0]
     )
-    form = forms.hopf(d, omega)
+    form = pair.normal_form(d, omega)
     assert form["l1"] == pytest.approx(l1, rel=1e-13)
     assert form["d"] == pytest.approx(1.0, rel=1e-13)
 
@@ -279,18 +280,18 @@ def test_lyapunov_coefficient_of_the_hopf_normal_form(l1, omega):
 def test_lyapunov_coefficient_with_quadratic_terms():
     """The adaptive control system at al = be = 1: -0.3 for the unit eigenvector."""
     d = derivatives(["y", "z", "-al*z - y - x + x**2"], "al", [0, 0, 0, 1.0])
-    assert forms.hopf(d, 1.0)["l1"] == pytest.approx(-0.3, rel=1e-13)
+    assert pair.normal_form(d, 1.0)["l1"] == pytest.approx(-0.3, rel=1e-13)
 
 
 def test_normal_forms_on_a_slow_manifold():
     """Y = x^2 + k x^3: the reduced cubic is -1 + what y feeds back."""
     d = derivatives(["mu*x + x*y - x**3", "-2*y + x**2"], "mu", [0, 0, 0])
-    form = forms.branch_point(d, np.array([0.0, 0.0, 1.0]), pitchfork=True)
+    form = branch_point.normal_form(d, np.array([0.0, 0.0, 1.0]), pitchfork=True)
     # y = x^2/2 + ..., so x' = mu x + (1/2 - 1) x^3.
     assert form["c"] == pytest.approx(-0.5, rel=1e-13)
     assert form["d"] == pytest.approx(1.0, rel=1e-13)
     d = derivatives(["mu + 3*x**2 - x*y", "-y + 5*x"], "mu", [0, 0, 0])
-    form = forms.fold(d)
+    form = fold.normal_form(d)
     # On y = 5 x + ...: mu - 2 x^2 in x, and xi = |(1, 5)| x for the unit eigenvector.
     size = math.sqrt(26.0)
     assert abs(form["a"]) == pytest.approx(2.0 / size, rel=1e-13)

@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 
 import phasekit
+import phasekit as pk
+from phasekit.bifurcation.continuation import locate
+from phasekit.bifurcation.continuation.periodic import events
+from phasekit.bifurcation.continuation.points.curve_tests import TESTS
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.plot.parts.style import POINTS_OF
@@ -44,3 +48,28 @@ def test_every_kind_but_ends_has_its_own_look():
     looks = [(look["marker"], look["markerfacecolor"]) for look in POINTS_OF.values()]
     assert set(POINTS_OF) == set(KINDS) - {"end"}
     assert len(set(looks)) == len(looks) >= 11
+
+
+def test_all_tests_are_of_kinds_that_are_registered():
+    kinds = [test.kind for test in (*TESTS, *events.TESTS)]
+    assert len(kinds) >= 11
+    assert set(kinds) <= set(KINDS)
+    assert {test.change for test in locate.TESTS} == {"branch", "fold", "flip", "pair", "touch"}
+
+
+@pytest.mark.parametrize(
+    ("kind", "f", "start", "span", "is_map"),
+    [
+        ("fold", {"x": "p - x**2"}, (1.0, [1.0]), (-1.0, 2.0), False),
+        ("transcritical", {"x": "p*x - x**2"}, (-1.0, [0.0]), (-1.0, 1.0), False),
+        ("pitchfork", {"x": "p*x - x**3"}, (-1.0, [0.0]), (-1.0, 1.0), False),
+        ("hopf", {"x": "p*x - y - x**3", "y": "x + p*y"}, (-0.5, [0.0, 0.0]), (-0.5, 0.5), False),
+        ("period_doubling", {"x": "p*x*(1 - x)"}, (2.0, [0.5]), (2.0, 3.3), True),
+        ("torus", {"x": "p*x*(1 - y)", "y": "x"}, (1.5, [1 / 3, 1 / 3]), (1.5, 2.2), True),
+    ],
+)
+def test_a_normal_form_has_the_coefficients_that_the_registry_names(kind, f, start, span, is_map):
+    problem = pk.Problem(f, state=tuple(f), parameters={"p": start[0]}, map=is_map)
+    (point,) = pk.continuation(problem, "p", x0=start[1], span=span).special(kind)
+    assert set(point.normal_form) == set(KINDS[kind].normal_form)
+    assert np.isfinite(list(point.normal_form.values())).all()

@@ -8,8 +8,8 @@ import sympy
 import xarray as xr
 
 import phasekit as pk
-from phasekit.cells.dispatch import pass_from, passes_of
-from phasekit.cells.states import at_states
+from phasekit.cells.request import passes_of
+from phasekit.cells.states import at_states, pass_from
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.cells.dispatch import is_offered, passes_of
+from phasekit.cells.request import is_offered, passes_of
 from phasekit.labels.coordinates import STATES
 from phasekit.loads import functions
 from phasekit.table.quantities import ROWS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import ClassVar
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import phasekit as pk
 from phasekit.labels.arguments import NumberLike
+from phasekit.laws.factors import named
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import MODELS, Model, model
 
@@ -82,3 +84,34 @@ def test_every_picture_takes_it(Governor):
     pk.plot.bifurcation_diagram(pk.branches(hoop, "w", (0.0, 20.0)))
     ds = pk.sweep(hoop, w=np.linspace(1, 12, 5), wind=np.linspace(-1, 1, 4))
     pk.plot.parameter_map(ds, "topology")
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        (lambda v: (1, 9.81 * v["l"] ** -1, 0, 1), "power -1: a polynomial has whole powers"),
+        (lambda v: (1, v["l"] ** 0.5, 0, 1), "power 0.5: a polynomial has whole powers"),
+        (lambda v: (1, 9.81 / v["l"], 0, 1), "multiply all four by what is divided by"),
+        (lambda v: (1, v["l"] / v["l"], 0, 1), "multiply all four by what is divided by"),
+        (lambda v: (1, np.sin(v["l"]), 0, 1), "TypeError: .*sin.*; wants A N, B N, C N and N as"),
+        (lambda v: (1, v["length"], 0, 1), "KeyError: 'length'; wants A N"),
+        (lambda v: (1, v["l"], 0), "not enough values to unpack .*; wants A N, B N, C N and N as"),
+        (lambda v: (1.0, 2.0, 0.5, 1), "got numbers alone, wants A N"),
+        (
+            lambda v: (v["l"], v["tilt"][1], v["tilt"][0], 1),
+            r"the degrees \[0, 1\] in the sine, cosine and radius of tilt, wants all of one",
+        ),
+    ],
+)
+def test_what_is_no_law_is_refused_where_the_class_is_made(law, message):
+    declared = (
+        Parameter(name="l", units="m", long_name="length", positive=True),
+        Parameter(name="tilt", units="rad", long_name="angle of the plane"),
+    )
+    with pytest.raises(pk.ParameterError, match=f"products of Odd: .*{message}"):
+        type("Odd", (Model,), {"declared": declared, "products": staticmethod(law)})
+
+
+def test_a_law_may_be_divided_by_numbers():
+    halves = named("l") * named("l") / 2 + named("g") / 0.5
+    assert halves({"l": Fraction(3), "g": Fraction(1)}) == Fraction(13, 2)

@@ -7,7 +7,6 @@ import pytest
 import sympy as sp
 
 import phasekit as pk
-from phasekit.systems.perturbed_parts import RATES
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)
 FULL = pk.Perturbed(
@@ -116,7 +115,7 @@ def test_the_euler_force_of_a_particle():
     at = {"radius": 0.5, "omega": 2.0, "tilt": 0.4, "offset": 0.2, "normal_offset": 0.1, "g": 9.0}
     numbers = dict(zip((R, tilt, d, n, g), (0.5, 0.4, 0.2, 0.1, 9.0), strict=True))
     A, B, C = pk.ParticleOnCircle(**at).coefficients()
-    E0, Es, Ec = RATES["ParticleOnCircle"].euler(at)
+    E0, Es, Ec = pk.ParticleOnCircle.frame_rate.euler(at)
     for angle in (0.3, 2.0, -1.2):
         state = {phi.diff(t, 2): 0, turned.diff(t, 2): 0.7, turned.diff(t): 2.0, phi.diff(t): 0}
         value = equation.doit().subs(state).subs({phi: angle, turned: 0.0, **numbers})

@@ -9,16 +9,16 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
-from phasekit.bifurcation.continuation.points.branch_point import (
-    VERTICAL,
+from phasekit.bifurcation.continuation.points import (
     branch_point,
-    described,
-    meets,
-    singular_point,
+    fold,
+    pair,
+    period_doubling,
+    torus,
 )
-from phasekit.bifurcation.continuation.points.fold import fold
-from phasekit.bifurcation.continuation.points.pair import pair, pairs
-from phasekit.bifurcation.continuation.points.period_doubling import period_doubling
+from phasekit.bifurcation.continuation.points.branch_point import described, meets, singular_point
+from phasekit.bifurcation.continuation.points.pair import pairs
+from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -26,13 +26,19 @@ from phasekit.bifurcation.continuation.points.special import (
     interval_of,
     reach_of,
 )
-from phasekit.bifurcation.continuation.points.torus import torus
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, orientation
+from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
 
 FLAT = 1e-12  # a tangent's part along the parameter that is no more than rounding
 SAME = 1e-6
+
+#: What test functions along a path tell of, each beside what those before it have found.
+TESTS: tuple[PathTest, ...] = (
+    branch_point.CROSSING, fold.TURN, period_doubling.FLIP, torus.PAIR, pair.PAIR,
+    branch_point.TOUCH,
+)  # fmt: skip
 
 
 def locate(curve: Curve, bracket: Bracket) -> list[Special]:
@@ -47,17 +53,8 @@ def locate(curve: Curve, bracket: Bracket) -> list[Special]:
 
 def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     found: list[Special] = []
-    if "branch" in bracket.changes:
-        found.append(branch_point(curve, bracket))
-    if "fold" in bracket.changes and not any(_is_turn(curve, point) for point in found):
-        found.append(fold(curve, bracket))
-    if "flip" in bracket.changes:
-        found.append(period_doubling(curve, bracket))
-    if "pair" in bracket.changes:
-        point = torus(curve, bracket) if curve.discrete else pair(curve, bracket, found)
-        found += [] if point is None else [point]
-    if "touch" in bracket.changes:
-        found += _touch(curve, bracket)
+    for test in TESTS:
+        found += test.found_in(curve, bracket, found)
     found = _merged(curve, found)
     left = abs(bracket.jump) - sum(_explained(one) for one in found)
     if left > 0 and curve.discrete:
@@ -69,25 +66,9 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     return found
 
 
-def _touch(curve: Curve, bracket: Bracket) -> list[Special]:
-    """A branch point at which two eigenvalues pass zero, one in each direction; or nothing."""
-    best = min((bracket.a, bracket.b), key=lambda s: orientation(curve, s.tangent, s.slopes)[1])
-    width = curve.length(bracket.b.u - bracket.a.u)
-    point = singular_point(curve, best.u, width, 2.0 * width, least=2)
-    if point is None or not meets(curve, point):
-        return []
-    return [described(curve, bracket, best, point)]
-
-
-def _is_turn(curve: Curve, point: Special) -> bool:
-    """Whether the parameter turns back at a branch point: the path is a pitchfork's side branch."""
-    t = point.tangent
-    return t is not None and bool(abs(t[curve.n]) / curve.scale[curve.n] < VERTICAL)
-
-
 def _explained(point: Special) -> int:
     """How many eigenvalues may cross at a point."""
-    return {"hopf": 2, "torus": 2, "period_doubling": 1}.get(point.kind, point.corank)
+    return KINDS[point.kind].crossing or point.corank
 
 
 def _merged(curve: Curve, found: list[Special]) -> list[Special]:

@@ -1,1 +1,17 @@
 """Continuation with labels: branches, special points, diagrams, and the files they are kept in."""
+
+from phasekit.labelled.continuation.onward import lead
+
+lead(
+    {
+        "branch.save": "phasekit.labelled.continuation.branch_store:save",
+        "branch.load": "phasekit.labelled.continuation.branch_store:load",
+        "cycles.save": "phasekit.labelled.continuation.cycle_store:save",
+        "point.switch": "phasekit.labelled.continuation.point_curves:switch",
+        "point.double": "phasekit.labelled.continuation.point_curves:doubled",
+        "point.orbits": "phasekit.labelled.continuation.cycle_start:from_hopf",
+        "point.curve": "phasekit.labelled.continuation.point_curves:point_curve",
+        "orbit.switch": "phasekit.labelled.continuation.cycle_start:switched",
+        "orbit.curve": "phasekit.labelled.continuation.cycle_start:point_curve",
+    }
+)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from os import PathLike
@@ -25,6 +24,7 @@ from phasekit.bifurcation.continuation.start import go_on
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch_points import points_of
+from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import SpecialPoint, special_point
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, whole
@@ -106,7 +106,7 @@ class Branch:
     start: Sample
     tracks: tuple[Track | None, Track | None]
     _points: xr.Dataset
-    special_points: tuple[SpecialPoint, ...]
+    special_points: tuple[SpecialPoint[Branch], ...]
     stops: tuple[Stop, Stop]
     kind: str
     record: Record
@@ -163,7 +163,7 @@ class Branch:
         )
         return ds
 
-    def special(self, label: str) -> tuple[SpecialPoint, ...]:
+    def special(self, label: str) -> tuple[SpecialPoint[Branch], ...]:
         """The special points of one label (LP, BP, ...), kind (fold, ...) or named event.
 
         Parameters
@@ -262,9 +262,7 @@ class Branch:
         StoreError
             If there is something under that name.
         """
-        importlib.import_module("phasekit.labelled.continuation.branch_store").save(
-            self, path, overwrite
-        )
+        onward("branch.save")(self, path, overwrite)
 
     @staticmethod
     def load(
@@ -294,8 +292,7 @@ class Branch:
         StoreError
             If nothing that `save` wrote is there, or it is damaged.
         """
-        module = importlib.import_module("phasekit.labelled.continuation.branch_store")
-        loaded: Branch = module.load(path, problem, record, events)
+        loaded: Branch = onward("branch.load")(path, problem, record, events)
         return loaded
 
     def __reduce__(self) -> tuple[Any, ...]:

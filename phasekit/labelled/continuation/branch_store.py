@@ -14,6 +14,7 @@ import xarray as xr
 from phasekit.errors import StoreError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.branch_stored import ARRAYS, Stored, damaged
+from phasekit.labelled.continuation.cycle_store import made_again
 from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
 from phasekit.maps.netcdf import open_netcdf
@@ -92,8 +93,6 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
             given = stored.problem()
         functions = stored.functions(record or {})
         if stored.spec["kind"] in ("cycle", "fold_of_cycles", "period_doubling", "torus"):
-            from phasekit.labelled.continuation.cycle_store import made_again
-
             return made_again(stored, given, functions)
         curve = stored.curve(given).replace(**stored.asked(given, events))
         start, tracks = stored.traces(curve)

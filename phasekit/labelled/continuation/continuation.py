@@ -15,8 +15,9 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.user_events import events_of, stop_of
-from phasekit.labels.arguments import bad, numeric, pair, unknown
+from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
 
@@ -189,31 +190,6 @@ def equilibrium_curve(
         conservative=problem.conservative,
         discrete=problem.map,
     )
-
-
-def check_options(options: Any) -> ContinuationOptions:
-    """Options, by default all defaults."""
-    if options is None:
-        return ContinuationOptions()
-    if not isinstance(options, ContinuationOptions):
-        raise bad("options", options, "pk.ContinuationOptions(...)")
-    return options
-
-
-def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter") -> str:
-    """A parameter of the problem by its name."""
-    if not isinstance(parameter, str) or parameter not in problem.parameters:
-        raise unknown(f"{argument} of the problem", parameter, problem.parameters)
-    return parameter
-
-
-def check_span(span: Any, units: str | None = None) -> tuple[float, float]:
-    """Two numbers, the lower one first."""
-    wants = "two numbers (low, high), finite, with low < high"
-    low, high = pair("span", span, wants, units)
-    if not low < high:
-        raise bad("span", span, wants)
-    return low, high
 
 
 def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from os import PathLike
@@ -19,8 +18,9 @@ from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, go_
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch
-from phasekit.labelled.continuation.cycle_points import orbit_dataset, points_of
+from phasekit.labelled.continuation.cycle_points import clock_code, orbit_dataset, points_of
 from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
+from phasekit.labelled.continuation.onward import onward
 from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
@@ -130,9 +130,7 @@ class CycleBranch(Branch):
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""
-        importlib.import_module("phasekit.labelled.continuation.cycle_store").save(
-            self, path, overwrite
-        )
+        onward("cycles.save")(self, path, overwrite)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made again of what was traced, as when a branch is loaded."""
@@ -198,7 +196,7 @@ def make_cycles(
         points_of(problem, cycles, points, labels, record), (), path.stops, kind,
         MappingProxyType(dict(record)), path=tuple(points), origin=origin,
     )  # fmt: skip
-    made: tuple[CyclePoint, ...] = tuple(
+    made: tuple[CyclePoint[CycleBranch], ...] = tuple(
         cycle_point(problem, cycles, one, place, branch)
         for one, place in zip(found, places, strict=True)
     )
@@ -223,7 +221,5 @@ def _again(
     form: type[Cycles], problem: Problem, kept: Mapping[str, Any], start: Point, tracks: Tracks,
     record: Any, origin: Stop, kind: str,
 ) -> CycleBranch:  # fmt: skip
-    from phasekit.labelled.continuation.cycle_start import clock_code
-
     cycles = form(field=problem.field, clock=clock_code(problem, kept["active"]), **kept)
     return make_cycles(problem, cycles, start, tracks, record, origin, kind)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
@@ -24,6 +25,14 @@ _CHECKS = {
     "residual": "largest size of x' - f beside that of f",
 }
 ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
+
+
+def clock_code(problem: Problem, active: tuple[int, ...]) -> int:
+    """Machine code of the period of the forcing, with its derivatives; 0 without forcing."""
+    if problem.time is None:
+        return 0
+    field = SymbolicField((problem.period,), (), (*problem.parameters, problem.time))
+    return field.first(active)
 
 
 def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = False) -> int:

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.family import Found
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
+from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
 
-if TYPE_CHECKING:
-    from phasekit.labelled.continuation.cycle_branch import CycleBranch
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CyclePoint(SpecialPoint):
+class CyclePoint(SpecialPoint[Of]):
     """A periodic orbit at which something happens: LPC, PD, TR, BPC or an end.
 
     ``x`` is a state on the orbit, ``eigenvalues`` are its multipliers. ``normal_form`` holds the
@@ -30,12 +28,11 @@ class CyclePoint(SpecialPoint):
     """
 
     special: Found  # type: ignore[assignment]
-    branch: CycleBranch
 
     @property
     def corank(self) -> int:
         """Number of critical multipliers besides the one that is always 1; 0 at ends."""
-        return {"end": 0, "torus": 2}.get(self.kind, 1)
+        return KINDS[self.kind].crossing or 0
 
     @property
     def period(self) -> float:
@@ -52,22 +49,22 @@ class CyclePoint(SpecialPoint):
         """A state, a parameter or the period by name."""
         return self.period if name == "period" else super().__getitem__(name)
 
-    def switch(self, *, direction: int = 0, options: Any = None) -> CycleBranch:
+    def switch(self, *, direction: int = 0, options: Any = None) -> Of:
         """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
-        module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
         with said(f"following periodic orbits along {self.branch.parameter}"):
-            return module.switched(self, direction, options)  # type: ignore[no-any-return]
+            found: Of = onward("orbit.switch")(self, direction, options)
+            return found
 
-    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Any:
+    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
         """The curve of such orbits in this branch's parameter and a second one."""
-        module = importlib.import_module("phasekit.labelled.continuation.cycle_start")
         with said(f"following {self.kind} points along {parameter}"):
-            return module.point_curve(self, parameter, span, options)
+            found: Of = onward("orbit.curve")(self, parameter, span, options)
+            return found
 
 
 def cycle_point(
-    problem: Problem, cycles: Cycles, found: Found, index: int, branch: CycleBranch
-) -> CyclePoint:
+    problem: Problem, cycles: Cycles, found: Found, index: int, branch: Of
+) -> CyclePoint[Of]:
     """A special point of a branch of periodic orbits."""
     point = found.point
     x = point.orbit.x[0].copy()

@@ -11,7 +11,6 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
@@ -19,9 +18,10 @@ from phasekit.bifurcation.continuation.periodic.extended import extended
 from phasekit.bifurcation.continuation.periodic.family import run
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.errors import ConvergenceError
-from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
-from phasekit.labelled.continuation.cycle_points import orbit_dataset
+from phasekit.labelled.continuation.cycle_points import clock_code, orbit_dataset
 from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
@@ -34,14 +34,6 @@ UNFOLDING = "unfolding"
 CURVES = ("fold_of_cycles", "period_doubling", "torus")
 
 FloatArray = npt.NDArray[np.float64]
-
-
-def clock_code(problem: Problem, active: tuple[int, ...]) -> int:
-    """Machine code of the period of the forcing, with its derivatives; 0 without forcing."""
-    if problem.time is None:
-        return 0
-    field = SymbolicField((problem.period,), (), (*problem.parameters, problem.time))
-    return field.first(active)
 
 
 def cycles_of(
@@ -78,7 +70,7 @@ def scale_of(x: FloatArray) -> FloatArray:
     return np.asarray(np.where(size > 1e-6 * top, size, top if top > 0.0 else 1.0))
 
 
-def from_hopf(point: SpecialPoint, options: ContinuationOptions | None) -> CycleBranch:
+def from_hopf(point: SpecialPoint[Branch], options: ContinuationOptions | None) -> CycleBranch:
     """The periodic orbits that a Hopf point gives rise to."""
     if point.kind != "hopf":
         raise bad("point", point.kind, "a Hopf point")
@@ -279,7 +271,7 @@ def orbit_of(cycles: Cycles, problem: Problem, found: Solution, where: str) -> x
     return orbit_dataset(problem, cycles, _start(cycles, found, where))
 
 
-def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
+def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
     """The other branch at a period doubling or a branch point of cycles."""
     if point.kind not in ("period_doubling", "cycle_branch_point"):
         raise bad("point", point.kind, "a period doubling or a branch point of cycles")
@@ -313,7 +305,9 @@ def switched(point: CyclePoint, direction: int, options: Any) -> CycleBranch:
     return make_cycles(problem, cycles, start, tracks, point.branch.record)
 
 
-def point_curve(point: CyclePoint, parameter: str, span: Any, options: Any) -> CycleBranch:
+def point_curve(
+    point: CyclePoint[CycleBranch], parameter: str, span: Any, options: Any
+) -> CycleBranch:
     """The curve of folds, period doublings or tori of cycles through one, in two parameters."""
     if point.kind not in CURVES:
         raise bad("point", point.kind, f"one of {', '.join(CURVES)}")

@@ -24,7 +24,7 @@ from phasekit.bifurcation.continuation.periodic.point import Point, State
 from phasekit.bifurcation.continuation.periodic.trace import Track
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
-from phasekit.labelled.continuation.cycle_start import clock_code
+from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.labels.arguments import flag
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions

@@ -14,7 +14,8 @@ from phasekit.bifurcation.continuation.path import Path, join
 from phasekit.bifurcation.continuation.same_path import lies_on, turned
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch
-from phasekit.labelled.continuation.continuation import check_parameter, check_span, continuation
+from phasekit.labelled.continuation.checks import check_parameter, check_span
+from phasekit.labelled.continuation.continuation import continuation
 from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, reals, whole
@@ -110,7 +111,7 @@ def diagram(
 def _grow(branches: list[Branch], first: int, depth: int) -> None:
     """Switch at every branch point of the branches from `first` on, to a depth."""
     queue = [(branches[first], 0)]
-    done: list[SpecialPoint] = []
+    done: list[SpecialPoint[Branch]] = []
     while queue:
         branch, level = queue.pop(0)
         if level >= depth:
@@ -133,13 +134,13 @@ def path_of(branch: Branch) -> tuple[Curve, Path]:
     return curve, join(curve, branch.start, *branch.tracks)
 
 
-def _same(a: SpecialPoint, b: SpecialPoint) -> bool:
+def _same(a: SpecialPoint[Branch], b: SpecialPoint[Branch]) -> bool:
     curve, _ = a.branch.known()
     gap = turned(curve, a.special.u[: curve.m] - b.special.u[: curve.m])
     return bool(np.max(np.abs(gap / curve.scale[: curve.m])) < 1e-6)
 
 
-def _led(branches: list[Branch], point: SpecialPoint, t: FloatArray) -> bool:
+def _led(branches: list[Branch], point: SpecialPoint[Branch], t: FloatArray) -> bool:
     """Whether both ways along another branch are known already."""
     curve, _ = point.branch.known()
     for sign in (1.0, -1.0):

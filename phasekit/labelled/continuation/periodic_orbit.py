@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, starts
 from phasekit.errors import ConvergenceError, ParameterError
-from phasekit.labelled.continuation.continuation import check_options
+from phasekit.labelled.continuation.checks import check_options
 from phasekit.labelled.continuation.cycle_start import (
     UNFOLDING,
     cycles_of,

@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, make_branch
-from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
 
@@ -23,7 +23,7 @@ _CURVES = {"fold": FOLD, "hopf": HOPF, "branch_point": BRANCH}
 
 
 def point_curve(
-    point: SpecialPoint,
+    point: SpecialPoint[Branch],
     parameter: str,
     span: Sequence[float],
     *,
@@ -102,7 +102,7 @@ def point_curve(
     return make_branch(problem, made, start, backward, forward, {})
 
 
-def doubled(point: SpecialPoint, *, options: ContinuationOptions | None = None) -> Branch:
+def doubled(point: SpecialPoint[Branch], *, options: ContinuationOptions | None = None) -> Branch:
     """The orbit of period 2 that begins at a period doubling of a map.
 
     Raises
@@ -124,7 +124,7 @@ def doubled(point: SpecialPoint, *, options: ContinuationOptions | None = None) 
 
 
 def switch(
-    point: SpecialPoint, *, direction: int = 0, options: ContinuationOptions | None = None
+    point: SpecialPoint[Branch], *, direction: int = 0, options: ContinuationOptions | None = None
 ) -> Branch:
     """Another branch through a branch point, followed to both sides.
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any, Generic
 
 import numpy as np
 import numpy.typing as npt
@@ -15,17 +14,15 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch_points import eigenvalues_at, wrap
+from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
-
-if TYPE_CHECKING:
-    from phasekit.labelled.continuation.branch import Branch
 
 FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SpecialPoint:
+class SpecialPoint(Generic[Of]):
     """A point of a branch where something happens.
 
     Of a map the kinds are fold, branch_point, period_doubling (PD) and torus (TR).
@@ -110,7 +107,7 @@ class SpecialPoint:
     eigenvalues: npt.NDArray[np.complex128]
     index: int
     special: Special
-    branch: Branch
+    branch: Of
 
     @property
     def corank(self) -> int:
@@ -139,7 +136,7 @@ class SpecialPoint:
             return float(self.x[self.branch.problem_state.index(name)])
         return self.parameters[name]
 
-    def switch(self, *, direction: int = 0, options: Any = None) -> Branch:
+    def switch(self, *, direction: int = 0, options: Any = None) -> Of:
         """Another branch through a branch point, or the orbits that begin at a point.
 
         Of a Hopf point the periodic orbits; of a period doubling of a map the orbit of period 2,
@@ -189,17 +186,15 @@ class SpecialPoint:
         >>> sides = [point.switch(direction=i) for i in range(3)]
         """
         if self.kind == "hopf":
-            from phasekit.labelled.continuation.cycle_start import from_hopf
-
             with said(f"following periodic orbits along {self.branch.parameter}"):
-                return from_hopf(self, options)
-        if self.kind == "period_doubling":
-            return _module("doubled")(self, options=options)  # type: ignore[no-any-return]
-        return _module("switch")(  # type: ignore[no-any-return]
-            self, direction=direction, options=options
-        )
+                found: Of = onward("point.orbits")(self, options)
+        elif self.kind == "period_doubling":
+            found = onward("point.double")(self, options=options)
+        else:
+            found = onward("point.switch")(self, direction=direction, options=options)
+        return found
 
-    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Branch:
+    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
         """The curve of such points in this branch's parameter and a second one.
 
         Parameters
@@ -232,9 +227,8 @@ class SpecialPoint:
         ['end', 'cusp', 'end']
         """
         with said(f"following {self.kind} points along {parameter}"):
-            return _module("point_curve")(  # type: ignore[no-any-return]
-                self, parameter, span, options=options
-            )
+            found: Of = onward("point.curve")(self, parameter, span, options=options)
+            return found
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold their branch, of which they are the same point."""
@@ -256,20 +250,14 @@ class SpecialPoint:
         return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
 
 
-def _point_of(branch: Branch, place: int) -> SpecialPoint:
-    return branch.special_points[place]
-
-
-def _module(name: str) -> Callable[..., Any]:
-    function: Callable[..., Any] = getattr(
-        importlib.import_module("phasekit.labelled.continuation.point_curves"), name
-    )
-    return function
+def _point_of(branch: Of, place: int) -> SpecialPoint[Of]:
+    point: SpecialPoint[Of] = branch.special_points[place]
+    return point
 
 
 def special_point(
-    problem: Problem, curve: Curve, special: Special, index: int, branch: Branch
-) -> SpecialPoint:
+    problem: Problem, curve: Curve, special: Special, index: int, branch: Of
+) -> SpecialPoint[Of]:
     """A special point of a branch, angles wrapped."""
     n = curve.n
     parameters = dict(problem.parameters)

@@ -8,8 +8,11 @@ bordered equations and det(M - 1) ([Kuznetsov2004] 10.3).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import cmath
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -20,32 +23,29 @@ from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
+from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
+Value = Callable[[Point, bool], float]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
 NODES = 9  # points of the family through which a branch point is interpolated
-FOLD, DOUBLING, TORUS, BRANCHING = (
-    "fold_of_cycles",
-    "period_doubling",
-    "torus",
-    "cycle_branch_point",
-)
 
 
-def nontrivial(values: Complex, forced: bool) -> Complex:
+def nontrivial(values: Complex, forced: bool) -> list[complex]:
     """Multipliers but for the one that is 1 for every orbit of an autonomous system."""
-    if forced:
-        return values
-    return np.asarray(np.delete(values, int(np.argmin(np.abs(values - 1.0)))))
+    mu: list[complex] = values.tolist()
+    if not forced:
+        mu.remove(min(mu, key=lambda one: abs(one - 1.0)))
+    return mu
 
 
 def unstable(values: Complex, forced: bool) -> int:
     """Number of multipliers outside the unit circle."""
-    return int(np.sum(np.abs(nontrivial(values, forced)) > 1.0))
+    return sum(abs(mu) > 1.0 for mu in nontrivial(values, forced))
 
 
 def _none_passes(a: Point, b: Point, forced: bool) -> bool:
@@ -56,9 +56,9 @@ def _none_passes(a: Point, b: Point, forced: bool) -> bool:
     beyond = 0
     for point in (a, b):
         mu = nontrivial(point.multipliers, forced)
-        if np.min(np.abs(mu - 1.0), initial=np.inf) < CRITICAL:
+        if any(abs(one - 1.0) < CRITICAL for one in mu):
             return False
-        beyond += int(np.sum((mu.imag == 0.0) & (mu.real > 1.0)))
+        beyond += sum(one.imag == 0.0 and one.real > 1.0 for one in mu)
     return beyond % 2 == 0
 
 
@@ -67,35 +67,29 @@ def fold_test(point: Point, forced: bool) -> float:
     return float(point.dy[1])
 
 
+def _parts(values: Iterable[complex], at: float) -> complex:
+    """Product of at - z, each beside its size."""
+    return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
+
+
 def doubling_test(point: Point, forced: bool) -> float:
     """det(M + 1), each factor beside its size."""
-    mu = point.multipliers
-    return float(np.prod((1.0 + mu) / (1.0 + np.abs(mu))).real)
+    return _parts((-mu for mu in point.multipliers.tolist()), 1.0).real
 
 
 def torus_test(point: Point, forced: bool) -> float:
     """Product of 1 - mu_i mu_j over pairs, each beside its size."""
     mu = nontrivial(point.multipliers, forced)
-    i, j = np.triu_indices(len(mu), 1)
-    both = mu[i] * mu[j]
-    return float(np.prod((1.0 - both) / (1.0 + np.abs(both))).real)
+    return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
 
 
-def branching_test(point: Point, forced: bool) -> float:
+def determinant(point: Point, forced: bool) -> float:
     """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
-    parts = (1.0 - point.multipliers) / (1.0 + np.abs(point.multipliers))
+    mu = point.multipliers.tolist()
     if forced:
-        return float(np.prod(parts).real)
-    n = len(parts)
-    return float(sum(np.prod(np.delete(parts, i)) for i in range(n)).real) if n > 1 else 0.0
-
-
-TESTS: dict[str, Callable[[Point, bool], float]] = {
-    FOLD: fold_test,
-    DOUBLING: doubling_test,
-    TORUS: torus_test,
-    BRANCHING: lambda point, forced: point.sign,
-}
+        return _parts(mu, 1.0).real
+    n = len(mu)
+    return sum(_parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,34 +148,42 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
     found: list[Found] = []
     if len(cycles.active) != 1:
         return found
+    signs = [_signs(cycles, point) for point in path.points]
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
-        singular = a.sign == 0.0 or b.sign == 0.0  # a branch point that the path begins at
-        if singular or not (a.trusted and b.trusted):
+        if signs[i] is None or signs[i + 1] is None or signs[i] == signs[i + 1]:
             continue
         for one in _between(cycles, a, b, DEPTH):
             found.append(replace(one, index=i))
     return found
 
 
+def _signs(cycles: Cycles, point: Point) -> tuple[Any, ...] | None:
+    """The signs of all test functions and the number of unstable multipliers; None: not known."""
+    if point.sign == 0.0 or not point.trusted:  # a branch point that the path begins at
+        return None
+    tests = [test.value(point, cycles.forced) >= 0.0 for test in TESTS]
+    return (*tests, unstable(point.multipliers, cycles.forced))
+
+
 def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     """The special points between two points of a family."""
     forced = cycles.forced
     changed = [
-        kind for kind, test in TESTS.items() if (test(a, forced) >= 0.0) != (test(b, forced) >= 0.0)
+        test for test in TESTS if (test.value(a, forced) >= 0.0) != (test.value(b, forced) >= 0.0)
     ]
     if vertical(cycles, a) and vertical(cycles, b):
         # Conservative: a second multiplier is always 1, and the parameter never moves.
-        changed = [kind for kind in changed if kind == DOUBLING]
-        return [one for one in (refined(Stretch(cycles, a, b), kind) for kind in changed) if one]
+        changed = [test for test in changed if test is DOUBLING]
+        return [one for one in (refined(Stretch(cycles, a, b), test) for test in changed) if one]
     if FOLD in changed and BRANCHING not in changed and _none_passes(a, b, forced):
         changed.remove(FOLD)  # the parameter stands still to rounding, and no multiplier passes 1
     gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
     if not changed and gap == 0:
         return []
     stretch = Stretch(cycles, a, b)
-    found = [refined(stretch, kind) for kind in changed]
+    found = [refined(stretch, test) for test in changed]
     kept = [one for one in found if one is not None]
-    moves = [2 if one.kind == TORUS else 1 for one in kept]
+    moves = [KINDS[one.kind].crossing or 0 for one in kept]
     explained = abs(gap) <= sum(moves) and (gap - sum(moves)) % 2 == 0
     if explained or depth == 0:
         return sorted(kept, key=lambda one: one.point.arclength)
@@ -191,51 +193,23 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     return [*_between(cycles, a, middle, depth - 1), *_between(cycles, middle, b, depth - 1)]
 
 
-def refined(stretch: Stretch, kind: str) -> Found | None:
+def refined(stretch: Stretch, test: CycleTest) -> Found | None:
     """A special point where its test function vanishes; None if it is none after all."""
-    forced = stretch.cycles.forced
-    point = _branching(stretch) if kind == BRANCHING else _root(stretch, TESTS[kind])
+    point = test.root(stretch, test.value)
     p = stretch.a.orbit.y[1], stretch.b.orbit.y[1]
     interval = (float(min(p)), float(max(p)))
     if point is None:
         return Found(
-            kind, stretch.b, -1, interval, "guess",
+            test.kind, stretch.b, -1, interval, "guess",
             "Newton's method did not converge between the points", {},
         )  # fmt: skip
-    if kind == TORUS:
-        mu = nontrivial(point.multipliers, forced)
-        i, j = np.triu_indices(len(mu), 1)
-        k = int(np.argmin(np.abs(1.0 - mu[i] * mu[j])))
-        if abs(mu[i[k]].imag) <= 1e-9 * abs(mu[i[k]]):
-            return None  # two real multipliers with the product 1
-    critical = {BRANCHING: 1.0, DOUBLING: -1.0}.get(kind)
-    if critical is not None:
-        mu = nontrivial(point.multipliers, forced)
-        if not np.min(np.abs(mu - critical)) <= ASTRAY:
-            return None
-    return Found(
-        kind, point, -1, interval, "converged", "", _normal_form(stretch.cycles, kind, point)
-    )
+    if not test.holds(nontrivial(point.multipliers, stretch.cycles.forced)):
+        return None
+    form = test.normal_form(stretch.cycles, point)
+    return Found(test.kind, point, -1, interval, "converged", "", form)
 
 
-def _normal_form(cycles: Cycles, kind: str, point: Point) -> dict[str, float]:
-    """Coefficients of the normal form."""
-    if kind == FOLD:
-        return at_fold(cycles, point.orbit, point.dx, point.dy)
-    if kind == DOUBLING:
-        W = cycles.looked_at(point.orbit, point.dx, point.dy).W
-        v = null_vector(cycles, point.orbit, W, -1.0)
-        return at_doubling(cycles, point.orbit, v)
-    if kind == TORUS:
-        mu = nontrivial(point.multipliers, cycles.forced)
-        mu = mu[mu.imag > 0.0]
-        if len(mu):
-            one = mu[np.argmin(np.abs(np.abs(mu) - 1.0))]
-            return at_torus(cycles, point.orbit, float(np.angle(one)))
-    return {}
-
-
-def _root(stretch: Stretch, test: Callable[[Point, bool], float]) -> Point | None:
+def _root(stretch: Stretch, test: Value) -> Point | None:
     """The point of a stretch where a test function vanishes, by secants within a bracket."""
     forced = stretch.cycles.forced
     low, high = 0.0, stretch.length
@@ -277,7 +251,7 @@ def _root(stretch: Stretch, test: Callable[[Point, bool], float]) -> Point | Non
     return best
 
 
-def _branching(stretch: Stretch) -> Point | None:
+def _branching(stretch: Stretch, test: Value) -> Point | None:
     """A branch point, where the equations are singular: from the points to both of its sides.
 
     The family is smooth through it, so its points at a distance say where it is to rounding.
@@ -289,7 +263,7 @@ def _branching(stretch: Stretch) -> Point | None:
     if len(made) < NODES - 2:
         return None
     at = np.array([s for s, _ in made]) / stretch.length
-    values = np.array([branching_test(p, cycles.forced) for _, p in made])
+    values = np.array([determinant(p, cycles.forced) for _, p in made])
     fit = np.polynomial.Polynomial.fit(at, values, len(at) - 1, domain=[0.0, 1.0])
     roots = fit.roots()
     inside = roots[(np.abs(roots.imag) < 1e-6) & (roots.real > -1e-9) & (roots.real < 1.0 + 1e-9)]
@@ -310,3 +284,69 @@ def _branching(stretch: Stretch) -> Point | None:
     )
     checked = cycles.looked_at(orbit, *mixed)
     return point_of(cycles, checked, stretch.a.arclength + s * stretch.length, s * stretch.length)
+
+
+# ------------------------------------------------------------------------------ the kinds
+
+
+@dataclass(frozen=True, eq=False)
+class CycleTest:
+    """A kind of special point of a family: how it is told, found and described.
+
+    Attributes
+    ----------
+    kind : str
+        A kind of the registry of special points.
+    value : callable
+        The test function of a point, forced or not, whose sign changes.
+    normal_form : callable
+        Coefficients at the point.
+    holds : callable
+        Whether it is such a point, by its multipliers but for the one that is always 1.
+    root : callable
+        The point of a stretch at which the test function vanishes.
+    """
+
+    kind: str
+    value: Value
+    normal_form: Callable[[Cycles, Point], dict[str, float]] = lambda cycles, point: {}
+    holds: Callable[[list[complex]], bool] = lambda multipliers: True
+    root: Callable[[Stretch, Value], Point | None] = _root
+
+
+def _form_of_fold(cycles: Cycles, point: Point) -> dict[str, float]:
+    return at_fold(cycles, point.orbit, point.dx, point.dy)
+
+
+def _form_of_doubling(cycles: Cycles, point: Point) -> dict[str, float]:
+    W = cycles.looked_at(point.orbit, point.dx, point.dy).W
+    return at_doubling(cycles, point.orbit, null_vector(cycles, point.orbit, W, -1.0))
+
+
+def _form_of_torus(cycles: Cycles, point: Point) -> dict[str, float]:
+    pairs = [mu for mu in nontrivial(point.multipliers, cycles.forced) if mu.imag > 0.0]
+    if not pairs:
+        return {}
+    one = min(pairs, key=lambda mu: abs(abs(mu) - 1.0))
+    return at_torus(cycles, point.orbit, cmath.phase(one))
+
+
+def _near(critical: float) -> Callable[[list[complex]], bool]:
+    """Whether a multiplier is next to a critical one."""
+    return lambda multipliers: min(abs(one - critical) for one in multipliers) <= ASTRAY
+
+
+def _conjugate(multipliers: list[complex]) -> bool:
+    """Whether the two multipliers whose product is 1 are no real ones."""
+    pairs = combinations(multipliers, 2)
+    one, _ = min(pairs, key=lambda pair: abs(1.0 - pair[0] * pair[1]))
+    return abs(one.imag) > 1e-9 * abs(one)
+
+
+FOLD = CycleTest("fold_of_cycles", fold_test, _form_of_fold)
+DOUBLING = CycleTest("period_doubling", doubling_test, _form_of_doubling, _near(-1.0))
+TORUS = CycleTest("torus", torus_test, _form_of_torus, _conjugate)
+BRANCHING = CycleTest(
+    "cycle_branch_point", lambda point, forced: point.sign, holds=_near(1.0), root=_branching
+)
+TESTS = (FOLD, DOUBLING, TORUS, BRANCHING)

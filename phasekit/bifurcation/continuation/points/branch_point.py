@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
 from phasekit.bifurcation.continuation.points.around import rays_around
 from phasekit.bifurcation.continuation.points.directions import Directions, directions
+from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.singular import Singular, candidates, refine
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
@@ -105,7 +106,7 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
             kind = "pitchfork" if any(steep) else "transcritical"
             moving = others[0] if steep[0] else own
             if not all(steep):
-                form = forms.branch_point(
+                form = normal_form(
                     forms.Derivatives(curve, u), moving, pitchfork=kind == "pitchfork"
                 )
     note = message or found.message or forms.unknown(form)
@@ -170,3 +171,42 @@ def directions_at(curve: Curve, u: Array) -> list[Array]:
         return [t / curve.length(t)]
     found = directions(curve, point)
     return found.tangents
+
+
+def normal_form(d: forms.Derivatives, tangent: Array, *, pitchfork: bool) -> dict[str, float]:
+    """Xi' = d (p - p0) xi + a xi^2, or + c xi^3 at a pitchfork; xi from the branch of `tangent`.
+
+    ``tangent`` is that of a branch on which the parameter moves.
+    """
+    n = d.curve.n
+    jacobian = d.slopes[:, :n]
+    rows = force_sizes(d.curve, d.u)
+    q, p = forms.null_vectors(jacobian, d.curve.scale[:n], rows)
+    along = tangent[: n + 1] / tangent[n]
+    length = float(np.max(np.abs(along) / d.curve.scale[: n + 1]))
+    bent = d.second(q, q)
+    form = {"d": forms.known(d.second(q, along).dot(p), forms.unit_of(d, rows, p, q, 1) * length)}
+    if not pitchfork:
+        form["a"] = forms.known(bent.dot(p) * 0.5, forms.unit_of(d, rows, p, q, 2))
+        return form
+    h = forms.solve_off(jacobian, bent.value, q, p)
+    loose = forms.solve_off(jacobian, bent.error, q, p)
+    fed = d.second(q, h)
+    fed = forms.Estimate(fed.value, fed.error + np.abs(d.second(q, loose).value))
+    total = d.third(q, q, q) - 3.0 * fed
+    form["c"] = forms.known(total.dot(p) * (1.0 / 6.0), forms.unit_of(d, rows, p, q, 3))
+    return form
+
+
+def touch(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
+    """A branch point at which two eigenvalues pass zero, one in each direction; or nothing."""
+    best = min((bracket.a, bracket.b), key=lambda s: orientation(curve, s.tangent, s.slopes)[1])
+    width = curve.length(bracket.b.u - bracket.a.u)
+    point = singular_point(curve, best.u, width, 2.0 * width, least=2)
+    if point is None or not meets(curve, point):
+        return []
+    return [described(curve, bracket, best, point)]
+
+
+CROSSING = PathTest("branch", lambda curve, bracket, known: [branch_point(curve, bracket)])
+TOUCH = PathTest("touch", touch)

@@ -11,10 +11,12 @@ from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import FOLD
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
 from phasekit.bifurcation.continuation.points.branch_point import (
+    VERTICAL,
     described,
     meets,
     singular_point,
 )
+from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -55,7 +57,7 @@ def fold(curve: Curve, bracket: Bracket) -> Special:
     if message:
         best, _, _ = bracket_root(curve, left, right, test, steps=60, width=1e-14)
         u = best.u
-    form = forms.fold(forms.Derivatives(curve, u))
+    form = normal_form(forms.Derivatives(curve, u))
     return Special(
         "fold", u, interval_of(curve, bracket), residual, GUESS if message else CONVERGED,
         message or forms.unknown(form), form, tangent=tangent_at(curve, u, best.tangent),
@@ -72,3 +74,26 @@ def _turns(curve: Curve, u: Array, v: Array) -> bool:
     rest = abs(w @ curve.at(u)[1][:, :n] @ v)
     rate = abs(w @ curve.bend(u, v)[:, :n] @ v)
     return bool(rest <= 1e-8 * rate + 1e2 * curve.field.accuracy)
+
+
+def normal_form(d: forms.Derivatives) -> dict[str, float]:
+    """Xi' = b (p - p0) + a xi^2 on the center manifold."""
+    n = d.curve.n
+    rows = force_sizes(d.curve, d.u)
+    q, p = forms.null_vectors(d.slopes[:, :n], d.curve.scale[:n], rows)
+    unit = forms.unit_of(d, rows, p, q, 2)
+    return {
+        "a": forms.known(d.second(q, q).dot(p) * 0.5, unit),
+        "b": float(p @ d.slopes[:, n]),
+    }
+
+
+def turn(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
+    """The fold of a bracket, unless the path is a pitchfork's side branch, which turns there."""
+    tangents = [point.tangent for point in known if point.tangent is not None]
+    if any(abs(t[curve.n]) / curve.scale[curve.n] < VERTICAL for t in tangents):
+        return []
+    return [fold(curve, bracket)]
+
+
+TURN = PathTest("fold", turn)

@@ -9,6 +9,7 @@ from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import HOPF
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
+from phasekit.bifurcation.continuation.points.pair import normal_form
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +21,7 @@ def lyapunov(curve: Curve, u: Array, slopes: Array) -> Array:
     found = np.full(len(u), np.nan)
     for i in np.flatnonzero(u[:, m + n] > 1e-8 * np.maximum(1e-300, size**2)):
         d = forms.Derivatives(curve, u[i])
-        found[i] = forms.hopf(d, float(np.sqrt(u[i, m + n])))["l1"]
+        found[i] = normal_form(d, float(np.sqrt(u[i, m + n])))["l1"]
     return found
 
 

@@ -11,6 +11,7 @@ from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.kernels.defining import HOPF
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
 from phasekit.bifurcation.continuation.points.branch_point import described, meets, singular_point
+from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -21,13 +22,14 @@ from phasekit.bifurcation.continuation.points.special import (
     tangent_at,
 )
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
+from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
 
 ON = 1e-6  # distance on scaled axes within which a point of larger corank is looked for
 
 
-def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None:
+def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
     """The point of a bracket in which the pair function changes its sign.
 
     A Hopf point where the two eigenvalues are conjugate, a neutral saddle where they are real; a
@@ -46,8 +48,8 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None
     point = singular_point(curve, u, near, max(10.0 * near, 1e-4), least=2)
     if point is not None and meets(curve, point):
         if any(curve.length(one.u - point.u) < ON and one.corank >= 2 for one in known):
-            return None
-        return described(curve, bracket, best, point)
+            return []
+        return [described(curve, bracket, best, point)]
     slopes = curve.at(u)[1]
     values = _values(curve, slopes)
     i, j = _nearest_pair(values)
@@ -55,10 +57,11 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None
     size = float(np.max(np.abs(values)))
     accuracy = curve.field.accuracy
     if _doubtful(curve, u, kappa, best.tangent):
-        return Special(
+        double = Special(
             "bogdanov_takens", u, interval_of(curve, bracket), residual, GUESS,
             "two eigenvalues vanish together", tangent=tangent_at(curve, u, best.tangent), corank=1,
         )  # fmt: skip
+        return [double]
     kind = "hopf" if values[i].imag != 0.0 else "neutral_saddle"
     if not message and (extra[-1] > 0.0) != (kind == "hopf"):
         message = "the defining system led to another pair of eigenvalues"
@@ -71,13 +74,14 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> Special | None
         omega = float(np.sqrt(extra[-1] if not message else kappa))
         form = {"l1": np.nan, "omega": omega, "d": np.nan}
         if not message:
-            form = forms.hopf(forms.Derivatives(curve, u), omega)
+            form = normal_form(forms.Derivatives(curve, u), omega)
             note = forms.unknown(form)
-    return Special(
+    found = Special(
         kind, u, interval_of(curve, bracket), residual, status, note, form,
         tangent=tangent_at(curve, u, best.tangent),
         extra=None if message else np.concatenate([extra, aux]),
     )  # fmt: skip
+    return [found]
 
 
 def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
@@ -154,3 +158,39 @@ def _nearest_pair(values: npt.NDArray[np.complex128]) -> tuple[int, int]:
     sums[~alike | np.eye(len(values), dtype=bool)] = np.inf
     i, j = np.unravel_index(np.argmin(sums), sums.shape)
     return int(min(i, j)), int(max(i, j))
+
+
+def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
+    """First Lyapunov coefficient and frequency.
+
+    With A q = i omega q, A^T p = -i omega p, <q, q> = 1, <p, q> = 1:
+    l1 = Re[<p, C(q, q, q*)> - 2 <p, B(q, A^-1 B(q, q*))> + <p, B(q*, (2 i omega - A)^-1 B(q, q))>]
+    / (2 omega) ([Kuznetsov2004] (5.62)).
+    """
+    n = d.curve.n
+    A = d.slopes[:, :n]
+    values, vectors = np.linalg.eig(A)
+    q = vectors[:, np.argmin(np.abs(values - 1j * omega))]
+    q = q / np.linalg.norm(q)
+    values, vectors = np.linalg.eig(A.T)
+    p = vectors[:, np.argmin(np.abs(values + 1j * omega))]
+    p = p / np.conj(np.vdot(p, q))
+    bar = np.conj(q)
+    still, double = d.second(q, bar), d.second(q, q)
+    matrix = 2j * omega * np.eye(n) - A
+    second = forms.fed(d, q, np.linalg.solve(A, still.value.real), np.linalg.inv(A), still.error)
+    third = forms.fed(
+        d, bar, np.linalg.solve(matrix, double.value), np.linalg.inv(matrix), double.error
+    )
+    total = (d.third(q, q, bar) - 2.0 * second + third).dot(p) * (0.5 / omega)
+    rows = force_sizes(d.curve, d.u)
+    motion = forms.motion(d)
+    length = float(np.max(np.abs(motion) / d.curve.scale[: n + 1]))
+    return {
+        "l1": forms.known(total, forms.unit_of(d, rows, p, q, 3) / omega),
+        "omega": float(omega),
+        "d": forms.known(d.second(q, motion).dot(p), forms.unit_of(d, rows, p, q, 1) * length),
+    }
+
+
+PAIR = PathTest("pair", pair, discrete=False)

@@ -9,6 +9,7 @@ from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
+from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -19,6 +20,7 @@ from phasekit.bifurcation.continuation.points.special import (
     tangent_at,
 )
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, flip_function
+from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
 
@@ -55,7 +57,7 @@ def period_doubling(curve: Curve, bracket: Bracket) -> Special:
     if message:
         best, _, _ = bracket_root(curve, left, right, test, steps=60, width=1e-14)
         u = best.u
-    form = {"c": np.nan} if message else forms.period_doubling(forms.Derivatives(curve, u))
+    form = {"c": np.nan} if message else normal_form(forms.Derivatives(curve, u))
     if not message:
         values = eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)
         double = np.isnan(form["c"]) and np.sum(np.abs(values + 1.0) < DOUBLE) > 1
@@ -65,3 +67,24 @@ def period_doubling(curve: Curve, bracket: Bracket) -> Special:
         GUESS if message else CONVERGED, message or note, form,
         tangent=tangent_at(curve, u, best.tangent), others=(z[m:],), extra=z[m:],
     )  # fmt: skip
+
+
+def normal_form(d: forms.Derivatives) -> dict[str, float]:
+    """Of a map next to a multiplier -1, xi -> -xi + c xi^3; c > 0: a stable orbit of period 2.
+
+    With A q = -q, A^T p = -p, <p, q> = 1: c = <p, C(q, q, q)>/6 +
+    <p, B(q, (1 - A)^-1 B(q, q))>/2 ([Kuznetsov2004] 5.4).
+    """
+    n = d.curve.n
+    rows = force_sizes(d.curve, d.u)
+    q, p = forms.null_vectors(d.curve.linear(d.slopes) + np.eye(n), d.curve.scale[:n], rows)
+    bent = d.second(q, q)
+    inverse = np.linalg.inv(-d.slopes[:, :n])
+    fed = forms.fed(d, q, inverse @ bent.value, inverse, bent.error)
+    total = (1.0 / 6.0) * d.third(q, q, q) + 0.5 * fed
+    c = forms.known(total.dot(p), forms.unit_of(d, rows, p, q, 3))
+    # Where two multipliers are -1, `null_vectors` makes another product 1.
+    return {"c": c if abs(float(p @ q) - 1.0) < 1e-9 else np.nan}
+
+
+FLIP = PathTest("flip", lambda curve, bracket, known: [period_doubling(curve, bracket)])

@@ -9,6 +9,7 @@ from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket
 from phasekit.bifurcation.continuation.path import Sample, bracket_root
+from phasekit.bifurcation.continuation.points.path_test import PathTest
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -19,14 +20,15 @@ from phasekit.bifurcation.continuation.points.special import (
     tangent_at,
 )
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, product_function
+from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
 
 RESONANT = 1e-6  # distance of a third or fourth power of a multiplier from 1
 
 
-def torus(curve: Curve, bracket: Bracket) -> Special | None:
-    """The point of a bracket at which mu_i mu_j - 1 of a pair vanishes; None of a real pair."""
+def torus(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
+    """The point of a bracket at which mu_i mu_j - 1 of a pair vanishes; none of a real pair."""
     n, m, scale = curve.n, curve.m, curve.scale[: curve.n]
 
     def test(s: Sample) -> float:
@@ -39,7 +41,7 @@ def torus(curve: Curve, bracket: Bracket) -> Special | None:
     above = np.flatnonzero(values.imag > 0.0)
     near = above[np.argsort(np.abs(np.abs(values[above]) - 1.0))]
     if not len(near) or abs(abs(values[near[0]]) ** 2 - 1.0) > 2.0 * abs(test(best)) + 1e-9:
-        return None
+        return []
     mu, q = values[near[0]], vectors[:, near[0]]
     v = q.real / np.linalg.norm(q.real)
     l_row = A @ v - np.dot(v, A @ v) * v
@@ -75,18 +77,47 @@ def torus(curve: Curve, bracket: Bracket) -> Special | None:
     angle = float(np.angle(mu)) if message else float(np.arccos(z[-1]))
     form, note = {"d": np.nan, "angle": angle}, message
     if not message:
-        form, note = _normal_form(curve, u, angle)
-    return Special(
+        form, note = _described(curve, u, angle)
+    point = Special(
         "torus", u, interval_of(curve, bracket), residual, GUESS if message else CONVERGED, note,
         form, tangent=tangent_at(curve, u, best.tangent),
     )  # fmt: skip
+    return [point]
 
 
-def _normal_form(curve: Curve, u: Array, angle: float) -> tuple[dict[str, float], str]:
+def _described(curve: Curve, u: Array, angle: float) -> tuple[dict[str, float], str]:
     """The normal form; of a strong resonance, of which it says nothing, a note."""
     for k, word in ((3, "a third"), (4, "a quarter")):
         if abs(np.exp(1j * k * angle) - 1.0) < RESONANT:
             form = {"d": np.nan, "angle": angle}
             return form, f"d not known: the angle is {word} of a turn, a strong resonance"
-    form = forms.torus(forms.Derivatives(curve, u), angle)
+    form = normal_form(forms.Derivatives(curve, u), angle)
     return form, forms.unknown(form)
+
+
+def normal_form(d: forms.Derivatives, angle: float) -> dict[str, float]:
+    """Of a map next to multipliers exp(+-i angle): |xi| -> |xi| + d |xi|^3; d < 0: supercritical.
+
+    With A q = e^(i angle) q, A^T p = e^(-i angle) p, <q, q> = <p, q> = 1:
+    d = Re{e^(-i angle) [<p, C(q, q, q*)> + 2 <p, B(q, (1 - A)^-1 B(q, q*))> +
+    <p, B(q*, (e^(2 i angle) - A)^-1 B(q, q))>]}/2 ([Kuznetsov2004] 5.4).
+    """
+    n = d.curve.n
+    A, turn = d.curve.linear(d.slopes), np.exp(1j * angle)
+    values, vectors = np.linalg.eig(A)
+    q = vectors[:, np.argmin(np.abs(values - turn))]
+    q = q / np.linalg.norm(q)
+    values, vectors = np.linalg.eig(A.T)
+    p = vectors[:, np.argmin(np.abs(values - np.conj(turn)))]
+    p = p / np.conj(np.vdot(p, q))
+    bar = np.conj(q)
+    still, double = d.second(q, bar), d.second(q, q)
+    back, twice = np.linalg.inv(np.eye(n) - A), np.linalg.inv(turn**2 * np.eye(n) - A)
+    second = forms.fed(d, q, (back @ still.value).real, back, still.error)
+    third = forms.fed(d, bar, twice @ double.value, twice, double.error)
+    total = (d.third(q, q, bar) + 2.0 * second + third) * (0.5 * np.conj(turn))
+    unit = forms.unit_of(d, force_sizes(d.curve, d.u), p, q, 3)
+    return {"d": forms.known(total.dot(p), unit), "angle": float(angle)}
+
+
+PAIR = PathTest("pair", torus, discrete=True)

@@ -1,0 +1,34 @@
+"""Arguments that all of continuation takes: options, a parameter, its span."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.labels.arguments import bad, pair, unknown
+from phasekit.systems.problem import Problem
+
+
+def check_options(options: Any) -> ContinuationOptions:
+    """Options, by default all defaults."""
+    if options is None:
+        return ContinuationOptions()
+    if not isinstance(options, ContinuationOptions):
+        raise bad("options", options, "pk.ContinuationOptions(...)")
+    return options
+
+
+def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter") -> str:
+    """A parameter of the problem by its name."""
+    if not isinstance(parameter, str) or parameter not in problem.parameters:
+        raise unknown(f"{argument} of the problem", parameter, problem.parameters)
+    return parameter
+
+
+def check_span(span: Any, units: str | None = None) -> tuple[float, float]:
+    """Two numbers, the lower one first."""
+    wants = "two numbers (low, high), finite, with low < high"
+    low, high = pair("span", span, wants, units)
+    if not low < high:
+        raise bad("span", span, wants)
+    return low, high
