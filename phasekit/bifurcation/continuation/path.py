@@ -86,7 +86,8 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
         if forward is not None:
             kept.append(forward.slopes)
         slopes = np.concatenate(kept).reshape(-1, n, m)
-    residual = curve.residuals(u, slopes)
+    # Sizes of terms need few digits.
+    residual = curve.residuals(u, slopes if curve.keeps else Slopes(curve, u, sharp=False))
     fixed = _fixed(curve, u, len(behind), stops)
     better, message = accepted(curve, u, tangent, residual, fixed)
     for i, found in better.items():
@@ -120,12 +121,13 @@ class Slopes:
 
     curve: Curve
     u: Array
+    sharp: bool = True
 
     def __getitem__(self, places: Any) -> Array:
         """Those at one point, or at several."""
         if np.ndim(self.u[places]) == 1:
-            return self.curve.at(self.u[places])[1]
-        return np.array([self.curve.at(u)[1] for u in self.u[places]])
+            return self.curve.at(self.u[places], sharp=self.sharp)[1]
+        return np.array([self.curve.at(u, sharp=self.sharp)[1] for u in self.u[places]])
 
     def chunks(self) -> Iterator[slice]:
         """The points, so many at a time that their derivatives take little memory."""

@@ -72,6 +72,7 @@ def trace(
         angle = 0.0
         steps = 0
         side = 0.0
+        moved = False
         smooth = True
         which = -1
         reason = -1
@@ -122,6 +123,7 @@ def trace(
                 evaluate(first, second, mode, kind, n, par, active, w, v)
                 reason = CLOSED
                 break
+            moved = True
             for j in range(size):
                 w[guess + j] = w[v + j]  # to come back to
                 if which >= 0:
@@ -171,7 +173,8 @@ def trace(
                 w[new : new + size] /= length
             break
 
-        gather(w, scale, b, -1, u, v, chord, -1, size)
+        if moved:
+            gather(w, scale, b, -1, u, v, chord, -1, size)
         length = np.sqrt(inner(w, weight, chord, chord, size))
         w[number + LENGTH] += length
         w[number + LAST] = 0.0 if not smooth else (h if reason < 0 else length)
