@@ -71,7 +71,7 @@ class Curve:
     field : Field
         The right-hand side.
     kind : int
-        EQUILIBRIUM, FOLD, HOPF or BRANCH.
+        EQUILIBRIUM, FOLD, HOPF or BRANCH; of maps FLIP or TORUS, too.
     par : ndarray
         All parameters; those that are free are not used.
     active : tuple of int

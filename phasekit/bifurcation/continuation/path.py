@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.acceptance import accepted
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 
 Array = npt.NDArray[np.float64]
@@ -173,7 +173,7 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
         + h * s * (1.0 - s) * ((1.0 - s) * a.tangent - s * b.tangent)
     )
     guess += (s - np.dot(row, guess - a.u) / np.dot(row, chord)) * chord
-    if curve.kind == HOPF:
+    if curve.kind in (HOPF, TORUS):
         curve, guess = _in_phase(curve, a if s < 0.5 else b, guess)
     point = curve.refine(guess, row)
     if not point.converged or curve.length(point.u - guess) > 0.5 * h:
@@ -183,7 +183,7 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
 
 
 def _in_phase(curve: Curve, near: Sample, guess: Array) -> tuple[Curve, Array]:
-    """A Hopf curve whose phase condition is that of a point of it, and v as it is there.
+    """A curve of pairs whose phase condition is that of a point of it, and v as it is there.
 
     A trace turns v in its plane from time to time.
     """

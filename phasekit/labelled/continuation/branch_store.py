@@ -91,7 +91,8 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         else:
             given = stored.problem()
         functions = stored.functions(record or {})
-        if stored.spec["kind"] in ("cycle", "fold_of_cycles", "period_doubling", "torus"):
+        of_cycles = ("cycle", "fold_of_cycles", "period_doubling", "torus")
+        if stored.spec["kind"] in of_cycles and not given.map:
             from phasekit.labelled.continuation.cycle_store import made_again
 
             return made_again(stored, given, functions)
