@@ -8,8 +8,9 @@ matrices are pieces of one flat array ``w``, named by the place where they begin
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
@@ -120,14 +121,28 @@ def _solve(w: Array, a: int, b: int, n: int) -> float:
 def solve(w: Array, a: int, b: int, n: int) -> float:
     """Solve for two right sides, in their place; the determinant's sign, 0 if it is singular.
 
-    The interpreter leaves the sign to `orientation`.
+    Of many unknowns that are compiled the sign is left to `orientation`.
     """
     right = w[b : b + 2 * n].reshape(n, 2)
-    try:
-        right[:] = np.linalg.solve(w[a : a + n * n].reshape(n, n), right)
-    except np.linalg.LinAlgError:
+    factors, swapped, solved, singular = _lapack()(w[a : a + n * n].reshape(n, n), right)
+    if singular:
         return 0.0
-    return 1.0
+    right[:] = solved
+    negative = np.count_nonzero(swapped != _places(n)) + np.count_nonzero(factors.diagonal() < 0.0)
+    return -1.0 if negative % 2 else 1.0
+
+
+@functools.cache
+def _lapack() -> Callable[..., Any]:
+    """Elimination that gives its factors as well."""
+    from scipy.linalg.lapack import dgesv
+
+    return cast(Callable[..., Any], dgesv)
+
+
+@functools.lru_cache(maxsize=16)
+def _places(n: int) -> Any:
+    return np.arange(n)
 
 
 def _orientation(w: Array, a: int, n: int, sign: float) -> float:
@@ -139,7 +154,7 @@ def _orientation(w: Array, a: int, n: int, sign: float) -> float:
 @twin(_orientation)
 def orientation(w: Array, a: int, n: int, sign: float) -> float:
     """Sign of the determinant of the matrix that was solved last."""
-    return float(np.linalg.slogdet(w[a : a + n * n].reshape(n, n))[0])
+    return sign
 
 
 def _inner(w: Array, weight: int, x: int, y: int, n: int) -> float:

@@ -276,8 +276,8 @@ def _bends(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> tuple[FloatA
 
 def _looks(one: Branch) -> list[style.Look]:
     points = one.points
-    if one.kind == "hopf":
-        pair = [str(name) or "hopf" for name in points.kind_of_pair.values]
+    if "kind_of_pair" in points:
+        pair = [str(name) or one.kind for name in points.kind_of_pair.values]
         return [_CURVES[name] for name in pair]
     if one.kind not in ("equilibrium", "cycle"):
         return [_CURVES[one.kind]] * points.sizes["point"]

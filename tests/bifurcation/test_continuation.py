@@ -12,7 +12,14 @@ from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonF
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.kernels import defining
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BRANCH,
+    EQUILIBRIUM,
+    FLIP,
+    FOLD,
+    HOPF,
+    TORUS,
+)
 from phasekit.bifurcation.continuation.kernels.newton import refine
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.points import branch_point, fold, pair
@@ -107,7 +114,7 @@ def make(field, kind=EQUILIBRIUM, active=(0,)):
     infinite = np.full(size, np.inf)
     return Curve(
         field, kind, np.array([0.3, 0.8]), active, np.ones(size), np.zeros(size), -infinite,
-        infinite, ContinuationOptions(), np.array([0.6, -0.8]) if kind == HOPF else None,
+        infinite, ContinuationOptions(), np.array([0.6, -0.8]) if kind in (HOPF, TORUS) else None,
     )  # fmt: skip
 
 
@@ -171,7 +178,7 @@ def test_derivatives_of_every_form(form):
     np.testing.assert_allclose(d.third(a, b, c).value, wanted, rtol=error, atol=error)
 
 
-@pytest.mark.parametrize("kind", [FOLD, HOPF, BRANCH])
+@pytest.mark.parametrize("kind", [FOLD, HOPF, BRANCH, FLIP, TORUS])
 @pytest.mark.parametrize("active", [(0,), (1, 0)])
 def test_jacobians_of_defining_systems(kind, active):
     """Against differences of G itself, which the kernel returns interpreted and compiled."""
@@ -185,7 +192,7 @@ def test_jacobians_of_defining_systems(kind, active):
         w = np.zeros(defining.work_size(kind, 2, len(active)))
         w[3 * size : 4 * size] = 1.0
         places = defining.places(kind, 2, len(active))
-        w[places[2] : places[2] + 2] = curve.aux if kind == HOPF else 0.0
+        w[places[2] : places[2] + 2] = curve.aux if kind in (HOPF, TORUS) else 0.0
         w[places[3] : places[3] + size] = u
         first, second = curve.field.first(active), curve.field.second(active)
         kernel = refine

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -15,6 +16,8 @@ from phasekit.numerics import differences
 from phasekit.numerics.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
 
 Array = npt.NDArray[np.float64]
+
+NUMBERS = np.dtype(float)
 
 
 class CompiledField(Field):
@@ -193,25 +196,25 @@ class PythonField(Field):
             if begin == m:
                 return
 
-            def along(j: int) -> Callable[[float], Array]:
-                def at(h: float) -> Array:
-                    if j >= n:
-                        return self.value(x.copy(), p | {free[j - n]: values[j] + h})
+            unit = [_power(max(abs(values[j]), self.sizes[j])) for j in range(begin, m)]
+
+            def at(j: int, h: float) -> Array:
+                if j < n:
                     shifted = x.copy()
                     shifted[j] += h
                     return self.value(shifted, p)
+                p[free[j - n]] = values[j] + h
+                value = self.value(x.copy(), p)
+                p[free[j - n]] = values[j]
+                return value
 
-                return at
-
-            unit = [_power(max(abs(values[j]), self.sizes[j])) for j in range(m)]
             if sharp:
-                slopes[:, begin:] = _slopes(
-                    [along(j) for j in range(begin, m)], middle, unit[begin:]
-                )
+                lines = [functools.partial(at, j) for j in range(begin, m)]
+                slopes[:, begin:] = _slopes(lines, middle, unit)
                 return
-            for j in range(begin, m):
-                at, h = along(j), COARSE * unit[j]
-                slopes[:, j] = (at(h) - at(-h)) / (2.0 * h)
+            for j, size in enumerate(unit, begin):
+                h = COARSE * size
+                slopes[:, j] = (at(j, h) - at(j, -h)) / (2.0 * h)
 
         return first
 
@@ -261,7 +264,7 @@ def _power(h: float) -> float:
     return math.ldexp(0.5, math.frexp(h)[1])
 
 
-def _slopes(lines: list[Callable[[float], Array]], middle: Array, sizes: list[float]) -> Array:
+def _slopes(lines: Sequence[Callable[[float], Array]], middle: Array, sizes: list[float]) -> Array:
     """The slopes of functions at 0 (columns), as `phasekit.numerics.differences` takes them."""
     short = []
     for at, size in zip(lines, sizes, strict=True):
@@ -317,7 +320,7 @@ def numbers_of(argument: str, result: Any, shape: tuple[int, ...]) -> Array:
     """What a function returned as an array of its own, of real numbers."""
     try:
         numbers = np.array(result)
-        if numbers.dtype == float and numbers.shape == shape:
+        if numbers.dtype is NUMBERS and numbers.shape == shape:
             return numbers
         if numbers.dtype.kind == "c":
             raise ParameterError(

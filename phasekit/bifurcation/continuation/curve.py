@@ -71,7 +71,7 @@ class Curve:
     field : Field
         The right-hand side.
     kind : int
-        EQUILIBRIUM, FOLD, HOPF or BRANCH.
+        EQUILIBRIUM, FOLD, HOPF or BRANCH; of maps FLIP or TORUS, too.
     par : ndarray
         All parameters; those that are free are not used.
     active : tuple of int
@@ -201,14 +201,14 @@ class Curve:
             int(steps),
         )  # fmt: skip
 
-    def at(self, u: Array) -> tuple[Array, Array]:
-        """F and its derivatives by states and free parameters."""
+    def at(self, u: Array, *, sharp: bool = True) -> tuple[Array, Array]:
+        """F and its derivatives by states and free parameters, to a few digits unless sharp."""
         n, m = self.n, self.m
         w = np.zeros(2 * m + n + n * m + differences.spare_size(n, m))
         w[:m] = u[:m]
         w[m : 2 * m] = self.scale[:m]
         out = 2 * m
-        first, _, mode = self._functions(sharp=True)
+        first, _, mode = self._functions(sharp=sharp)
         w = np.concatenate([w, np.zeros(n + n * m + 4 * m)])
         spare = out + n + n * m
         active = np.array(self.active, dtype=np.int64)

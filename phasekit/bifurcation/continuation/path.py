@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.acceptance import accepted
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 
 Array = npt.NDArray[np.float64]
@@ -86,7 +86,8 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
         if forward is not None:
             kept.append(forward.slopes)
         slopes = np.concatenate(kept).reshape(-1, n, m)
-    residual = curve.residuals(u, slopes)
+    # Sizes of terms need few digits.
+    residual = curve.residuals(u, slopes if curve.keeps else Slopes(curve, u, sharp=False))
     fixed = _fixed(curve, u, len(behind), stops)
     better, message = accepted(curve, u, tangent, residual, fixed)
     for i, found in better.items():
@@ -120,12 +121,13 @@ class Slopes:
 
     curve: Curve
     u: Array
+    sharp: bool = True
 
     def __getitem__(self, places: Any) -> Array:
         """Those at one point, or at several."""
         if np.ndim(self.u[places]) == 1:
-            return self.curve.at(self.u[places])[1]
-        return np.array([self.curve.at(u)[1] for u in self.u[places]])
+            return self.curve.at(self.u[places], sharp=self.sharp)[1]
+        return np.array([self.curve.at(u, sharp=self.sharp)[1] for u in self.u[places]])
 
     def chunks(self) -> Iterator[slice]:
         """The points, so many at a time that their derivatives take little memory."""
@@ -171,7 +173,7 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
         + h * s * (1.0 - s) * ((1.0 - s) * a.tangent - s * b.tangent)
     )
     guess += (s - np.dot(row, guess - a.u) / np.dot(row, chord)) * chord
-    if curve.kind == HOPF:
+    if curve.kind in (HOPF, TORUS):
         curve, guess = _in_phase(curve, a if s < 0.5 else b, guess)
     point = curve.refine(guess, row)
     if not point.converged or curve.length(point.u - guess) > 0.5 * h:
@@ -181,7 +183,7 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
 
 
 def _in_phase(curve: Curve, near: Sample, guess: Array) -> tuple[Curve, Array]:
-    """A Hopf curve whose phase condition is that of a point of it, and v as it is there.
+    """A curve of pairs whose phase condition is that of a point of it, and v as it is there.
 
     A trace turns v in its plane from time to time.
     """

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF, TORUS
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.placed import Placed, unique
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
@@ -32,7 +32,7 @@ def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curv
     n, m = curve.n, curve.m
     assert special.extra is not None
     extra, aux = special.extra, None
-    if kind == HOPF:
+    if kind in (HOPF, TORUS):
         extra, aux = extra[: n + 1], extra[n + 1 :]
     u = np.concatenate([special.u[: n + 1], [curve.par[curve.active[1]]], extra])
     made = extended(curve, kind, u, extra, aux)

@@ -15,7 +15,14 @@ import xarray as xr
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.ending import cut
 from phasekit.bifurcation.continuation.gaps import narrow
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EQUILIBRIUM, FOLD, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BRANCH,
+    EQUILIBRIUM,
+    FLIP,
+    FOLD,
+    HOPF,
+    TORUS,
+)
 from phasekit.bifurcation.continuation.path import Path, Sample, join
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
@@ -33,7 +40,10 @@ from phasekit.systems.problem import Problem
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
 
-KINDS = {EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point"}
+KINDS = {
+    EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point",
+    FLIP: "period_doubling", TORUS: "torus",
+}  # fmt: skip
 NUMBERS = {name: number for number, name in KINDS.items()}
 
 
@@ -61,7 +71,7 @@ class Branch:
     messages : tuple of str
         What is not certain about the curve as a whole; empty where nothing is in doubt.
     kind : str
-        equilibrium, fold, hopf or branch_point.
+        equilibrium, fold, hopf or branch_point; of maps period_doubling or torus, too.
     parameter : str
         The free parameter; ``free`` holds all of them.
     problem : Problem

@@ -11,7 +11,7 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.spectrum import (
@@ -86,7 +86,7 @@ def points_of(
         if one.special.kind != "end" or not label[place]:  # it may end on a special point
             label[place] = KINDS[one.special.kind].label
     kappa = np.full(total, np.nan)
-    if curve.kind == HOPF:
+    if curve.kind in (HOPF, TORUS):
         kappa[own] = path.u[:, -1]
     residual = np.empty(total)
     residual[own] = path.residual
@@ -155,11 +155,12 @@ def _dataset(
                 else "number of eigenvalues with a positive real part; -1: not known"
             },
         )  # fmt: skip
-    if curve.kind == HOPF:
-        pair = np.where(
-            np.isnan(kappa), "", np.where(kappa > 0.0, "hopf", "neutral_saddle")
-        ).astype(np.dtypes.StringDType())
-        data["kind_of_pair"] = (dim, pair, {"long_name": "Hopf point or neutral saddle"})
+    if curve.kind in (HOPF, TORUS):
+        name, most = ("torus", 4.0) if curve.kind == TORUS else ("hopf", np.inf)
+        on = (kappa > 0.0) & (kappa < most)
+        pair = np.where(np.isnan(kappa), "", np.where(on, name, "neutral_saddle"))
+        says = {"long_name": f"{name.capitalize()} point or neutral saddle"}
+        data["kind_of_pair"] = (dim, pair.astype(np.dtypes.StringDType()), says)
     data["arclength"] = (
         dim, info[:, trace.ARCLENGTH].copy(), {"long_name": "arclength on scaled axes"},
     )  # fmt: skip

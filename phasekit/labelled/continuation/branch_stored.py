@@ -18,7 +18,7 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS as STATE_NUMBERS
 from phasekit.bifurcation.continuation.kernels.state import VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -158,7 +158,7 @@ class Stored:
             }
             if not (arrays["scale"] > 0.0).all() or not (arrays["period"] >= 0.0).all():
                 raise ValueError("raw_curve_scale, raw_curve_period: want numbers > 0, and >= 0")
-            aux = self.array("curve_aux", (made.n if kind == HOPF else 0,))
+            aux = self.array("curve_aux", (made.n if kind in (HOPF, TORUS) else 0,))
             return made.replace(**arrays, aux=aux if aux.size else None)
 
     def traces(self, curve: Curve) -> tuple[Sample, tuple[Track | None, Track | None]]:

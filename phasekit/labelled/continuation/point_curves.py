@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, FOLD, HOPF
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, FLIP, FOLD, HOPF, TORUS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run
@@ -19,7 +19,9 @@ from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
 
 #: Defining systems of curves, by what special points say of theirs.
-_CURVES = {"fold": FOLD, "hopf": HOPF, "branch_point": BRANCH}
+_CURVES = {
+    "fold": FOLD, "hopf": HOPF, "branch_point": BRANCH, "period_doubling": FLIP, "torus": TORUS,
+}  # fmt: skip
 
 
 def point_curve(
@@ -29,12 +31,13 @@ def point_curve(
     *,
     options: ContinuationOptions | None = None,
 ) -> Branch:
-    """The curve of folds, Hopf or branch points through one, in two parameters.
+    """The curve of points of one kind through one, in two parameters.
 
     Parameters
     ----------
     point : SpecialPoint
-        A fold, Hopf point, neutral saddle or branch point of a branch of equilibria.
+        A fold, Hopf point, neutral saddle or branch point of a branch of equilibria; of fixed
+        points of a map a period doubling or torus point, too.
     parameter : str
         The second parameter. The first, that of the branch, is free within ten times its span,
         unless `options` bounds it.
@@ -48,7 +51,9 @@ def point_curve(
     Branch
         Its special points are cusps (CP), Bogdanov-Takens (BT), generalized Hopf (GH),
         zero-Hopf (ZH) and Hopf-Hopf (HH) points. A Hopf curve goes on beyond a Bogdanov-Takens
-        point as a curve of neutral saddles; ``points.kind_of_pair`` tells which.
+        point as a curve of neutral saddles; ``points.kind_of_pair`` tells which. Of maps: cusps,
+        strong resonances (R1 to R4), fold-flip (LPPD), generalized flip (GPD) and Chenciner
+        (CH) points; a torus curve goes on as a curve of neutral saddles beyond R1 and R2.
 
     Raises
     ------

@@ -209,8 +209,9 @@ class SpecialPoint(Generic[Of]):
         Returns
         -------
         Branch
-            Of the kind of the point (fold, hopf, branch_point), with cusps, Bogdanov-Takens and
-            other points of codimension two as its special points.
+            Of the kind of the point (fold, hopf, branch_point; of maps period_doubling and torus,
+            too), with cusps, Bogdanov-Takens and other points of codimension two as its special
+            points.
 
         Raises
         ------

@@ -9,9 +9,16 @@ The unknowns are u = (x, p, ...) with the state x, the free parameters p and wha
 - BRANCH: f + b w = 0, w f_x = 0, w f_q = 0, w.w = 1 with u = (x, p, w, b), q the first free
   parameter: a branch point where b = 0.
 
-Norms of v and w are taken in units of their scales. With one free parameter the last three are
+Of a map A the field is f = A - x, so that multipliers -1 and exp(+-i theta) are
+
+- FLIP: f = 0, (f_x + 2) v = 0, v.v = 1 with u = (x, p, v).
+- TORUS: f = 0, (f_x^2 + k f_x + k) v = 0, v.v = 1, l.v = 0 with u = (x, p, v, k): the matrix is
+  A^2 - (2 - k) A + 1, so k = 2 - 2 cos theta between 0 and 4, and two real multipliers with the
+  product 1 elsewhere.
+
+Norms of v and w are taken in units of their scales. With one free parameter all but the first are
 square and define a point; with two they define a curve ([Govaerts2000] chapters 4 and 6,
-[Kuznetsov2004] chapter 10).
+[Kuznetsov2004] chapters 9 and 10).
 
 Everything lies in one flat work array: what `places` returns is where each piece begins.
 """
@@ -26,17 +33,17 @@ from phasekit.bifurcation.continuation.kernels.state import NUMBERS, SCALE, VECT
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.differences import DERIVED, bend, jet, spare_size
 
-EQUILIBRIUM, FOLD, HOPF, BRANCH = range(4)
+EQUILIBRIUM, FOLD, HOPF, BRANCH, FLIP, TORUS = range(6)
 
 
 def unknowns(kind: int, n: int, free: int) -> int:
     """Number of unknowns of a defining system."""
-    return n + free + (0, n, n + 1, n + 1)[kind]
+    return n + free + (0, n, n + 1, n + 1, n, n + 1)[kind]
 
 
 def equations(kind: int, n: int) -> int:
     """Number of equations of a defining system."""
-    return n if kind == EQUILIBRIUM else (2 * n + 1 if kind == FOLD else 2 * n + 2)
+    return n if kind == EQUILIBRIUM else 2 * n + (1, 2)[kind not in (FOLD, FLIP)]
 
 
 def work_size(kind: int, n: int, free: int) -> int:
@@ -67,7 +74,7 @@ def places(kind: int, n: int, free: int) -> tuple[int, ...]:
     m = n + free
     size = m
     rows = n
-    if kind == FOLD:
+    if kind == FOLD or kind == FLIP:
         size = m + n
         rows = 2 * n + 1
     elif kind != EQUILIBRIUM:
@@ -144,25 +151,28 @@ def evaluate(
         w[z + i] = 0.0
         for j in range(n):
             w[z + i] += w[base + i * m + j] * w[v + j]
-    if kind == FOLD:
+    if kind == FOLD or kind == FLIP:
+        shift = 2.0 if kind == FLIP else 0.0
         for i in range(n):
             row = jac + (n + i) * size
-            w[g + n + i] = w[z + i]
+            w[g + n + i] = w[z + i] + shift * w[v + i]
             for j in range(m):
                 w[row + j] = w[bent + i * m + j]
             for j in range(n):
                 w[row + m + j] = w[base + i * m + j]
+            w[row + m + i] += shift
         return
+    shift = extra if kind == TORUS else 0.0
     for i in range(n):
         row = jac + (n + i) * size
         for k in range(n):
-            value = w[base + i * m + k]
+            value = w[base + i * m + k] + (shift if i == k else 0.0)
             for j in range(m):
                 w[row + j] += value * w[bent + k * m + j]
             for j in range(n):
                 w[row + m + j] += value * w[base + k * m + j]
         w[row + m + i] += extra
-        w[row + m + n] = w[v + i]
+        w[row + m + n] = w[v + i] + (w[z + i] if kind == TORUS else 0.0)
         w[g + n + i] = 0.0
         for j in range(n):
             w[g + n + i] += w[row + m + j] * w[v + j]

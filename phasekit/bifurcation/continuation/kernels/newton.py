@@ -13,7 +13,7 @@ import numpy as np
 from phasekit.bifurcation.continuation.kernels.defining import evaluate, places
 from phasekit.bifurcation.continuation.kernels.state import QUADRATIC, SCALE, SIGN, VECTORS
 from phasekit.numerics.compile import Array, kernel, routine
-from phasekit.numerics.native import dot, solve, twin
+from phasekit.numerics.native import _solve, dot, solve, twin
 
 # Newton steps that shrink like this converge quadratically.
 FAST = 1e-3
@@ -65,6 +65,27 @@ def assemble(
     right[:, 0] /= -largest
     right[:, 1] = 0.0
     right[rows:, 1] = 1.0
+
+
+def _solved(
+    w: Array, g: int, jac: int, rows: int, n: int, scale: int, row: int, rest: float, a: int, b: int
+) -> float:
+    assemble(w, g, jac, rows, n, scale, row, rest, a, b)
+    return solve(w, a, b, n)
+
+
+@twin(_solved)
+def solved(
+    w: Array, g: int, jac: int, rows: int, n: int, scale: int, row: int, rest: float, a: int, b: int
+) -> float:
+    """The step and the tangent, scaled, in place of the right sides; the determinant's sign."""
+    if n > FEW:
+        return _solved(w, g, jac, rows, n, scale, row, rest, a, b)
+    numbers: Any = w.tolist()
+    _assemble(numbers, g, jac, rows, n, scale, row, rest, a, b)
+    sign = _solve(numbers, a, b, n)
+    w[a : b + 2 * n] = numbers[a : b + 2 * n]
+    return sign
 
 
 def _advance(w: Array, u: int, scale: int, b: int, n: int) -> float:
@@ -201,8 +222,7 @@ def correct(
         rest = 0.0
         if rows < size:
             rest = dot(w, row, u, size) - target
-        assemble(w, g, jac, rows, size, scale, row, rest, a, b)
-        sign = solve(w, a, b, size)
+        sign = solved(w, g, jac, rows, size, scale, row, rest, a, b)
         if sign == 0.0:
             return NO_NUMBER if not finite(w, jac, rows * size) else SINGULAR
         w[VECTORS * size + SIGN] = sign

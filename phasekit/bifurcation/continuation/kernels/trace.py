@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.defining import HOPF, evaluate, places
+from phasekit.bifurcation.continuation.kernels.defining import HOPF, TORUS, evaluate, places
 from phasekit.bifurcation.continuation.kernels.newton import DIVERGED, NO_NUMBER, correct
 from phasekit.bifurcation.continuation.kernels.state import (
     DONE,
@@ -72,6 +72,7 @@ def trace(
         angle = 0.0
         steps = 0
         side = 0.0
+        moved = False
         smooth = True
         which = -1
         reason = -1
@@ -122,6 +123,7 @@ def trace(
                 evaluate(first, second, mode, kind, n, par, active, w, v)
                 reason = CLOSED
                 break
+            moved = True
             for j in range(size):
                 w[guess + j] = w[v + j]  # to come back to
                 if which >= 0:
@@ -171,7 +173,8 @@ def trace(
                 w[new : new + size] /= length
             break
 
-        gather(w, scale, b, -1, u, v, chord, -1, size)
+        if moved:
+            gather(w, scale, b, -1, u, v, chord, -1, size)
         length = np.sqrt(inner(w, weight, chord, chord, size))
         w[number + LENGTH] += length
         w[number + LAST] = 0.0 if not smooth else (h if reason < 0 else length)
@@ -194,8 +197,8 @@ def trace(
         record[k, j + NEWTON_STEPS] = steps
         record[k, j + ANGLE] = angle
         record[k, j + ARCLENGTH] = w[number + LENGTH]
-        if kind == HOPF:
-            turn_phase(w, n, m, size, aux, base + n, spare)
+        if kind == HOPF or kind == TORUS:
+            turn_phase(kind, w, n, m, size, aux, base + n, spare)
         if reason >= 0:
             return k + 1, reason, which
     return record.shape[0], FULL, 0
@@ -332,8 +335,8 @@ def grow(w: Array, n: int, size: int, fixed: Array, period: int) -> None:
 
 
 @routine
-def turn_phase(w: Array, n: int, m: int, size: int, aux: int, base: int, y: int) -> None:
-    """Keep v of a Hopf curve off eigenvectors, and the phase condition l.v = 0 one that decides.
+def turn_phase(kind: int, w: Array, n: int, m: int, size: int, aux: int, base: int, y: int) -> None:
+    """Keep v of a curve of pairs off eigenvectors, and the phase l.v = 0 one that decides.
 
     Where v is an eigenvector, as it may become on neutral saddles, the curve meets one on which
     only one eigenvalue counts. In the invariant plane, v is turned to where f_x turns it most.
@@ -356,8 +359,13 @@ def turn_phase(w: Array, n: int, m: int, size: int, aux: int, base: int, y: int)
     root = np.sqrt(square)
     if not root > 1e-6 * large:
         return
-    # f_x on the plane, by v and what is across it: trace zero, determinant k.
-    back = -(w[m + n] + along * along) / root
+    # f_x on the plane, by v and what is across it: trace zero, determinant k; of a map (whose
+    # trace is -k) once half the trace is taken off.
+    pair = w[m + n]
+    if kind == TORUS:
+        along += 0.5 * pair
+        pair -= 0.25 * pair * pair
+    back = -(pair + along * along) / root
     even, odd = 0.5 * (root - back), 0.5 * (root + back)
     amplitude = np.sqrt(odd * odd + along * along)
     sign = 1.0 if even >= 0.0 else -1.0

@@ -23,15 +23,15 @@ class CurveTest:
     kind : str
         A kind of the registry of special points.
     curve : int
-        FOLD, HOPF or BRANCH.
+        FOLD, HOPF or BRANCH; of maps FLIP or TORUS.
     values : callable
         Its values at points (rows of unknowns, with the derivatives of f at each).
     states : int
         The least number of states with which there are such points.
     holds : callable
         Whether a zero is such a point.
-    discrete : bool
-        Whether there are such points of maps, too.
+    of : tuple of bool
+        Whether there are such points of flows (False), of maps (True), or of both.
     """
 
     kind: str
@@ -39,7 +39,7 @@ class CurveTest:
     values: Callable[[Curve, Array, Array], Array]
     states: int = 1
     holds: Callable[[Curve, Sample], bool] = lambda curve, s: True
-    discrete: bool = False
+    of: tuple[bool, ...] = (False,)
 
     def value(self, curve: Curve, s: Sample) -> float:
         """The function at one point."""

@@ -8,6 +8,7 @@ from phasekit.bifurcation.continuation.points import (
     cusp,
     generalized_hopf,
     hopf_hopf,
+    of_maps,
     zero_hopf,
 )
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
@@ -15,7 +16,7 @@ from phasekit.bifurcation.special_points import KINDS
 
 TESTS: list[CurveTest] = [
     *cusp.TESTS, *bogdanov_takens.TESTS, *generalized_hopf.TESTS, *zero_hopf.TESTS,
-    *hopf_hopf.TESTS,
+    *hopf_hopf.TESTS, *of_maps.TESTS,
 ]  # fmt: skip
 
 
@@ -44,7 +45,5 @@ def tests_of(curve: Curve) -> list[CurveTest]:
     return [
         test
         for test in TESTS
-        if test.curve == curve.kind
-        and curve.n >= test.states
-        and (test.discrete or not curve.discrete)
+        if test.curve == curve.kind and curve.n >= test.states and curve.discrete in test.of
     ]

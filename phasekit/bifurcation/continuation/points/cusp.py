@@ -24,4 +24,4 @@ def quadratic(curve: Curve, u: Array, slopes: Array) -> Array:
     return np.asarray(np.einsum("ki,kij,kj->k", p, bent, v))
 
 
-TESTS = (CurveTest("cusp", FOLD, quadratic, discrete=True),)
+TESTS = (CurveTest("cusp", FOLD, quadratic, of=(False, True)),)

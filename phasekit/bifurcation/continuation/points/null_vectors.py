@@ -1,4 +1,4 @@
-"""Null vectors of f_x along a curve of folds, which do not jump from point to point."""
+"""Null vectors along a curve of folds or flips, which do not jump from point to point."""
 
 from __future__ import annotations
 
@@ -6,19 +6,22 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels.defining import FLIP
 
 Array = npt.NDArray[np.float64]
 
 
 def left_and_right(curve: Curve, u: Array, slopes: Array) -> tuple[Array, Array]:
-    """Left and right null vectors of f_x at points of a fold curve; both move smoothly along it.
+    """Left and right null vectors at points of a curve of folds; both move smoothly along it.
 
-    The adjugate of f_x is smooth and a multiple of v p; so p is the adjugate's transpose on v.
+    They are those of f_x, of a curve of flips those of f_x + 2. The adjugate is smooth and a
+    multiple of v p; so p is the adjugate's transpose on v.
     """
     n, m = curve.n, curve.m
     scale = curve.scale[:n]
     v = u[:, m : m + n] / scale
-    scaled = slopes[:, :, :n] * scale
+    matrix = slopes[:, :, :n] + (2.0 * np.eye(n) if curve.kind == FLIP else 0.0)
+    scaled = matrix * scale
     rows = np.max(np.abs(slopes * curve.scale[:m]), axis=2)
     # Each row by the same number at all points, so that nothing jumps.
     rows = np.max(rows, axis=0)

@@ -76,11 +76,13 @@ def torus(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]
         u = best.u
     angle = float(np.angle(mu)) if message else float(np.arccos(z[-1]))
     form, note = {"d": np.nan, "angle": angle}, message
+    extra = None
     if not message:
         form, note = _described(curve, u, angle)
+        extra = np.concatenate([z[m:-1], [2.0 - 2.0 * z[-1]], l_row])
     point = Special(
         "torus", u, interval_of(curve, bracket), residual, GUESS if message else CONVERGED, note,
-        form, tangent=tangent_at(curve, u, best.tangent),
+        form, tangent=tangent_at(curve, u, best.tangent), extra=extra,
     )  # fmt: skip
     return [point]
 
