@@ -21,6 +21,7 @@ from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.laws.perturbed import PerturbedTrigonometric
 from phasekit.perturbation.torque import equilibria_under, torqued_equilibria
 from phasekit.phase.exact.equilibria import Equilibria
+from phasekit.phase.exact.orbits import energy_rises
 from phasekit.phase.exact.potential import gradient
 from phasekit.phase.exact.separatrices import separatrices
 
@@ -149,20 +150,22 @@ def _of_cells(A: Array, B: Array, C: Array, N: Array, points: Equilibria) -> tup
     )
     saddle = saddle_at(A[:, None], phi, k, N[:, None])
     offset = np.full((*phi.shape, 2), np.nan)
-    area, error = offset.copy(), offset.copy()
+    area, error, joins = offset.copy(), offset.copy(), np.zeros(offset.shape, bool)
     for side, way in enumerate((-1.0, 1.0)):
         marks = marks_of(points.phi, phi, way)
-        offset[..., side] = turning(saddle, (A, B, C, N), marks, way)
+        fall = falls(saddle, (A, B, C, N), marks, way)
+        offset[..., side], joins[..., side] = turning(saddle, (A, B, C, N), marks, fall, way)
         area[..., side], error[..., side] = lobe(saddle, marks, offset[..., side], way)
     closed = np.isfinite(offset)
     loop = np.select(
-        [~there, closed.all(-1), closed.any(-1)], [Loop.ABSENT, Loop.LOBES, Loop.LOBE],
+        [~there, joins.any(-1), closed.all(-1), closed.any(-1)],
+        [Loop.ABSENT, Loop.HETEROCLINIC, Loop.LOBES, Loop.LOBE],
         Loop.UNBOUNDED,
     ).astype(np.int8)  # fmt: skip
     eight = (loop == Loop.LOBES).any(-1)
     topology = np.select(
-        [points.n_equilibria < 0, eight, there.any(-1)],
-        [Topology.NOT_COMPUTED, Topology.FIGURE_EIGHT, Topology.HOMOCLINIC],
+        [points.n_equilibria < 0, joins.any((-1, -2)), eight, there.any(-1)],
+        [Topology.NOT_COMPUTED, Topology.HETEROCLINIC, Topology.FIGURE_EIGHT, Topology.HOMOCLINIC],
         Topology.NONE,
     ).astype(np.int8)
     away = there[..., None] & ~closed
@@ -187,14 +190,49 @@ def marks_of(phi: Array, saddle: Array, way: float) -> Array:
     return np.sort(far, axis=-1)
 
 
-def turning(saddle: Saddle, system: tuple[Array, ...], marks: Array, way: float) -> Array:
-    """Signed angle to the turning point on one side; NaN where the separatrix runs away."""
+def falls(
+    saddle: Saddle, system: tuple[Array, ...], marks: Array, way: float
+) -> tuple[Array, Array]:
+    """Energy of each saddle less that of the other one next on a side; and what rounding hides.
+
+    Under next to no torque the difference is that of no torque, which is known to its last digits,
+    and what the torque N makes of it, ``d(h_i - h_j)/dN = phi_j - phi_i``.
+    """
+    A, B, C, N = (x[:, None] for x in system)
+    two = np.isfinite(marks[..., 3])  # else it is the saddle's own next
+    first = np.where(two, marks[..., 1], TURN)
+    direct = saddle.depth(way * first)
+    size = np.abs(A) + np.abs(B) + np.abs(C) + TURN * np.abs(N)
+    hidden = 16.0 * 2.0**-52 * size
+    level = separatrices(*system[:3])
+    step = energy_rises(*system[:3])[:, 2, None] * np.array([-1.0, 1.0])  # of lower less upper
+    apart = np.mod(way * (level.saddle_phi[:, ::-1] - level.saddle_phi), TURN)
+    slope = 0.5 * (first + apart)
+    near = step + way * N * slope
+    with np.errstate(all="ignore"):
+        least = np.min(np.minimum(saddle.square, level.saddle_exponent**2), axis=1, keepdims=True)
+        bend = (N / least) ** 2
+    terms = np.abs(step) + np.abs(N) * slope
+    lost = terms * (16.0 * 2.0**-52 + bend) + np.abs(N) * np.abs(first - apart)
+    good = two & (lost < hidden)
+    return np.where(good, near, direct), np.where(good, lost, hidden)
+
+
+def turning(
+    saddle: Saddle, system: tuple[Array, ...], marks: Array, fall: tuple[Array, Array], way: float
+) -> tuple[Array, Any]:
+    """Signed angle to the turning point on one side, NaN where the separatrix runs away.
+
+    Besides whether it is the other saddle, as high within rounding.
+    """
     A, B, C, N = (x[:, None] for x in system)
     two = np.isfinite(marks[..., 3])  # else the second one is the saddle's next
     first = np.where(two, marks[..., 1], TURN)
-    begin = np.where(saddle.depth(way * first) <= 0.0, marks[..., 0], marks[..., 2])
-    end = np.where(saddle.depth(way * first) <= 0.0, first, TURN)
-    found = (two & (saddle.depth(way * first) <= 0.0)) | (way * N < 0.0)
+    joins = two & (np.abs(fall[0]) <= fall[1])
+    turns = fall[0] <= 0.0
+    begin = np.where(turns, marks[..., 0], marks[..., 2])
+    end = np.where(turns, first, TURN)
+    found = (two & turns) | (way * N < 0.0)
     found &= np.isfinite(saddle.phi)
     low, high = np.where(found, begin, np.nan), np.where(found, end, np.nan)
     x = 0.5 * (low + high)
@@ -204,7 +242,7 @@ def turning(saddle: Saddle, system: tuple[Array, ...], marks: Array, way: float)
         with np.errstate(all="ignore"):
             step = x + depth / (way * (gradient(A, B, C, saddle.phi + way * x) - N))
         x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-    return np.asarray(way * x)
+    return np.asarray(way * np.where(joins, first, x)), joins
 
 
 def lobe(saddle: Saddle, marks: Array, offset: Array, way: float) -> tuple[Array, Array]:
