@@ -12,6 +12,7 @@ which cancels neither next to the saddle nor next to a fold.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ HALVINGS = 64
 #: Gauss's rules whose difference is the error, and panels that are finer towards a saddle.
 RULES = tuple(np.polynomial.legendre.leggauss(n) for n in (12, 16))
 EDGES = np.append(0.0, 0.5 ** np.arange(14, -1, -1))
+#: Taylor's coefficients of (sin x - x)/x^3 by x^2.
+EXCESS = [(-1.0) ** (n + 1) / math.factorial(2 * n + 3) for n in range(9)]
 #: Cells at a time, for memory.
 CELLS = 1024
 
@@ -90,11 +93,14 @@ def sine_excess(x: Any) -> Array:
     True
     """
     x = np.asarray(x, float)
-    square = np.minimum(x * x, 1.0)
-    total = np.zeros(x.shape)
-    for n in range(10, 0, -1):
-        total = -square / ((2 * n) * (2 * n + 1)) * (1.0 + total)
-    return np.asarray(np.where(np.abs(x) < 1.0, x * total, np.sin(x) - x))
+    small = np.abs(x) < 1.0
+    square = np.where(small, x * x, 0.0)
+    total = np.full(x.shape, EXCESS[-1])
+    for coefficient in EXCESS[-2::-1]:
+        total *= square
+        total += coefficient
+    total *= square * x
+    return np.asarray(np.where(small, total, np.sin(x) - x))
 
 
 def tilted_separatrices(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Tilted:
@@ -241,7 +247,9 @@ def turning(
         low, high = np.where(depth > 0.0, x, low), np.where(depth > 0.0, high, x)
         with np.errstate(all="ignore"):
             step = x + depth / (way * (gradient(A, B, C, saddle.phi + way * x) - N))
-        x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        before, x = x, np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        if not (np.abs(x - before) > 2.0**-52 * np.abs(x)).any():
+            break
     return np.asarray(way * np.where(joins, first, x)), joins
 
 
@@ -255,19 +263,17 @@ def lobe(saddle: Saddle, marks: Array, offset: Array, way: float) -> tuple[Array
         (np.where(inner, marks[..., 1], np.nan), marks[..., 2]),
         (np.where(inner, end, np.nan), marks[..., 2]),
     ]
-    seen = saddle.spread()
-    sums = []
-    for nodes, weights in RULES:
-        half = 0.5 * np.diff(EDGES)[:, None]
-        x = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + half * nodes).reshape(-1)
-        w = (half * weights).reshape(-1) * 2.0 * x
-        total = np.zeros(end.shape)
-        for start, stop in legs:
-            length = (stop - start)[..., None]
-            theta = way * (start[..., None] + length * x * x)
-            speed = np.sqrt(np.maximum(2.0 * seen.depth(theta), 0.0))
-            part = 2.0 * np.abs(stop - start) * (speed @ w)
-            total = total + np.where(np.isfinite(start), part, 0.0)
-        sums.append(np.where(np.isfinite(end), total, np.nan))
+    whole = np.broadcast_arrays(*saddle, end)[:-1]
+    sums = [np.where(np.isfinite(end), 0.0, np.nan) for _ in RULES]
+    for start, stop in legs:
+        there = np.isfinite(start + stop) & np.isfinite(end)
+        seen = Saddle._make(x[there] for x in whole).spread()
+        first, length = start[there][:, None], (stop - start)[there][:, None]
+        for total, (nodes, weights) in zip(sums, RULES, strict=True):
+            half = 0.5 * np.diff(EDGES)[:, None]
+            x = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + half * nodes).reshape(-1)
+            w = (half * weights).reshape(-1) * 2.0 * x
+            speed = np.sqrt(np.maximum(2.0 * seen.depth(way * (first + length * x * x)), 0.0))
+            total[there] += 2.0 * np.abs(length[:, 0]) * (speed @ w)
     area = sums[1]
     return area, np.abs(area - sums[0]) + 8.0 * 2.0**-52 * area
