@@ -160,6 +160,8 @@ class EscapeRegime(IntEnum):
 class OrbitKind(IntEnum):
     """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at.
 
+    Under a constant torque one that runs turns round for ever and gains energy each turn.
+
     Examples
     --------
     >>> import phasekit as pk
@@ -173,6 +175,7 @@ class OrbitKind(IntEnum):
     ROTATION = 2
     ASYMPTOTIC = 3
     UNBOUNDED = 4
+    RUNNING = 5
 
 
 class OrbitFamily(IntEnum):

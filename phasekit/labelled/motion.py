@@ -159,7 +159,7 @@ def separatrix_motion(
     -------
     xarray.Dataset
         ``motion_phi`` in rad, continuous from the saddle's angle, and ``motion_dphi`` in s^-1; NaN
-        where the saddle is absent.
+        where the saddle is absent, and on a side to which its separatrix runs away.
 
     Raises
     ------

@@ -77,6 +77,12 @@ def orbits(
         Results of a `Potential` have estimates of their errors, ``period_error`` and
         ``action_error``.
 
+        Under a constant torque, ``pk.Perturbed(system, torque=...)``, the energy is
+        ``phi'^2/2 + V - torque phi`` of the unwrapped angle. Librations are quadratures, with
+        estimates of their errors; an orbit that is running turned back once, at its only turning
+        point, and gains ``gain_per_turn`` from each turn to the next: it has no period and no
+        action, both are NaN, and its other end is infinite.
+
     Raises
     ------
     ParameterError
@@ -205,7 +211,7 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     >>> round(back.phi_of_angle.item(), 12), round(back.dphi_of_angle.item(), 12)
     (0.5, 0.1)
     """
-    rows = select(["orbit_family", "action", "angle", "frequency", "twist"])
+    rows = select(["orbit_family", "action", "angle", "frequency", "twist", "angle_error"])
     return at_states(system, rows, {"phi": ("state_phi", phi), "dphi": ("state_dphi", dphi)})
 
 

@@ -167,3 +167,21 @@ class TiltedTrigonometric(PerturbedTrigonometric):
     """The same under a constant torque alone, which keeps an energy."""
 
     called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
+
+    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
+        """What is said of a quantity: the torque has a part in the energy."""
+        words = dict(super().words(name, units, long_name))
+        return words | ({"equation": TILTED[name]} if name in TILTED else {})
+
+
+_V = "-B cos(phi) + (A/2) cos(phi)^2 - C sin(phi) - torque phi"
+#: Equations that the torque changes, by quantity.
+TILTED = {
+    "potential": f"V = {_V}",
+    "potential_gradient": "V' = B sin(phi) - A sin(phi) cos(phi) - C cos(phi) - torque",
+    "energy_integral": f"h = phi'^2/2 {_V}",
+    "orbit_energy": f"h = phi'^2/2 {_V}",
+    "phase_velocity": "phi' = sqrt(2 (h - V(phi) + torque phi))",
+    "motion_phi": "phi'' = -V'(phi) + torque",
+    "motion_dphi": "phi'' = -V'(phi) + torque",
+}

@@ -114,7 +114,9 @@ def action_in_well(
             with np.errstate(all="ignore"):
                 step = theta + left / (gradient(A, B, C, seen.phi + theta) - N)
             inside = (step - low) * (step - high) < 0.0
-            theta = np.where(inside, step, 0.5 * (low + high))
+            before, theta = theta, np.where(inside, step, 0.5 * (low + high))
+            if not (np.abs(theta - before) > 2.0**-52 * np.abs(theta)).any():
+                break
         turns.append(theta)
     tau, weight = panels(ROUND)
     middle, half = 0.5 * (turns[0] + turns[1]), 0.5 * (turns[1] - turns[0])

@@ -12,6 +12,7 @@ which cancels neither next to the saddle nor next to a fold.
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.laws.perturbed import PerturbedTrigonometric
 from phasekit.perturbation.torque import equilibria_under, torqued_equilibria
 from phasekit.phase.exact.equilibria import Equilibria
+from phasekit.phase.exact.orbits import energy_rises
 from phasekit.phase.exact.potential import gradient
 from phasekit.phase.exact.separatrices import separatrices
 
@@ -31,6 +33,8 @@ HALVINGS = 64
 #: Gauss's rules whose difference is the error, and panels that are finer towards a saddle.
 RULES = tuple(np.polynomial.legendre.leggauss(n) for n in (12, 16))
 EDGES = np.append(0.0, 0.5 ** np.arange(14, -1, -1))
+#: Taylor's coefficients of (sin x - x)/x^3 by x^2.
+EXCESS = [(-1.0) ** (n + 1) / math.factorial(2 * n + 3) for n in range(9)]
 #: Cells at a time, for memory.
 CELLS = 1024
 
@@ -89,11 +93,14 @@ def sine_excess(x: Any) -> Array:
     True
     """
     x = np.asarray(x, float)
-    square = np.minimum(x * x, 1.0)
-    total = np.zeros(x.shape)
-    for n in range(10, 0, -1):
-        total = -square / ((2 * n) * (2 * n + 1)) * (1.0 + total)
-    return np.asarray(np.where(np.abs(x) < 1.0, x * total, np.sin(x) - x))
+    small = np.abs(x) < 1.0
+    square = np.where(small, x * x, 0.0)
+    total = np.full(x.shape, EXCESS[-1])
+    for coefficient in EXCESS[-2::-1]:
+        total *= square
+        total += coefficient
+    total *= square * x
+    return np.asarray(np.where(small, total, np.sin(x) - x))
 
 
 def tilted_separatrices(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Tilted:
@@ -149,20 +156,22 @@ def _of_cells(A: Array, B: Array, C: Array, N: Array, points: Equilibria) -> tup
     )
     saddle = saddle_at(A[:, None], phi, k, N[:, None])
     offset = np.full((*phi.shape, 2), np.nan)
-    area, error = offset.copy(), offset.copy()
+    area, error, joins = offset.copy(), offset.copy(), np.zeros(offset.shape, bool)
     for side, way in enumerate((-1.0, 1.0)):
         marks = marks_of(points.phi, phi, way)
-        offset[..., side] = turning(saddle, (A, B, C, N), marks, way)
+        fall = falls(saddle, (A, B, C, N), marks, way)
+        offset[..., side], joins[..., side] = turning(saddle, (A, B, C, N), marks, fall, way)
         area[..., side], error[..., side] = lobe(saddle, marks, offset[..., side], way)
     closed = np.isfinite(offset)
     loop = np.select(
-        [~there, closed.all(-1), closed.any(-1)], [Loop.ABSENT, Loop.LOBES, Loop.LOBE],
+        [~there, joins.any(-1), closed.all(-1), closed.any(-1)],
+        [Loop.ABSENT, Loop.HETEROCLINIC, Loop.LOBES, Loop.LOBE],
         Loop.UNBOUNDED,
     ).astype(np.int8)  # fmt: skip
     eight = (loop == Loop.LOBES).any(-1)
     topology = np.select(
-        [points.n_equilibria < 0, eight, there.any(-1)],
-        [Topology.NOT_COMPUTED, Topology.FIGURE_EIGHT, Topology.HOMOCLINIC],
+        [points.n_equilibria < 0, joins.any((-1, -2)), eight, there.any(-1)],
+        [Topology.NOT_COMPUTED, Topology.HETEROCLINIC, Topology.FIGURE_EIGHT, Topology.HOMOCLINIC],
         Topology.NONE,
     ).astype(np.int8)
     away = there[..., None] & ~closed
@@ -187,14 +196,49 @@ def marks_of(phi: Array, saddle: Array, way: float) -> Array:
     return np.sort(far, axis=-1)
 
 
-def turning(saddle: Saddle, system: tuple[Array, ...], marks: Array, way: float) -> Array:
-    """Signed angle to the turning point on one side; NaN where the separatrix runs away."""
+def falls(
+    saddle: Saddle, system: tuple[Array, ...], marks: Array, way: float
+) -> tuple[Array, Array]:
+    """Energy of each saddle less that of the other one next on a side; and what rounding hides.
+
+    Under next to no torque the difference is that of no torque, which is known to its last digits,
+    and what the torque N makes of it, ``d(h_i - h_j)/dN = phi_j - phi_i``.
+    """
+    A, B, C, N = (x[:, None] for x in system)
+    two = np.isfinite(marks[..., 3])  # else it is the saddle's own next
+    first = np.where(two, marks[..., 1], TURN)
+    direct = saddle.depth(way * first)
+    size = np.abs(A) + np.abs(B) + np.abs(C) + TURN * np.abs(N)
+    hidden = 16.0 * 2.0**-52 * size
+    level = separatrices(*system[:3])
+    step = energy_rises(*system[:3])[:, 2, None] * np.array([-1.0, 1.0])  # of lower less upper
+    apart = np.mod(way * (level.saddle_phi[:, ::-1] - level.saddle_phi), TURN)
+    slope = 0.5 * (first + apart)
+    near = step + way * N * slope
+    with np.errstate(all="ignore"):
+        least = np.min(np.minimum(saddle.square, level.saddle_exponent**2), axis=1, keepdims=True)
+        bend = (N / least) ** 2
+    terms = np.abs(step) + np.abs(N) * slope
+    lost = terms * (16.0 * 2.0**-52 + bend) + np.abs(N) * np.abs(first - apart)
+    good = two & (lost < hidden)
+    return np.where(good, near, direct), np.where(good, lost, hidden)
+
+
+def turning(
+    saddle: Saddle, system: tuple[Array, ...], marks: Array, fall: tuple[Array, Array], way: float
+) -> tuple[Array, Any]:
+    """Signed angle to the turning point on one side, NaN where the separatrix runs away.
+
+    Besides whether it is the other saddle, as high within rounding.
+    """
     A, B, C, N = (x[:, None] for x in system)
     two = np.isfinite(marks[..., 3])  # else the second one is the saddle's next
     first = np.where(two, marks[..., 1], TURN)
-    begin = np.where(saddle.depth(way * first) <= 0.0, marks[..., 0], marks[..., 2])
-    end = np.where(saddle.depth(way * first) <= 0.0, first, TURN)
-    found = (two & (saddle.depth(way * first) <= 0.0)) | (way * N < 0.0)
+    joins = two & (np.abs(fall[0]) <= fall[1])
+    turns = fall[0] <= 0.0
+    begin = np.where(turns, marks[..., 0], marks[..., 2])
+    end = np.where(turns, first, TURN)
+    found = (two & turns) | (way * N < 0.0)
     found &= np.isfinite(saddle.phi)
     low, high = np.where(found, begin, np.nan), np.where(found, end, np.nan)
     x = 0.5 * (low + high)
@@ -203,8 +247,10 @@ def turning(saddle: Saddle, system: tuple[Array, ...], marks: Array, way: float)
         low, high = np.where(depth > 0.0, x, low), np.where(depth > 0.0, high, x)
         with np.errstate(all="ignore"):
             step = x + depth / (way * (gradient(A, B, C, saddle.phi + way * x) - N))
-        x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
-    return np.asarray(way * x)
+        before, x = x, np.where((step > low) & (step < high), step, 0.5 * (low + high))
+        if not (np.abs(x - before) > 2.0**-52 * np.abs(x)).any():
+            break
+    return np.asarray(way * np.where(joins, first, x)), joins
 
 
 def lobe(saddle: Saddle, marks: Array, offset: Array, way: float) -> tuple[Array, Array]:
@@ -217,19 +263,17 @@ def lobe(saddle: Saddle, marks: Array, offset: Array, way: float) -> tuple[Array
         (np.where(inner, marks[..., 1], np.nan), marks[..., 2]),
         (np.where(inner, end, np.nan), marks[..., 2]),
     ]
-    seen = saddle.spread()
-    sums = []
-    for nodes, weights in RULES:
-        half = 0.5 * np.diff(EDGES)[:, None]
-        x = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + half * nodes).reshape(-1)
-        w = (half * weights).reshape(-1) * 2.0 * x
-        total = np.zeros(end.shape)
-        for start, stop in legs:
-            length = (stop - start)[..., None]
-            theta = way * (start[..., None] + length * x * x)
-            speed = np.sqrt(np.maximum(2.0 * seen.depth(theta), 0.0))
-            part = 2.0 * np.abs(stop - start) * (speed @ w)
-            total = total + np.where(np.isfinite(start), part, 0.0)
-        sums.append(np.where(np.isfinite(end), total, np.nan))
+    whole = np.broadcast_arrays(*saddle, end)[:-1]
+    sums = [np.where(np.isfinite(end), 0.0, np.nan) for _ in RULES]
+    for start, stop in legs:
+        there = np.isfinite(start + stop) & np.isfinite(end)
+        seen = Saddle._make(x[there] for x in whole).spread()
+        first, length = start[there][:, None], (stop - start)[there][:, None]
+        for total, (nodes, weights) in zip(sums, RULES, strict=True):
+            half = 0.5 * np.diff(EDGES)[:, None]
+            x = (0.5 * (EDGES[1:] + EDGES[:-1])[:, None] + half * nodes).reshape(-1)
+            w = (half * weights).reshape(-1) * 2.0 * x
+            speed = np.sqrt(np.maximum(2.0 * seen.depth(way * (first + length * x * x)), 0.0))
+            total[there] += 2.0 * np.abs(length[:, 0]) * (speed @ w)
     area = sums[1]
     return area, np.abs(area - sums[0]) + 8.0 * 2.0**-52 * area

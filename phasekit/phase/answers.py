@@ -53,6 +53,10 @@ class Answers:
         `Orbits` of a state (x, x').
     momentum : (str, float, str), optional
         Name, value and unit of the momentum that is constant.
+    tilt : float
+        What V falls by in a turn of an angle; where it does, one turn is looked at as a line.
+    cut_at : callable, optional
+        The same of the turn that begins at another angle, where V falls.
     """
 
     coordinate: str
@@ -70,11 +74,13 @@ class Answers:
     orbit: Callable[[float, float], Any]
     inertia: Callable[[Any], Array] = np.ones_like
     momentum: tuple[str, float, str] | None = None
+    tilt: float = 0.0
+    cut_at: Callable[[float], Answers] | None = None
 
     @property
     def is_angle(self) -> bool:
         """Whether the coordinate is an angle in rad."""
-        return _is_turn(self.period)
+        return _is_turn(self.period) or self.cut_at is not None
 
 
 @functools.singledispatch
@@ -113,8 +119,8 @@ def _(law: Trigonometric, values: Mapping[str, float]) -> Answers:
         units="s-2",
         potential=lambda x: closed_form.potential(A, B, C, x),
         orbit=lambda x, v: orbits(A, B, C, x, v),
-        **_present(points),
-        **_highest_first(loops),
+        **present(points),
+        **highest_first(loops),
     )
 
 
@@ -130,8 +136,8 @@ def _(law: Formula, values: Mapping[str, float]) -> Answers:
         units="s-2" if _is_turn(law.period) else "",
         potential=lambda x: law.values(x, *own),
         orbit=lambda x, v: functions.orbits(law, *own, x, v),
-        **_present(points),
-        **_highest_first(loops),
+        **present(points),
+        **highest_first(loops),
     )
 
 
@@ -155,8 +161,8 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
         orbit=functools.partial(path.orbit, ground),
         inertia=lambda x: np.asarray(law.inertia(x)[0]),
         momentum=law.momentum,
-        **_present(law.equilibria()),
-        **_highest_first(loops._replace(saddle_phi=own, turning_offset=offset)),
+        **present(law.equilibria()),
+        **highest_first(loops._replace(saddle_phi=own, turning_offset=offset)),
     )
 
 
@@ -164,14 +170,14 @@ def _is_turn(period: float | None) -> bool:
     return period is not None and math.isclose(period, 2.0 * math.pi, rel_tol=1e-12)
 
 
-def _present(points: Any) -> dict[str, Any]:
+def present(points: Any) -> dict[str, Any]:
     """Equilibria that are there, by phi."""
     there = np.flatnonzero(np.isfinite(points.phi))
     order = there[np.argsort(points.phi[there])]
     return {name: getattr(points, name)[order] for name in ("phi", "kind", "energy")}
 
 
-def _highest_first(loops: Any) -> dict[str, Any]:
+def highest_first(loops: Any) -> dict[str, Any]:
     """Saddles that are there, by their energy."""
     there = np.flatnonzero(loops.loop > Loop.ABSENT)
     order = there[np.argsort(-loops.saddle_energy[there], kind="stable")]

@@ -25,6 +25,8 @@ _SAMPLES = 241
 _BISECTIONS = 60
 #: Energies that differ by less than this part of the largest are one.
 _SAME = 8.0 * np.finfo(float).eps
+#: Turns over which what runs on is followed.
+_TURNS = 24
 #: How far outside an arc rounding may put a state that is on it, as part of what is seen.
 _NEAR = 1e-6
 
@@ -237,6 +239,8 @@ class LevelCurves:
     def separatrices(self) -> list[Separatrix]:
         """What leaves the saddles, the highest first; what joins two of them once."""
         known = self.answers
+        if known.cut_at is not None:
+            return self._tilted_separatrices()
         found = []
         for s, energy, loop, offsets in zip(
             known.saddle_phi, known.saddle_energy, known.loop, known.turning_offset, strict=True
@@ -254,6 +258,39 @@ class LevelCurves:
                 arc = (float(min(s, end)), float(max(s, end)))
                 found.append(Separatrix(float(energy), arc, shape or Loop.UNBOUNDED))
         return found
+
+    def _tilted_separatrices(self) -> list[Separatrix]:
+        """What leaves the saddles of one turn of a potential that falls, from turn to turn."""
+        known = self.answers
+        found = []
+        for s, energy, loop, offsets in zip(
+            known.saddle_phi, known.saddle_energy, known.loop, known.turning_offset, strict=True
+        ):
+            for side, offset in enumerate(offsets):
+                shape = Loop(int(loop)) if np.isfinite(offset) else Loop.UNBOUNDED
+                for arc in self.arcs(float(energy)):
+                    if arc[1 - side] == s:
+                        parts = self.followed(float(energy), arc)
+                        found += [Separatrix(height, part, shape) for height, part in parts]
+        return found
+
+    def followed(self, energy: float, arc: Arc) -> list[tuple[float, Arc]]:
+        """Return a level over an arc, and how it goes on at the other side of one turn."""
+        parts = [(energy, arc)]
+        if self.answers.cut_at is None:
+            return parts
+        for here, there, rise in ((1, 0, self.answers.tilt), (0, 1, -self.answers.tilt)):
+            level, part = energy, arc
+            for _ in range(_TURNS):
+                if part[here] != self.window[here]:
+                    break
+                level += rise
+                on = [one for one in self.arcs(level) if one[there] == self.window[there]]
+                if not on:
+                    break
+                (part,) = on
+                parts.append((level, part))
+        return parts
 
     def _is_saddle(self, x: float) -> bool:
         size = 1e-3 * _NEAR * (self.window[1] - self.window[0])

@@ -218,8 +218,7 @@ def _draw_separatrices(ax: Axes, tip: _Tip) -> list[Artist]:
 
 def _draw_orbit(ax: Axes, tip: _Tip, start: tuple[float, float], number: int) -> list[Artist]:
     land, look = tip.land, strokes.orbit_look(number)
-    energy = land.energy(*start)
-    for arc in strokes.orbit_arcs(land, start):
+    for energy, arc in strokes.orbit_levels(land, start):
         phi, speed = land.curve(arc, energy)
         if arc == land.window:
             curves = [tip(phi, speed if start[1] >= 0.0 else -speed)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from phasekit.labels.arguments import bad, one_of, reals
 from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
-from phasekit.plot.parts.circle import Circle
+from phasekit.plot.parts.circle import TURN, Circle
 from phasekit.plot.parts.units import Units, printed
 from phasekit.systems.as_system import single
 
@@ -52,7 +53,9 @@ def phase_portrait(
     Parameters
     ----------
     system
-        A system whose parameters are scalars; a `Potential` on a line or a circle as well; a
+        A system whose parameters are scalars; a `Potential` on a line or a circle as well; one
+        under a constant torque, ``pk.Perturbed(system, torque=...)``, whose levels are those of one
+        turn, on which what runs on comes back higher, or lower, each time; a
         `FreeGyroRotor` at a momentum, ``rotor.amended(p)``, or by itself at the momentum that it
         has when the disk hangs at rest and the support turns at the disk's omega1.
     energies : float or sequence of float, optional
@@ -180,13 +183,18 @@ class Picture:
             raise bad("angles", shown.angles, wants)
         scale = units.scale(*place), units.scale(*rate)
         if shown.cut is not None:
-            if known.period is None:
+            if not known.is_angle and known.period is None:
                 raise bad("cut", shown.cut, "None, for the coordinate is not on a circle")
-            land = LevelCurves(known, Circle.cut_at(shown.cut, scale[0], known.period).low)
+            low = Circle.cut_at(shown.cut, scale[0], known.period or TURN).low
+            land = (
+                LevelCurves(known, low) if known.cut_at is None else LevelCurves(known.cut_at(low))
+            )
         chosen = (
             land.levels(1.0 / (6.0 * density)) if energies is None else levels_of(land, energies)
         )
         starts = [] if orbits is None else starts_of(land, orbits)
+        if known.cut_at is not None:  # angles, though the picture is one of a line
+            starts = [(float(Circle(land.window[0]).home(x)), v) for x, v in starts]
         symbol = labels.coordinate_symbol(known.coordinate)
         return cls(land, chosen, starts, units, rate, symbol, scale)
 
@@ -206,7 +214,7 @@ class Picture:
         text = f"${self.symbol}$"
         if known.is_angle:
             name = known.coordinate
-            style.circle_axis(ax, "x", self.units, strokes.circle_of(self.land), name)
+            style.circle_axis(ax, "x", self.units, Circle(self.land.window[0]), name)
             text += f" ({self.units.text(name, 'rad')})"
         else:
             ax.set_xlim(*(self.scale[0] * end for end in self.land.window))
@@ -219,6 +227,7 @@ class Picture:
 
 def curves_of(system: Any) -> LevelCurves:
     """Return the level curves of one system."""
+    importlib.import_module("phasekit.perturbation.tilted_answers")  # registers there
     return LevelCurves(answers(*single(system)))
 
 

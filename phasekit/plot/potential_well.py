@@ -142,5 +142,5 @@ def _draw_chords(ax: Axes, picture: Picture) -> None:
                 x = (phi + turn) * stretch
                 ax.fill_between(x, height, energy * rise, zorder=0.5, **style.EIGHT_FILL)
     for number, start in enumerate(picture.starts):
-        for arc in strokes.orbit_arcs(land, start):
-            chord(land.energy(*start), arc, 4, strokes.orbit_look(number))
+        for energy, arc in strokes.orbit_levels(land, start):
+            chord(energy, arc, 4, strokes.orbit_look(number))

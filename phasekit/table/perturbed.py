@@ -8,7 +8,7 @@ from phasekit.laws.perturbed import (
     PerturbedTrigonometric,
     TiltedTrigonometric,
 )
-from phasekit.table.row import ABC, LAW, SIDES, Pass, Quantity
+from phasekit.table.row import ABC, LAW, SIDES, STATE, Pass, Quantity
 
 REGION, DIRECTION = ("region",), ("direction",)
 CHIRIKOV = "[Chirikov1979] section 4"
@@ -63,6 +63,16 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("lobe_area_error", "separatrices", SIDES, "float64", "s-1",
              "estimated error of the area inside the separatrix", "of its quadrature", TORQUE,
              of=TiltedTrigonometric),
+    Quantity("period_error", "orbits", (), "float64", "s", "estimated error of the period",
+             "of its quadrature", TORQUE, of=TiltedTrigonometric),
+    Quantity("action_error", "orbits", (), "float64", "s-1", "estimated error of the action",
+             "of its quadrature", TORQUE, of=TiltedTrigonometric),
+    Quantity("gain_per_turn", "orbits", (), "float64", "s-2",
+             "energy that an orbit which runs gains each turn, 0 for others", "2 pi |torque|",
+             TORQUE, of=TiltedTrigonometric),
+    Quantity("angle_error", "action_angle", (), "float64", "rad",
+             "estimated error of the angle variable", "distance from the orbit found back", TORQUE,
+             of=TiltedTrigonometric),
     Quantity("retrapping_torque", "retrapping", DIRECTION, "float64", "s-2",
              "least constant torque, over the inertia, that keeps a rotation going, at small "
              "damping", "(damping S + quadratic int |phi'|^3 dt)/(2 pi) of a winding separatrix",
@@ -100,6 +110,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 
 _CAPTURE = "phasekit.perturbation.capture:"
 _TORQUE = "phasekit.perturbation.torque:"
+_TILTED = "phasekit.perturbation.tilted_"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
 
 PASSES: tuple[Pass, ...] = (
@@ -123,6 +134,21 @@ PASSES: tuple[Pass, ...] = (
         (LAW,),
         ("equilibria", "separatrices"),
         TiltedTrigonometric,
+    ),
+    *(
+        Pass(_TILTED + name, (LAW, *states), groups, TiltedTrigonometric, options)
+        for name, states, groups, options in (
+            ("energy:potential", ("state_phi",), ("potential",), ()),
+            ("energy:gradient", ("state_phi",), ("potential_gradient",), ()),
+            ("energy:curvature", ("state_phi",), ("potential_curvature",), ()),
+            ("energy:energy", STATE, ("energy_integral",), ()),
+            ("energy:phase_velocity", ("state_phi", "state_energy"), ("phase_velocity",), ()),
+            ("orbits:orbits", STATE, ("orbits",), ()),
+            ("orbits:angle_variables", STATE, ("action_angle",), ()),
+            ("orbits:orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
+            ("orbits:orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
+            ("orbits:separatrix_motion", ("time",), ("motion",), ("saddle", "side")),
+        )
     ),
     Pass("phasekit.perturbation.escape:escape_rate", (LAW,), ("escape",), PerturbedTrigonometric),
     Pass(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -127,15 +128,20 @@ def orbits_at_energy(formula: Formula, *inputs: npt.ArrayLike, center: int | Non
     points = ground.points
     usable = points.kind == EquilibriumKind.CENTER
     column, there = _pick(points.energy, usable, center)
-    rows = np.arange(h.size)
+    states = states_at_energy(ground, h, column, there)
+    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * states.kinetic))
+    return _shaped(found, shape)
+
+
+def states_at_energy(ground: Ground, h: Array, column: Index, there: Any) -> rounds.States:
+    """States of an energy at a center, by its column."""
+    points, rows = ground.points, np.arange(h.size)
     excess = h[:, None] - points.energy
     x = np.where(there, _at(points.phi, rows, column), np.nan)
     kinetic = np.where(there, _at(excess, rows, column), np.nan)
     kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
     size = np.maximum(np.abs(h)[:, None], np.abs(points.energy))
-    states = rounds.States(x, np.zeros(x.shape), kinetic, excess, 4.0 * np.finfo(float).eps * size)
-    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * kinetic))
-    return _shaped(found, shape)
+    return rounds.States(x, np.zeros(x.shape), kinetic, excess, 4.0 * np.finfo(float).eps * size)
 
 
 def orbits_at_gap(
@@ -144,8 +150,19 @@ def orbits_at_gap(
     """Orbits by their energy above a saddle: its number, or the lowest; side 0 left, 1 right."""
     *parameters, level = inputs
     ground, shape, (gap,) = _cells(formula, parameters, (level,))
-    points = ground.points
     column, there = _pick_saddle(ground, saddle)
+    height = _at(ground.points.energy, np.arange(gap.size), column)
+    states = states_at_gap(ground, gap, column, there, side)
+    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * states.kinetic))
+    energies = np.where(found.orbit_kind >= 0, height + gap, np.nan)
+    return _shaped(found._replace(orbit_energy=energies), shape)
+
+
+def states_at_gap(
+    ground: Ground, gap: Array, column: Index, there: Any, side: int
+) -> rounds.States:
+    """States of an energy above a saddle, by its column, on one side of it."""
+    points = ground.points
     rows = np.arange(gap.size)
     height = _at(points.energy, rows, column)
     rise = height[:, None] - points.energy
@@ -157,16 +174,13 @@ def orbits_at_gap(
     way = np.where((points.kind == EquilibriumKind.CENTER) & (way > 0.0), way, np.inf)
     center = np.argmin(way, axis=1) if way.shape[1] else column
     inside = gap <= 0.0
-    there &= ~inside | np.isfinite(_at(way, rows, center))
+    there = there & (~inside | np.isfinite(_at(way, rows, center)))
     start = np.where(inside, center, column)
     kinetic = np.where(there, _at(excess, rows, start), np.nan)
     kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
     x = np.where(there, _at(points.phi, rows, start), np.nan)
     blur = np.zeros(excess.shape)
-    states = rounds.States(x, np.zeros(x.shape), kinetic, excess, blur)
-    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * kinetic))
-    energies = np.where(found.orbit_kind >= 0, height + gap, np.nan)
-    return _shaped(found._replace(orbit_energy=energies), shape)
+    return rounds.States(x, np.zeros(x.shape), kinetic, excess, blur)
 
 
 def flow(formula: Formula, *inputs: npt.ArrayLike) -> Motion:

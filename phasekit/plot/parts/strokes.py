@@ -89,8 +89,8 @@ def draw_separatrices(ax: Axes, land: LevelCurves, scale: Scale) -> list[Artist]
 def draw_orbit(ax: Axes, land: LevelCurves, start: State, number: int, scale: Scale) -> Artist:
     """Draw the orbit through a start (x, x'), mark the start, return a handle."""
     look = orbit_look(number)
-    where, energy = circle_of(land).home(start[0]), land.energy(*start)
-    for arc in orbit_arcs(land, start):
+    where = circle_of(land).home(start[0])
+    for energy, arc in orbit_levels(land, start):
         if land.comes_back(*start):
             draw_level(ax, land, energy, arc, scale, zorder=4, **look)
         else:
@@ -102,11 +102,16 @@ def draw_orbit(ax: Axes, land: LevelCurves, start: State, number: int, scale: Sc
     return Line2D([], [], label=start_name(land, start, scale), **START, **look)
 
 
-def orbit_arcs(land: LevelCurves, start: State) -> list[Arc]:
-    """Return the arc of the orbit through a start; none where it is at rest or out of sight."""
+def orbit_levels(land: LevelCurves, start: State) -> list[tuple[float, Arc]]:
+    """Return energy and arc of the orbit through a start, and of its turns where they differ.
+
+    None where it is at rest or out of sight.
+    """
     if land.at_rest(*start):
         return []
-    return land.arcs_of((land.energy(*start), circle_of(land).home(start[0])))
+    energy = land.energy(*start)
+    arcs = land.arcs_of((energy, circle_of(land).home(start[0])))
+    return [level for arc in arcs for level in land.followed(energy, arc)]
 
 
 def start_name(land: LevelCurves, start: State, scale: Scale) -> str:
