@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phasekit.labels.arguments import Value, bad, numeric
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import Value, bad, describe, numeric
+from phasekit.laws.trigonometric import Values
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -96,3 +100,19 @@ class Parameter:
 def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:
     """Attributes of the coordinates or results that are named as these parameters."""
     return {p.name: {"long_name": p.long_name, "units": p.units} for p in parameters}
+
+
+def of_parameters(products: Callable[[Values], Any]) -> Callable[[Values], Any]:
+    """A law that names what it was given where that is not its parameters."""
+
+    @functools.wraps(products)
+    def checked(v: Values) -> Any:
+        try:
+            return products(v)
+        except Exception as error:
+            raise ParameterError(
+                f"v: got {describe(v)}, wants the parameters by name, angles as (sine, cosine, "
+                f"radius): {type(error).__name__}: {error}"
+            ) from error
+
+    return checked
