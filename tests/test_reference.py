@@ -92,6 +92,66 @@ def test_everything_with_a_page_has_an_example(name):
         assert not bare, f"{name}: no example of {', '.join(bare)}"
 
 
+def sections(doc):
+    """Sections of a numpydoc docstring, by their titles."""
+    parts = re.split(r"^([A-Z][A-Za-z ]+)\n-{3,}\n", inspect.cleandoc(doc or ""), flags=re.M)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def named(section):
+    """Names that a section of parameters or results declares."""
+    heads = re.findall(r"^(\S[^:\n]*?)(?: :.*)?$", section, re.M)
+    return {name.strip(" *") for head in heads for name in head.split(",")}
+
+
+def undocumented(function, docs):
+    """Arguments that no docstring names, and "Returns" where what comes back is not said."""
+    signature = inspect.signature(function)
+    said = [sections(doc) for doc in docs]
+    known = {name for one in said for name in named(one.get("Parameters", ""))}
+    silent = signature.return_annotation in (None, "None")
+    missing = [name for name in signature.parameters if name not in {"self", "cls"} | known]
+    if not silent and not any({"Returns", "Yields"} & set(one) for one in said):
+        missing.append("Returns")
+    return missing
+
+
+@pytest.mark.parametrize("name", listed())
+def test_arguments_and_results_are_explained(name):
+    thing = find(name)
+    if not inspect.isclass(thing):
+        assert not undocumented(thing, [thing.__doc__])
+        return
+    if "Parameters" in sections(thing.__doc__):  # not made by phasekit alone
+        made = thing.__init__ if "__init__" in vars(thing) else thing.__new__
+        assert not undocumented(made, [thing.__doc__, "Returns\n-------\nIt"])
+    lacking = {}
+    for method in methods(thing):
+        raw = inspect.getattr_static(thing, method)
+        # An override of a law repeats the words of its base.
+        owners = [o.__dict__[method] for o in thing.__mro__ if method in o.__dict__]
+        owners = owners if method == "products" else owners[:1]
+        docs = [getattr(one, "__func__", one).__doc__ for one in owners]
+        if missing := undocumented(getattr(raw, "__func__", raw), docs):
+            lacking[method] = missing
+    assert not lacking
+
+
+def test_what_is_not_explained_is_found():
+    def half(x, y, *more, **rest) -> int:
+        """Say something.
+
+        Parameters
+        ----------
+        x : float
+            A number: not y.
+        *more
+            Others.
+        """
+
+    assert undocumented(half, [half.__doc__]) == ["y", "rest", "Returns"]
+
+
 def test_an_example_is_missed_where_there_is_none():
     class Bare:
         """Says nothing.

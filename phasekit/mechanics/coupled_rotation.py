@@ -121,6 +121,11 @@ class CoupledRotation(Frozen):
             Angular accelerations in rad/s^2. That of a body which turns freely about its shaft:
             `CoupledRotationState.free_acceleration`.
 
+        Returns
+        -------
+        CoupledRotationState
+            Of the shape of states and machines together.
+
         Raises
         ------
         ParameterError

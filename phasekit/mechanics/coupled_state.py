@@ -134,6 +134,11 @@ class CoupledRotationState(CoupledMomentum):
         ----------
         ddomega1, ddomega2 : float or array_like
             Rates of change of domega1 and domega2 in rad/s^3.
+
+        Returns
+        -------
+        dict of str to ndarray
+            By the names of `rotators`, shape (...).
         """
         jerks = {1: numbers("ddomega1", ddomega1), 2: numbers("ddomega2", ddomega2)}
         common_shape(state=self.shape, ddomega1=jerks[1].shape, ddomega2=jerks[2].shape)
@@ -163,6 +168,11 @@ class CoupledRotationState(CoupledMomentum):
             Weight vector in N, fixed frame, (..., 3).
         s_A, s_B : float or array_like
             Positions on the shaft in m, of either sign.
+
+        Returns
+        -------
+        SelfBearings
+            F_A2 and F_B2, each (..., 3).
 
         Raises
         ------
@@ -197,6 +207,11 @@ class CoupledRotationState(CoupledMomentum):
         rho_B1 : float or array_like
             Position of B1 in m, of either sign, not zero.
 
+        Returns
+        -------
+        FixedBearings
+            F_A1 and F_B1, each (..., 3).
+
         Raises
         ------
         ParameterError
@@ -219,16 +234,36 @@ class CoupledRotationState(CoupledMomentum):
     def drive_torque(self, G: npt.ArrayLike) -> Array:
         """Couple about n1 with which the drive keeps the motion of phi1, in N m.
 
-        ``(n1, dL_O1/dt - [r_C, G])``, G being the weight vector in N, (..., 3).
+        ``(n1, dL_O1/dt - [r_C, G])``.
+
+        Parameters
+        ----------
+        G : array_like
+            Weight vector in N, fixed frame, (..., 3).
+
+        Returns
+        -------
+        float or ndarray
+            Shape (...).
         """
         force, moment = self._loads(G)
         return dot(self.n1, cross(self.r0, force) + moment)
 
     @quiet
     def power(self, G: npt.ArrayLike) -> Array:
-        """Power ``omega1 (n1, W)`` of the drive in W; G as of `drive_torque`.
+        """Power ``omega1 (n1, W)`` of the drive, in W.
 
         Where the body turns freely about n2, the rate of kinetic and potential energy together.
+
+        Parameters
+        ----------
+        G : array_like
+            Weight vector in N, fixed frame, (..., 3).
+
+        Returns
+        -------
+        float or ndarray
+            Shape (...).
         """
         return np.asarray(self.omega1 * self.drive_torque(G))[()]
 
@@ -236,7 +271,17 @@ class CoupledRotationState(CoupledMomentum):
     def self_torque(self, G: npt.ArrayLike) -> Array:
         """Couple ``Q2 = (n2, M_O2 - [rho_C, G])`` from the carrier on the body about n2, in N m.
 
-        What keeps the motion of phi2; zero in free motion. G is the weight vector in N, (..., 3).
+        What keeps the motion of phi2; zero in free motion.
+
+        Parameters
+        ----------
+        G : array_like
+            Weight vector in N, fixed frame, (..., 3).
+
+        Returns
+        -------
+        float or ndarray
+            Shape (...).
         """
         return dot(self.n2, self._loads(G)[1])
 
@@ -253,6 +298,11 @@ class CoupledRotationState(CoupledMomentum):
             Weight vector in N, fixed frame, (..., 3).
         torque : float or array_like
             Couple about n2 from the carrier on the body in N m, a motor's or a brake's.
+
+        Returns
+        -------
+        float or ndarray
+            Shape (...).
         """
         torque = numbers("torque", torque)
         moment = self._loads(G, torque=torque.shape)[1] - times(self.domega2, self.inertia_moment_2)

@@ -39,6 +39,16 @@ class MassMoments(Frozen):
 
         [HedrihVeljovic2011] (2.1); perpendicular to n and to the vector to the center.
 
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis, of any length, shape (..., 3).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
+
         Examples
         --------
         >>> import phasekit as pk
@@ -52,6 +62,16 @@ class MassMoments(Frozen):
         """Mass inertia moment vector ``J_n = sum m [rho, [n, rho]]`` in kg m^2.
 
         The inertia tensor applied to n; [HedrihVeljovic2011] (2.2).
+
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis, of any length, shape (..., 3).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
 
         Examples
         --------
@@ -67,6 +87,16 @@ class MassMoments(Frozen):
 
         [HedrihVeljovic2011] (2.5), (2.6); it is zero for principal axes.
 
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis, of any length, shape (..., 3).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
+
         Examples
         --------
         >>> import phasekit as pk
@@ -79,6 +109,16 @@ class MassMoments(Frozen):
     @quiet
     def axial_moment(self, n: npt.ArrayLike) -> Array:
         """Moment of inertia ``(n, J_n)`` about the axis, in kg m^2.
+
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis, of any length, shape (..., 3).
+
+        Returns
+        -------
+        float or ndarray
+            Shape (...).
 
         Examples
         --------
@@ -93,6 +133,11 @@ class MassMoments(Frozen):
     def polar_moment(self) -> Array:
         """Polar moment ``J_O = sum m rho^2`` of the pole, half the trace of the tensor, in kg m^2.
 
+        Returns
+        -------
+        float or ndarray
+            Shape (...).
+
         Examples
         --------
         >>> import phasekit as pk
@@ -105,6 +150,16 @@ class MassMoments(Frozen):
     def spherical_moment(self, n: npt.ArrayLike) -> Array:
         """Spherical part ``(2/3) J_O n`` of the inertia moment vector, in kg m^2.
 
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis, of any length, shape (..., 3).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
+
         Examples
         --------
         >>> import phasekit as pk
@@ -116,6 +171,16 @@ class MassMoments(Frozen):
     @quiet
     def deviatoric_moment(self, n: npt.ArrayLike) -> Array:
         """Deviatoric part ``J_n - (2/3) J_O n`` of the inertia moment vector, in kg m^2.
+
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis, of any length, shape (..., 3).
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
 
         Examples
         --------
@@ -145,6 +210,11 @@ class MassMoments(Frozen):
             Angular velocities of the body and of the axis, vectors (..., 3) in rad/s; by default
             the axis keeps its direction.
 
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
+
         Examples
         --------
         >>> import phasekit as pk
@@ -168,6 +238,18 @@ class MassMoments(Frozen):
         ``dJ_n/dt = [omega, J_n] + I [Omega - omega, n]``, I being the inertia tensor; arguments as
         of `linear_moment_rate`.
 
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis now, of any length, shape (..., 3).
+        angular_velocity, axis_velocity : array_like
+            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s.
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
+
         Examples
         --------
         >>> import phasekit as pk
@@ -188,6 +270,18 @@ class MassMoments(Frozen):
         """Rate of change of D_n while the body turns about the pole, in kg m^2/s.
 
         That of ``D_n = J_n - n (n, J_n)``; arguments as of `linear_moment_rate`.
+
+        Parameters
+        ----------
+        n : array_like
+            Direction of the axis now, of any length, shape (..., 3).
+        angular_velocity, axis_velocity : array_like
+            Angular velocities of the body and of the axis, vectors (..., 3) in rad/s.
+
+        Returns
+        -------
+        ndarray
+            Shape (..., 3).
 
         Examples
         --------

@@ -129,6 +129,10 @@ class RigidBody(MassMoments):
         positions : array_like
             Positions from the pole in m, shape (..., n, 3).
 
+        Returns
+        -------
+        RigidBody
+
         Raises
         ------
         ParameterError
@@ -174,6 +178,10 @@ class RigidBody(MassMoments):
         beta : float or array_like
             Angle between the shaft and the diameter through O2, 0 to pi rad.
 
+        Returns
+        -------
+        RigidBody
+
         Raises
         ------
         ParameterError
@@ -209,6 +217,15 @@ class RigidBody(MassMoments):
         The transfer of [HedrihVeljovic2011] (2.3), whose vector points from the new pole to the
         old one; to the mass center and from it, the theorem of Huygens and Steiner, (2.4).
 
+        Parameters
+        ----------
+        vector : array_like
+            Where the new pole lies from this one, in m, shape (..., 3).
+
+        Returns
+        -------
+        RigidBody
+
         Examples
         --------
         >>> RigidBody.from_points([2.0], [[3.0, 0.0, 1.0]]).shifted([3, 0, 0])
@@ -225,6 +242,10 @@ class RigidBody(MassMoments):
     def centroidal(self) -> Self:
         """Return the body with its mass center as the pole.
 
+        Returns
+        -------
+        RigidBody
+
         Examples
         --------
         >>> RigidBody.from_points([1.0, 1.0], [[1, 0, 0], [1, 2, 0]]).centroidal()
@@ -240,6 +261,10 @@ class RigidBody(MassMoments):
         ----------
         matrix : array_like
             Orthogonal matrices (..., 3, 3); of determinant -1 they give mirror images.
+
+        Returns
+        -------
+        RigidBody
 
         Raises
         ------

@@ -26,6 +26,8 @@ from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
+ROUNDING = 1e-10  # beside its size, what a located state may be wrong by
+
 _STABLE: style.Look = {
     "color": style.BLUE,
     "linestyle": "-",
@@ -174,6 +176,8 @@ def branch(
         handles[kind + name] = Line2D([], [], linestyle="none", **look)
     if circle is not None:
         style.circle_axis(axes, "y", shown, circle)
+    else:
+        _show_constant(axes, abs(stretch[-1]) * max(map(_size, several, columns)))
     if labels:
         label_points(axes, named)
     axes.set_xlabel(words.label(columns[0][0], shown, style.letters(axes, "x")))
@@ -294,6 +298,23 @@ def _looks(one: Branch) -> list[style.Look]:
             for k in kinds
         ]
     return [_STABLE if k == 0 else _UNSTABLE for k in points.n_unstable.values]
+
+
+def _size(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> float:
+    """The size of what is drawn upwards: its values, or that of a state on scaled axes."""
+    column = pair[1]
+    scale = np.ravel(getattr(one.curve, "scale", ()))  # periodic orbits have none
+    sizes = dict(zip((*one.problem_state, *one.free), scale, strict=False))
+    values = np.abs(column.values[np.isfinite(column.values)])
+    return float(max(values.max(initial=0.0), sizes.get(str(column.name), 0.0)))
+
+
+def _show_constant(axes: Axes, size: float) -> None:
+    """Show what changes by rounding alone as the constant that it is."""
+    low, high = axes.dataLim.intervaly
+    if 0.0 <= high - low <= ROUNDING * size:
+        middle = 0.5 * (low + high)
+        axes.set_ylim(middle - 0.1 * size, middle + 0.1 * size)
 
 
 def _cuts(one: Branch, pair: Sequence[xr.DataArray]) -> Any:

@@ -78,6 +78,7 @@ def multipliers(
     axes.set_aspect("equal")
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
+    axes.locator_params(nbins=5)  # as many ticks at any size, so that the layout keeps their room
     bar = axes.figure.colorbar(dots, ax=axes)
     bar.set_label(labels.label(along, shown, style.letters(axes, "y")))
     axes.set_xlabel("real part of the multipliers")

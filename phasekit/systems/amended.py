@@ -82,26 +82,81 @@ class Amended(Lawful):
         return {}
 
     def potential(self, phi: States) -> States:
-        """Amended potential V_p in J at angles in rad."""
+        """Amended potential V_p in J at angles in rad.
+
+        Parameters
+        ----------
+        phi : float, array_like or xarray.DataArray
+            Angle of the disk in rad.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As phi.
+        """
         return self._potential(0, "amended_potential", "amended potential", phi)
 
     def gradient(self, phi: States) -> States:
-        """First derivative of the amended potential, in J."""
+        """First derivative of the amended potential, in J.
+
+        Parameters
+        ----------
+        phi : float, array_like or xarray.DataArray
+            Angle of the disk in rad.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As phi.
+        """
         return self._potential(1, "amended_gradient", "gradient of the amended potential", phi)
 
     def curvature(self, phi: States) -> States:
-        """Second derivative of the amended potential, in J."""
+        """Second derivative of the amended potential, in J.
+
+        Parameters
+        ----------
+        phi : float, array_like or xarray.DataArray
+            Angle of the disk in rad.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As phi.
+        """
         return self._potential(2, "amended_curvature", "curvature of the amended potential", phi)
 
     def effective_inertia(self, phi: States) -> States:
-        """Inertia ``M22 - M12^2/M11`` of phi alone, in kg m^2."""
+        """Inertia ``M22 - M12^2/M11`` of phi alone, in kg m^2.
+
+        Parameters
+        ----------
+        phi : float, array_like or xarray.DataArray
+            Angle of the disk in rad.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As phi.
+        """
         rows = {"effective_inertia": ("kg m2", "inertia of the disk's angle at fixed momentum")}
         return on_states(lambda x: (mechanics.effective_inertia(self._machine, x),), rows, phi=phi)[
             0
         ]
 
     def omega1(self, phi: States, dphi: States) -> States:
-        """Angular velocity ``(p - M12 phi')/M11`` of the support, in s^-1."""
+        """Angular velocity ``(p - M12 phi')/M11`` of the support, in s^-1.
+
+        Parameters
+        ----------
+        phi, dphi : float, array_like or xarray.DataArray
+            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As the states.
+        """
 
         def function(*state: Any) -> tuple[Any, ...]:
             return (mechanics.support_velocity(self._machine, self.p, *state),)
@@ -113,6 +168,18 @@ class Amended(Lawful):
         """Angular velocity of the disk at an angle, on the level of an energy in J.
 
         ``+sqrt(2 (energy - V_p)/(M22 - M12^2/M11))`` in s^-1; NaN where the energy is below V_p.
+
+        Parameters
+        ----------
+        phi : float, array_like or xarray.DataArray
+            Angle of the disk in rad.
+        energy : float, array_like or xarray.DataArray
+            The level in J; broadcasts with phi.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As phi and energy.
         """
 
         def function(angle: Any, level: Any) -> tuple[Any, ...]:

@@ -11,6 +11,7 @@ from phasekit.systems.system import MODELS, Model
 
 #: Where models are; each registers itself when it is imported.
 HOMES = (
+    "phasekit.systems.reduced",
     "phasekit.systems.disk",
     "phasekit.systems.analogues",
     "phasekit.systems.field_analogues",

@@ -191,6 +191,11 @@ class SpinOrbit(Model):
         asymmetry, mean_motion : float or array_like
             As of the class.
 
+        Returns
+        -------
+        SpinOrbit
+            With the strength ``H(p, e)``.
+
         Raises
         ------
         ParameterError

@@ -145,13 +145,28 @@ class FreeGyroRotor(RotorMotions):
 
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
-        """Names of the parameters on which the equilibria depend."""
+        """Names of the parameters on which the equilibria depend.
+
+        Returns
+        -------
+        tuple of str
+        """
         return ("beta", "e", "a", "r", "omega1", "m", "g", "carrier_inertia", "momentum")
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed, of the disk or of the support.
 
         Arrays make axes of maps; a machine with arrays has equilibria, and no single motion.
+
+        Parameters
+        ----------
+        **changes : float, array_like or xarray.DataArray
+            New values by name; ``disk`` for the whole disk.
+
+        Returns
+        -------
+        FreeGyroRotor
+            This one stays as it is.
 
         Raises
         ------
@@ -169,6 +184,15 @@ class FreeGyroRotor(RotorMotions):
     @classmethod
     def from_dataset(cls, ds: xr.Dataset) -> Self:
         """Rebuild the machine from a map, or from any selection of it.
+
+        Parameters
+        ----------
+        ds : xarray.Dataset
+            A Dataset that phasekit made.
+
+        Returns
+        -------
+        FreeGyroRotor
 
         Raises
         ------
@@ -267,6 +291,21 @@ class FreeGyroRotor(RotorMotions):
 
         It multiplies (omega1', phi''). The last two axes, for a DataArray the dims ``row`` and
         ``column``, are those of the matrix.
+
+        Parameters
+        ----------
+        phi : float, array_like or xarray.DataArray
+            Angle of the disk in rad.
+
+        Returns
+        -------
+        ndarray or xarray.DataArray
+            Shape (..., 2, 2).
+
+        Raises
+        ------
+        ParameterError
+            If an argument is unusable, or shapes do not fit.
         """
         rows = {"mass_matrix": ("kg m2", "mass matrix of support and disk")}
         return on_states(
@@ -280,6 +319,23 @@ class FreeGyroRotor(RotorMotions):
         """Kinetic and potential energy, J; constant without torques.
 
         The potential energy of the weight is 0 at ``phi = pi/2``.
+
+        Parameters
+        ----------
+        phi, dphi : float, array_like or xarray.DataArray
+            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
+        omega1 : float, array_like or xarray.DataArray, optional
+            Angular velocity of the support in s^-1; that of the disk's parameters by default.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As the states.
+
+        Raises
+        ------
+        ParameterError
+            If an argument is unusable, or shapes do not fit.
         """
         rows = {"mechanical_energy": ("J", "kinetic and potential energy")}
         return on_states(
@@ -294,6 +350,23 @@ class FreeGyroRotor(RotorMotions):
         """Angular momentum ``M11 omega1 + M12 phi'`` about the vertical axis, kg m^2/s.
 
         Its rate is the torque on the support: it is constant without one.
+
+        Parameters
+        ----------
+        phi, dphi : float, array_like or xarray.DataArray
+            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
+        omega1 : float, array_like or xarray.DataArray, optional
+            Angular velocity of the support in s^-1; that of the disk's parameters by default.
+
+        Returns
+        -------
+        float, ndarray or xarray.DataArray
+            As the states.
+
+        Raises
+        ------
+        ParameterError
+            If an argument is unusable, or shapes do not fit.
         """
         rows = {"angular_momentum": ("kg m2 s-1", "angular momentum about the vertical axis")}
         return on_states(
@@ -311,6 +384,11 @@ class FreeGyroRotor(RotorMotions):
         ----------
         p : float
             Angular momentum about the vertical axis, kg m^2/s: `angular_momentum` of any state.
+
+        Returns
+        -------
+        Amended
+            Its potential, equilibria and motions at that momentum.
 
         Raises
         ------

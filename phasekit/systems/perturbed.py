@@ -196,20 +196,51 @@ class Perturbed(Model):
         return modulated[0] if modulated and not self.forcing else "s-2"
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the parameters of the potential."""
+        """Names of the parameters of the potential.
+
+        Returns
+        -------
+        tuple of str
+        """
         return self.system.formula_inputs()
 
     def unit_of(self, name: str) -> str | None:
-        """Unit of a parameter or state; None where it may be any."""
+        """Unit of a parameter or state; None where it may be any.
+
+        Parameters
+        ----------
+        name : str
+            The parameter or state.
+
+        Returns
+        -------
+        str or None
+        """
         units = {p.name: p.units for p in self.declared if p not in self.system.declared}
         return units.get(name) or self.system.unit_of(name)
 
     def coefficients(self) -> Any:
-        """Coefficients (A, B, C) of the potential, without damping and drive."""
+        """Coefficients (A, B, C) of the potential, without damping and drive.
+
+        Returns
+        -------
+        Coefficients
+            In s^-2; floats, or DataArrays where a parameter is an array.
+        """
         return self.system.coefficients()
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed, or system, forcing, modulation, ...
+
+        Parameters
+        ----------
+        **changes
+            New values by name: of parameters, and of the arguments of the class.
+
+        Returns
+        -------
+        Perturbed
+            This one stays as it is.
 
         Raises
         ------
@@ -254,6 +285,15 @@ class Perturbed(Model):
     @classmethod
     def from_dataset(cls, ds: xr.Dataset) -> Self:
         """Rebuild the system from a map, or from any selection of it.
+
+        Parameters
+        ----------
+        ds : xarray.Dataset
+            A Dataset that phasekit made.
+
+        Returns
+        -------
+        Perturbed
 
         Raises
         ------

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from typing import Any
 
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import forcing_names
+from phasekit.laws.trigonometric import Trigonometric
 
 #: What is added to the potential; kT is noise, of which a periodic orbit knows nothing.
 ADDED = ("damping", "quadratic", "torque")
@@ -52,6 +53,16 @@ def formulas_of(system: Any) -> tuple[list[Any], tuple[str, str], dict[str, floa
         turns = math.lcm(*(ratio.denominator for ratio in ratios))
         keywords.update(time=time, period=f"{2 * turns}*pi/forcing_frequency")
     return [v, force], states, values, keywords
+
+
+def words_of(system: Any, states: Sequence[str], names: Iterable[str]) -> dict[str, Any]:
+    """Long names and units of the states and parameters of the `Problem` of a system."""
+    declared = {p.name: {"long_name": p.long_name, "units": p.units} for p in system.declared}
+    words = {name: declared[name] for name in names}
+    if isinstance(system.law.base, Trigonometric):
+        words[states[0]] = {"long_name": "angle", "units": "rad"}
+        words[states[1]] = {"long_name": "angular velocity", "units": "s-1"}
+    return words
 
 
 def ratios_of(frequencies: Sequence[float]) -> list[Fraction]:

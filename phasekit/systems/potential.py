@@ -8,13 +8,11 @@ from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from phasekit.errors import ParameterError
 from phasekit.labels.arguments import (
     FloatArray,
     NumberLike,
     Value,
     bad,
-    brief,
     named_arguments,
     numeric,
     same,
@@ -189,7 +187,17 @@ class Potential(Model):
         return self.formula
 
     def potential(self, x: ArrayLike) -> FloatArray:
-        """V at x, an array of the shape of x; `phasekit.potential` labels it.
+        """V at x; `phasekit.potential` labels it.
+
+        Parameters
+        ----------
+        x : float or array_like
+            Values of the coordinate.
+
+        Returns
+        -------
+        ndarray
+            Of the shape of x, per unit of inertia.
 
         Raises
         ------
@@ -199,15 +207,41 @@ class Potential(Model):
         return self.formula.values(x, *self._scalars())
 
     def gradient(self, x: ArrayLike) -> FloatArray:
-        """V' at x, an array of the shape of x."""
+        """V' at x; `phasekit.gradient` labels it.
+
+        Parameters
+        ----------
+        x : float or array_like
+            Values of the coordinate.
+
+        Returns
+        -------
+        ndarray
+            Of the shape of x.
+        """
         return self.formula.slopes(x, *self._scalars())
 
     def curvature(self, x: ArrayLike) -> FloatArray:
-        """V'' at x, an array of the shape of x."""
+        """V'' at x; `phasekit.curvature` labels it.
+
+        Parameters
+        ----------
+        x : float or array_like
+            Values of the coordinate.
+
+        Returns
+        -------
+        ndarray
+            Of the shape of x.
+        """
         return self.formula.bends(x, *self._scalars())
 
     def problem(self) -> Problem:
         """The planar system of (x, x') for `continuation`: its equilibria, orbits and loops.
+
+        Returns
+        -------
+        Problem
 
         Raises
         ------
@@ -228,23 +262,33 @@ class Potential(Model):
         return values
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
-        """Names of the parameters: all of them."""
+        """Names of the parameters: all of them.
+
+        Returns
+        -------
+        tuple of str
+        """
         return tuple(self._values)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed, or expression, period or interval.
+
+        Parameters
+        ----------
+        **changes : float, 1-D array_like or xarray.DataArray
+            New values, by the parameters' names.
+
+        Returns
+        -------
+        Potential
+            This one stays as it is.
 
         Raises
         ------
         ParameterError
             If a name is unknown, or a value is unusable.
         """
-        own = {
-            "expression": self.expression,
-            "coordinate": self.coordinate,
-            "period": self.period,
-            "interval": self.interval,
-        }
+        own = {n: getattr(self, n) for n in ("expression", "coordinate", "period", "interval")}
         values = {**self._values, **{k: v for k, v in changes.items() if k not in own}}
         own.update({key: value for key, value in changes.items() if key in own})
         if own["expression"] is self.expression:
@@ -254,7 +298,17 @@ class Potential(Model):
         return type(self)(parameters=values, **own)
 
     def unit_of(self, name: str) -> str | None:
-        """Only times have a known unit; V may be one of anything."""
+        """Only times have a known unit; V may be one of anything.
+
+        Parameters
+        ----------
+        name : str
+            The parameter or state.
+
+        Returns
+        -------
+        str or None
+        """
         return STATES[name][0] if name == "time" else None
 
     @property
@@ -283,37 +337,23 @@ class Potential(Model):
     def from_dataset(cls, ds: Any) -> Self:
         """Rebuild the potential from a map, or from any selection of it.
 
+        Parameters
+        ----------
+        ds : xarray.Dataset
+            A Dataset that phasekit made.
+
+        Returns
+        -------
+        Potential
+
         Raises
         ------
         ParameterError
             If the map was made with another model, a parameter's coordinate is gone, or the
             attributes that hold the formula are damaged.
         """
-        from phasekit.systems.identity import model_name, parameter_values
-
-        if model_name(ds) != cls.__name__:
-            raise ParameterError(
-                f"ds: got a map of {model_name(ds)}, wants one of {cls.__name__}; "
-                "use ds.phasekit.system()"
-            )
-        expression, coordinate, names, period, ends = (
-            parts.attribute(ds, name)
-            for name in ("expression", "coordinate", "parameters", "period", "interval")
-        )
-        declared = [Parameter(name=name, units="1", long_name=name) for name in names.split()]
-        try:
-            return cls(
-                expression,
-                coordinate,
-                parameter_values(ds, declared),
-                None if period == "None" else period,
-                interval=[float(end) for end in ends.split()] or None,
-            )
-        except ValueError as error:  # as ParameterError is
-            raise ParameterError(
-                f"ds: got a map whose potential cannot be made again: {error}; its attributes "
-                "phasekit_* or its coordinates were changed: make the map again"
-            ) from error
+        made: Self = parts.of_dataset(cls, ds)
+        return made
 
     def __reduce__(self) -> Any:
         """Pickle what it was made from; the functions are made anew."""
@@ -322,15 +362,7 @@ class Potential(Model):
 
     def __repr__(self) -> str:
         """Write the potential and its parameters, long arrays by their ends."""
-        written = [repr(self.formula.text), repr(self.coordinate)]
-        if self._values:
-            shown = ", ".join(f"{name!r}: {brief(value)}" for name, value in self._values.items())
-            written.append(f"{{{shown}}}")
-        if self.period is not None:
-            written.append(f"period={self.period!r}")
-        if self.interval is not None:
-            written.append(f"interval={self.interval!r}")
-        return f"Potential({', '.join(written)})"
+        return parts.written(self)
 
     def _key(self) -> tuple[Any, ...]:
         formula = self.formula

@@ -7,8 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.labels.arguments import bad, number, pair
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import bad, brief, number, pair
 from phasekit.laws.formulas import NAME, is_name, read_formula
+from phasekit.systems.identity import model_name, parameter_values
+from phasekit.systems.parameter import Parameter
 
 
 def attribute(ds: Any, name: str) -> str:
@@ -76,3 +79,43 @@ def interval(interval: Any, period: Any) -> tuple[float, float] | None:
     if not low < high:
         raise bad("interval", interval, wants)
     return low, high
+
+
+def of_dataset(cls: Any, ds: Any) -> Any:
+    """The potential of a map, whose attributes hold its formula."""
+    if model_name(ds) != cls.__name__:
+        raise ParameterError(
+            f"ds: got a map of {model_name(ds)}, wants one of {cls.__name__}; "
+            "use ds.phasekit.system()"
+        )
+    expression, coordinate, names, period, ends = (
+        attribute(ds, name)
+        for name in ("expression", "coordinate", "parameters", "period", "interval")
+    )
+    declared = [Parameter(name=name, units="1", long_name=name) for name in names.split()]
+    try:
+        return cls(
+            expression,
+            coordinate,
+            parameter_values(ds, declared),
+            None if period == "None" else period,
+            interval=[float(end) for end in ends.split()] or None,
+        )
+    except ValueError as error:  # as ParameterError is
+        raise ParameterError(
+            f"ds: got a map whose potential cannot be made again: {error}; its attributes "
+            "phasekit_* or its coordinates were changed: make the map again"
+        ) from error
+
+
+def written(potential: Any) -> str:
+    """A potential as the call that makes it, long arrays by their ends."""
+    words = [repr(potential.formula.text), repr(potential.coordinate)]
+    if potential.parameters:
+        shown = ", ".join(f"{k!r}: {brief(value)}" for k, value in potential.parameters.items())
+        words.append(f"{{{shown}}}")
+    if potential.period is not None:
+        words.append(f"period={potential.period!r}")
+    if potential.interval is not None:
+        words.append(f"interval={potential.interval!r}")
+    return f"Potential({', '.join(words)})"

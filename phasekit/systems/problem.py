@@ -12,12 +12,10 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labels.arguments import bad, flag, reals, unknown, whole
-from phasekit.laws.formulas import symbols_of, take_formula
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.systems.as_system import as_system, stands_on
 from phasekit.systems.maps import iterated
-from phasekit.systems.perturbed_problem import formulas_of
+from phasekit.systems.perturbed_problem import formulas_of, words_of
 from phasekit.systems.problem_parts import (
     angles_of,
     clock_of,
@@ -25,16 +23,17 @@ from phasekit.systems.problem_parts import (
     make_field,
     names_of,
     refuse_of_maps,
-    specified,
     values_of,
+    words_checked,
     written,
 )
+from phasekit.systems.problem_sources import ProblemSources
 from phasekit.systems.system import MODELS, Model
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class Problem:
+class Problem(ProblemSources):
     """A smooth system ``x' = f(x, **parameters)`` with states and parameters by name.
 
     Parameters
@@ -103,7 +102,7 @@ class Problem:
 
     __slots__ = (
         "_field", "_own", "conservative", "f", "jac", "map", "parameters", "period", "periods",
-        "state", "system", "time",
+        "state", "system", "time", "words",
     )  # fmt: skip
 
     f: Any
@@ -116,6 +115,7 @@ class Problem:
     conservative: bool
     map: bool
     system: Model | None
+    words: Mapping[str, Mapping[str, str]]  # long_name and units, of what a system made
     _field: Field
     _own: Field  # f itself, where that of a map is f(x) - x
 
@@ -157,6 +157,7 @@ class Problem:
         self._set("map", bool(map))
         self._set("jac", jac)
         self._set("system", None)
+        self._set("words", MappingProxyType({}))
         names = (*values, *self._times())
         own, kept = make_field(f, jac, states, names)
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
@@ -179,7 +180,8 @@ class Problem:
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
         arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
         more = {name: getattr(self, name) for name in ("conservative", "time", "period", "map")}
-        return _made, (type(self), *arguments, more, self.system)
+        words = {name: dict(one) for name, one in self.words.items()}
+        return _made, (type(self), *arguments, more, self.system, words)
 
     @property
     def field(self) -> Field:
@@ -193,69 +195,13 @@ class Problem:
             return "symbolic"
         return "compiled" if isinstance(self._field, CompiledField) else "python"
 
-    @classmethod
-    def from_potential(
-        cls,
-        potential: Any,
-        coordinate: str = "x",
-        parameters: Mapping[str, float] | None = None,
-        *,
-        period: float | None = None,
-    ) -> Problem:
-        """The planar conservative system ``x'' = -V'(x)`` with the states (x, dx).
+    def replace(self, **changes: float) -> Self:
+        """Return a copy with some parameters changed, given by name.
 
         Parameters
         ----------
-        potential : str or sympy.Expr
-            V, a formula of the coordinate and the parameters.
-        coordinate : str
-            Its name; the velocity's is the same with a d before it.
-        parameters : mapping of str to float, optional
-            The parameters and their values.
-        period : float, optional
-            The period of the coordinate, where it is an angle.
-
-        Examples
-        --------
-        >>> Problem.from_potential("x**4/4 - x**2/2")
-        Problem(x' = dx, dx' = -x**3 + x; conservative)
-        """
-        states = names_of("coordinate", (coordinate,))
-        states += (f"d{coordinate}",)
-        values = values_of("parameters", {} if parameters is None else parameters)
-        symbols = symbols_of([*states, *values])
-        V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
-        force = -V.diff(symbols[coordinate])
-        periods = {} if period is None else {coordinate: period}
-        return cls([symbols[states[1]], force], states, values, periods=periods, conservative=True)
-
-    @classmethod
-    def from_system(cls, system: Model) -> Problem:
-        """The problem phi' = -V'(phi) whose equilibria are those of a system with scalars.
-
-        Raises
-        ------
-        ParameterError
-            If a parameter is an array.
-        """
-        system = stands_on(as_system(system), Conservative, "continuation")
-        law: Any = system.law
-        names = system.formula_inputs()
-        values: dict[str, float] = {}
-        for key in names:
-            value = system.parameters[key]
-            if not isinstance(value, float):
-                raise bad(key, value, "a single number, to continue a single system")
-            values[key] = value
-        x = law.coordinate
-        force = -law.gradient_formula(symbols_of([x, *names]))
-        periods = {} if law.period is None else {x: law.period}
-        problem = cls([force], x, values, periods=periods, conservative=True)
-        problem._set("system", system)
-        return problem
-
-    def replace(self, **changes: float) -> Self:
-        """Return a copy with some parameters changed, given by name.
+        **changes : float
+            New values, by the parameters' names.
 
         Returns
         -------
@@ -280,6 +226,33 @@ class Problem:
             copy._set("system", self.system.replace(**changes))
         return copy
 
+    def described(self, words: Mapping[str, Mapping[str, str]]) -> Self:
+        """Return a copy whose states and parameters have words, which branches and axes show.
+
+        Parameters
+        ----------
+        words : mapping of str to mapping
+            For a state or parameter its ``long_name`` and ``units``; others have none.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        ParameterError
+            If a name is neither a state nor a parameter, or its words are no strings.
+
+        Examples
+        --------
+        >>> fall = Problem("g", "v", {"g": 9.81})
+        >>> fall.described({"v": {"long_name": "speed", "units": "m s-1"}}).words["v"]["units"]
+        'm s-1'
+        """
+        copy = self.replace()
+        copy._set("words", words_checked(words, (*self.state, *self.parameters)))
+        return copy
+
     def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:
         """Value of f at a state (and, of a forced system, a time), with some parameters changed."""
         at = changes.pop(self.time, 0.0) if self.time is not None else 0.0
@@ -288,6 +261,20 @@ class Problem:
 
     def iterated(self, times: int) -> Problem:
         """The map applied so many times, whose fixed points are orbits of that period of this map.
+
+        Parameters
+        ----------
+        times : int
+            How often, >= 1.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        ParameterError
+            If this is no map, or the number is none.
 
         Examples
         --------
@@ -340,24 +327,6 @@ class Problem:
         par = np.array([*self.parameters.values(), *(time for _ in self._times())])
         return jet_of(self._own, par, x)
 
-    def specification(self) -> dict[str, Any]:
-        """What is needed to make the problem again, as plain values; f is None if it is code."""
-        return specified(self)
-
-    @classmethod
-    def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
-        """Make a problem of what `specification` gave of no system; None where f was code."""
-        keys = ("f", "state", "parameters", "periods", "conservative")
-        if not isinstance(spec, Mapping) or not spec.keys() >= set(keys):
-            raise bad("spec", spec, "what Problem.specification returns")
-        if spec["f"] is None:
-            return None
-        return cls(
-            spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
-            conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
-            map=bool(spec.get("map", False)),
-        )  # fmt: skip
-
     def __repr__(self) -> str:
         """Write the equations, if they are formulas, and the parameters."""
         return f"Problem({written(self)})"
@@ -365,13 +334,13 @@ class Problem:
 
 def _made(
     kind: type[Problem], f: Any, state: Any, parameters: Any, jac: Any, periods: Any,
-    more: Any, system: Any,
+    more: Any, system: Any, words: Mapping[str, Mapping[str, str]] = MappingProxyType({}),
 ) -> Problem:  # fmt: skip
     """The problem of its arguments, for copies and pickles."""
     more = more if isinstance(more, dict) else {"conservative": more}
     problem = kind(f, state, parameters, jac, periods=periods, **more)
     problem._set("system", system)
-    return problem
+    return problem.described(words)
 
 
 def as_problem(problem: Any) -> Problem:
@@ -388,7 +357,7 @@ def as_problem(problem: Any) -> Problem:
         return problem
     if isinstance(problem, Model) and issubclass(problem.rung, PerturbedConservative):
         f, states, values, keywords = formulas_of(problem)
-        return Problem(f, states, values, **keywords)
+        return Problem(f, states, values, **keywords).described(words_of(problem, states, values))
     if isinstance(problem, Model):
         return Problem.from_system(problem)
     convert = getattr(problem, "as_problem", None)

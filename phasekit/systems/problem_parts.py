@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -220,10 +221,28 @@ def specified(problem: Any) -> dict[str, Any]:
         spec.update(time=problem.time, period=write_formula(problem.period))
     if problem.map:
         spec["map"] = True
+    if problem.words:
+        spec["words"] = {name: dict(words) for name, words in problem.words.items()}
     if problem.system is not None:
         spec["system"] = type(problem.system).__name__
         spec["system_parameters"] = problem.system.arguments
     return spec
+
+
+def words_checked(words: Any, names: Sequence[str]) -> Mapping[str, Mapping[str, str]]:
+    """What states and parameters are called, and their units."""
+    wants = "a mapping of names to {'long_name': ..., 'units': ...}"
+    if not isinstance(words, Mapping):
+        raise bad("words", words, wants)
+    kept = {}
+    for name, given in words.items():
+        if name not in names:
+            raise unknown("words: name", name, names)
+        known = isinstance(given, Mapping) and set(given) <= {"long_name", "units"}
+        if not known or not all(isinstance(text, str) for text in given.values()):
+            raise bad(f"words[{name!r}]", given, wants)
+        kept[name] = MappingProxyType(dict(given))
+    return MappingProxyType(kept)
 
 
 def jet_of(field: Field, par: Array, x: Array) -> tuple[Array, Array]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -37,6 +36,8 @@ from phasekit.systems.value import ModelValue
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from phasekit.systems.reduced import Reduced
 
 
 #: Every model by its name, as maps store it.
@@ -67,7 +68,7 @@ class Model(ModelValue):
 
     __slots__ = ()
 
-    #: Parameters for which folds are known in closed form, with the function that solves for each.
+    #: Parameters whose folds are known in closed form, with the function that solves for each.
     critical_values: ClassVar[Mapping[str, Callable[..., Any]]] = {}
     #: The rung of its law, which says what can be computed of it.
     rung: ClassVar[type[Law]] = Trigonometric
@@ -85,7 +86,23 @@ class Model(ModelValue):
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
-        """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each."""
+        """A N, B N, C N and N > 0 of the parameters: the model's law, stated by each.
+
+        Parameters
+        ----------
+        v : mapping of str to value
+            Parameters by name, angles as (sine, cosine, radius).
+
+        Returns
+        -------
+        tuple of four values
+            A N, B N and C N in N s^-2, and N.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is missing, or the law is not one of (A, B, C).
+        """
         raise ParameterError(
             f"v: got {describe(v)}, wants the parameters of a system with coefficients "
             "(A, B, C), which this one has not"
@@ -112,12 +129,27 @@ class Model(ModelValue):
 
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
-        """Names of the parameters on which the coefficients depend."""
+        """Names of the parameters on which the coefficients depend.
+
+        Returns
+        -------
+        tuple of str
+        """
         return cls.trigonometric().parameters
 
     def unit_of(self, name: str) -> str | None:
-        """Unit of a parameter or state; None where it may be any."""
-        units = {parameter.name: parameter.units for parameter in self.declared}
+        """Unit of a parameter or state; None where it may be any.
+
+        Parameters
+        ----------
+        name : str
+            The parameter or state.
+
+        Returns
+        -------
+        str or None
+        """
+        units = {p.name: p.units for p in self.declared}
         return units.get(name) or STATES.get(name, (None,))[0]
 
     @property
@@ -138,7 +170,19 @@ class Model(ModelValue):
 
     @classmethod
     def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
-        """Values of a parameter, NaN where they leave its domain."""
+        """Values of a parameter, NaN where they leave its domain.
+
+        Parameters
+        ----------
+        name : str
+            The parameter.
+        value : ndarray
+            Values in its unit, of any shape.
+
+        Returns
+        -------
+        ndarray
+        """
         for parameter in cls.declared:
             if parameter.name == name and not (valid := parameter.valid(value)).all():
                 return np.where(valid, value, np.nan)
@@ -148,7 +192,17 @@ class Model(ModelValue):
     def valid_coefficients(
         cls, parameters: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Coefficients from arrays that broadcast, NaN where a parameter leaves its domain."""
+        """Coefficients in s^-2 from arrays that broadcast, NaN where a parameter leaves its domain.
+
+        Parameters
+        ----------
+        parameters : mapping of str to array_like
+            Those of `formula_inputs`, in SI units and radians.
+
+        Returns
+        -------
+        A, B, C : ndarray
+        """
         law = cls.trigonometric()
         used = {name: parameters[name] for name in law.parameters}
         with np.errstate(all="ignore"):
@@ -177,7 +231,7 @@ class Model(ModelValue):
             return self.valid_coefficients(dict(zip(names, arrays, strict=True)))
 
         attrs = attrs_of(*self.declared, *Coefficients.declared)
-        results = combine(abc, used, ("A", "B", "C"), attrs)
+        results = combine(abc, used, Coefficients._fields, attrs)
         if not all(np.isfinite(x) for x in results if isinstance(x, float)):
             got = ", ".join(f"{name}={brief(value)}" for name, value in used.items())
             raise ParameterError(
@@ -189,35 +243,32 @@ class Model(ModelValue):
     def reduced(self) -> Reduced:
         """Return the papers' form (lambda, psi, Omega^2); cells with ``A = 0`` become NaN.
 
+        Returns
+        -------
+        Reduced
+            Floats, or DataArrays as of `coefficients`; as [Veljovic2015] (12).
+
         Raises
         ------
         ParameterError
             If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
         """
-        A, B, C = self.coefficients()
-        if isinstance(A, float) and A == 0.0:
-            raise ParameterError(
-                "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "
-                "use .coefficients(), which has no such limit"
-            )
+        from phasekit.systems.reduced import reduced_of
 
-        def divide(A: FloatArray, B: FloatArray, C: FloatArray) -> tuple[FloatArray, ...]:
-            with np.errstate(all="ignore"):
-                lam, psi = (np.where(A == 0, np.nan, x / A) for x in (B, C))
-                return lam, psi, A + 0 * (B + C)
-
-        attrs = attrs_of(*self.declared, *Reduced.declared)
-        values = combine(divide, {"A": A, "B": B, "C": C}, ("lam", "psi", "Omega_sq"), attrs)
-        if not all(np.isfinite(value) for value in values if isinstance(value, float)):
-            raise ParameterError(
-                f"A: got {A!r} with B = {B!r} and C = {C!r}, wants a size for which "
-                "lambda = B/A and psi = C/A are finite; use .coefficients(), which has no such "
-                "limit"
-            )
-        return Reduced(*values)
+        return reduced_of(self)
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed.
+
+        Parameters
+        ----------
+        **changes : float, 1-D array_like or xarray.DataArray
+            New values, by the parameters' names.
+
+        Returns
+        -------
+        Model
+            Of the same class; this one stays as it is.
 
         Raises
         ------
@@ -239,6 +290,10 @@ class Model(ModelValue):
         ds : xarray.Dataset
             A Dataset that phasekit made. Parameters that are scalar coordinates become scalars;
             swept ones that were not selected stay arrays.
+
+        Returns
+        -------
+        Model
 
         Raises
         ------
@@ -312,7 +367,12 @@ class Coefficients(Model, _ABC):
         return cls(*iterable)
 
     def coefficients(self) -> Coefficients:
-        """Return itself: coefficients are a system."""
+        """Return itself: coefficients are a system.
+
+        Returns
+        -------
+        Coefficients
+        """
         return self
 
     @staticmethod
@@ -341,49 +401,3 @@ class Coefficients(Model, _ABC):
 
 Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
 MODELS["Coefficients"] = Coefficients
-
-
-@model
-@dataclass(frozen=True, eq=False, repr=False)
-class Reduced(Model):
-    """The papers' reduced form, in lambda and psi.
-
-    ``phi'' + Omega^2 (lam - cos phi) sin phi - Omega^2 psi cos phi = 0``.
-
-    Parameters
-    ----------
-    lam, psi : float, 1-D array_like or xarray.DataArray
-        Gravity and eccentric centrifugal force against the coupling term, of any sign.
-    Omega_sq : float or array_like, default 1.0
-        Omega^2 in s^-2; negative for a disk that is nearly in line with its shaft.
-
-    Raises
-    ------
-    ParameterError
-        If a value is not a real, finite number or an array of numbers.
-
-    Notes
-    -----
-    [Veljovic2015] (12): ``A = Omega^2``, ``B = lam Omega^2``, ``C = psi Omega^2``.
-
-    Examples
-    --------
-    >>> import phasekit as pk
-    >>> pk.Reduced(0.25, 0.125, 4.0).coefficients()
-    Coefficients(A=4.0, B=1.0, C=0.5)
-    """
-
-    lam: NumberLike
-    psi: NumberLike
-    Omega_sq: NumberLike = 1.0
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="lam", units="1", long_name="lambda = B/A"),
-        Parameter(name="psi", units="1", long_name="psi = C/A"),
-        Parameter(name="Omega_sq", units="s-2", long_name="Omega^2 = A"),
-    )
-
-    @staticmethod
-    def products(v: Values) -> tuple[Any, Any, Any, Any]:
-        """[Veljovic2015] (12)."""
-        return v["Omega_sq"], v["lam"] * v["Omega_sq"], v["psi"] * v["Omega_sq"], 1

@@ -9,6 +9,10 @@ Below the fold the disk can swing about two centers, and both swings end at the 
 On the fold the upper center and the lower saddle are gone; the swing about the lower center then
 goes on to the top.
 
+Answer. It always falls: from 2.52 rad/s at rest to nothing at an amplitude of 90 degrees for
+:math:`\beta = 0.01\pi`, from 0.75 rad/s to nothing at 180 degrees for :math:`\pi/2`. All numbers
+are printed.
+
 Run: ``python studies/questions/backbone_curves.py [PICTURE]``
 """
 

@@ -65,7 +65,7 @@ def main() -> None:
     axes[1].set_xticks(DAMPINGS, [f"{damping:g}" for damping in DAMPINGS])
     axes[1].minorticks_off()
     axes[1].set_xlabel("damping (1/s)")
-    axes[1].set_ylabel("right rest")
+    axes[1].set_ylabel("share that ends in the right rest")
     axes[1].legend(frameon=False)
     path = sys.argv[1] if len(sys.argv) > 1 else "capture_against_simulation.png"
     figure.savefig(path, dpi=150)

@@ -47,7 +47,7 @@ def main() -> None:
     print(f"with {FEIGENBAUM:.6f} from there on, chaos begins at c = {end:.4f}")
     figure, axes = plt.subplots(1, 2, figsize=(12, 5.0), layout="constrained")
     pk.plot.branch(branches, y="x_max", ax=axes[0])
-    axes[0].set(xlim=(2.5, 4.3), ylabel="greatest x")
+    axes[0].set(xlim=(2.5, 4.4), xlabel="c", ylabel="greatest x")
     for number, one in enumerate(branches):
         at = int(np.argmin(np.abs(one.points["c"].values - places[number])))
         orbit = one.orbit(at)

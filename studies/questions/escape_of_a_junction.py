@@ -80,7 +80,8 @@ def main() -> None:
     for bias, noise in ((0.8, 0.03), (0.9, 0.01)):
         rate, error = (x[0] for x in escape(np.array([bias]), noise))
         found, spread = simulated(bias, noise, 500.0)
-        axes[0].errorbar([bias], [found], [spread], fmt="ko", markersize=4)
+        label = "simulated" if noise == 0.01 else None
+        axes[0].errorbar([bias], [found], [spread], fmt="ko", markersize=4, label=label)
         print(
             f"bias {bias}, noise {noise}: rate {rate:.3e} (error {error:.2f}), "
             f"simulated {found:.3e} +- {spread:.1e}"

@@ -1,4 +1,4 @@
-"""
+r"""
 How long does every orbit take?
 ===============================
 
@@ -6,6 +6,10 @@ Map of the period over the phase plane.
 
 Every point of the plane is a state; its color is the period of the orbit through it. The period
 grows without bound towards the separatrices, but only like a logarithm.
+
+Answer. Small oscillations take 6.36 s about the lower center and 7.59 s about the upper one, and
+an orbit round both at least 11.77 s, for :math:`\lambda = 0.4` and :math:`\psi = 0.1` at
+:math:`\Omega = 1` 1/s.
 
 Run: ``python studies/questions/period_map.py [PICTURE]``
 """

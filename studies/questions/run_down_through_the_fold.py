@@ -78,6 +78,7 @@ def main() -> None:
     axes[1].set_xlabel(r"rate $-\dot\omega_1$ (1/s$^2$)")
     axes[1].set_ylabel(r"lag of $\omega_1$ behind the fold (1/s)")
     axes[1].set_xticks(RATES, [f"{rate}" for rate in RATES])
+    axes[1].set_yticks([0.05, 0.1, 0.2, 0.5], ["0.05", "0.1", "0.2", "0.5"])
     axes[1].minorticks_off()
     axes[1].legend(frameon=False)
     path = sys.argv[1] if len(sys.argv) > 1 else "run_down_through_the_fold.png"

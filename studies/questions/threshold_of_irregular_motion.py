@@ -101,7 +101,7 @@ def main() -> None:
         BETA / pk.deg, FREQUENCY, values, norm=LogNorm(vmax=50.0), rasterized=True
     )
     axis.plot(*np.transpose(TRIED), "o", mfc="white", mec="black", label="simulated")
-    axis.set(xlabel="beta (deg)", ylabel="frequency of the torque (s$^{-1}$)", yscale="log")
+    axis.set(xlabel=r"$\beta$ (°)", ylabel="frequency of the torque (s$^{-1}$)", yscale="log")
     marks = [2, 5, 10, 20, 50]
     axis.set_yticks(marks, labels=map(str, marks))
     axis.set_yticks([], minor=True)

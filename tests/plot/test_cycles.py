@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -52,3 +54,58 @@ def test_one_family_alone(ax):
     cycles.plot(ax=ax)
     values = np.concatenate([line.get_ydata() for line in ax.lines])
     assert np.isclose(np.nanmax(values), float(cycles.points.x_max.max()))
+
+
+def test_branches_of_a_perturbed_system_have_its_words_and_units(ax, tmp_path):
+    driven = pk.Perturbed(
+        pk.Pendulum(length=1.0, g=1.0), damping=0.1, forcing=pk.Harmonic(0.2, 1.3)
+    )
+    few = pk.ContinuationOptions(max_points=3, intervals=10)
+    orbit = pk.periodic_orbit(driven, [0.0, 0.0], settle=100.0, options=few)
+    family = pk.continuation(driven, "forcing_frequency", orbit=orbit, span=(1.2, 1.4), options=few)
+    family.save(tmp_path / "family.zarr")
+    loaded = pk.Branch.load(tmp_path / "family.zarr")
+    copied = pickle.loads(pickle.dumps(family))
+    for one in (family, loaded, copied):
+        attrs = {name: one.points[name].attrs for name in ("phi_max", "dphi_min", "damping")}
+        assert {name: words["units"] for name, words in attrs.items()} == {
+            "phi_max": "rad", "dphi_min": "s-1", "damping": "s-1",
+        }  # fmt: skip
+        assert attrs["phi_max"]["long_name"] == "largest angle"
+        assert one.orbit(0).phi.attrs == orbit.phi.attrs == {"long_name": "angle", "units": "rad"}
+        assert one.orbit(0).time.attrs["units"] == "s"
+        one.plot(ax=ax, angles="deg")
+        assert ax.get_ylabel() == r"$\varphi$ (°)"
+        assert ax.get_xlabel() == r"angular frequency of the forcing (s$^{-1}$)"
+        ax.clear()
+
+
+def test_equilibria_of_a_perturbed_system_have_units_and_a_problem_of_ones_own_its_words(ax):
+    damped = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.1)
+    rest = pk.continuation(damped, "damping", x0=[0.0, 0.0], span=(0.1, 0.3))
+    rest.plot(y="dphi", ax=ax)
+    assert (ax.get_xlabel(), ax.get_ylabel()) == (
+        "linear damping (s$^{-1}$)", "angular velocity (rad/s)",
+    )  # fmt: skip
+    fall = pk.Problem("g - d*v", "v", {"g": 9.81, "d": 1.0})
+    words = {"v": {"long_name": "speed", "units": "m s-1"}}
+    ax.clear()
+    pk.continuation(fall.described(words), "d", x0=[9.81], span=(1, 2)).plot(ax=ax)
+    assert ax.get_ylabel() == "speed (m s$^{-1}$)"
+    assert fall.described(words).replace(d=2.0).words == words
+    for wrong in ({"w": {}}, {"v": {"unit": "m"}}, {"v": {"units": 1}}, [1]):
+        with pytest.raises(pk.ParameterError, match="^words"):
+            fall.described(wrong)
+
+
+@pytest.mark.parametrize("level", [0.0, 1.0 / 3.0, -7e6])
+def test_a_constant_state_is_drawn_as_one_and_not_as_its_rounding(ax, level):
+    level_of = pk.Problem(["m - x**3", "(c - y)*(1 + m**2)"], ("x", "y"), {"m": 1.0, "c": level})
+    branch = pk.continuation(level_of, "m", x0=[1.0, level], span=(0.5, 2.0))
+    branch.plot(y="y", ax=ax)
+    low, high = ax.get_ylim()
+    assert low < level < high
+    assert high - low > 1e-3 * max(abs(level), 1e-3)
+    ax.clear()
+    branch.plot(y="x", ax=ax)
+    assert np.ptp(ax.get_ylim()) < 1.0

@@ -173,7 +173,12 @@ class ContinuationOptions:
         return functools.partial(type(self), **self.as_dict()), ()
 
     def as_dict(self) -> dict[str, Any]:
-        """The options as plain values, which make the same options again."""
+        """The options as plain values, which make the same options again.
+
+        Returns
+        -------
+        dict
+        """
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         values["detect"] = list(self.detect)
         values["bounds"] = {name: list(pair) for name, pair in self.bounds.items()}

@@ -58,11 +58,15 @@ class Plot {
   constructor(canvas) {
     this.canvas = canvas;
     this.c = canvas.getContext("2d");
+    this.box = null;
+    // Asking for the size while the page changes costs a layout each time.
+    new ResizeObserver(() => { this.box = null; }).observe(canvas);
   }
 
   // Clear, and fix the ranges; `labels` are {x, y, xScale, yScale}.
   begin(x, y, labels) {
-    const box = this.canvas.getBoundingClientRect();
+    this.box ??= this.canvas.getBoundingClientRect();
+    const { box } = this;
     const ratio = window.devicePixelRatio || 1;
     this.width = Math.max(160, box.width);
     this.height = Math.max(100, box.height);

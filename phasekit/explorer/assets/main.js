@@ -53,7 +53,7 @@ function addSlider(parent, name, words, units, read, write, range) {
   slider.addEventListener("input", () => {
     const [low, high] = range();
     const value = low + ((high - low) * slider.valueAsNumber) / STEPS;
-    if (control.write(value) === "") update(control);
+    if (control.write(value) === "") soon(control);
   });
   number.addEventListener("change", () => {
     const factor = inDegrees(units === "rad");
@@ -122,6 +122,20 @@ function complain(lines) {
 
 // ---------------------------------------------------------------- drawing
 
+// Draws at once, and then once a frame, however many changes come.
+const frame = { open: true, due: null };
+function soon(moved) {
+  frame.due = moved;
+  if (!frame.open) return;
+  frame.open = false;
+  frame.due = null;
+  update(moved);
+  requestAnimationFrame(() => {
+    frame.open = true;
+    if (frame.due) soon(frame.due);
+  });
+}
+
 // Draws what a change needs; `moved` is the slider under the hand.
 function update(moved) {
   const start = performance.now();
@@ -162,7 +176,8 @@ function drawForces() {
   drawForce(plots.force, scene.forceRows, scene);
 }
 
-// The map belongs to all parameters but its own two; it is made in pieces, so that nothing waits.
+// The map belongs to all parameters but its own two; it is made in pieces, so that nothing waits. Where it is in closed
+// form a coarse one is shown until it is whole.
 function startMap() {
   const [xName, yName] = [state.x, state.y];
   const whole = xName !== yName;
@@ -176,10 +191,13 @@ function startMap() {
   const key = JSON.stringify([xName, yName, rangeOf(xName), rangeOf(yName), fixed]);
   if (key !== scene.mapKey) {
     scene.mapKey = key;
-    const count = (x, y) => countEquilibria(LAW, ...potentialAt(xName, x, yName, y));
-    const [columns, rows] = closed ? [120, 90] : [48, 36];
-    scene.map = new ParameterMap(count, [...rangeOf(xName)], [...rangeOf(yName)], columns, rows);
-    scene.map.work(closed ? 6 : 2);
+    const at = sampler(xName, yName);
+    const count = (x, y) => countEquilibria(LAW, ...at(x, y));
+    const over = (columns, rows) => new ParameterMap(count, [...rangeOf(xName)], [...rangeOf(yName)], columns, rows);
+    scene.map = closed ? over(120, 90) : over(48, 36);
+    scene.coarse = closed ? over(40, 30) : null;
+    if (closed) scene.coarse.work(6);
+    else scene.map.work(2);
   }
   drawMap();
   if (scene.map.next <= scene.map.columns && !pending) pending = setTimeout(continueMap, 0);
@@ -188,14 +206,14 @@ function startMap() {
 function continueMap() {
   pending = 0;
   if (!scene.map || scene.map.next > scene.map.columns) return;
-  scene.map.work(10);
-  drawMap();
+  if (scene.map.work(8) || !scene.coarse) drawMap();
   if (scene.map.next <= scene.map.columns) pending = setTimeout(continueMap, 0);
 }
 
 function drawMap() {
   const at = [valueOf(state.x), valueOf(state.y)];
-  scene.map.draw(plots.map, { xName: axisWords(state.x), yName: axisWords(state.y), xScale: scaleOf(state.x), yScale: scaleOf(state.y), at });
+  const whole = scene.map.next > scene.map.columns;
+  (whole || !scene.coarse ? scene.map : scene.coarse).draw(plots.map, { xName: axisWords(state.x), yName: axisWords(state.y), xScale: scaleOf(state.x), yScale: scaleOf(state.y), at });
 }
 
 // ---------------------------------------------------------------- hands

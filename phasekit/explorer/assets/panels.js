@@ -237,7 +237,10 @@ function drawDiagram(plot, scene, make) {
   const grid = made.map(({ slope }) => Float64Array.from({ length: rows + 1 }, (_, j) => slope(low + dy * j)));
   const stretches = { solid: [], dashed: [] };
   for (let i = 0; i < columns; i++) {
+    const [left, right] = [grid[i], grid[i + 1]];
     for (let j = 0; j < rows; j++) {
+      const below = left[j] < 0;
+      if (below === right[j] < 0 && below === right[j + 1] < 0 && below === left[j + 1] < 0) continue;
       const corners = [grid[i][j], grid[i + 1][j], grid[i + 1][j + 1], grid[i][j + 1]];
       for (const [p, q] of crossings(corners)) {
         const at = ([u, w]) => [a + ((b - a) * (i + u)) / columns, low + dy * (j + w)];
@@ -339,7 +342,8 @@ class ParameterMap {
   draw(plot, scene) {
     plot.begin(this.x, this.y, { x: scene.xName, y: scene.yName, xScale: scene.xScale, yScale: scene.yScale });
     const [dx, dy] = [(this.x[1] - this.x[0]) / this.columns, (this.y[1] - this.y[0]) / this.rows];
-    const few = Math.min(...this.counts.flatMap((row) => Array.from(row).filter((n) => n >= 0)));
+    let few = Infinity;
+    for (const row of this.counts) for (const n of row) if (n >= 0 && n < few) few = n;
     plot.c.setLineDash([]);
     this.counts.forEach((row, i) => {
       const left = plot.px(this.x[0] + dx * (i - 0.5));

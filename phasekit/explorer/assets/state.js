@@ -111,4 +111,15 @@ function potentialAt(name = null, value = 0, other = null, second = 0) {
   return [p.map((x) => (x === null ? NaN : x)), torque];
 }
 
+// The same over two axes, in one array that the next call changes.
+function sampler(name, other) {
+  const [p, constant] = potentialAt();
+  const [i, j] = [NAMES.indexOf(name), NAMES.indexOf(other)];
+  return (x, y) => {
+    if (i >= 0) p[i] = x;
+    if (j >= 0) p[j] = y;
+    return [p, name === TORQUE ? x : other === TORQUE ? y : constant];
+  };
+}
+
 const make = (p, torque) => new Potential(LAW, p, torque);

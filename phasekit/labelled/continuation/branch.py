@@ -252,7 +252,12 @@ class Branch:
         return self.problem.map
 
     def known(self) -> tuple[Curve, Problem]:
-        """The curve and the problem."""
+        """The curve and the problem.
+
+        Returns
+        -------
+        tuple of (Curve, Problem)
+        """
         return self.curve, self.problem
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:

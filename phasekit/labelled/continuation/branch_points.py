@@ -133,7 +133,7 @@ def _dataset(
         column = u[:, i].copy()
         if curve.period[i] > 0.0:
             column = wrap(column, float(curve.period[i]))
-        data[names[i]] = (dim, column, _attrs(problem, names[i]))
+        data[names[i]] = (dim, column, attrs_of(problem, names[i]))
     if problem.conservative and curve.kind == EQUILIBRIUM:
         flags = {
             "long_name": "kind of the equilibrium",
@@ -176,7 +176,7 @@ def _dataset(
     coords: dict[str, Any] = {"unknown": np.array(names, dtype=np.dtypes.StringDType())}
     for name, value in problem.parameters.items():
         if name not in data:
-            coords[name] = ((), value, _attrs(problem, name))
+            coords[name] = ((), value, attrs_of(problem, name))
     ds = xr.Dataset(data, coords)
     if record:
         from phasekit.labelled.continuation.recording import recorded
@@ -188,11 +188,12 @@ def _dataset(
     return ds
 
 
-def _attrs(problem: Problem, name: str) -> dict[str, str]:
+def attrs_of(problem: Problem, name: str) -> dict[str, str]:
+    """Long name and units of a state or parameter, where the problem has them."""
     if problem.system is not None:
         from phasekit.cells.schema import input_attrs
 
         if name == "phi":
             return {"long_name": "angle of the equilibrium", "units": "rad"}
         return input_attrs(problem.system, name)
-    return {}
+    return dict(problem.words.get(name, {}))

@@ -108,11 +108,22 @@ class CycleBranch(Branch):
         return orbit_dataset(problem, cycles, self.path[at], label)
 
     def known(self) -> tuple[Cycles, Problem]:  # type: ignore[override]
-        """The family and the problem."""
+        """The family and the problem.
+
+        Returns
+        -------
+        tuple of (Cycles, Problem)
+        """
         return self.curve, self.problem
 
     def to_dataset(self) -> xr.Dataset:
-        """The points with the special points beside them, on the dim ``special_point``."""
+        """The points with the special points beside them, on the dim ``special_point``.
+
+        Returns
+        -------
+        xarray.Dataset
+            As `Branch.to_dataset`, with ``special_period``.
+        """
         ds = super().to_dataset()
         ds["special_period"] = (
             "special_point", np.array([s["period"] for s in self.special_points]),
@@ -129,7 +140,22 @@ class CycleBranch(Branch):
         return cast(Self, longer)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
-        """Save everything, to be loaded and extended exactly; ``.zarr`` or ``.nc``."""
+        """Save everything, to be loaded and extended exactly.
+
+        Parameters
+        ----------
+        path : path
+            A name that ends in ``.zarr`` or ``.nc``.
+        overwrite : bool, default False
+            Whether a branch that is there already may be replaced.
+
+        Raises
+        ------
+        ParameterError
+            If the name ends otherwise, or the problem is not known.
+        StoreError
+            If there is something under that name.
+        """
         onward("cycles.save")(self, path, overwrite)
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.point import Point, vertical
+from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -24,6 +25,7 @@ _CHECKS = {
     "mesh_error": "estimated error of the states beside their amplitudes",
     "residual": "largest size of x' - f beside that of f",
 }
+_WHICH = {"min": "least", "max": "largest", "mean": "mean"}
 ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
 
 
@@ -86,13 +88,20 @@ def points_of(
     free = [cycles.field.parameters[i] for i in cycles.active]
     data: dict[str, Any] = {}
     for k, name in enumerate(free):
-        data[name] = (dim, np.array([p.orbit.y[1 + k] for p in points]))
+        column = np.array([p.orbit.y[1 + k] for p in points])
+        data[name] = (dim, column, attrs_of(problem, name))
     for name in rows[0]:
         kind = np.int64 if name in ("n_unstable", "n_intervals") else np.float64
         data[name] = (dim, np.array([row[name] for row in rows], dtype=kind))
+    for name in problem.state:
+        words = attrs_of(problem, name)
+        for what in ("min", "max", "mean") if words else ():
+            long_name = f"{_WHICH[what]} {words['long_name']}"
+            data[f"{name}_{what}"] = (*data[f"{name}_{what}"], {**words, "long_name": long_name})
     for name, text in _CHECKS.items():
         data[name] = (*data[name], {"long_name": text})
-    data["period"] = (*data["period"], {"long_name": "period of the orbit"})
+    period = {"long_name": "period of the orbit", **({"units": "s"} if problem.words else {})}
+    data["period"] = (*data["period"], period)
     data["n_intervals"] = (*data["n_intervals"], {"long_name": "mesh intervals"})
     data["n_unstable"] = (
         *data["n_unstable"],
@@ -112,7 +121,9 @@ def points_of(
     data["special"] = (dim, np.array(labels, dtype=np.dtypes.StringDType()))
     data["step"] = (dim, np.array([p.step for p in points]))
     data["newton_steps"] = (dim, np.array([p.newton_steps for p in points], dtype=np.int64))
-    coords: dict[str, Any] = {k: v for k, v in problem.parameters.items() if k not in free}
+    coords: dict[str, Any] = {
+        k: ((), v, attrs_of(problem, k)) for k, v in problem.parameters.items() if k not in free
+    }
     if len(turns) > 1:
         coords["angle"] = np.array(list(problem.periods), dtype=np.dtypes.StringDType())
     if record:
@@ -131,13 +142,18 @@ def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "
     orbit = point.orbit
     at = collocation.times(orbit.mesh, cycles.m) * orbit.y[0]
     data: dict[str, Any] = {
-        name: ("time", orbit.x[:, i].copy()) for i, name in enumerate(problem.state)
+        name: ("time", orbit.x[:, i].copy(), attrs_of(problem, name))
+        for i, name in enumerate(problem.state)
     }
     data.update(summary(problem, cycles, point, label))
     data["multiplier"] = ("multiplier", point.multipliers.copy())
     turns = winding(cycles)
     data["winding"] = sum(turns) if len(turns) <= 1 else ("angle", np.array(turns))
-    ds = xr.Dataset(data, {"time": at, **parameters_at(problem, cycles, orbit)})
+    held = parameters_at(problem, cycles, orbit)
+    coords: dict[str, Any] = {k: ((), v, attrs_of(problem, k)) for k, v in held.items()}
+    if problem.words:
+        coords["time"] = ("time", at, {"long_name": "time", "units": "s"})
+    ds = xr.Dataset(data, {"time": at, **coords})
     ds = ds.drop_vars("multiplier").assign({"multiplier": ("multiplier", point.multipliers.copy())})
     return ds
 

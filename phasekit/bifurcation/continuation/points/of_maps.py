@@ -12,6 +12,8 @@ from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FLIP, FOLD, TORUS
 from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.points import period_doubling
+from phasekit.bifurcation.continuation.points import torus as of_torus
 from phasekit.bifurcation.continuation.points.bogdanov_takens import product
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 
@@ -25,7 +27,7 @@ RESONANT = {"resonance_1": 0.0, "resonance_2": 4.0, "resonance_3": 3.0, "resonan
 
 def flip(curve: Curve, u: Array, slopes: Array) -> Array:
     """The coefficient c of period doublings."""
-    found = [forms.period_doubling(forms.Derivatives(curve, point))["c"] for point in u]
+    found = [period_doubling.normal_form(forms.Derivatives(curve, point))["c"] for point in u]
     return np.array(found)
 
 
@@ -36,7 +38,7 @@ def torus(curve: Curve, u: Array, slopes: Array) -> Array:
     off = np.min([np.abs(k - one) for one in RESONANT.values()], axis=0)
     for i in np.flatnonzero((k > 0.0) & (k < 4.0) & (off > 1e-6)):
         angle = float(np.arccos(1.0 - 0.5 * k[i]))
-        found[i] = forms.torus(forms.Derivatives(curve, u[i]), angle)["d"]
+        found[i] = of_torus.normal_form(forms.Derivatives(curve, u[i]), angle)["d"]
     return found
 
 

@@ -1,0 +1,141 @@
+"""What a `Problem` can be made of: a potential, a system, and what was saved of a problem."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from phasekit.labels.arguments import bad
+from phasekit.laws.formulas import symbols_of, take_formula
+from phasekit.laws.ladder import Conservative
+from phasekit.systems.as_system import as_system, stands_on
+from phasekit.systems.problem_parts import names_of, specified, values_of
+from phasekit.systems.system import Model
+
+if TYPE_CHECKING:
+    from phasekit.systems.problem import Problem
+
+
+class ProblemSources:
+    """Ways to a `Problem` beside its equations."""
+
+    __slots__ = ()
+
+    @classmethod
+    def from_potential(
+        cls,
+        potential: Any,
+        coordinate: str = "x",
+        parameters: Mapping[str, float] | None = None,
+        *,
+        period: float | None = None,
+    ) -> Problem:
+        """The planar conservative system ``x'' = -V'(x)`` with the states (x, dx).
+
+        Parameters
+        ----------
+        potential : str or sympy.Expr
+            V, a formula of the coordinate and the parameters.
+        coordinate : str
+            Its name; the velocity's is the same with a d before it.
+        parameters : mapping of str to float, optional
+            The parameters and their values.
+        period : float, optional
+            The period of the coordinate, where it is an angle.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        ParameterError
+            If V cannot be read, or a name has no value.
+
+        Examples
+        --------
+        >>> Problem.from_potential("x**4/4 - x**2/2")
+        Problem(x' = dx, dx' = -x**3 + x; conservative)
+        """
+        states = names_of("coordinate", (coordinate,))
+        states += (f"d{coordinate}",)
+        values = values_of("parameters", {} if parameters is None else parameters)
+        symbols = symbols_of([*states, *values])
+        V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
+        force = -V.diff(symbols[coordinate])
+        periods = {} if period is None else {coordinate: period}
+        return cls([symbols[states[1]], force], states, values, periods=periods, conservative=True)
+
+    @classmethod
+    def from_system(cls, system: Model) -> Problem:
+        """The problem phi' = -V'(phi) whose equilibria are those of a system with scalars.
+
+        Parameters
+        ----------
+        system : system
+            A system in a potential, of scalar parameters.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is an array, or the system is damped or driven.
+        """
+        system = stands_on(as_system(system), Conservative, "continuation")
+        law: Any = system.law
+        names = system.formula_inputs()
+        values: dict[str, float] = {}
+        for key in names:
+            value = system.parameters[key]
+            if not isinstance(value, float):
+                raise bad(key, value, "a single number, to continue a single system")
+            values[key] = value
+        x = law.coordinate
+        force = -law.gradient_formula(symbols_of([x, *names]))
+        periods = {} if law.period is None else {x: law.period}
+        problem = cls([force], x, values, periods=periods, conservative=True)
+        problem._set("system", system)
+        return problem
+
+    def specification(self) -> dict[str, Any]:
+        """What is needed to make the problem again, as plain values; f is None if it is code.
+
+        Returns
+        -------
+        dict
+            Numbers, strings, lists and mappings, which JSON can hold.
+        """
+        return specified(self)
+
+    @classmethod
+    def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
+        """Make a problem of what `specification` gave of no system; None where f was code.
+
+        Parameters
+        ----------
+        spec : mapping
+            What `specification` returned.
+
+        Returns
+        -------
+        Problem or None
+
+        Raises
+        ------
+        ParameterError
+            If it is something else.
+        """
+        keys = ("f", "state", "parameters", "periods", "conservative")
+        if not isinstance(spec, Mapping) or not spec.keys() >= set(keys):
+            raise bad("spec", spec, "what Problem.specification returns")
+        if spec["f"] is None:
+            return None
+        made = cls(
+            spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
+            conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
+            map=bool(spec.get("map", False)),
+        )  # fmt: skip
+        return made.described(spec.get("words", {}))
