@@ -8,8 +8,11 @@ bordered equations and det(M - 1) ([Kuznetsov2004] 10.3).
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import cmath
+import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -36,16 +39,17 @@ FOLD, DOUBLING, TORUS, BRANCHING = (
 )
 
 
-def nontrivial(values: Complex, forced: bool) -> Complex:
+def nontrivial(values: Complex, forced: bool) -> list[complex]:
     """Multipliers but for the one that is 1 for every orbit of an autonomous system."""
-    if forced:
-        return values
-    return np.asarray(np.delete(values, int(np.argmin(np.abs(values - 1.0)))))
+    mu: list[complex] = values.tolist()
+    if not forced:
+        mu.remove(min(mu, key=lambda one: abs(one - 1.0)))
+    return mu
 
 
 def unstable(values: Complex, forced: bool) -> int:
     """Number of multipliers outside the unit circle."""
-    return int(np.sum(np.abs(nontrivial(values, forced)) > 1.0))
+    return sum(abs(mu) > 1.0 for mu in nontrivial(values, forced))
 
 
 def _none_passes(a: Point, b: Point, forced: bool) -> bool:
@@ -56,9 +60,9 @@ def _none_passes(a: Point, b: Point, forced: bool) -> bool:
     beyond = 0
     for point in (a, b):
         mu = nontrivial(point.multipliers, forced)
-        if np.min(np.abs(mu - 1.0), initial=np.inf) < CRITICAL:
+        if any(abs(one - 1.0) < CRITICAL for one in mu):
             return False
-        beyond += int(np.sum((mu.imag == 0.0) & (mu.real > 1.0)))
+        beyond += sum(one.imag == 0.0 and one.real > 1.0 for one in mu)
     return beyond % 2 == 0
 
 
@@ -67,27 +71,29 @@ def fold_test(point: Point, forced: bool) -> float:
     return float(point.dy[1])
 
 
+def _parts(values: Iterable[complex], at: float) -> complex:
+    """Product of at - z, each beside its size."""
+    return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
+
+
 def doubling_test(point: Point, forced: bool) -> float:
     """det(M + 1), each factor beside its size."""
-    mu = point.multipliers
-    return float(np.prod((1.0 + mu) / (1.0 + np.abs(mu))).real)
+    return _parts((-mu for mu in point.multipliers.tolist()), 1.0).real
 
 
 def torus_test(point: Point, forced: bool) -> float:
     """Product of 1 - mu_i mu_j over pairs, each beside its size."""
     mu = nontrivial(point.multipliers, forced)
-    i, j = np.triu_indices(len(mu), 1)
-    both = mu[i] * mu[j]
-    return float(np.prod((1.0 - both) / (1.0 + np.abs(both))).real)
+    return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
 
 
 def branching_test(point: Point, forced: bool) -> float:
     """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
-    parts = (1.0 - point.multipliers) / (1.0 + np.abs(point.multipliers))
+    mu = point.multipliers.tolist()
     if forced:
-        return float(np.prod(parts).real)
-    n = len(parts)
-    return float(sum(np.prod(np.delete(parts, i)) for i in range(n)).real) if n > 1 else 0.0
+        return _parts(mu, 1.0).real
+    n = len(mu)
+    return sum(_parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
 
 
 TESTS: dict[str, Callable[[Point, bool], float]] = {
@@ -154,13 +160,21 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
     found: list[Found] = []
     if len(cycles.active) != 1:
         return found
+    signs = [_signs(cycles, point) for point in path.points]
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
-        singular = a.sign == 0.0 or b.sign == 0.0  # a branch point that the path begins at
-        if singular or not (a.trusted and b.trusted):
+        if signs[i] is None or signs[i + 1] is None or signs[i] == signs[i + 1]:
             continue
         for one in _between(cycles, a, b, DEPTH):
             found.append(replace(one, index=i))
     return found
+
+
+def _signs(cycles: Cycles, point: Point) -> tuple[Any, ...] | None:
+    """The signs of all test functions and the number of unstable multipliers; None: not known."""
+    if point.sign == 0.0 or not point.trusted:  # a branch point that the path begins at
+        return None
+    tests = [test(point, cycles.forced) >= 0.0 for test in TESTS.values()]
+    return (*tests, unstable(point.multipliers, cycles.forced))
 
 
 def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
@@ -203,15 +217,14 @@ def refined(stretch: Stretch, kind: str) -> Found | None:
             "Newton's method did not converge between the points", {},
         )  # fmt: skip
     if kind == TORUS:
-        mu = nontrivial(point.multipliers, forced)
-        i, j = np.triu_indices(len(mu), 1)
-        k = int(np.argmin(np.abs(1.0 - mu[i] * mu[j])))
-        if abs(mu[i[k]].imag) <= 1e-9 * abs(mu[i[k]]):
+        pairs = combinations(nontrivial(point.multipliers, forced), 2)
+        one, _ = min(pairs, key=lambda pair: abs(1.0 - pair[0] * pair[1]))
+        if abs(one.imag) <= 1e-9 * abs(one):
             return None  # two real multipliers with the product 1
     critical = {BRANCHING: 1.0, DOUBLING: -1.0}.get(kind)
     if critical is not None:
         mu = nontrivial(point.multipliers, forced)
-        if not np.min(np.abs(mu - critical)) <= ASTRAY:
+        if not min(abs(one - critical) for one in mu) <= ASTRAY:
             return None
     return Found(
         kind, point, -1, interval, "converged", "", _normal_form(stretch.cycles, kind, point)
@@ -227,11 +240,10 @@ def _normal_form(cycles: Cycles, kind: str, point: Point) -> dict[str, float]:
         v = null_vector(cycles, point.orbit, W, -1.0)
         return at_doubling(cycles, point.orbit, v)
     if kind == TORUS:
-        mu = nontrivial(point.multipliers, cycles.forced)
-        mu = mu[mu.imag > 0.0]
-        if len(mu):
-            one = mu[np.argmin(np.abs(np.abs(mu) - 1.0))]
-            return at_torus(cycles, point.orbit, float(np.angle(one)))
+        pairs = [mu for mu in nontrivial(point.multipliers, cycles.forced) if mu.imag > 0.0]
+        if pairs:
+            one = min(pairs, key=lambda mu: abs(abs(mu) - 1.0))
+            return at_torus(cycles, point.orbit, cmath.phase(one))
     return {}
 
 

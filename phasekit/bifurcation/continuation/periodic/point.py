@@ -52,8 +52,10 @@ def vertical(cycles: Cycles, point: Point) -> bool:
 
     Where cycles explode along canards the parameter hardly moves either.
     """
+    if not cycles.vertical(point.dy):
+        return False
     near = np.sum(np.abs(point.multipliers - 1.0) < NEUTRAL)
-    return cycles.vertical(point.dy) and bool(near > (0 if cycles.forced else 1))
+    return bool(near > (0 if cycles.forced else 1))
 
 
 @dataclass(frozen=True, eq=False)

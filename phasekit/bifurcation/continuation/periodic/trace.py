@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,13 +67,13 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
             step *= 0.5
             continue
         solution, cosine = made
-        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        angle = math.acos(min(cosine, 1.0))
         if angle > o.max_turn:
             reason = f"the branch turns by more than max_turn = {o.max_turn:g}"
             step *= 0.5
             continue
         point = point_of(cycles, solution, state.arclength + step, step)
-        grow = float(np.clip(o.turn / max(angle, 1e-3), 0.5, 2.0))
+        grow = min(max(o.turn / max(angle, 1e-3), 0.5), 2.0)
         if solution.steps > 5:
             grow = min(grow, 0.7)
         after = State(
@@ -126,7 +127,8 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
         guess, _ = cycles.on(mesh, found.orbit)
     else:
         return f"no mesh brings the mesh error {error:.2g} under its tolerance"
-    return found, cycles.inner(orbit.mesh, dx, found.dx, dy, found.dy)
+    # The tangent's part along the last one, which is its whole length but for the turn.
+    return found, 1.0 / found.length
 
 
 def _meshed(cycles: Cycles, state: State) -> State:
