@@ -11,6 +11,7 @@ from phasekit.numerics.native import call
 
 STILL = 1e-3  # part of the largest amplitude that others count as at least
 
+
 @kernel
 def borders(
     mesh: Array, weights: Array, value: Array, slope: Array, reference: Array, tangent: Array,
@@ -127,7 +128,10 @@ def extremes(x: Array, fine: Array, m: int, low: Array, high: Array) -> None:
                 for k in range(m + 1):
                     tops[j] = max(tops[j], sign * x[j * m + k, c])
             for _ in range(min(3, count)):
-                j = np.argmax(tops)
+                j = 0
+                for i in range(count):
+                    if tops[i] > tops[j]:
+                        j = i
                 best = max(best, tops[j])
                 tops[j] = -np.inf
                 at = 0

@@ -20,6 +20,7 @@ Array = npt.NDArray[np.float64]
 
 FINE = 65  # places of an interval among which extremes are looked for
 
+
 @dataclass(frozen=True, eq=False)
 class Scheme:
     """Collocation with m Gauss points an interval.

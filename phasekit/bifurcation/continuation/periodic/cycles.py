@@ -283,11 +283,9 @@ class Cycles:
         if np.sum(parts) > MOST:
             return None
         counts = np.maximum(2, parts).astype(int)
-        places = [
-            np.linspace(a, b, k, endpoint=False)
-            for a, b, k in zip(orbit.mesh[:-1], orbit.mesh[1:], counts, strict=True)
-        ]
-        return np.append(np.concatenate(places), 1.0)
+        first, length = (np.repeat(a, counts) for a in (orbit.mesh[:-1], np.diff(orbit.mesh)))
+        within = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.append(first + length * (within / np.repeat(counts, counts)), 1.0)
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""

@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 REMESH = 3  # points after which the mesh follows the orbit
+WORSE = 10.0  # times the mesh error, which a new mesh that does not fit exceeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,5 +138,8 @@ def _meshed(cycles: Cycles, state: State) -> State:
         return state
     mesh = fitted(cycles, state.orbit)
     orbit, (dx,) = cycles.on(mesh, state.orbit, state.dx)
+    before = max(cycles.mesh_error(state.orbit), cycles.options.mesh_tolerance)
+    if not cycles.mesh_error(orbit) <= WORSE * before:
+        return replace(state, since=0)
     length = np.sqrt(cycles.inner(mesh, dx, dx, state.dy, state.dy))
     return replace(state, orbit=orbit, dx=dx / length, dy=state.dy / length, since=0)
