@@ -52,7 +52,7 @@ def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = 
 def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:
     """Numbers of one orbit by name."""
     orbit, m = point.orbit, cycles.m
-    low, high = collocation.extremes(orbit.mesh, orbit.x, m)
+    low, high = collocation.extremes(orbit.x, m)
     middle = collocation.mean(orbit.mesh, orbit.x, m)
     found: dict[str, Any] = {"period": float(orbit.y[0])}
     for i, name in enumerate(problem.state):
@@ -201,7 +201,7 @@ def _recorded(
             values = parameters_at(problem, cycles, p.orbit)
             at = collocation.times(p.orbit.mesh, cycles.m) * p.orbit.y[0]
             series = _along(function, p.orbit.x, values, problem.time, at)[:, None]
-            low, high = collocation.extremes(p.orbit.mesh, series, cycles.m)
+            low, high = collocation.extremes(series, cycles.m)
             middle = collocation.mean(p.orbit.mesh, series, cycles.m)
             found[i] = low[0], high[0], middle[0]
         for k, what in enumerate(("min", "max", "mean")):

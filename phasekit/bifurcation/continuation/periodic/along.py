@@ -9,89 +9,23 @@ import numpy as np
 from phasekit.numerics.compile import Array, kernel
 from phasekit.numerics.native import call
 
-
-@kernel
-def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Array) -> None:
-    """Periodic QR: G_N ... G_1 Q = Q' R after some passes, without ever forming the product.
-
-    The triangle is diag(exp(log)) R. Q is any orthogonal matrix and becomes Q'; with the turn
-    Q^T Q' the product is similar to the turn times the triangle ([Lust2001]).
-    """
-    count, n = G.shape[0], G.shape[1]
-    Z = np.empty((n, n))
-    start = np.empty((n, n))
-    step = np.empty((n, n))
-    for turn in range(passes):
-        for i in range(n):
-            log[i] = 0.0
-            for k in range(n):
-                R[i, k] = 1.0 if i == k else 0.0
-                start[i, k] = Q[i, k]
-        for j in range(count):
-            for i in range(n):
-                for k in range(n):
-                    total = 0.0
-                    for d in range(n):
-                        total += G[j, i, d] * Q[d, k]
-                    Z[i, k] = total
-            # Gram-Schmidt, twice, which is as good as reflections.
-            for k in range(n):
-                for d in range(n):
-                    step[d, k] = 0.0
-                for _ in range(2):
-                    for d in range(k):
-                        total = 0.0
-                        for i in range(n):
-                            total += Z[i, d] * Z[i, k]
-                        step[d, k] += total
-                        for i in range(n):
-                            Z[i, k] -= total * Z[i, d]
-                size = 0.0
-                for i in range(n):
-                    size += Z[i, k] * Z[i, k]
-                size = np.sqrt(size)
-                step[k, k] = size
-                for i in range(n):
-                    Z[i, k] /= size
-            for i in range(n):
-                for k in range(n):
-                    Q[i, k] = Z[i, k]
-            if turn < passes - 1:
-                continue
-            # D_new U_new D U = (D_new D) (D^-1 U_new D) U with unit triangles U.
-            for i in range(n):
-                for k in range(i + 1, n):
-                    step[i, k] *= np.exp(log[k] - log[i]) / step[i, i]
-            for i in range(n):
-                for k in range(i + 1, n):
-                    total = R[i, k] + step[i, k]
-                    for d in range(i + 1, k):
-                        total += step[i, d] * R[d, k]
-                    # Upwards from row i: entries of rows below are not needed again.
-                    Z[i, k] = total
-            for i in range(n):
-                for k in range(i + 1, n):
-                    R[i, k] = Z[i, k]
-                log[i] += np.log(step[i, i])
-    for i in range(n):
-        for k in range(n):
-            turn_[i, k] = 0.0
-            for d in range(n):
-                turn_[i, k] += start[d, i] * Q[d, k]
+STILL = 1e-3  # part of the largest amplitude that others count as at least
 
 
 @kernel
 def borders(
     mesh: Array, weights: Array, value: Array, slope: Array, reference: Array, tangent: Array,
-    scale: Array, forced: bool, rows: Array,
+    scale: Array, forced: bool, rows: Array, at: Array,
 ) -> None:  # fmt: skip
     """Fill the row of the phase condition (the first) and that of the arclength (the last).
 
-    They are the integrals of x . x_ref' and of x . tangent, on scaled axes.
+    They are the integrals of x . x_ref' and of x . tangent, on scaled axes; ``at`` is what they are
+    for the reference.
     """
     m, n = weights.size, scale.size
     end = rows.shape[0] - 1
     rows[:] = 0.0
+    at[:] = 0.0
     for j in range(mesh.size - 1):
         h = mesh[j + 1] - mesh[j]
         for i in range(m):
@@ -105,6 +39,10 @@ def borders(
                     if not forced:
                         rows[0, j * m + k, c] += part * along * value[i, k]
                     rows[end, j * m + k, c] += h * part / n * across * value[i, k]
+    for i in range(reference.shape[0]):
+        for c in range(n):
+            at[0] += rows[0, i, c] * reference[i, c]
+            at[end] += rows[end, i, c] * reference[i, c]
 
 
 @kernel
@@ -156,8 +94,9 @@ def interpolate(mesh: Array, x: Array, places: Array, at: Array, out: Array) -> 
 
 
 @kernel
-def ranges(mesh: Array, x: Array, turns: Array, m: int, half: Array) -> None:
-    """Half the range of each state, less its turns, over all places."""
+def amplitudes(mesh: Array, x: Array, turns: Array, scale: Array, m: int, half: Array) -> None:
+    """Half the range of each state, less its turns; where it hardly moves, a part of all."""
+    most = 0.0
     for c in range(x.shape[1]):
         low, high = np.inf, -np.inf
         for j in range(mesh.size - 1):
@@ -166,6 +105,68 @@ def ranges(mesh: Array, x: Array, turns: Array, m: int, half: Array) -> None:
                 value = x[j * m + k, c] - turns[c] * (mesh[j] + k * h)
                 low, high = min(low, value), max(high, value)
         half[c] = 0.5 * (high - low)
+        most = max(most, half[c] / scale[c])
+    for c in range(x.shape[1]):
+        half[c] = max(half[c], STILL * most * scale[c])
+
+
+@kernel
+def extremes(x: Array, fine: Array, m: int, low: Array, high: Array) -> None:
+    """Least and largest values of each column, with ``fine`` from places to those of a fine grid.
+
+    The three intervals with the highest places are looked at, and a parabola is laid through the
+    three highest values.
+    """
+    count, grid = (x.shape[0] - 1) // m, fine.shape[0]
+    values = np.empty(grid)
+    tops = np.empty(count)
+    for c in range(x.shape[1]):
+        for sign in (1.0, -1.0):
+            best = -np.inf
+            for j in range(count):
+                tops[j] = -np.inf
+                for k in range(m + 1):
+                    tops[j] = max(tops[j], sign * x[j * m + k, c])
+            for _ in range(min(3, count)):
+                j = 0
+                for i in range(count):
+                    if tops[i] > tops[j]:
+                        j = i
+                best = max(best, tops[j])
+                tops[j] = -np.inf
+                at = 0
+                for i in range(grid):
+                    total = 0.0
+                    for k in range(m + 1):
+                        total += fine[i, k] * x[j * m + k, c]
+                    values[i] = sign * total
+                    if values[i] > values[at]:
+                        at = i
+                top = values[at]
+                if 0 < at < grid - 1:
+                    a, b, d = values[at - 1], values[at], values[at + 1]
+                    bend = a - 2.0 * b + d
+                    if bend < 0.0:
+                        top = b - 0.125 * (d - a) ** 2 / bend
+                best = max(best, top)
+            if sign > 0.0:
+                high[c] = best
+            else:
+                low[c] = -best
+
+
+@kernel
+def mean(mesh: Array, x: Array, weights: Array, value: Array, out: Array) -> None:
+    """Integral over a period of each column."""
+    m = weights.size
+    out[:] = 0.0
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for k in range(m + 1):
+                part = h * weights[i] * value[i, k]
+                for c in range(x.shape[1]):
+                    out[c] += part * x[j * m + k, c]
 
 
 @kernel
@@ -192,6 +193,18 @@ def highest(
         out[j] = 0.0
         for c in range(n):
             out[j] = max(out[j], 0.5 * (jump[j, c] + jump[after, c]))
+
+
+@kernel
+def error(mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Array) -> float:
+    """Largest part of the derivative of order m + 1 that an interval sees."""
+    sizes = np.empty(mesh.size - 1)
+    highest(mesh, x, coefficients, scale, closure, sizes)
+    worst = 0.0
+    for j in range(sizes.size):
+        size = sizes[j] * (mesh[j + 1] - mesh[j]) ** coefficients.size
+        worst = size if not size <= worst else worst
+    return worst
 
 
 @kernel

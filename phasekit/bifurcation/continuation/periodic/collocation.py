@@ -18,6 +18,8 @@ from phasekit.bifurcation.continuation.periodic import along
 
 Array = npt.NDArray[np.float64]
 
+FINE = 65  # places of an interval among which extremes are looked for
+
 
 @dataclass(frozen=True, eq=False)
 class Scheme:
@@ -35,6 +37,8 @@ class Scheme:
         From the values at even places to the m-th derivative, which is constant.
     side : float
         Sign of the determinant of the slopes by all places but the first.
+    fine : ndarray, shape (FINE, m + 1)
+        From the values at even places to those on a fine grid of the interval.
     """
 
     m: int
@@ -44,6 +48,7 @@ class Scheme:
     slope: Array
     high: Array
     side: float
+    fine: Array
 
 
 @functools.cache
@@ -56,7 +61,8 @@ def scheme(m: int) -> Scheme:
     high = np.array([float(m) ** m / np.prod((p - places)[places != p]) for p in places])
     high *= float(np.prod(np.arange(1.0, m + 1.0)))
     side = float(np.sign(np.linalg.det(slope[:, 1:])))
-    return Scheme(m, nodes, 0.5 * weights, value, slope, high, side)
+    fine, _ = basis(m, np.linspace(0.0, 1.0, FINE))
+    return Scheme(m, nodes, 0.5 * weights, value, slope, high, side, fine)
 
 
 def basis(m: int, at: Array) -> tuple[Array, Array]:
@@ -124,27 +130,15 @@ def functional(mesh: Array, values: Array, m: int) -> Array:
 
 def mean(mesh: Array, x: Array, m: int) -> Array:
     """Integral over a period."""
-    c = scheme(m)
-    return np.asarray(np.einsum("j,i,jin->n", np.diff(mesh), c.weights, at_gauss(x, m)))
+    c, out = scheme(m), np.empty(x.shape[1])
+    along.mean(mesh, np.ascontiguousarray(x), c.weights, c.value, out)
+    return out
 
 
-def extremes(mesh: Array, x: Array, m: int) -> tuple[Array, Array]:
+def extremes(x: Array, m: int) -> tuple[Array, Array]:
     """Least and largest values of each column of a piecewise polynomial."""
-    value, _ = basis(m, np.linspace(0.0, 1.0, 65))
-    low, high = np.min(x, axis=0), np.max(x, axis=0)
-    parts = pieces(x, m)
-    for c in range(x.shape[1]):
-        for sign, best in ((1.0, high), (-1.0, low)):
-            tops = np.max(sign * parts[:, :, c], axis=1)
-            for j in np.argsort(-tops)[:3]:
-                fine = sign * (value @ parts[j, :, c])
-                k = int(np.argmax(fine))
-                top = float(fine[k])
-                if 0 < k < len(fine) - 1:  # a parabola through the three highest
-                    a, b, d = fine[k - 1 : k + 2]
-                    bend = a - 2.0 * b + d
-                    top = float(b - 0.125 * (d - a) ** 2 / bend) if bend < 0.0 else top
-                best[c] = max(best[c], sign * sign * top) if sign > 0 else min(best[c], -top)
+    low, high = np.empty((2, x.shape[1]))
+    along.extremes(np.ascontiguousarray(x), scheme(m).fine, m, low, high)
     return low, high
 
 
@@ -161,7 +155,7 @@ def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Arra
 
 def error(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> float:
     """Largest estimated error of the polynomials between the ends of intervals, on scaled axes."""
-    return float(np.max(highest(mesh, x, m, scale, closure) * np.diff(mesh) ** (m + 1))) * factor(m)
+    return float(along.error(mesh, x, scheme(m).high, scale, closure)) * factor(m)
 
 
 @functools.cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -13,7 +14,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
 from phasekit.bifurcation.continuation.periodic.jets import Jets
-from phasekit.bifurcation.continuation.periodic.multipliers import across, along_flow, multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -59,6 +60,8 @@ class Solution:
         Integral of the trace of f_x over the period.
     W : ndarray
         The condensed equations (see `kernels.condense`).
+    length : float
+        Of the tangent whose part along the direction of the plane is 1.
     """
 
     orbit: Orbit
@@ -70,6 +73,7 @@ class Solution:
     divergence: float
     W: Array
     message: str = ""
+    length: float = 1.0
 
     @property
     def converged(self) -> bool:
@@ -181,15 +185,15 @@ class Cycles:
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
         """Bordering rows, phase or period first, direction last; with their values at the orbit."""
         c = collocation.scheme(self.m)
-        rows = np.empty((self.q, *orbit.x.shape))
+        rows, at = np.empty((self.q, *orbit.x.shape)), np.empty(self.q)
         along.borders(
-            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows
+            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows, at
         )
         rows_y = np.zeros((self.q, self.q))
         if self.fixed:
             rows_y[1, 0] = 1.0
         rows_y[-1, 1:] = dy[1:] / self.width**2
-        return rows, rows_y, np.einsum("rkn,kn->r", rows, orbit.x) + rows_y @ orbit.y
+        return rows, rows_y, at + rows_y @ orbit.y
 
     def correct(
         self,
@@ -216,7 +220,7 @@ class Cycles:
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, self.sizes)
-            end, steps, sign, residual, divergence, size = kernels.newton(
+            end, steps, sign, residual, divergence, size, length = kernels.newton(
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale,
                 self.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
@@ -227,7 +231,8 @@ class Cycles:
                 break
         orbit = Orbit(mesh, x, y)
         if end == kernels.FOUND:
-            return self._found(orbit, dx[1], dy[1], step, residual, sign, divergence, W)
+            found = (step, residual, sign, divergence, W)
+            return Solution(orbit, dx[1], dy[1], *found, length=length)
         message = {
             kernels.NOT_FINITE: "f or its derivatives are not finite",
             kernels.SINGULAR: "the equations are singular",
@@ -243,16 +248,8 @@ class Cycles:
             jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
             self.scale, orbit.x, orbit.y, W,
         )  # fmt: skip
-        return self._found(orbit, dx, dy, 1, residual, 0.0, divergence, W)
-
-    def _found(
-        self, orbit: Orbit, dx: Array, dy: Array, steps: int, residual: float, sign: float,
-        divergence: float, W: Array,
-    ) -> Solution:  # fmt: skip
-        length = float(np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy)))
-        if not length > 0.0:
-            length = 1.0
-        return Solution(orbit, dx / length, dy / length, steps, residual, sign, divergence, W)
+        length = float(np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy))) or 1.0
+        return Solution(orbit, dx / length, dy / length, 1, residual, 0.0, divergence, W)
 
     def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
         """Floquet multipliers, the logarithm of the size of their product, the trivial one's error.
@@ -263,16 +260,14 @@ class Cycles:
         n = self.n
         G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
         if not self.forced and n > 1:
-            with np.errstate(all="ignore"):
-                f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes) / self.scale
-            if np.isfinite(f).all() and np.all(np.any(f != 0.0, axis=1)):
-                G = G * self.scale / self.scale[:, None]
-                trivial, off = along_flow(G, f)
-                others, log = multipliers(across(G, f / np.max(np.abs(f), axis=1, keepdims=True)))
-                whole = np.append(others, trivial)
-                order = np.argsort(-np.abs(whole), kind="stable")
-                with np.errstate(all="ignore"):
-                    return whole[order], log + float(np.log(abs(trivial))), abs(trivial - 1.0) + off
+            f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+            if np.isfinite(f).all() and f.any(axis=1).all():
+                A = np.empty((len(f), n - 1, n - 1))
+                trivial, off = across(G, f, self.scale, A)
+                others, log = multipliers(A)
+                whole = sorted([*others.tolist(), complex(trivial)], key=abs, reverse=True)
+                log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
+                return np.array(whole), log, abs(trivial - 1.0) + off
         values, log = multipliers(G)
         return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
 
@@ -288,11 +283,9 @@ class Cycles:
         if np.sum(parts) > MOST:
             return None
         counts = np.maximum(2, parts).astype(int)
-        places = [
-            np.linspace(a, b, k, endpoint=False)
-            for a, b, k in zip(orbit.mesh[:-1], orbit.mesh[1:], counts, strict=True)
-        ]
-        return np.append(np.concatenate(places), 1.0)
+        first, length = (np.repeat(a, counts) for a in (orbit.mesh[:-1], np.diff(orbit.mesh)))
+        within = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
+        return np.append(first + length * (within / np.repeat(counts, counts)), 1.0)
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""
@@ -306,9 +299,8 @@ class Cycles:
     def amplitudes(self, orbit: Orbit) -> Array:
         """Half the range of each state, without its turns; where it hardly moves, a part of all."""
         half = np.empty(self.n)
-        along.ranges(orbit.mesh, orbit.x, self.turns, self.m, half)
-        whole = half / self.scale
-        return np.asarray(self.scale * np.maximum(whole, 1e-3 * float(np.max(whole))))
+        along.amplitudes(orbit.mesh, orbit.x, self.turns, self.scale, self.m, half)
+        return half
 
     def mesh_error(self, orbit: Orbit) -> float:
         """Largest estimated error of a state, beside its amplitude."""

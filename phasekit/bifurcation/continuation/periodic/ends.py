@@ -95,8 +95,7 @@ def _rests(cycles: Cycles, orbit: Orbit, dx: Array, rate: float) -> bool:
     step = REACH / float(np.max(np.abs(dx) / cycles.scale))
     flat = orbit.x - np.outer(collocation.times(orbit.mesh, cycles.m), cycles.turns)
     before, after = (
-        np.ptp(collocation.extremes(orbit.mesh, flat + s * step * dx, cycles.m), axis=0)
-        for s in (-1.0, 1.0)
+        np.ptp(collocation.extremes(flat + s * step * dx, cycles.m), axis=0) for s in (-1.0, 1.0)
     )
     sizes = np.maximum(before + after, STEADY * cycles.scale)
     growth = np.abs(after - before) / sizes / (step * rate)

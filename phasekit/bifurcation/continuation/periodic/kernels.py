@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.bifurcation.continuation.periodic.along import inner
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
@@ -332,11 +333,11 @@ def newton(
     side: float, scale: Array, sizes: Array, width: Array, closure: Array, turns: Array,
     rows: Array, rows_y: Array, target: Array, x: Array, y: Array, W: Array, dx: Array, dy: Array,
     jet_: Array, tolerance: float, iterations: int, damped: bool, before: float,
-) -> tuple[int, int, float, float, float, float]:  # fmt: skip
+) -> tuple[int, int, float, float, float, float, float]:  # fmt: skip
     """Newton's method for an orbit, in its place, with the derivatives of f given or taken here.
 
-    Returns how it ended, steps, sign of the determinant, residual, integral of the trace and the
-    size of the last step.
+    Returns how it ended, steps, sign of the determinant, residual, integral of the trace, the size
+    of the last step and the length of the tangent before it is made 1.
     """
     m, n, q = nodes.size, x.shape[1], y.size
     places = x.shape[0]
@@ -368,12 +369,12 @@ def newton(
             jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
         )
         if sign == 0.0:
-            return NOT_FINITE, step, sign, residual, divergence, size
+            return NOT_FINITE, step, sign, residual, divergence, size, 1.0
         for c in range(n):
             gap[c] = closure[c] * x[0, c] + turns[c] - x[places - 1, c]
         sign *= solve(W, rows, border, right, gap, closure, m, dx, dy)
         if sign == 0.0:
-            return SINGULAR, step, sign, residual, divergence, size
+            return SINGULAR, step, sign, residual, divergence, size, 1.0
         size = abs(dy[0, 0]) / y[0]
         for k in range(1, q):
             size = max(size, abs(dy[0, k]) / width[k - 1])
@@ -381,7 +382,7 @@ def newton(
             for c in range(n):
                 size = max(size, abs(dx[0, i, c]) / scale[c])
         if not np.isfinite(size):
-            return DIVERGED, step, sign, residual, divergence, size
+            return DIVERGED, step, sign, residual, divergence, size, 1.0
         part = min(1.0, 0.5 / size) if damped and size > 0.0 else 1.0
         for i in range(places):
             for c in range(n):
@@ -389,11 +390,17 @@ def newton(
         for k in range(q):
             y[k] += part * dy[0, k]
         if not y[0] > 0.0:
-            return DIVERGED, step, sign, residual, divergence, size
+            return DIVERGED, step, sign, residual, divergence, size, 1.0
         flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
         if part == 1.0 and (size <= tolerance or flat):
-            return FOUND, step, sign, residual, divergence, size
+            length = inner(mesh, weights, value, dx[1], dx[1], scale)
+            for k in range(1, q):
+                length += (dy[1, k] / width[k - 1]) ** 2
+            length = np.sqrt(length) if length > 0.0 else 1.0
+            dx[1] /= length
+            dy[1] /= length
+            return FOUND, step, sign, residual, divergence, size, length
         if not damped and before < np.inf and size > 2.0 * before:
-            return DIVERGED, step, sign, residual, divergence, size
+            return DIVERGED, step, sign, residual, divergence, size, 1.0
         before = size
-    return ON_ITS_WAY, iterations, sign, residual, divergence, size
+    return ON_ITS_WAY, iterations, sign, residual, divergence, size, 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import along
+from phasekit.numerics.compile import kernel
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -14,6 +14,96 @@ APART = 1e-14  # entries below the diagonal blocks that are rounding
 ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative error they are
 PASSES = 12
 ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
+
+
+@kernel
+def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Array) -> None:
+    """Periodic QR: G_N ... G_1 Q = Q' R after some passes, without ever forming the product.
+
+    The triangle is diag(exp(log)) R. Q is any orthogonal matrix and becomes Q'; with the turn
+    Q^T Q' the product is similar to the turn times the triangle ([Lust2001]).
+    """
+    count, n = G.shape[0], G.shape[1]
+    Z = np.empty((n, n))
+    start = np.empty((n, n))
+    step = np.empty((n, n))
+    for turn in range(passes):
+        for i in range(n):
+            log[i] = 0.0
+            for k in range(n):
+                R[i, k] = 1.0 if i == k else 0.0
+                start[i, k] = Q[i, k]
+        for j in range(count):
+            for i in range(n):
+                for k in range(n):
+                    total = 0.0
+                    for d in range(n):
+                        total += G[j, i, d] * Q[d, k]
+                    Z[i, k] = total
+            # Gram-Schmidt, twice, which is as good as reflections.
+            for k in range(n):
+                for d in range(n):
+                    step[d, k] = 0.0
+                for _ in range(2):
+                    for d in range(k):
+                        total = 0.0
+                        for i in range(n):
+                            total += Z[i, d] * Z[i, k]
+                        step[d, k] += total
+                        for i in range(n):
+                            Z[i, k] -= total * Z[i, d]
+                size = 0.0
+                for i in range(n):
+                    size += Z[i, k] * Z[i, k]
+                size = np.sqrt(size)
+                step[k, k] = size
+                for i in range(n):
+                    Z[i, k] /= size
+            for i in range(n):
+                for k in range(n):
+                    Q[i, k] = Z[i, k]
+            if turn < passes - 1:
+                continue
+            # D_new U_new D U = (D_new D) (D^-1 U_new D) U with unit triangles U.
+            for i in range(n):
+                for k in range(i + 1, n):
+                    step[i, k] *= np.exp(log[k] - log[i]) / step[i, i]
+            for i in range(n):
+                for k in range(i + 1, n):
+                    total = R[i, k] + step[i, k]
+                    for d in range(i + 1, k):
+                        total += step[i, d] * R[d, k]
+                    # Upwards from row i: entries of rows below are not needed again.
+                    Z[i, k] = total
+            for i in range(n):
+                for k in range(i + 1, n):
+                    R[i, k] = Z[i, k]
+                log[i] += np.log(step[i, i])
+    for i in range(n):
+        for k in range(n):
+            turn_[i, k] = 0.0
+            for d in range(n):
+                turn_[i, k] += start[d, i] * Q[d, k]
+
+
+@kernel
+def iterate(G: Array, Q: Array, R: Array, log: Array, turn: Array, cut: Array) -> None:
+    """Orthogonal iteration until blocks of unlike multipliers part: where they do, ``cut`` is 1."""
+    n = G.shape[1]
+    for _ in range(PASSES // 2):
+        triangular(G, 2, Q, R, log, turn)
+        settled, finite = True, np.isfinite(log[n - 1])
+        for i in range(n - 1):
+            below = 0.0
+            for k in range(i + 1, n):
+                for d in range(i + 1):
+                    below = max(below, abs(turn[k, d]))
+            apart = log[i] - log[i + 1]
+            cut[i] = 1.0 if below <= (ROUNDED if apart > ALIKE else APART) else 0.0
+            settled = settled and (cut[i] == 1.0 or abs(apart) <= ALIKE)
+            finite = finite and np.isfinite(log[i])
+        if settled or not finite:
+            break
 
 
 def multipliers(G: Array) -> tuple[Complex, float]:
@@ -25,52 +115,81 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     """
     n = G.shape[1]
     Q, R, log, turn = np.eye(n), np.empty((n, n)), np.empty(n), np.empty((n, n))
-    G = np.ascontiguousarray(G)
+    cut = np.ones(n)
+    unknown = np.full(n, np.nan, dtype=complex), np.nan
     if not np.isfinite(G).all():
-        return np.full(n, np.nan, dtype=complex), np.nan
-    for _ in range(PASSES // 2):
-        along.triangular(G, 2, Q, R, log, turn)
-        apart = log[:-1] - log[1:]
-        below = [float(np.abs(turn[i:, :i]).max()) for i in range(1, n)]
-        cuts = [i + 1 for i in range(n - 1) if below[i] <= (ROUNDED if apart[i] > ALIKE else APART)]
-        if all(i + 1 in cuts or abs(apart[i]) <= ALIKE for i in range(n - 1)):
-            break
-        if not np.isfinite(log).all():
-            break
-    values, logs = [], 0.0
-    edges = [0, *cuts, n]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+        return unknown
+    iterate(np.ascontiguousarray(G), Q, R, log, turn, cut)
+    values, logs, first = [], 0.0, 0
+    for last in (np.flatnonzero(cut) + 1).tolist():
         here = slice(first, last)
-        top = float(np.max(log[here]))
-        block = turn[here, here] @ (np.exp(log[here] - top)[:, None] * R[here, here])
-        if not np.isfinite(block).all():
-            return np.full(n, np.nan, dtype=complex), np.nan
-        found = block[0] if last - first == 1 else np.linalg.eigvals(block)
+        top = float(log[first]) if last == first + 1 else float(np.max(log[here]))
         with np.errstate(all="ignore"):
-            values.append(np.asarray(found, dtype=complex) * np.exp(top))
+            block = turn[here, here] @ (np.exp(log[here] - top)[:, None] * R[here, here])
+            if not np.isfinite(block).all():
+                return unknown
+            found = block[0].tolist() if last == first + 1 else np.linalg.eigvals(block).tolist()
+            size = float(np.exp(top))
             # Of the values found: the triangle's own would be right even where they are not.
             logs += float(np.sum(np.log(np.abs(found)))) + (last - first) * top
-    whole = np.concatenate(values)
-    return whole[np.argsort(-np.abs(whole), kind="stable")], logs
+        values += [complex(one) * size for one in found]
+        first = last
+    return np.array(sorted(values, key=abs, reverse=True)), logs
 
 
-def along_flow(G: Array, f: Array) -> tuple[float, float]:
-    """The multiplier that belongs to f along the orbit, and how far f is carried off itself.
+@kernel
+def across(G: Array, f: Array, scale: Array, A: Array) -> tuple[float, float]:
+    """Part the flow from what is across it: fill A, on scaled axes.
 
+    Returns the multiplier that belongs to f along the orbit, and how far f is carried off itself.
     Each matrix takes f to f at the next interval, so it is a product of numbers that are near 1:
-    as accurate as the orbit, where that of the whole product drowns in the rounding of others.
+    as accurate as the orbit, where that of the whole product drowns in the rounding of others. A is
+    what is left across f, in frames that reflections of the first axis into f give.
     """
-    after = np.roll(f, -1, axis=0)
-    carried = np.einsum("jik,jk->ji", G, f)
-    with np.errstate(all="ignore"):
-        square = np.einsum("ji,ji->j", after, after)
-        part = np.einsum("ji,ji->j", after, carried) / square
-        off = np.sqrt(np.einsum("ji->j", (carried - part[:, None] * after) ** 2) / square)
-        return float(np.prod(part)), float(np.max(off))
-
-
-def across(G: Array, f: Array) -> Array:
-    """The part of each matrix across a direction that it takes to the next one, as it does f."""
-    frames = np.linalg.qr(f[:, :, None], mode="complete")[0][:, :, 1:]
-    after = np.roll(frames, -1, axis=0)
-    return np.asarray(np.swapaxes(after, 1, 2) @ G @ frames)
+    count, n = f.shape
+    v, length = np.empty((count, n)), np.empty(count)
+    for j in range(count):
+        length[j] = 0.0
+        for c in range(n):
+            v[j, c] = f[j, c] / scale[c]
+            length[j] = max(length[j], abs(v[j, c]))
+        total = 0.0
+        for c in range(n):
+            v[j, c] /= length[j]
+            total += v[j, c] ** 2
+        total = np.sqrt(total)
+        length[j] *= total
+        # The reflection 1 - v v^T that takes f to the first axis.
+        first = v[j, 0] / total
+        part = 1.0 / np.sqrt(1.0 + abs(first))
+        for c in range(n):
+            v[j, c] *= part / total
+        v[j, 0] += part if first >= 0.0 else -part
+    trivial, off = 1.0, 0.0
+    B = np.empty((n, n))
+    for j in range(count):
+        after = j + 1 if j < count - 1 else 0
+        for i in range(n):
+            total = 0.0
+            for k in range(n):
+                B[i, k] = G[j, i, k] * scale[k] / scale[i]
+                total += B[i, k] * v[j, k]
+            for k in range(n):
+                B[i, k] -= total * v[j, k]
+        for k in range(n):
+            total = 0.0
+            for i in range(n):
+                total += v[after, i] * B[i, k]
+            for i in range(n):
+                B[i, k] -= v[after, i] * total
+        # Reflections take f to minus its sign along the first axis.
+        side = 1.0 if v[j, 0] * v[after, 0] > 0.0 else -1.0
+        ratio = side * length[j] / length[after]
+        trivial *= ratio * B[0, 0]
+        aside = 0.0
+        for i in range(1, n):
+            aside += (ratio * B[i, 0]) ** 2
+            for k in range(1, n):
+                A[j, i - 1, k - 1] = B[i, k]
+        off = max(off, np.sqrt(aside))
+    return trivial, off

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +15,9 @@ Complex = npt.NDArray[np.complex128]
 
 TRUSTED = 1e-5  # error by Liouville's formula above which no tests
 NEAR = 5e-7  # the same of the trivial multiplier
-UNRESOLVED = 1e-7  # by which logarithms of the product differ where multipliers are not resolved
-ALIKE = 1e-3  # the same, beside their size, above which nothing is known of multipliers
+UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are not resolved
+ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
+LARGEST = 709.0  # logarithm of the largest numbers
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
 
@@ -52,8 +54,10 @@ def vertical(cycles: Cycles, point: Point) -> bool:
 
     Where cycles explode along canards the parameter hardly moves either.
     """
+    if not cycles.vertical(point.dy):
+        return False
     near = np.sum(np.abs(point.multipliers - 1.0) < NEUTRAL)
-    return cycles.vertical(point.dy) and bool(near > (0 if cycles.forced else 1))
+    return bool(near > (0 if cycles.forced else 1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +77,11 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
     """A point of what Newton's method found."""
     values, log, trivial = cycles.multipliers(s.W, s.orbit)
     divergence = cycles.divergence(s.divergence)
+    error = cycles.mesh_error(s.orbit)
     # An orbit may be smooth where its variational equations are stiff.
-    mesh = cycles.resolving(s.orbit) if abs(log - divergence) > UNRESOLVED else None
+    least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
+    unresolved = abs(log - divergence) > least * (1.0 + abs(divergence))
+    mesh = cycles.resolving(s.orbit) if unresolved else None
     if mesh is not None:
         orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
         fine = cycles.correct(orbit, *cycles.rows(orbit, dx, s.dy))
@@ -82,13 +89,13 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
             fine = cycles.looked_at(orbit, dx, s.dy)
         values, log, trivial = cycles.multipliers(fine.W, fine.orbit)
         divergence = cycles.divergence(fine.divergence)
-    with np.errstate(all="ignore"):
-        product, exact = np.exp(log), np.exp(divergence)
-        defect = abs(product - exact) / max(1.0, exact)
-        apart = abs(log - divergence) / (1.0 + abs(divergence))
-        if not np.isfinite(exact) or not apart <= ALIKE:
-            defect = apart
+    # Where both are beyond all numbers, their logarithms are compared.
+    apart = abs(log - divergence) / (1.0 + abs(divergence))
+    defect = apart
+    if apart <= ALIKE and max(log, divergence) < LARGEST:
+        exact = math.exp(divergence)
+        defect = abs(math.exp(log) - exact) / max(1.0, exact)
     return Point(
         s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
-        float(defect), cycles.mesh_error(s.orbit),
+        defect, error,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 REMESH = 3  # points after which the mesh follows the orbit
+WORSE = 10.0  # times the mesh error, which a new mesh that does not fit exceeds
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,13 +68,13 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
             step *= 0.5
             continue
         solution, cosine = made
-        angle = float(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        angle = math.acos(min(cosine, 1.0))
         if angle > o.max_turn:
             reason = f"the branch turns by more than max_turn = {o.max_turn:g}"
             step *= 0.5
             continue
         point = point_of(cycles, solution, state.arclength + step, step)
-        grow = float(np.clip(o.turn / max(angle, 1e-3), 0.5, 2.0))
+        grow = min(max(o.turn / max(angle, 1e-3), 0.5), 2.0)
         if solution.steps > 5:
             grow = min(grow, 0.7)
         after = State(
@@ -126,7 +128,8 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
         guess, _ = cycles.on(mesh, found.orbit)
     else:
         return f"no mesh brings the mesh error {error:.2g} under its tolerance"
-    return found, cycles.inner(orbit.mesh, dx, found.dx, dy, found.dy)
+    # The tangent's part along the last one, which is its whole length but for the turn.
+    return found, 1.0 / found.length
 
 
 def _meshed(cycles: Cycles, state: State) -> State:
@@ -135,5 +138,8 @@ def _meshed(cycles: Cycles, state: State) -> State:
         return state
     mesh = fitted(cycles, state.orbit)
     orbit, (dx,) = cycles.on(mesh, state.orbit, state.dx)
+    before = max(cycles.mesh_error(state.orbit), cycles.options.mesh_tolerance)
+    if not cycles.mesh_error(orbit) <= WORSE * before:
+        return replace(state, since=0)
     length = np.sqrt(cycles.inner(mesh, dx, dx, state.dy, state.dy))
     return replace(state, orbit=orbit, dx=dx / length, dy=state.dy / length, since=0)
