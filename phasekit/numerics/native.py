@@ -17,7 +17,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic, overload
 
-from phasekit.numerics.compile import Array, Function
+from phasekit.numerics.compile import OPTIONS, Array, Function
 
 OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
 
@@ -26,9 +26,7 @@ def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
     """Give a function that is interpreted as it stands another body for the compiler."""
 
     def decorate(function: Function) -> Function:
-        overload(function, jit_options={"error_model": "numpy"}, strict=False)(
-            lambda *args: compiled
-        )
+        overload(function, jit_options=OPTIONS, strict=False)(lambda *args: compiled)
         return function
 
     return decorate
