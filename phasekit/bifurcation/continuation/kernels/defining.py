@@ -153,6 +153,20 @@ def evaluate(
             for j in range(n):
                 w[row + m + j] = w[base + i * m + j]
         return
+    hopf_rows(first, second, mode, n, par, active, w, u)
+
+
+@routine
+def hopf_rows(
+    first: Any, second: Any, mode: int, n: int, par: Array, active: Any, w: Array, u: int
+) -> None:
+    """The equations (f_x^2 + k) v = 0 and the phase of v; z is f_x v, the norm is there already."""
+    size, _, aux, _, _, _, f, g, jac, bent, _, z, spare = places(HOPF, n, active.size)
+    scale = SCALE * size
+    m = n + active.size
+    v = u + m
+    base = f + n  # the derivatives
+    extra = w[u + size - 1]
     for i in range(n):
         row = jac + (n + i) * size
         for k in range(n):
