@@ -8,6 +8,7 @@ import tomllib
 from pathlib import Path
 
 import phasekit
+from phasekit.systems.registry import models
 
 ROOT = Path(phasekit.__file__).parent
 MODULE = re.compile(r"(phasekit(?:\.[a-z_]\w*)+)(?::\w*)?")
@@ -110,6 +111,23 @@ def test_there_is_no_import_circle():
     }
     circles = [c for c in strongly_connected(arrows) if len(c) > 1]
     assert circles == []
+
+
+def test_nothing_knows_a_system_by_the_name_of_its_class():
+    """A method belongs to a rung of the ladder of laws; what a system adds, its class says."""
+    names, seen = set(models()), 0
+    for module, path in modules().items():
+        for node in ast.walk(ast.parse(path.read_text())):
+            parts = []
+            if isinstance(node, ast.Dict):
+                parts = node.keys
+            elif isinstance(node, ast.Compare):
+                parts = [node.left, *node.comparators]
+            seen += len(parts)
+            known = {part.value for part in parts if isinstance(part, ast.Constant)} & names
+            assert not known, (module, node.lineno)
+    assert len(names) > 8
+    assert seen > 1000
 
 
 def strongly_connected(arrows: dict[str, set[str]]) -> list[set[str]]:

@@ -49,7 +49,7 @@ def _model(argv: Sequence[str]) -> tuple[Any, Any]:
         argv,
         _options,
     )
-    if not given and model.__name__ == "GyroRotorDisk":
+    if not given and EXAMPLE.keys() <= {parameter.name for parameter in model.declared}:
         given = EXAMPLE
     system, swept = common.build(model, given)
     if swept:

@@ -25,7 +25,7 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
-from phasekit.numerics.compile import Array, inline, kernel
+from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 
 Codes = npt.NDArray[np.int16]
@@ -60,6 +60,24 @@ def box_of(phi: float, dphi: float, period: float, box: Array, boxes: Codes) -> 
     if not (0 <= i < boxes.shape[0] and 0 <= j < boxes.shape[1]):
         return -1
     return int(boxes[int(i), int(j)])
+
+
+@routine
+def stays(lane: int, inside: int, visits: int, last: Index, same: Index) -> bool:
+    """Whether a motion has come to boxes of one attractor so many times in succession."""
+    same[lane] = same[lane] + 1 if inside >= 0 and inside == last[lane] else 1
+    last[lane] = inside
+    return inside >= 0 and bool(same[lane] >= visits)
+
+
+@routine
+def resume(lane: int, done: int, leg: float, again: bool, real: Array, whole: Index) -> None:
+    """Let a motion go on through its next leg; where the law repeats itself, time begins anew."""
+    whole[STATE, lane] = RUNNING
+    if again:
+        whole[ACCEPTED, lane] = CHANGED
+    real[T, lane] = 0.0 if again else done * leg
+    real[END, lane] = leg if again else (done + 1) * leg
 
 
 @kernel
@@ -104,11 +122,8 @@ def strobe(
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
     z = np.zeros(3 * LANES)
     real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
-    done, last, same = (
-        np.zeros(LANES, np.int64),
-        np.zeros(LANES, np.int64),
-        np.zeros(LANES, np.int64),
-    )
+    counts = np.zeros((3, LANES), np.int64)
+    done, last, same = counts[0], counts[1], counts[2]
     cell = first
     left = stop - first
     while left > 0:
@@ -118,7 +133,6 @@ def strobe(
             if state == RUNNING:
                 continue
             own = whole[CELL, lane]
-            leg = legs[own]
             ended = state != IDLE and state != ARRIVED
             if state == ARRIVED:
                 done[lane] += 1
@@ -128,20 +142,14 @@ def strobe(
                     out[own, done[lane] - skip, 1] = dphi
                 near = nearest_of(phi, dphi, points, period, scale)
                 inside = box_of(phi, dphi, period, box, boxes)
-                same[lane] = same[lane] + 1 if inside >= 0 and inside == last[lane] else 1
-                last[lane] = inside
-                if near < 0 and inside >= 0 and same[lane] >= visits:
+                if stays(lane, inside, visits, last, same) and near < 0:
                     near = inside
                 if near >= 0:
                     code[own] = near
                 ended = near >= 0 or done[lane] >= many
                 if not ended:
-                    whole[STATE, lane] = RUNNING
-                    if again:
-                        fresh = True
-                        whole[ACCEPTED, lane] = CHANGED
-                    real[T, lane] = 0.0 if again else done[lane] * leg
-                    real[END, lane] = leg if again else (done[lane] + 1) * leg
+                    resume(lane, done[lane], legs[own], again, real, whole)
+                    fresh = fresh or again
             if ended:
                 taken[own] = done[lane]
                 status[own] = state

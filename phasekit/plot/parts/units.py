@@ -80,9 +80,10 @@ class Units:
 
     def scale(self, name: str, held: str) -> float:
         """Return what values that are held in the unit `held` are multiplied by to be shown."""
-        unit, base = self.unit(name, held), _base(held)
+        unit = self.unit(name, held)
         if unit == held:
             return 1.0
+        base = _base(held)
         si = float(factor(name, held, base)) if held != base else 1.0
         return float(converted(f"units: {name}", si, base, unit))
 

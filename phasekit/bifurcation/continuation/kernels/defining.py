@@ -162,6 +162,20 @@ def evaluate(
                 w[row + m + j] = w[base + i * m + j]
             w[row + m + i] += shift
         return
+    pair_rows(first, second, mode, kind, n, par, active, w, u)
+
+
+@routine
+def pair_rows(
+    first: Any, second: Any, mode: int, kind: int, n: int, par: Array, active: Any, w: Array, u: int
+) -> None:
+    """The equations of a pair and the phase of v; z is f_x v, the norm is there already."""
+    size, _, aux, _, _, _, f, g, jac, bent, _, z, spare = places(kind, n, active.size)
+    scale = SCALE * size
+    m = n + active.size
+    v = u + m
+    base = f + n  # the derivatives
+    extra = w[u + size - 1]
     shift = extra if kind == TORUS else 0.0
     for i in range(n):
         row = jac + (n + i) * size

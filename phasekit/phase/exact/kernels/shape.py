@@ -243,14 +243,10 @@ def factors(x: float, product: float, others: float, w: Array) -> tuple[float, f
 
 
 @routine
-def swing(w: Array) -> None:
-    """A libration: roots, turning points and Moebius map."""
-    e = w[GAP]
-    slope = w[SLOPE]
-    m = w[M]
-    n = w[N]
-    place = int(w[PLACE])
-    c2 = slope + 2.0 * e
+def swing_roots(w: Array) -> tuple[float, float, float]:
+    """The real root x that counts of a libration, product and sum of the other two."""
+    e, m, n = w[GAP], w[M], w[N]
+    c2 = w[SLOPE] + 2.0 * e
     c1 = 2.0 * e * (m - n)
     c0 = -2.0 * e * m * n
     x = least_root(c2, c1, c0, w)
@@ -270,6 +266,14 @@ def swing(w: Array) -> None:
     w[Y_PRODUCT] = g
     w[FIRST] = np.sqrt(root)
     w[SECOND] = np.sqrt(max(square, 0.0))
+    return x, product, others
+
+
+@routine
+def swing(w: Array) -> None:
+    """A libration: roots, turning points and Moebius map."""
+    e, place = w[GAP], int(w[PLACE])
+    x, product, others = swing_roots(w)
     tau, r1, r2 = factors(x, product, others, w)
     lobe = e < 0.0 and (place == LEFT or place == RIGHT)
     second = place == RIGHT if lobe else r2 < r1
@@ -286,8 +290,7 @@ def swing(w: Array) -> None:
     # The zero without cancellation first.
     big = 0.5 * (sum_ + disc) if sum_ >= 0.0 else 0.5 * (sum_ - disc)
     small = own / big if big != 0.0 else 0.0
-    z_big = max(big, small)
-    z_small = min(big, small)
+    z_big, z_small = max(big, small), min(big, small)
     o_first = 2.0 * angle_half(1.0, z_big)
     o_second = 2.0 * angle_half(1.0, z_small)
     if e > 0.0:  # the orbit encloses the reference
