@@ -136,7 +136,8 @@ def _of_system(
         duration, 0, level, period=turn or None, direction=direction,
     )  # fmt: skip
     if turn:
-        found.state[0] = 0.5 * turn - np.mod(0.5 * turn - found.state[0], turn)
+        # Of what rounding leaves next to the cut, some would stand at either side of it.
+        found.state[0] = 0.5 * turn - np.mod(0.5 * turn - level, turn)
     names = ("section_time", "section_phi", "section_dphi")
     data = {}
     for name, values in zip(names, (found.time, *found.state), strict=True):

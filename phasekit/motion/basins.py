@@ -50,7 +50,8 @@ def basins(
 
     Notes
     -----
-    The error of a share has two parts: that of a sample of as many states, and the undecided.
+    The error of a share has two parts: that of a sample of as many states, Wilson's, which is
+    not 0 of a share of 0 or 1; and the undecided.
     """
     shape = (len(phi), len(dphi))
     states = np.stack(np.meshgrid(phi, dphi, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -66,7 +67,8 @@ def basins(
     size = max(len(code), 1)
     shares = np.array([np.sum(code == i) for i in range(number)], float) / size
     open_ = np.sum(code == UNDECIDED) / size
-    errors = np.sqrt(shares * (1.0 - shares) / size) + open_
+    sampled = np.sqrt(shares * (1.0 - shares) / size + 0.25 / size**2) / (1.0 + 1.0 / size)
+    errors = sampled + open_
     grid = code.reshape(shape)
     wraps = bool(search.period) and _covers_turn(phi, search.period)
     return Basins(grid, time.reshape(shape), shares, errors, _boundary(grid, wraps))

@@ -83,8 +83,10 @@ def means(law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatric
         mean = mean - each["quadratic"] * cubes(A, loops)
     for parameter in law.drifting:
         rate = values[drift_name(parameter)]
-        slopes = (rate * slope for slope in law.derivatives(values, parameter))
+        slopes = [rate * slope for slope in law.derivatives(values, parameter)]
         change = area_rates(A, B, C, loops.saddle_phi, loops.saddle_exponent, loops.loop, *slopes)
+        arcs = loops.loop[..., None] == Loop.HETEROCLINIC
+        change = np.where(arcs, arc_rates(A, B, C, loops, *slopes), change)
         if law.rate is not None and law.rate.parameter == parameter:
             level = np.asarray(law.euler(values)[0])[..., None, None]
             winds = loops.loop[..., None] == Loop.WINDING
@@ -93,6 +95,38 @@ def means(law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatric
             )
         mean = mean - np.where(rate[..., None, None] == 0.0, 0.0, change)
     return np.asarray(mean)
+
+
+def arc_rates(A: Any, B: Any, C: Any, loops: Separatrices, dA: Any, dB: Any, dC: Any) -> Array:
+    """Rates at which the areas of arcs between saddles change; NaN where their energies part.
+
+    There phi' is sqrt(A) |sin phi + C/A| if A > 0, B = 0, and phi -> pi/2 - phi exchanges this
+    with A < 0, C = 0.
+    """
+    turned = np.asarray(A) < 0.0
+    size, other = np.abs(A), np.where(turned, B, C)
+    slope, along, apart = (
+        np.where(turned, -dA, dA),
+        np.where(turned, dB, dC),
+        np.where(turned, dC, dB),
+    )
+    size, other, slope, along, apart = (
+        np.asarray(x)[..., None, None]
+        for x in np.broadcast_arrays(size, other, slope, along, apart)
+    )
+    start = loops.saddle_phi[..., None] + np.zeros(2)
+    stop = start + loops.turning_offset
+    flipped = turned[..., None, None]
+    start, stop = (np.where(flipped, 0.5 * np.pi - x, x) for x in (start, stop))
+    with np.errstate(all="ignore"):
+        ratio = other / size
+
+        def inner(phi: Array) -> Array:
+            return np.asarray(0.5 * slope * (-np.cos(phi) - ratio * phi) + along * phi)
+
+        sense = np.sign(np.sin(0.5 * (start + stop)) + ratio) * np.sign(stop - start)
+        rates = sense * (inner(stop) - inner(start)) / np.sqrt(size)
+    return np.asarray(np.where(apart == 0.0, rates, np.nan))
 
 
 def cubes(A: Any, loops: Separatrices) -> Array:

@@ -62,7 +62,8 @@ QUANTITIES: tuple[Quantity, ...] = (
              RECURRENCE, of=_OF, labels=_NUMBERED),
     Quantity("basin_fraction_error", "basin_fractions", _ATTRACTOR, "float64", "1",
              "error of the share: that of a sample of as many states, and the undecided",
-             "sqrt(f (1 - f)/N) + undecided", RECURRENCE, of=_OF, labels=_NUMBERED),
+             "sqrt(f (1 - f)/N + 1/(4 N^2))/(1 + 1/N) + undecided", RECURRENCE, of=_OF,
+             labels=_NUMBERED),
     Quantity("attractor_angle", "basin_fractions", _ATTRACTOR, "float64", "rad",
              "angle of the attractor, once a period the least one; attractors are numbered by "
              "period, then by it", "phi(n T), wrapped", RECURRENCE, of=_OF, labels=_NUMBERED),

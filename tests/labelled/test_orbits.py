@@ -7,6 +7,7 @@ from scipy.special import ellipe, ellipk
 
 import phasekit as pk
 from phasekit.labels.coordinates import LABELS, STATES
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import action_angle as angle_floor
 from phasekit.phase.exact import orbits as floor
 from phasekit.table.quantities import ROWS, plan_passes, select
@@ -299,8 +300,12 @@ def test_families_over_parameters():
 
 
 def test_rows_and_fields_of_the_floor_below_are_the_same():
-    assert [row.name for row in select("orbits")] == list(floor.Orbits._fields)
-    assert [row.name for row in select("action_angle")] == list(angle_floor.Angles._fields)
+    for group, fields in (
+        ("orbits", floor.Orbits._fields), ("action_angle", angle_floor.Angles._fields),
+    ):  # fmt: skip
+        # besides, there are rows of systems under a torque alone
+        rows = [row.name for row in select(group) if issubclass(Trigonometric, row.of)]
+        assert rows == list(fields)
     assert [p.groups for p in plan_passes(select("orbits"))] == [("orbits",)]
     for of in ("angle", ["angle", "twist"], ["angle", "period"]):
         assert [p.groups for p in plan_passes(select(of))] == [("orbits", "action_angle")]

@@ -91,3 +91,12 @@ def test_many_passages_in_one_step_are_foreseen():
     assert np.allclose(passages(few, 50.0, 0, 0.5, period=1.0).time, np.arange(50) + 0.5)
     with pytest.raises(pk.ConvergenceError, match="more than 51 times"):
         passages(few, 52.0, 0, 0.5, period=1.0)
+
+
+@pytest.mark.parametrize("section", [np.pi, -np.pi, 3 * np.pi])
+@pytest.mark.parametrize("speed", [3.0, -3.0])
+def test_a_section_at_the_cut_stands_at_one_side_of_it(section, speed):
+    spinning = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=0.01)
+    ds = pk.poincare_section(spinning, 0.0, speed, duration=20.0, section=section, direction=0)
+    assert ds.section_phi.values.tolist() == [np.pi] * 7
+    assert (np.sign(ds.section_dphi) == np.sign(speed)).all()

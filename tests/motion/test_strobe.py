@@ -199,6 +199,15 @@ def test_a_coarse_grid_says_so():
     assert (ds.basin_fraction_error > 0.1).all()
 
 
+def test_a_few_states_do_not_make_a_share_certain():
+    one = pk.basins(DUFFING, phi=[1.0], dphi=[0.0])
+    assert one.basin_fraction.values.tolist() == [1.0]
+    assert one.basin_fraction_error.values.tolist() == [0.25]  # Wilson's interval: 0.5 to 1
+    many = pk.basins(DUFFING, phi=np.linspace(1.20, 1.21, 10), dphi=np.linspace(0.0, 0.01, 10))
+    assert many.basin_fraction.values.tolist() == [1.0]
+    assert many.basin_fraction_error.item() == pytest.approx(0.005, rel=0.02)
+
+
 def test_what_cannot_be_searched_is_refused():
     grid = {"phi": [0.0, 1.0], "dphi": [0.0, 1.0]}
     with pytest.raises(pk.ParameterError, match="damping: got 0.0"):
