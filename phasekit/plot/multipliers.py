@@ -78,8 +78,8 @@ def multipliers(
     axes.set_aspect("equal")
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
-    axes.locator_params(nbins=5)  # as many ticks at any size, so that the layout keeps their room
-    bar = axes.figure.colorbar(dots, ax=axes)
+    # Beside Axes of a fixed aspect a layout finds no room for a bar of its own.
+    bar = axes.figure.colorbar(dots, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)))
     bar.set_label(labels.label(along, shown, style.letters(axes, "y")))
     axes.set_xlabel("real part of the multipliers")
     axes.set_ylabel("imaginary part")
