@@ -68,6 +68,8 @@ def multipliers(
     values, _ = shown.shown(along)
     found = points["multiplier"].transpose("point", "multiplier").values
     axes = style.axes_for(ax, legend=False)
+    if ax is None:
+        axes.get_figure(root=True).set_layout_engine("compressed")  # for Axes of a fixed aspect
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=1.2)
     color = np.repeat(values, found.shape[1])
@@ -78,8 +80,7 @@ def multipliers(
     axes.set_aspect("equal")
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
-    # Beside Axes of a fixed aspect a layout finds no room for a bar of its own.
-    bar = axes.figure.colorbar(dots, cax=axes.inset_axes((1.04, 0.0, 0.05, 1.0)))
+    bar = axes.figure.colorbar(dots, ax=axes)
     bar.set_label(labels.label(along, shown, style.letters(axes, "y")))
     axes.set_xlabel("real part of the multipliers")
     axes.set_ylabel("imaginary part")

@@ -409,6 +409,7 @@ def test_a_narrow_legend_has_two_columns_of_short_names():
         ax = pk.plot.phase_portrait(disk, orbits=starts, angles="deg")
     names = [text.get_text() for text in ax.get_legend().get_texts()]
     assert names[-3:] == ["(5.73, 0)", "(28.65, 57.3)", "(57.3, 114.6)"]
+    ax.figure.canvas.draw()
     left = {round(text.get_window_extent().x0) for text in ax.get_legend().get_texts()}
     assert len(left) == 2
     plt.close(ax.figure)
