@@ -68,8 +68,9 @@ def multipliers(
     values, _ = shown.shown(along)
     found = points["multiplier"].transpose("point", "multiplier").values
     axes = style.axes_for(ax, legend=False)
-    if ax is None:
-        axes.get_figure(root=True).set_layout_engine("compressed")  # for Axes of a fixed aspect
+    figure = axes.get_figure(root=True)
+    if ax is None and figure is not None:
+        figure.set_layout_engine("compressed")  # for Axes of a fixed aspect
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=1.2)
     color = np.repeat(values, found.shape[1])

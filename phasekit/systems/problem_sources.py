@@ -64,7 +64,11 @@ class ProblemSources:
         V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
         force = -V.diff(symbols[coordinate])
         periods = {} if period is None else {coordinate: period}
-        return cls([symbols[states[1]], force], states, values, periods=periods, conservative=True)
+        make: Any = cls
+        made: Problem = make(
+            [symbols[states[1]], force], states, values, periods=periods, conservative=True
+        )
+        return made
 
     @classmethod
     def from_system(cls, system: Model) -> Problem:
@@ -96,7 +100,8 @@ class ProblemSources:
         x = law.coordinate
         force = -law.gradient_formula(symbols_of([x, *names]))
         periods = {} if law.period is None else {x: law.period}
-        problem = cls([force], x, values, periods=periods, conservative=True)
+        make: Any = cls
+        problem: Problem = make([force], x, values, periods=periods, conservative=True)
         problem._set("system", system)
         return problem
 
@@ -133,7 +138,8 @@ class ProblemSources:
             raise bad("spec", spec, "what Problem.specification returns")
         if spec["f"] is None:
             return None
-        made = cls(
+        make: Any = cls
+        made: Problem = make(
             spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
             conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
             map=bool(spec.get("map", False)),
