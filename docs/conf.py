@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import enum
 import os
 import re
 import sys
@@ -97,9 +98,21 @@ def _link_papers(app: Any, what: str, name: str, thing: Any, options: Any, lines
             lines[i] = _cited.sub(r"[\1]_", line)
 
 
+#: Tables that the classes of systems hold for phasekit itself.
+_TABLES = {"declared", "critical_values", "rung"}
+
+
+def _skip(app: Any, what: str, name: str, thing: Any, skip: bool, options: Any) -> bool | None:
+    """Leave out tables and fields, which stand among the parameters; keep codes."""
+    if isinstance(thing, enum.Enum):
+        return False
+    return True if name in _TABLES or type(thing).__name__ == "_tuplegetter" else None
+
+
 def setup(app: Any) -> None:
-    """Look at docstrings before numpydoc does."""
+    """Look at docstrings before numpydoc does, and at members."""
     app.connect("autodoc-process-docstring", _link_papers, priority=400)
+    app.connect("autodoc-skip-member", _skip)
 
 
 # Quantities, systems, special points and codes have pages that are made of the code.

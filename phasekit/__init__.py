@@ -93,8 +93,8 @@ if TYPE_CHECKING:
     from phasekit.systems.perturbed import Perturbed as Perturbed
     from phasekit.systems.potential import Potential as Potential
     from phasekit.systems.problem import Problem as Problem
-    from phasekit.systems.reduced import Reduced as Reduced
     from phasekit.systems.system import Coefficients as Coefficients
+    from phasekit.systems.system import Reduced as Reduced
     from phasekit.table.quantities import quantities as quantities
 
 _MODULES = {
@@ -161,8 +161,7 @@ _MODULES = {
     "phasekit.labelled.section": ("poincare_section",),
     "phasekit.maps.whole": ("open_map",),
     "phasekit.maps.sweep": ("sweep",),
-    "phasekit.systems.reduced": ("Reduced",),
-    "phasekit.systems.system": ("Coefficients",),
+    "phasekit.systems.system": ("Coefficients", "Reduced"),
     "phasekit.mechanics.coupled_rotation": ("CoupledRotation",),
     "phasekit.mechanics.rigid_body": ("RigidBody",),
 }

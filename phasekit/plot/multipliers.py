@@ -68,6 +68,9 @@ def multipliers(
     values, _ = shown.shown(along)
     found = points["multiplier"].transpose("point", "multiplier").values
     axes = style.axes_for(ax, legend=False)
+    figure = axes.get_figure(root=True)
+    if ax is None and figure is not None:
+        figure.set_layout_engine("compressed")  # for Axes of a fixed aspect
     turn = np.linspace(0.0, 2.0 * np.pi, 361)
     axes.plot(np.cos(turn), np.sin(turn), color=style.GRAY, linewidth=1.2)
     color = np.repeat(values, found.shape[1])
@@ -78,7 +81,6 @@ def multipliers(
     axes.set_aspect("equal")
     axes.set_xlim(-reach, reach)
     axes.set_ylim(-reach, reach)
-    axes.locator_params(nbins=5)  # as many ticks at any size, so that the layout keeps their room
     bar = axes.figure.colorbar(dots, ax=axes)
     bar.set_label(labels.label(along, shown, style.letters(axes, "y")))
     axes.set_xlabel("real part of the multipliers")

@@ -11,7 +11,6 @@ from phasekit.systems.system import MODELS, Model
 
 #: Where models are; each registers itself when it is imported.
 HOMES = (
-    "phasekit.systems.reduced",
     "phasekit.systems.disk",
     "phasekit.systems.analogues",
     "phasekit.systems.field_analogues",

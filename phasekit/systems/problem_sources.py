@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any, Self
 
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of, take_formula
@@ -11,9 +11,6 @@ from phasekit.laws.ladder import Conservative
 from phasekit.systems.as_system import as_system, stands_on
 from phasekit.systems.problem_parts import names_of, specified, values_of
 from phasekit.systems.system import Model
-
-if TYPE_CHECKING:
-    from phasekit.systems.problem import Problem
 
 
 class ProblemSources:
@@ -29,7 +26,7 @@ class ProblemSources:
         parameters: Mapping[str, float] | None = None,
         *,
         period: float | None = None,
-    ) -> Problem:
+    ) -> Self:
         """The planar conservative system ``x'' = -V'(x)`` with the states (x, dx).
 
         Parameters
@@ -54,7 +51,8 @@ class ProblemSources:
 
         Examples
         --------
-        >>> Problem.from_potential("x**4/4 - x**2/2")
+        >>> import phasekit as pk
+        >>> pk.Problem.from_potential("x**4/4 - x**2/2")
         Problem(x' = dx, dx' = -x**3 + x; conservative)
         """
         states = names_of("coordinate", (coordinate,))
@@ -64,10 +62,14 @@ class ProblemSources:
         V = take_formula(potential, symbols, "potential", "give parameters={'name': ...}")
         force = -V.diff(symbols[coordinate])
         periods = {} if period is None else {coordinate: period}
-        return cls([symbols[states[1]], force], states, values, periods=periods, conservative=True)
+        make: Any = cls
+        made: Self = make(
+            [symbols[states[1]], force], states, values, periods=periods, conservative=True
+        )
+        return made
 
     @classmethod
-    def from_system(cls, system: Model) -> Problem:
+    def from_system(cls, system: Model) -> Self:
         """The problem phi' = -V'(phi) whose equilibria are those of a system with scalars.
 
         Parameters
@@ -96,9 +98,11 @@ class ProblemSources:
         x = law.coordinate
         force = -law.gradient_formula(symbols_of([x, *names]))
         periods = {} if law.period is None else {x: law.period}
-        problem = cls([force], x, values, periods=periods, conservative=True)
+        make: Any = cls
+        problem: Any = make([force], x, values, periods=periods, conservative=True)
         problem._set("system", system)
-        return problem
+        kept: Self = problem
+        return kept
 
     def specification(self) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code.
@@ -111,7 +115,7 @@ class ProblemSources:
         return specified(self)
 
     @classmethod
-    def from_specification(cls, spec: Mapping[str, Any]) -> Problem | None:
+    def from_specification(cls, spec: Mapping[str, Any]) -> Self | None:
         """Make a problem of what `specification` gave of no system; None where f was code.
 
         Parameters
@@ -133,9 +137,11 @@ class ProblemSources:
             raise bad("spec", spec, "what Problem.specification returns")
         if spec["f"] is None:
             return None
-        made = cls(
+        make: Any = cls
+        made: Any = make(
             spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
             conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
             map=bool(spec.get("map", False)),
         )  # fmt: skip
-        return made.described(spec.get("words", {}))
+        described: Self = made.described(spec.get("words", {}))
+        return described

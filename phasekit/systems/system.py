@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -32,12 +33,11 @@ from phasekit.laws.trigonometric import Trigonometric, Values, checked_products
 from phasekit.laws.trigonometric import law as make_law
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter, attrs_of
+from phasekit.systems.reduced_form import reduced_form
 from phasekit.systems.value import ModelValue
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from phasekit.systems.reduced import Reduced
 
 
 #: Every model by its name, as maps store it.
@@ -253,9 +253,8 @@ class Model(ModelValue):
         ParameterError
             If ``A = 0`` for a system of scalars, where lambda and psi are infinite.
         """
-        from phasekit.systems.reduced import reduced_of
-
-        return reduced_of(self)
+        attrs = attrs_of(*self.declared, *Reduced.declared)
+        return Reduced(*reduced_form(*self.coefficients(), attrs))
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed.
@@ -401,3 +400,49 @@ class Coefficients(Model, _ABC):
 
 Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # type: ignore[method-assign]
 MODELS["Coefficients"] = Coefficients
+
+
+@model
+@dataclass(frozen=True, eq=False, repr=False)
+class Reduced(Model):
+    """The papers' reduced form, in lambda and psi.
+
+    ``phi'' + Omega^2 (lam - cos phi) sin phi - Omega^2 psi cos phi = 0``.
+
+    Parameters
+    ----------
+    lam, psi : float, 1-D array_like or xarray.DataArray
+        Gravity and eccentric centrifugal force against the coupling term, of any sign.
+    Omega_sq : float or array_like, default 1.0
+        Omega^2 in s^-2; negative for a disk that is nearly in line with its shaft.
+
+    Raises
+    ------
+    ParameterError
+        If a value is not a real, finite number or an array of numbers.
+
+    Notes
+    -----
+    [Veljovic2015] (12): ``A = Omega^2``, ``B = lam Omega^2``, ``C = psi Omega^2``.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pk.Reduced(0.25, 0.125, 4.0).coefficients()
+    Coefficients(A=4.0, B=1.0, C=0.5)
+    """
+
+    lam: NumberLike
+    psi: NumberLike
+    Omega_sq: NumberLike = 1.0
+
+    declared: ClassVar[tuple[Parameter, ...]] = (
+        Parameter(name="lam", units="1", long_name="lambda = B/A"),
+        Parameter(name="psi", units="1", long_name="psi = C/A"),
+        Parameter(name="Omega_sq", units="s-2", long_name="Omega^2 = A"),
+    )
+
+    @staticmethod
+    def products(v: Values) -> tuple[Any, Any, Any, Any]:
+        """[Veljovic2015] (12)."""
+        return v["Omega_sq"], v["lam"] * v["Omega_sq"], v["psi"] * v["Omega_sq"], 1

@@ -327,3 +327,45 @@ def test_pictures_follow_the_theme_and_the_width(shown, tmp_path):
             path = Path(tmp_path) / "page.png"
             page.screenshot(path)
             assert path.stat().st_size > 30_000
+
+
+#: Moves of a slider before the next frame: how often is drawn, and what stands there at last.
+MOVES = """
+(async () => {
+  const plot = phasekit.plots.portrait;
+  const begin = plot.begin.bind(plot);
+  let drawn = 0;
+  plot.begin = (...given) => { drawn += 1; return begin(...given); };
+  const slider = document.querySelector('[aria-label="e, slider"]');
+  for (let i = 0; i < 20; i++) {
+    slider.value = String(300 + i);
+    slider.dispatchEvent(new Event("input"));
+  }
+  const { coarse, map } = phasekit.scene;
+  const first = [coarse.next > coarse.columns, map.next > map.columns];
+  for (let i = 0; i < 3; i++) await new Promise(requestAnimationFrame);
+  return [drawn, first, phasekit.scene.p[1] === phasekit.state.values[1]];
+})()
+"""
+
+
+def test_moves_between_two_frames_are_drawn_twice_and_the_map_is_coarse_at_first(shown):
+    page = shown(DISK)
+    drawn, (coarse, fine), followed = page.run(MOVES)
+    assert drawn == 2  # the first at once, the last with the next frame
+    assert coarse
+    assert not fine
+    assert followed
+    page.until("phasekit.scene.map.next > phasekit.scene.map.columns")
+
+
+def test_pictures_follow_the_size_of_the_window(shown):
+    page = shown(DISK)
+    before = page.run("phasekit.plots.diagram.width")
+    page.send(
+        "Emulation.setDeviceMetricsOverride", width=500, height=900, deviceScaleFactor=1,
+        mobile=False,
+    )  # fmt: skip
+    page.until("Math.abs(phasekit.plots.diagram.width - document.getElementById('diagram')"
+               ".getBoundingClientRect().width) < 1")  # fmt: skip
+    assert page.run("phasekit.plots.diagram.width") != before

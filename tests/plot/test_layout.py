@@ -35,6 +35,14 @@ def plane():
 
 
 @functools.cache
+def turns():
+    problem = pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 0.5})
+    few = pk.ContinuationOptions(max_points=5, intervals=10)
+    orbit = pk.periodic_orbit(problem, [2.0, 0.0], options=few)
+    return pk.continuation(problem, "mu", orbit=orbit, span=(0.5, 2.0), options=few)
+
+
+@functools.cache
 def motions():
     return pk.flow(DISK, [0.5, 1.0, 2.0], [3.0, 0.0, -60.0], np.linspace(0.0, 2.0, 101))
 
@@ -208,6 +216,7 @@ CASES = {
     },
     "multipliers": {
         "driven": lambda: P.multipliers(swings()),
+        "free": lambda: P.multipliers(turns()),
     },
     "parameter_map": {
         "topology": lambda: P.parameter_map(plane(), angles="deg"),

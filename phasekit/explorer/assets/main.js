@@ -195,8 +195,8 @@ function startMap() {
     const count = (x, y) => countEquilibria(LAW, ...at(x, y));
     const over = (columns, rows) => new ParameterMap(count, [...rangeOf(xName)], [...rangeOf(yName)], columns, rows);
     scene.map = closed ? over(120, 90) : over(48, 36);
-    scene.coarse = closed ? over(40, 30) : null;
-    if (closed) scene.coarse.work(6);
+    scene.coarse = closed ? over(32, 24) : null;
+    if (closed) scene.coarse.work(Infinity);
     else scene.map.work(2);
   }
   drawMap();

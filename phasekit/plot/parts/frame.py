@@ -109,7 +109,8 @@ def legend_below(
     if not handles:
         return None
     names = [str(handle.get_label()) for handle in handles]
-    brief = [{**SHORT, **(short or {})}.get(name, name) for name in names]
+    known = {**SHORT, **(short or {})}
+    brief = [known.get(name, name.removeprefix("from ")) for name in names]  # of a start its state
     tried: dict[float, tuple[list[str], int]] = {}
     width, height = _room(ax)
     for texts in [names, brief] if brief != names else [names]:
