@@ -45,6 +45,10 @@ FIRST = (
     "maps/test_kills.py",
     "maps/test_store_failures.py",
     "perturbation/test_melnikov.py",
+    "perturbation/test_escape.py",
+    "labelled/test_any_potential.py",
+    "maps/test_interrupts.py",
+    "docs/test_pages.py",
     "test_studies.py",
 )
 
