@@ -33,17 +33,22 @@ settings.register_profile("phasekit", deadline=None, derandomize=True, database=
 settings.load_profile("phasekit")
 
 #: Files that workers begin with. Of the first four, each compiles the kernels of another subject,
-#: for all workers, while the others compile theirs; the rest take long for so few tests.
+#: for all workers, while the others compile theirs; kernels that share routines are compiled by one
+#: process, which compiles those once. The rest take long for so few tests.
 FIRST = (
-    "phase/test_portrait_kernel.py",
-    "labelled/test_continuation.py",
     "phase/test_phase_space_kernel.py",
+    "labelled/test_continuation.py",
+    "phase/test_portrait_kernel.py",
     "labelled/test_cycles.py",
-    "loads/test_functions.py",
     "motion/test_strobe.py",
+    "loads/test_functions.py",
     "maps/test_kills.py",
     "maps/test_store_failures.py",
     "perturbation/test_melnikov.py",
+    "perturbation/test_escape.py",
+    "labelled/test_any_potential.py",
+    "maps/test_interrupts.py",
+    "docs/test_pages.py",
     "test_studies.py",
 )
 

@@ -30,7 +30,13 @@ STUDIES = [
     path for path in sorted(FOLDER.glob("*/*.py")) if "__main__" in path.read_text(encoding="utf-8")
 ]
 #: Thousands of motions.
-LONG = {"capture_against_simulation", "doublings_of_a_cycle", "response_of_a_driven_disk"}
+LONG = {
+    "capture_against_simulation",
+    "doublings_of_a_cycle",
+    "escape_of_a_junction",
+    "response_of_a_driven_disk",
+    "threshold_of_irregular_motion",
+}
 ALL = "PHASEKIT_STUDIES" in os.environ
 SITE = os.environ.get("PHASEKIT_SITE")
 

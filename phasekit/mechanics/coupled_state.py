@@ -60,6 +60,7 @@ class CoupledRotationState(CoupledMomentum):
     A particle of 2 kg, 0.1 m below the shaft, carried round at 3 rad/s:
 
     >>> from phasekit.mechanics.coupled_rotation import CoupledRotation
+    >>> from phasekit.mechanics.rigid_body import RigidBody
     >>> body = RigidBody.from_points([2.0], [[0.0, 0.0, -0.1]])
     >>> machine = CoupledRotation(body, n1=(0, 0, 1), n2=(1, 0, 0), a=0.5)
     >>> state = machine.at(omega1=3.0)

@@ -26,7 +26,7 @@ Outputs = tuple[npt.NDArray[Any], ...]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 #: No second entry for callers in C, which takes a tenth of the time to compile: nobody calls it.
-OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def kernel(function: Function) -> Function:
@@ -36,7 +36,7 @@ def kernel(function: Function) -> Function:
 
 def inline(function: Function) -> Function:
     """Compile as part of each caller, always inlined; integer literals are constants inside."""
-    options = {"forceinline": True, **OPTIONS}
+    options: Any = {"forceinline": True, **OPTIONS}
     overload(function, jit_options=options, strict=False, prefer_literal=True)(
         lambda *args: function
     )

@@ -1,4 +1,4 @@
-"""Periods, actions and turning points against adaptive quadrature with thirty digits.
+"""Periods, actions and turning points against adaptive quadrature with twenty digits.
 
 The bound on a relative error is a few roundings, and where the state itself decides no more, what
 its rounding changes: next to a separatrix the period answers an energy dh with
@@ -72,7 +72,7 @@ def bounds(A, B, C, phi0, v0, want, relative=RELATIVE):
 
 def check(A, B, C, phi0, v0, relative=RELATIVE, want=None):
     """Compare one orbit with the oracle; return it."""
-    want = want or orbit(A, B, C, phi0, v0, dps=30)
+    want = want or orbit(A, B, C, phi0, v0, dps=20)
     got = orbits(A, B, C, phi0, v0)
     context = (A, B, C, phi0, v0)
     assert got.orbit_kind == KINDS[want.kind], context

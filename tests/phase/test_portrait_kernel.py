@@ -8,7 +8,7 @@ from properties.strategies import systems
 
 from phasekit.numerics import launch
 from phasekit.phase.exact.action_angle import action_angle, orbits_with_angles, state_of
-from phasekit.phase.exact.flow import flow
+from phasekit.phase.exact.flow import flow, separatrix_motion
 from phasekit.phase.exact.orbits import orbits, orbits_at_energy, orbits_at_gap
 
 
@@ -30,6 +30,7 @@ def states():
 
 def test_compiled_and_interpreted_agree_to_the_last_bit(states, monkeypatch):
     A, B, C, phi0, v0, t = states
+    there = action_angle(A, B, C, phi0, v0)
     found = []
     for most in (10**9, 0):
         monkeypatch.setattr(launch, "INTERPRETED_AT_MOST", most)
@@ -43,6 +44,8 @@ def test_compiled_and_interpreted_agree_to_the_last_bit(states, monkeypatch):
                     *orbits_with_angles(A, B, C, phi0, v0)[1],
                     *orbits_at_energy(A, B, C, v0, 0),
                     *orbits_at_gap(A, B, C, v0, 1, 0),
+                    *state_of(A, B, C, there.action, there.angle, there.orbit_family),
+                    *separatrix_motion(A, B, C, t),
                 )
             )
     for one, other in zip(*found, strict=True):
