@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.branch_points import check_names
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, pair, unknown
 from phasekit.numerics.waits import said
@@ -170,6 +171,7 @@ def equilibrium_curve(
             "follow periodic orbits: pk.continuation(..., orbit=pk.periodic_orbit(problem, x0))",
         )  # fmt: skip
     n = len(problem.state)
+    check_names((*problem.state, parameter))
     names = list(problem.parameters)
     for name in (*options.bounds, *options.scales):
         if name not in problem.state and name not in names:
