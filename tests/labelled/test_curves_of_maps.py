@@ -59,7 +59,7 @@ def test_strong_resonances_on_a_torus_curve(tmp_path):
         "R2", "R3", "R4", "R1",
     ]  # fmt: skip
     np.testing.assert_allclose(sorted(at for _, at in resonant), [-2.0, -1.0, 0.0, 2.0], atol=1e-9)
-    own = curve.points.where(curve.points.special == "", drop=True)
+    own = curve.points.isel(point=curve.points.special.values == "")
     pairs = np.where(abs(own.t) < 2.0, "torus", "neutral_saddle")
     assert own.kind_of_pair.values.tolist() == pairs.tolist()
     values = branch.special("TR")[0].eigenvalues
