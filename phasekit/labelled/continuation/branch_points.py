@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,41 +21,10 @@ from phasekit.bifurcation.continuation.spectrum import (
 )
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
-from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
-
-#: What a branch says of its points, and of each special point as ``special_<name>``.
-COLUMNS = (
-    "kind", "n_unstable", "kind_of_pair", "arclength", "special", "tangent", "step", "residual",
-    "newton_steps", "point", "unknown", "end", "special_point",
-)  # fmt: skip
-OF_SPECIAL = (
-    "kind", "label", "status", "message", "name", "residual", "corank", "index", "interval",
-    "point",
-)  # fmt: skip
-
-
-def check_names(names: Sequence[str]) -> None:
-    """Refuse states and free parameters whose columns would stand for something else.
-
-    Raises
-    ------
-    ParameterError
-    """
-    for name in names:
-        if name in columns(names) or name in OF_SPECIAL:
-            raise bad(
-                "problem", name, "names of states and free parameters that are no columns",
-                f"these are {', '.join(COLUMNS)}, and special_<name> of special points",
-            )  # fmt: skip
-
-
-def columns(names: Iterable[str]) -> set[str]:
-    """What the columns of a branch are called, beside its own states and parameters."""
-    return {*COLUMNS, *(f"special_{one}" for one in (*OF_SPECIAL, *names))}
 
 
 def wrap(value: FloatArray, period: float) -> FloatArray:

@@ -15,7 +15,7 @@ from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
-from phasekit.labelled.continuation.branch_points import check_names
+from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, pair, unknown
 from phasekit.numerics.waits import said

@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, make_branch
-from phasekit.labelled.continuation.branch_points import check_names
+from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.continuation import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.branch_points import columns
+from phasekit.labelled.continuation.columns import columns
 from phasekit.labels.arguments import bad, unknown
 from phasekit.systems.problem import Problem
 
