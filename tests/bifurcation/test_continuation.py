@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import sympy
 
+import phasekit as pk
 from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.curve import Curve
@@ -314,3 +315,29 @@ def test_null_vectors_do_not_mind_units():
     assert np.abs((matrix / scale) @ q).max() < 1e-9
     assert np.abs(p @ (matrix / scale) * scale).max() < 1e-14 * np.abs(p).max()
     assert p @ q == pytest.approx(1.0)
+
+
+def test_points_of_many_states_take_few_calls_of_f():
+    """Sizes of terms need few digits: derivatives by differences are not refined for them."""
+    n, calls = 20, [0]
+
+    def f(x, p):
+        calls[0] += 1
+        return p * np.exp(-x) - x
+
+    def count(points):
+        options = pk.ContinuationOptions(
+            max_step=1e-3, max_points=points, directions="forward", detect=()
+        )
+        problem = pk.Problem(
+            f, [f"x{i}" for i in range(n)], {"p": 0.5},
+            jac=lambda x, p: np.diag(-p * np.exp(-x) - 1.0),
+        )  # fmt: skip
+        calls[0] = 0
+        branch = pk.continuation(
+            problem, "p", x0=np.full(n, 0.35), span=(0.0, 2.0), options=options
+        )
+        assert branch.points.sizes["point"] == points + 1
+        return calls[0]
+
+    assert count(60) - count(20) <= 40 * 10

@@ -59,7 +59,7 @@ def test_strong_resonances_on_a_torus_curve(tmp_path):
         "R2", "R3", "R4", "R1",
     ]  # fmt: skip
     np.testing.assert_allclose(sorted(at for _, at in resonant), [-2.0, -1.0, 0.0, 2.0], atol=1e-9)
-    own = curve.points.where(curve.points.special == "", drop=True)
+    own = curve.points.isel(point=curve.points.special.values == "")
     pairs = np.where(abs(own.t) < 2.0, "torus", "neutral_saddle")
     assert own.kind_of_pair.values.tolist() == pairs.tolist()
     values = branch.special("TR")[0].eigenvalues
@@ -121,3 +121,33 @@ def test_points_of_flows_are_not_looked_for_on_curves_of_maps_nor_the_other_way_
     fold = pk.continuation(problem, "m", x0=[1.0, 0.0], span=(-1.0, 1.0)).special("LP")[0]
     kinds = {one.kind for one in fold.curve("n", (-1.0, 1.0)).special_points}
     assert kinds == {"end", "bogdanov_takens"}
+
+
+def test_fixed_points_of_an_angle_map_up_to_whole_turns():
+    """Accelerator modes of the standard map: y grows by a turn each time where k sin x = 2 pi."""
+    at = {"k": 7.0}
+    x = np.pi - np.arcsin(2.0 * np.pi / 7.0)
+    angle = {"x": 2.0 * np.pi}
+    few = pk.ContinuationOptions(max_points=5)
+    standard = ["x + y + k*sin(x)", "y + k*sin(x)"]
+    turns = [f"{text} - 2*pi" for text in standard]
+    momentum = pk.Problem(standard, ["x", "y"], at, periods=angle | {"y": 2.0 * np.pi}, map=True)
+    for start in ([x, 0.0], [x + 1e-5, 0.0]):
+        with pytest.raises(pk.ParameterError, match="^x0: got .* f adds 1 turn to x there: take"):
+            pk.continuation(momentum, "k", x0=start, span=(6.5, 8.0), options=few)
+    lifted = pk.Problem(turns, ["x", "y"], at, periods=momentum.periods, map=True)
+    branch = pk.continuation(lifted, "k", x0=[x, 0.0], span=(6.5, 8.0), options=few)
+    assert branch.points.sizes["point"] > 5
+    np.testing.assert_allclose(branch.points.k * np.sin(branch.points.x), 2.0 * np.pi, rtol=1e-12)
+    plain = pk.continuation(momentum, "k", x0=[3.1, 0.01], span=(6.5, 8.0), options=few)
+    np.testing.assert_allclose(abs(plain.points.x), np.pi, rtol=1e-12)
+
+
+def test_what_newtons_method_leaves_of_zero_is_no_scale():
+    """Quadratic convergence ends at numbers such as 1e-52, which say nothing of a state's size."""
+    standard = ["x + y + 7*sin(x)*k", "y + 7*sin(x)*k"]
+    problem = pk.Problem(standard, ["x", "y"], {"k": 1.0}, map=True)
+    for start in ([0.3, 2.0 * np.pi], [0.3, 1.0], [0.1, -0.4]):
+        branch = pk.continuation(problem, "k", x0=start, span=(0.9, 1.1))
+        assert [stop.reason for stop in branch.stops] == ["bound", "bound"]
+        assert not np.any([branch.points.x, branch.points.y])

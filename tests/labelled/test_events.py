@@ -238,3 +238,28 @@ def test_functions_that_are_given_again_are_checked(tmp_path):
     traced({"code": threshold}).save(tmp_path / "b.nc")
     with pytest.raises(pk.ParameterError, match=r"events\['code'\].*arguments"):
         Branch.load(tmp_path / "b.nc", events={"code": lambda x: 1.0})
+
+
+@pytest.mark.parametrize(
+    ("state", "parameter"),
+    [("kind", "p"), ("x", "index"), ("step", "p"), ("x", "special_x"), ("arclength", "p")],
+)
+def test_names_that_columns_of_a_branch_have_are_refused(state, parameter):
+    problem = pk.Problem([f"{parameter} - {state}**2"], [state], {parameter: 0.5})
+    taken = state if state != "x" else parameter
+    with pytest.raises(pk.ParameterError, match=f"^problem: got '{taken}', wants .* columns"):
+        pk.continuation(problem, parameter, x0=[0.7], span=(-1, 1))
+
+
+@pytest.mark.parametrize("name", ["special_x", "special_kind", "arclength", "point"])
+def test_records_do_not_take_the_place_of_columns(name):
+    problem = pk.Problem(["p - x**2"], ["x"], {"p": 0.5})
+    with pytest.raises(pk.ParameterError, match="^record: got "):
+        pk.continuation(problem, "p", x0=[0.7], span=(-1, 1), record={name: lambda x, p: 1.0})
+
+
+def test_fixed_parameters_may_have_any_name():
+    problem = pk.Problem(["p*kind - x**2"], ["x"], {"p": 0.5, "kind": 1.0})
+    few = pk.ContinuationOptions(max_points=3)
+    branch = pk.continuation(problem, "p", x0=[0.7], span=(-1, 1), options=few)
+    assert branch.to_dataset().special_kind.values.tolist()[0] == "end"

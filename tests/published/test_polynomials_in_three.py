@@ -55,7 +55,7 @@ def common_roots(f, g):
         if abs(sp.im(value)) > 1e-20 or abs(value) > BOX:
             continue
         at = sp.re(value)
-        for root in sp.Poly(f.subs(p, at), x).nroots(n=20, maxsteps=2000):
+        for root in sp.Poly(f.subs(p, at), x).nroots(n=30, maxsteps=2000):
             there = {x: sp.re(root), p: at}
             if abs(sp.im(root)) < 1e-10 and abs(g.subs(there)) < 1e-12 * (1 + abs(root)) ** 9:
                 points.append((float(sp.re(root)), float(at)))

@@ -88,6 +88,14 @@ def without_rounding(curve: Curve, u: Array) -> Array:
     return u
 
 
+def rounded(curve: Curve, u: Array) -> Array:
+    """`without_rounding`, where f is no larger there."""
+    zeros = without_rounding(curve, u)
+    if np.array_equal(zeros, u) or residual_at(curve, zeros) > residual_at(curve, u):
+        return u
+    return zeros
+
+
 def _said(curve: Curve, points: list[Array], bound: float) -> str:
     """What is left of f, in words; nothing if unknowns of their scales would leave as much."""
     sizes = []

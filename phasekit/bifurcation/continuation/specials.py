@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.acceptance import residual_at, without_rounding
+from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
@@ -67,10 +67,7 @@ def _find(curve: Curve, path: Path) -> tuple[list[Placed], npt.NDArray[np.comple
 
 def _rounded(curve: Curve, special: Special) -> Special:
     """A special point with zeros for unknowns that are but rounding, where f is no larger there."""
-    u = without_rounding(curve, special.u)
-    if np.array_equal(u, special.u) or residual_at(curve, u) > residual_at(curve, special.u):
-        return special
-    return replace(special, u=u)
+    return replace(special, u=rounded(curve, special.u))
 
 
 def wanted(special: Special, detect: tuple[str, ...]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.curve import Curve, Track
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.ending import followed
@@ -41,7 +42,7 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     row[n] = 1.0
     point = curve.refine(u, row, iterations=30)
     if point.converged and np.isfinite(point.residual).all():
-        return _at(point.u, u, n)
+        return rounded(curve, _at(point.u, u, n))
 
     def vanishes(u: Array) -> bool:
         """Whether f does: beside its terms, and what it was where the search began."""

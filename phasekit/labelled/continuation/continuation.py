@@ -16,12 +16,15 @@ from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
+
+TURNED = 1e-3  # what is left of f(x) - x next to a point that f takes to itself on another turn
 
 
 def continuation(
@@ -47,7 +50,8 @@ def continuation(
     parameter : str
         The parameter that varies. It starts at the problem's own value.
     x0 : array_like or str, optional
-        The state to start from, which is corrected to an equilibrium first; default zeros. Of a
+        The state to start from, which is corrected to an equilibrium first; default zeros. Fixed
+        points of a map of angles are those of f itself, without whole turns added. Of a
         system also one of its labels: lower_center (the default), lower_saddle, upper_center,
         upper_saddle.
     span : (float, float)
@@ -142,6 +146,7 @@ def continuation(
         curve = curve.replace(events=asked, ends=ends)
     u = np.append(guess, problem.parameters[parameter])
     _check_values(problem, guess)
+    _refuse_turns(curve, u)
     where = ", ".join(
         f"{name} = {value:.6g}" for name, value in zip([*problem.state, parameter], u, strict=True)
     )
@@ -171,6 +176,7 @@ def equilibrium_curve(
             "follow periodic orbits: pk.continuation(..., orbit=pk.periodic_orbit(problem, x0))",
         )  # fmt: skip
     n = len(problem.state)
+    check_names((*problem.state, parameter))
     names = list(problem.parameters)
     for name in (*options.bounds, *options.scales):
         if name not in problem.state and name not in names:
@@ -241,6 +247,29 @@ def _labelled_start(problem: Problem, x0: str | None) -> FloatArray:
     if x0 not in there:
         raise bad("x0", x0, f"an equilibrium that exists here: {', '.join(there) or 'none'}")
     return np.array([float(ds.phi.values[labels.index(x0)])])
+
+
+def _refuse_turns(curve: Curve, u: FloatArray) -> None:
+    """Refuse what a map takes to itself but for whole turns of an angle.
+
+    Newton's method would lead to a fixed point elsewhere.
+    """
+    n = curve.n
+    if not curve.discrete or not curve.period.any():
+        return
+    gap = curve.at(u)[0]
+    if not np.isfinite(gap).all():
+        return
+    period = curve.period[:n]
+    turns = np.round(np.divide(gap, period, out=np.zeros(n), where=period > 0.0))
+    left = np.abs(gap - turns * period)
+    if turns.any() and np.all(left <= TURNED * np.maximum(np.abs(u[:n]), 1.0)):
+        name, k = curve.field.states[np.flatnonzero(turns)[0]], int(turns[turns != 0.0][0])
+        raise bad(
+            "x0", u[:n], "a fixed point of f itself",
+            f"f adds {k} turn{'s'[: abs(k) != 1]} to {name} there: take them off in f, whose fixed "
+            "points are then those up to so many turns",
+        )  # fmt: skip
 
 
 def _check_values(problem: Problem, guess: FloatArray) -> None:

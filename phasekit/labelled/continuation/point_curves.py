@@ -15,6 +15,7 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
 
@@ -76,6 +77,7 @@ def point_curve(
     check_parameter(problem, parameter)
     if parameter == point.branch.parameter:
         raise bad("parameter", parameter, "another one than that of the branch")
+    check_names((*problem.state, point.branch.parameter, parameter))
     low, high = check_span(span)
     value = problem.parameters[parameter]
     if not low <= value <= high:

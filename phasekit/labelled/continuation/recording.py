@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.errors import ParameterError
+from phasekit.labelled.continuation.columns import columns
 from phasekit.labels.arguments import bad, unknown
 from phasekit.systems.problem import Problem
 
@@ -39,7 +40,8 @@ def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
     if isinstance(record, str):
         record = [record]
     if isinstance(record, Mapping):
-        taken = [*problem.state, *problem.parameters, "kind", "n_unstable", "special", "tangent"]
+        own = {*problem.state, *problem.parameters}
+        taken = own | columns(own)
         for name, function in record.items():
             if not isinstance(name, str) or not name.isidentifier() or name in taken:
                 raise bad("record", name, "names that are identifiers and not taken")
