@@ -94,7 +94,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         if stored.spec["kind"] in ("cycle", "fold_of_cycles", "period_doubling", "torus"):
             from phasekit.labelled.continuation.cycle_store import made_again
 
-            return made_again(stored, given, functions)
+            return made_again(stored, given, functions, events)
         curve = stored.curve(given).replace(**stored.asked(given, events))
         start, tracks = stored.traces(curve)
     if problem is not None or any(functions.values()) or events:

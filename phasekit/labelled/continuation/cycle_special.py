@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CyclePoint(SpecialPoint):
-    """A periodic orbit at which something happens: LPC, PD, TR, BPC or an end.
+    """A periodic orbit at which something happens: LPC, PD, TR, BPC, UZ or an end.
 
     ``x`` is a state on the orbit, ``eigenvalues`` are its multipliers. ``normal_form`` holds the
     coefficient of the map over one period.
@@ -35,7 +35,7 @@ class CyclePoint(SpecialPoint):
     @property
     def corank(self) -> int:
         """Number of critical multipliers besides the one that is always 1; 0 at ends."""
-        return {"end": 0, "torus": 2}.get(self.kind, 1)
+        return {"end": 0, "event": 0, "torus": 2}.get(self.kind, 1)
 
     @property
     def period(self) -> float:

@@ -114,8 +114,7 @@ def amplitudes(mesh: Array, x: Array, turns: Array, scale: Array, m: int, half: 
 def extremes(x: Array, fine: Array, m: int, low: Array, high: Array) -> None:
     """Least and largest values of each column, with ``fine`` from places to those of a fine grid.
 
-    The three intervals with the highest places are looked at, and a parabola is laid through the
-    three highest values.
+    The three intervals with the highest places are looked at.
     """
     count, grid = (x.shape[0] - 1) // m, fine.shape[0]
     values = np.empty(grid)
@@ -142,13 +141,13 @@ def extremes(x: Array, fine: Array, m: int, low: Array, high: Array) -> None:
                     values[i] = sign * total
                     if values[i] > values[at]:
                         at = i
-                top = values[at]
-                if 0 < at < grid - 1:
-                    a, b, d = values[at - 1], values[at], values[at + 1]
-                    bend = a - 2.0 * b + d
-                    if bend < 0.0:
-                        top = b - 0.125 * (d - a) ** 2 / bend
-                best = max(best, top)
+                # A parabola through three values, whose top may lie between the last two.
+                k = min(max(at, 1), grid - 2)
+                rise = 0.5 * (values[k + 1] - values[k - 1])
+                bend = values[k - 1] - 2.0 * values[k] + values[k + 1]
+                if bend < 0.0 and abs(rise) <= -bend:
+                    best = max(best, values[k] - 0.5 * rise * rise / bend)
+                best = max(best, values[at])
             if sign > 0.0:
                 high[c] = best
             else:

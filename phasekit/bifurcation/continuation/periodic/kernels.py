@@ -107,11 +107,11 @@ def jets(
 def condense(
     jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
     slope: Array, side: float, scale: Array, x: Array, y: Array, W: Array,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, float]:  # fmt: skip
     """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
 
-    Returns the sign of the determinants, the largest residual beside the largest |T f|, both on
-    scaled axes, and the integral of the trace of T f_x.
+    Returns the sign of the determinants, the largest residual beside the largest |T f|, the latter,
+    both on scaled axes, and the integral of the trace of T f_x.
     """
     m, n = nodes.size, x.shape[1]
     q = y.size
@@ -150,18 +150,18 @@ def condense(
                 speed = max(speed, abs(y[0] * f) / scale[c])
                 worst = max(worst, abs(total / h) / scale[c])
                 if not np.isfinite(total):
-                    return 0.0, np.inf, np.nan
+                    return 0.0, np.inf, 0.0, np.nan
                 divergence += h * weights[i] * y[0] * jet_[at, base + c]
         found = eliminate(M, size, size, width) * side**n
         if found == 0.0:
-            return 0.0, np.inf, np.nan
+            return 0.0, np.inf, 0.0, np.nan
         sign *= found
         substitute(M, size, size, width)
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
     residual = worst / speed if speed > 0.0 else worst
-    return sign, residual, divergence
+    return sign, residual, speed, divergence
 
 
 @kernel
@@ -365,7 +365,7 @@ def newton(
             right[0] = multiple * w[own] - y[0]
         if not given:
             jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
-        sign, residual, divergence = condense(
+        sign, residual, speed, divergence = condense(
             jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
         )
         if sign == 0.0:
@@ -391,7 +391,9 @@ def newton(
             y[k] += part * dy[0, k]
         if not y[0] > 0.0:
             return DIVERGED, step, sign, residual, divergence, size, 1.0
-        flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
+        # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.
+        rounded = residual * min(speed, 1.0) < ROUNDING
+        flat = size > 0.25 * before and size < FLAT and rounded
         if part == 1.0 and (size <= tolerance or flat):
             length = inner(mesh, weights, value, dx[1], dx[1], scale)
             for k in range(1, q):
