@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.numerics.compile import Array, kernel
+from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
 STILL = 1e-3  # part of the largest amplitude that others count as at least
@@ -204,6 +205,38 @@ def error(mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Arr
         size = sizes[j] * (mesh[j + 1] - mesh[j]) ** coefficients.size
         worst = size if not size <= worst else worst
     return worst
+
+
+@kernel
+def jets(
+    first: Any, mode: int, par: Array, active: Any, forced: bool, mesh: Array, nodes: Array,
+    value: Array, x: Array, y: Array, scale: Array, out: Array,
+) -> None:  # fmt: skip
+    """F and its derivatives by states and active parameters at all Gauss points."""
+    m, n = nodes.size, x.shape[1]
+    a = active.size
+    count = n + n * (n + a)
+    u, sizes, value_at = 0, n + a, 2 * (n + a)
+    spare = value_at + count
+    w = np.zeros(spare + n + a + 7 * n)
+    for i in range(n + a):
+        w[sizes + i] = scale[i]
+    t = 1 if forced else 0
+    for i in range(t, a):
+        w[u + n + i] = y[1 + i - t]
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for c in range(n):
+                total = 0.0
+                for k in range(m + 1):
+                    total += value[i, k] * x[j * m + k, c]
+                w[u + c] = total
+            if forced:
+                w[u + n] = y[0] * (mesh[j] + h * nodes[i])
+            jet(first, mode, n, w, u, par, active, sizes, value_at, spare)
+            for k in range(count):
+                out[j * m + i, k] = w[value_at + k]
 
 
 @kernel

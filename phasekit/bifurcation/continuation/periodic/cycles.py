@@ -19,10 +19,6 @@ from phasekit.bifurcation.continuation.periodic.multipliers import across, multi
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-FLAT = (
-    1e-7  # a Newton step that no longer shrinks counts below this, where the residual is rounding
-)
-ROUNDING = 1e-11  # of the residual, relative
 SMOOTH = 2.5  # rate times length of an interval over which variational equations are resolved
 MOST = 20_000  # intervals of a mesh that resolves them
 

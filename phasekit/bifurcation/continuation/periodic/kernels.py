@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.periodic.along import inner
+from phasekit.bifurcation.continuation.periodic.along import inner, jets
 from phasekit.numerics.compile import Array, kernel, routine
-from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
@@ -69,38 +68,6 @@ def substitute(a: Array, n: int, first: int, last: int) -> None:
             if part != 0.0:
                 for k in range(first, last):
                     a[i, k] -= part * a[j, k]
-
-
-@kernel
-def jets(
-    first: Any, mode: int, par: Array, active: Any, forced: bool, mesh: Array, nodes: Array,
-    value: Array, x: Array, y: Array, scale: Array, out: Array,
-) -> None:  # fmt: skip
-    """F and its derivatives by states and active parameters at all Gauss points."""
-    m, n = nodes.size, x.shape[1]
-    a = active.size
-    count = n + n * (n + a)
-    u, sizes, value_at = 0, n + a, 2 * (n + a)
-    spare = value_at + count
-    w = np.zeros(spare + n + a + 7 * n)
-    for i in range(n + a):
-        w[sizes + i] = scale[i]
-    t = 1 if forced else 0
-    for i in range(t, a):
-        w[u + n + i] = y[1 + i - t]
-    for j in range(mesh.size - 1):
-        h = mesh[j + 1] - mesh[j]
-        for i in range(m):
-            for c in range(n):
-                total = 0.0
-                for k in range(m + 1):
-                    total += value[i, k] * x[j * m + k, c]
-                w[u + c] = total
-            if forced:
-                w[u + n] = y[0] * (mesh[j] + h * nodes[i])
-            jet(first, mode, n, w, u, par, active, sizes, value_at, spare)
-            for k in range(count):
-                out[j * m + i, k] = w[value_at + k]
 
 
 @kernel
