@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,9 @@ def orbit_events_of(problem: Problem, events: Any) -> tuple[Functional, ...]:
 def _function(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
     parameters = tuple(problem.parameters)
     if callable(given) and not hasattr(given, "free_symbols"):
-        check_call(argument, given, parameters)
+        # Besides parameters it may take the period and, of a forced system, time.
+        more = [name for name in ("period", problem.time) if name and name in _arguments(given)]
+        check_call(argument, given, (*parameters, *more))
         return OfOrbit(given, parameters)
     if not isinstance(given, str) and not hasattr(given, "free_symbols"):
         raise bad(argument, given, "a formula, or a function q(x, **parameters) of the orbit")
@@ -51,6 +54,13 @@ def _function(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
     if not formula.free_symbols:
         raise bad(argument, given, "a formula that depends on the orbit or the parameters")
     return Formula(formula, numbers, parameters)
+
+
+def _arguments(function: Any) -> tuple[str, ...]:
+    try:
+        return tuple(inspect.signature(function).parameters)
+    except (TypeError, ValueError):
+        return ()
 
 
 def try_events(cycles: Cycles, orbit: Orbit) -> None:
