@@ -7,7 +7,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
-from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
 
 @pytest.mark.parametrize("m", [2, 4, 7])
@@ -100,3 +100,43 @@ def test_multipliers_of_a_pair():
     expected = 0.9**10 * np.exp(1j * angle * 10)
     assert np.min(np.abs(values - expected)) < 1e-14
     assert np.isclose(values[0], np.conj(values[1]))
+
+
+@pytest.mark.parametrize("count", [8, 9, 13])
+def test_extremes_lie_anywhere_on_the_mesh(count):
+    # Tops of cosines on, before and after a place that two intervals share.
+    mesh = np.linspace(0.0, 1.0, count + 1)
+    at = 2.0 * np.pi * collocation.times(mesh, 7)
+    shifts = 2.0 * np.pi * (mesh[3] + np.linspace(-1.5, 1.5, 61) / (64.0 * count))
+    low, high = collocation.extremes(np.cos(at[:, None] - shifts), 7)
+    # Polynomials of degree 7 are as near as that; a parabola of three places is, too.
+    assert np.max(np.abs(high - 1.0)) < 5e-8
+    assert np.max(np.abs(low + 1.0)) < 5e-8
+
+
+def test_the_flow_is_parted_from_what_is_across_it():
+    rng = np.random.default_rng(3)
+    count, n = 30, 4
+    f, scale = rng.standard_normal((count, n)), 10.0 ** rng.uniform(-3, 3, n)
+    after = np.roll(f, -1, axis=0)
+    # Each matrix takes f to f, and a random complement to a random complement.
+    basis = rng.standard_normal((count, n, n))
+    basis[:, :, 0] = f
+    inner = np.zeros((count, n, n))
+    inner[:, 0, 0] = 1.0
+    inner[:, 0, 1:] = rng.standard_normal((count, n - 1))
+    inner[:, 1:, 1:] = np.eye(n - 1) + 0.3 * rng.standard_normal((count, n - 1, n - 1))
+    G = np.roll(basis, -1, axis=0) @ inner @ np.linalg.inv(basis)
+    assert np.allclose(np.einsum("jik,jk->ji", G, f), after)
+    G *= scale[:, None] / scale
+    A = np.empty((count, n - 1, n - 1))
+    trivial, off = across(np.ascontiguousarray(G), f * scale, scale, A)
+    assert abs(trivial - 1.0) < 1e-11
+    assert off < 1e-11
+    exact, found = np.eye(n - 1), np.eye(n - 1)
+    for j in range(count):
+        exact, found = inner[j, 1:, 1:] @ exact, A[j] @ found
+    assert np.allclose(
+        np.sort_complex(np.linalg.eigvals(found)), np.sort_complex(np.linalg.eigvals(exact)),
+        rtol=1e-7, atol=1e-12 * np.linalg.norm(exact),
+    )  # fmt: skip

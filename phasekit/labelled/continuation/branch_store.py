@@ -94,7 +94,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         functions = stored.functions(record or {})
         of_cycles = ("cycle", "fold_of_cycles", "period_doubling", "torus")
         if stored.spec["kind"] in of_cycles and not given.map:
-            return made_again(stored, given, functions)
+            return made_again(stored, given, functions, events)
         curve = stored.curve(given).replace(**stored.asked(given, events))
         start, tracks = stored.traces(curve)
     if problem is not None or any(functions.values()) or events:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -109,10 +109,20 @@ class Stored:
 
     def asked(self, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:
         """The events of the branch and where it ends, with functions that are given again."""
+        events = self.events(problem, given, events_of)
         with damaged(self.name, "its events"):
-            kept = dict(_mapping("events", self.spec.get("events", {})))
             ends = tuple(str(name) for name in self.spec.get("ends", ()))
             conditions = list(self.spec.get("conditions", ()))
+        events = tuple(replace(one, condition=one.name in conditions) for one in events)
+        return {"events": events, "ends": ends, "conservative": problem.conservative,
+                "discrete": problem.map}  # fmt: skip
+
+    def events(
+        self, problem: Problem, given: Mapping[str, Any] | None, take: Callable[..., Any]
+    ) -> tuple[Any, ...]:
+        """The events of the branch, with functions that are given again."""
+        with damaged(self.name, "its events"):
+            kept = dict(_mapping("events", self.spec.get("events", {})))
         missing = [n for n, text in kept.items() if text is None and n not in (given or {})]
         if missing:
             raise ParameterError(
@@ -126,13 +136,10 @@ class Stored:
         with damaged(self.name, "its events"):
             formulas = {
                 one.name: one
-                for one in events_of(problem, {n: t for n, t in kept.items() if t is not None})
+                for one in take(problem, {n: t for n, t in kept.items() if t is not None})
             }
-        functions = {one.name: one for one in events_of(problem, code)}
-        events = tuple((formulas | functions)[name] for name in kept)
-        events = tuple(replace(one, condition=one.name in conditions) for one in events)
-        return {"events": events, "ends": ends, "conservative": problem.conservative,
-                "discrete": problem.map}  # fmt: skip
+        functions = {one.name: one for one in take(problem, code)}
+        return tuple((formulas | functions)[name] for name in kept)
 
     def curve(self, problem: Problem) -> Curve:
         """The curve that was traced."""

@@ -71,7 +71,9 @@ def continuation(
         Functions of the states and parameters whose zeros are special points (``event``, UZ), by
         name: formulas, or functions ``q(x, **parameters)`` of one number. An angle counts as it is
         shown, in one turn. They hold on branches that are switched to, and on curves in two
-        parameters.
+        parameters. Of periodic orbits they are formulas of the parameters, ``period`` and, for each
+        state x, ``x_min``, ``x_max`` and ``x_mean``, or functions ``q(x, **parameters)`` of the
+        states of a whole orbit, of shape (state, time), which may take ``period`` as well.
     stop : str, callable, or sequence of them, optional
         Where the branch ends before: at the first event of a name, special point of a kind or
         label, zero of a function ``q(x, **parameters)`` or change of one that says yes or no. The
@@ -125,15 +127,11 @@ def continuation(
                 "orbit", orbit, "None of a map",
                 "orbits of a map are fixed points of problem.iterated(times)",
             )  # fmt: skip
-        for name, asked_for in (("events", events), ("stop", stop)):
-            if asked_for is not None:
-                raise bad(
-                    name, asked_for, "None with an orbit: events are functions of one state",
-                    "record= keeps the least, largest and mean value of a function over each orbit",
-                )  # fmt: skip
+        if stop is not None:
+            raise bad("stop", stop, "None with an orbit", "bounds= of the options end it, too")
         with said(f"following periodic orbits along {parameter}"):
             return continue_orbit(
-                problem, parameter, orbit, span, _record(problem, record), options, fix
+                problem, parameter, orbit, span, _record(problem, record), options, fix, events
             )
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")

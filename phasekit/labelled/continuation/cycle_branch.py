@@ -45,7 +45,7 @@ class CycleBranch(Branch):
         ``q_max`` and ``q_mean``.
     special_points : tuple of SpecialPoint
         In order along the family: fold_of_cycles (LPC), period_doubling (PD), torus (TR),
-        cycle_branch_point (BPC) and end (EP).
+        cycle_branch_point (BPC), event (UZ) and end (EP).
     stops : tuple of Stop
         Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, closed,
         max_points, stuck, start) and ``message``.

@@ -46,7 +46,9 @@ def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = 
         # Where energy is conserved, two are always 1.
         trivial = np.argsort(np.abs(values - 1.0), kind="stable")[: 2 if neutral else 1]
         values = np.delete(values, trivial)
-    return int(np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label or neutral else 0.0)))
+    return int(
+        np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label not in ("", "UZ") or neutral else 0.0))
+    )
 
 
 def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:

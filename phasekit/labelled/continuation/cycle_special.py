@@ -21,7 +21,7 @@ from phasekit.systems.problem import Problem
 
 @dataclass(frozen=True, eq=False, repr=False)
 class CyclePoint(SpecialPoint[Of]):
-    """A periodic orbit at which something happens: LPC, PD, TR, BPC or an end.
+    """A periodic orbit at which something happens: LPC, PD, TR, BPC, UZ or an end.
 
     ``x`` is a state on the orbit, ``eigenvalues`` are its multipliers. ``normal_form`` holds the
     coefficient of the map over one period.

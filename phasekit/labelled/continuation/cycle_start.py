@@ -21,6 +21,7 @@ from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_events import orbit_events_of, try_events
 from phasekit.labelled.continuation.cycle_points import clock_code, orbit_dataset
 from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -109,8 +110,10 @@ def continue_orbit(
     record: Mapping[str, Callable[..., Any]],
     options: ContinuationOptions,
     fix: str | None = None,
+    events: Any = None,
 ) -> CycleBranch:
     """Follow the family of a periodic orbit along a parameter, or along two at a fixed period."""
+    asked = orbit_events_of(problem, events)
     if problem.conservative:
         options = _by_period(parameter, span, options)
         problem, parameter = unfolded(problem), UNFOLDING
@@ -136,6 +139,8 @@ def continue_orbit(
     lead = start.dy[0] if cycles.vertical(start.dy) else start.dy[1]
     if lead < 0.0:
         start = start.flipped()
+    cycles = cycles.replace(events=asked)
+    try_events(cycles, start.orbit)
     return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
 
 

@@ -24,7 +24,9 @@ from phasekit.bifurcation.continuation.periodic.point import Point, State
 from phasekit.bifurcation.continuation.periodic.trace import Track
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_events import orbit_events_of
 from phasekit.labelled.continuation.cycle_points import clock_code
+from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import flag
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
@@ -75,17 +77,22 @@ def save(branch: CycleBranch, path: str | PathLike[str], overwrite: bool) -> Non
         ],
         "record": {name: function is None for name, function in branch.record.items()},
     }
+    if cycles.events:
+        spec["events"] = written(cycles.events)
     ds.attrs = {
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
     target.write(ds)
 
 
-def made_again(stored: Stored, problem: Problem, functions: Mapping[str, Any]) -> CycleBranch:
+def made_again(
+    stored: Stored, problem: Problem, functions: Mapping[str, Any], events: Any = None
+) -> CycleBranch:
     """The branch of periodic orbits that a file holds."""
     kind = stored.spec["kind"]
+    asked = stored.events(problem, events, orbit_events_of)
     with damaged(stored.name, "its periodic orbits"):
-        cycles = _cycles(stored, problem, kind)
+        cycles = _cycles(stored, problem, kind).replace(events=asked)
         (start,) = _unpacked(stored, "start", cycles)
         tracks: list[Track | None] = []
         for side, stop in zip(_SIDES, stored.spec["stops"], strict=True):

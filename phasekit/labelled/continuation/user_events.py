@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -38,16 +38,8 @@ def events_of(
     ParameterError
         If one is no formula of the states and parameters, or no function of one number.
     """
-    if events is None:
-        return ()
-    if not isinstance(events, Mapping):
-        raise bad("events", events, "a mapping from names to formulas or functions")
     found = []
-    for name, given in events.items():
-        if not isinstance(name, str) or not name.strip() or len(name) > NAME:
-            raise bad("events", name, f"names: text of 1 to {NAME} letters")
-        if name in TAKEN:
-            raise bad("events", name, "a name that is no kind or label of special points")
+    for name, given in named(events):
         event = _event(problem, name, given, f"events[{name!r}]", x)
         if event.condition:
             raise bad(
@@ -56,6 +48,20 @@ def events_of(
             )  # fmt: skip
         found.append(event)
     return tuple(found)
+
+
+def named(events: Any) -> Iterator[tuple[str, Any]]:
+    """What is asked for by name, where the names are good."""
+    if events is None:
+        return
+    if not isinstance(events, Mapping):
+        raise bad("events", events, "a mapping from names to formulas or functions")
+    for name, given in events.items():
+        if not isinstance(name, str) or not name.strip() or len(name) > NAME:
+            raise bad("events", name, f"names: text of 1 to {NAME} letters")
+        if name in TAKEN:
+            raise bad("events", name, "a name that is no kind or label of special points")
+        yield name, given
 
 
 def stop_of(
@@ -142,7 +148,7 @@ def _is_condition(
     return found.dtype.kind == "b"
 
 
-def written(events: tuple[Event, ...]) -> dict[str, str | None]:
+def written(events: Iterable[Any]) -> dict[str, str | None]:
     """Events as they are stored: formulas as text, None for code."""
     return {
         one.name: write_formula(one.function.expression)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.numerics.compile import Array, kernel
+from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
 STILL = 1e-3  # part of the largest amplitude that others count as at least
@@ -114,8 +115,7 @@ def amplitudes(mesh: Array, x: Array, turns: Array, scale: Array, m: int, half: 
 def extremes(x: Array, fine: Array, m: int, low: Array, high: Array) -> None:
     """Least and largest values of each column, with ``fine`` from places to those of a fine grid.
 
-    The three intervals with the highest places are looked at, and a parabola is laid through the
-    three highest values.
+    The three intervals with the highest places are looked at.
     """
     count, grid = (x.shape[0] - 1) // m, fine.shape[0]
     values = np.empty(grid)
@@ -142,13 +142,13 @@ def extremes(x: Array, fine: Array, m: int, low: Array, high: Array) -> None:
                     values[i] = sign * total
                     if values[i] > values[at]:
                         at = i
-                top = values[at]
-                if 0 < at < grid - 1:
-                    a, b, d = values[at - 1], values[at], values[at + 1]
-                    bend = a - 2.0 * b + d
-                    if bend < 0.0:
-                        top = b - 0.125 * (d - a) ** 2 / bend
-                best = max(best, top)
+                # A parabola through three values, whose top may lie between the last two.
+                k = min(max(at, 1), grid - 2)
+                rise = 0.5 * (values[k + 1] - values[k - 1])
+                bend = values[k - 1] - 2.0 * values[k] + values[k + 1]
+                if bend < 0.0 and abs(rise) <= -bend:
+                    best = max(best, values[k] - 0.5 * rise * rise / bend)
+                best = max(best, values[at])
             if sign > 0.0:
                 high[c] = best
             else:
@@ -205,6 +205,38 @@ def error(mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Arr
         size = sizes[j] * (mesh[j + 1] - mesh[j]) ** coefficients.size
         worst = size if not size <= worst else worst
     return worst
+
+
+@kernel
+def jets(
+    first: Any, mode: int, par: Array, active: Any, forced: bool, mesh: Array, nodes: Array,
+    value: Array, x: Array, y: Array, scale: Array, out: Array,
+) -> None:  # fmt: skip
+    """F and its derivatives by states and active parameters at all Gauss points."""
+    m, n = nodes.size, x.shape[1]
+    a = active.size
+    count = n + n * (n + a)
+    u, sizes, value_at = 0, n + a, 2 * (n + a)
+    spare = value_at + count
+    w = np.zeros(spare + n + a + 7 * n)
+    for i in range(n + a):
+        w[sizes + i] = scale[i]
+    t = 1 if forced else 0
+    for i in range(t, a):
+        w[u + n + i] = y[1 + i - t]
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for c in range(n):
+                total = 0.0
+                for k in range(m + 1):
+                    total += value[i, k] * x[j * m + k, c]
+                w[u + c] = total
+            if forced:
+                w[u + n] = y[0] * (mesh[j] + h * nodes[i])
+            jet(first, mode, n, w, u, par, active, sizes, value_at, spare)
+            for k in range(count):
+                out[j * m + i, k] = w[value_at + k]
 
 
 @kernel

@@ -19,10 +19,6 @@ from phasekit.bifurcation.continuation.periodic.multipliers import across, multi
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-FLAT = (
-    1e-7  # a Newton step that no longer shrinks counts below this, where the residual is rounding
-)
-ROUNDING = 1e-11  # of the residual, relative
 SMOOTH = 2.5  # rate times length of an interval over which variational equations are resolved
 MOST = 20_000  # intervals of a mesh that resolves them
 
@@ -109,6 +105,8 @@ class Cycles:
         Periods of the states that are angles, else 0.
     fixed : bool
         Whether the period keeps its value, for which one more parameter is free.
+    events : tuple of Functional
+        Numbers of orbits whose zeros are looked for.
     """
 
     field: Field
@@ -125,6 +123,7 @@ class Cycles:
     period: Array
     options: ContinuationOptions
     fixed: bool = False
+    events: tuple[Any, ...] = ()
 
     @property
     def n(self) -> int:
@@ -244,7 +243,7 @@ class Cycles:
         c = collocation.scheme(self.m)
         W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
         jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-        _, residual, divergence = kernels.condense(
+        _, residual, _, divergence = kernels.condense(
             jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
             self.scale, orbit.x, orbit.y, W,
         )  # fmt: skip

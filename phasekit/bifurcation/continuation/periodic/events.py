@@ -33,6 +33,7 @@ DEPTH = 6  # halvings of a step whose multipliers change more than its special p
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
 NODES = 9  # points of the family through which a branch point is interpolated
+EVENT = "event"
 
 
 def nontrivial(values: Complex, forced: bool) -> list[complex]:
@@ -146,14 +147,50 @@ class Stretch:
 def find(cycles: Cycles, path: Path) -> list[Found]:
     """All special points of a path, refined, in order."""
     found: list[Found] = []
-    if len(cycles.active) != 1:
-        return found
-    signs = [_signs(cycles, point) for point in path.points]
+    critical = len(cycles.active) == 1
+    signs = [_signs(cycles, point) if critical else None for point in path.points]
+    values = [_values(cycles, point) for point in path.points]
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
-        if signs[i] is None or signs[i + 1] is None or signs[i] == signs[i + 1]:
+        here: list[Found] = []
+        if signs[i] is not None and signs[i + 1] is not None and signs[i] != signs[i + 1]:
+            here = _between(cycles, a, b, DEPTH)
+        if cycles.events:
+            # A special point between them parts the stretch: at a fold a parameter turns back.
+            inside = [one.point for one in here if one.status == "converged"]
+            inner = [_values(cycles, point) for point in inside]
+            stops, at = [a, *inside, b], [values[i], *inner, values[i + 1]]
+            for k in range(len(stops) - 1):
+                here += _events(cycles, stops[k], stops[k + 1], at[k], at[k + 1])
+        found += [replace(one, index=i) for one in here]
+    return found
+
+
+def _values(cycles: Cycles, point: Point) -> list[float]:
+    """The numbers whose zeros are events."""
+    return [event.value(cycles, point.orbit) for event in cycles.events]
+
+
+def _events(
+    cycles: Cycles, a: Point, b: Point, left: list[float], right: list[float]
+) -> list[Found]:
+    """The zeros of the numbers of orbits after one point, up to another one."""
+    found = []
+    for event, before, after in zip(cycles.events, left, right, strict=True):
+        if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
-        for one in _between(cycles, a, b, DEPTH):
-            found.append(replace(one, index=i))
+
+        def value(point: Point, forced: bool, event: Any = event) -> float:
+            return float(event.value(cycles, point.orbit))
+
+        point = b if after == 0.0 else _root(Stretch(cycles, a, b), value)
+        p = sorted((float(a.orbit.y[1]), float(b.orbit.y[1])))
+        status, message = "converged", ""
+        if point is None:
+            point, status = b, "guess"
+            message = "Newton's method did not converge between the points"
+        found.append(
+            Found(EVENT, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
+        )  # fmt: skip
     return found
 
 

@@ -34,6 +34,8 @@ class Found:
     normal_form : dict
     others : tuple
         Directions (dx, dy) of other families, on the mesh of the point.
+    name : str
+        Of an event, else empty.
     """
 
     kind: str
@@ -44,6 +46,7 @@ class Found:
     message: str
     normal_form: dict[str, float]
     others: tuple[tuple[Array, Array], ...] = ()
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.fields import Field
-from phasekit.bifurcation.continuation.periodic import kernels
+from phasekit.bifurcation.continuation.periodic import along
 from phasekit.bifurcation.continuation.periodic.collocation import at_gauss, scheme
 from phasekit.errors import PhasekitError
 from phasekit.numerics import differences
@@ -41,7 +41,7 @@ class Jets:
             at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
             return self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale)
         out = np.empty(((len(mesh) - 1) * m, n * (1 + n + a)))
-        kernels.jets(
+        along.jets(
             self.first, self.mode, self.par, self.places, self.forced,
             mesh, c.nodes, c.value, x, y, scale, out,
         )  # fmt: skip
@@ -54,7 +54,7 @@ class Jets:
         if isinstance(self.field, PythonField):
             return self._python(points[:-1], y, mesh[:-1], scale)[:, :n]
         out = np.empty((len(mesh) - 1, n * (1 + n + len(self.active))))
-        kernels.jets(
+        along.jets(
             self.first, self.mode, self.par, self.places, self.forced, mesh, np.zeros(1),
             np.array([[1.0, 0.0]]), points, y, scale, out,
         )  # fmt: skip

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.periodic.along import inner
+from phasekit.bifurcation.continuation.periodic.along import inner, jets
 from phasekit.numerics.compile import Array, kernel, routine
-from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
@@ -72,46 +71,14 @@ def substitute(a: Array, n: int, first: int, last: int) -> None:
 
 
 @kernel
-def jets(
-    first: Any, mode: int, par: Array, active: Any, forced: bool, mesh: Array, nodes: Array,
-    value: Array, x: Array, y: Array, scale: Array, out: Array,
-) -> None:  # fmt: skip
-    """F and its derivatives by states and active parameters at all Gauss points."""
-    m, n = nodes.size, x.shape[1]
-    a = active.size
-    count = n + n * (n + a)
-    u, sizes, value_at = 0, n + a, 2 * (n + a)
-    spare = value_at + count
-    w = np.zeros(spare + n + a + 7 * n)
-    for i in range(n + a):
-        w[sizes + i] = scale[i]
-    t = 1 if forced else 0
-    for i in range(t, a):
-        w[u + n + i] = y[1 + i - t]
-    for j in range(mesh.size - 1):
-        h = mesh[j + 1] - mesh[j]
-        for i in range(m):
-            for c in range(n):
-                total = 0.0
-                for k in range(m + 1):
-                    total += value[i, k] * x[j * m + k, c]
-                w[u + c] = total
-            if forced:
-                w[u + n] = y[0] * (mesh[j] + h * nodes[i])
-            jet(first, mode, n, w, u, par, active, sizes, value_at, spare)
-            for k in range(count):
-                out[j * m + i, k] = w[value_at + k]
-
-
-@kernel
 def condense(
     jet_: Array, forced: bool, mesh: Array, nodes: Array, weights: Array, value: Array,
     slope: Array, side: float, scale: Array, x: Array, y: Array, W: Array,
-) -> tuple[float, float, float]:  # fmt: skip
+) -> tuple[float, float, float, float]:  # fmt: skip
     """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
 
-    Returns the sign of the determinants, the largest residual beside the largest |T f|, both on
-    scaled axes, and the integral of the trace of T f_x.
+    Returns the sign of the determinants, the largest residual beside the largest |T f|, the latter,
+    both on scaled axes, and the integral of the trace of T f_x.
     """
     m, n = nodes.size, x.shape[1]
     q = y.size
@@ -150,18 +117,18 @@ def condense(
                 speed = max(speed, abs(y[0] * f) / scale[c])
                 worst = max(worst, abs(total / h) / scale[c])
                 if not np.isfinite(total):
-                    return 0.0, np.inf, np.nan
+                    return 0.0, np.inf, 0.0, np.nan
                 divergence += h * weights[i] * y[0] * jet_[at, base + c]
         found = eliminate(M, size, size, width) * side**n
         if found == 0.0:
-            return 0.0, np.inf, np.nan
+            return 0.0, np.inf, 0.0, np.nan
         sign *= found
         substitute(M, size, size, width)
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
     residual = worst / speed if speed > 0.0 else worst
-    return sign, residual, divergence
+    return sign, residual, speed, divergence
 
 
 @kernel
@@ -365,7 +332,7 @@ def newton(
             right[0] = multiple * w[own] - y[0]
         if not given:
             jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
-        sign, residual, divergence = condense(
+        sign, residual, speed, divergence = condense(
             jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
         )
         if sign == 0.0:
@@ -391,7 +358,9 @@ def newton(
             y[k] += part * dy[0, k]
         if not y[0] > 0.0:
             return DIVERGED, step, sign, residual, divergence, size, 1.0
-        flat = size > 0.25 * before and size < FLAT and residual < ROUNDING
+        # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.
+        rounded = residual * min(speed, 1.0) < ROUNDING
+        flat = size > 0.25 * before and size < FLAT and rounded
         if part == 1.0 and (size <= tolerance or flat):
             length = inner(mesh, weights, value, dx[1], dx[1], scale)
             for k in range(1, q):

@@ -1,0 +1,85 @@
+"""Events of the user's along families of periodic orbits, checked."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.fields import refuse_uncompiled
+from phasekit.bifurcation.continuation.functions import Formula
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.functionals import (
+    Functional,
+    OfOrbit,
+    number_names,
+)
+from phasekit.errors import ParameterError
+from phasekit.labelled.continuation.user_events import named
+from phasekit.labels.arguments import bad
+from phasekit.laws.formulas import symbols_of, take_formula
+from phasekit.systems.problem import Problem
+from phasekit.systems.problem_parts import check_call
+
+
+def orbit_events_of(problem: Problem, events: Any) -> tuple[Functional, ...]:
+    """Events of formulas and functions by name.
+
+    Raises
+    ------
+    ParameterError
+        If one is no formula of numbers of an orbit, or no function of an orbit.
+    """
+    return tuple(
+        Functional(name, _function(problem, given, f"events[{name!r}]"))
+        for name, given in named(events)
+    )
+
+
+def _function(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
+    parameters = tuple(problem.parameters)
+    if callable(given) and not hasattr(given, "free_symbols"):
+        # Besides parameters it may take the period and, of a forced system, time.
+        more = [name for name in ("period", problem.time) if name and name in _arguments(given)]
+        check_call(argument, given, (*parameters, *more))
+        return OfOrbit(given, parameters)
+    if not isinstance(given, str) and not hasattr(given, "free_symbols"):
+        raise bad(argument, given, "a formula, or a function q(x, **parameters) of the orbit")
+    numbers = number_names(tuple(problem.state), parameters)
+    symbols = symbols_of([*numbers, *parameters])
+    words = f"wants parameters of the problem, and {', '.join(numbers)}"
+    formula = take_formula(given, symbols, argument, words)
+    refuse_uncompiled(formula, set(symbols.values()), argument)
+    if not formula.free_symbols:
+        raise bad(argument, given, "a formula that depends on the orbit or the parameters")
+    return Formula(formula, numbers, parameters)
+
+
+def _arguments(function: Any) -> tuple[str, ...]:
+    try:
+        return tuple(inspect.signature(function).parameters)
+    except (TypeError, ValueError):
+        return ()
+
+
+def try_events(cycles: Cycles, orbit: Orbit) -> None:
+    """Call the functions once, so that what they return is known to be a number.
+
+    Raises
+    ------
+    ParameterError
+        If one raises, or returns anything else.
+    """
+    for event in cycles.events:
+        if not isinstance(event.function, OfOrbit):
+            continue
+        argument = f"events[{event.name!r}]"
+        try:
+            event.value(cycles, orbit)
+        except Exception as error:
+            raise ParameterError(
+                f"{argument}: failed at the first orbit: {type(error).__name__}: {error}; wants a "
+                "function q(x, **parameters) of one number, with x the states of a whole orbit, "
+                f"of shape {np.shape(orbit.x[:, : cycles.own].T)}"
+            ) from error
