@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from phasekit.errors import ParameterError
@@ -251,7 +251,9 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
-        return kept, passes
+        words: list[Any] = [system.law.words(r.name, r.units, r.long_name) for r in kept]
+        told = (replace(row, **w) if w else row for row, w in zip(kept, words, strict=True))
+        return tuple(told), passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
