@@ -123,7 +123,7 @@ def test_the_delayed_logistic_map():
     assert set(branch.points.n_unstable.values[inside & (branch.points.r.values > 1.01)]) == {0}
     with pytest.raises(pk.ParameterError, match="a branch point"):
         torus.switch()
-    with pytest.raises(pk.ParameterError, match="point: got 'torus'"):
+    with pytest.raises(pk.ParameterError, match="parameter: got 'r', wants another"):
         torus.curve("r", (0, 1))
 
 

@@ -440,6 +440,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
     "Problem.iterated": {"times": lambda: 2},
+    "Problem.described": {"words": lambda: {"x": {"long_name": "place", "units": "m"}}},
     "SpecialPoint.curve": {"parameter": lambda: "r"},
     "Branch.save": {"path": lambda: "branch.zarr"},
     "FreeGyroRotor.poincare": {"section": lambda: 0.5},
