@@ -19,7 +19,7 @@ from phasekit.phase.exact import flow as closed_flow
 from phasekit.phase.exact import orbits as closed_orbits
 from phasekit.phase.exact import separatrices as closed_separatrices
 from phasekit.phase.numerical import functions
-from phasekit.phase.numerical.collocation import integrate
+from phasekit.phase.numerical.collocation import follow, integrate
 from phasekit.phase.numerical.formula import Shape, make_formula
 
 CENTER, SADDLE, DEGENERATE = (
@@ -446,6 +446,42 @@ def test_collocation_solves_a_nonlinear_equation_exactly_as_known():
     got = integrate(lambda rows, y: y * (1.0 - y), start, time, np.full(4, 0.1))[:, 0]
     np.testing.assert_allclose(got[:3], 0.3 / (0.3 + 0.7 * np.exp(-time[:3])), rtol=2e-15)
     assert np.isnan(got[3])
+
+
+def test_many_times_of_few_motions_are_reached_as_each_alone():
+    rng = np.random.default_rng(5)
+    owner = rng.integers(0, 3, 200)
+    time = rng.uniform(-4.0, 6.0, 200)
+    time[[3, 70]] = 0.0, np.nan
+    time[owner == 2] = -np.abs(time[owner == 2])
+    start = np.array([0.3, 0.9, -0.2])[owner][:, None]
+    calls = []
+
+    def rate(rows, y):
+        calls.append(y.size)
+        return y * (1.0 - y)
+
+    step = np.full(200, 0.1)
+    got = follow(rate, start, owner, time, step)[:, 0]
+    few = sum(calls)
+    calls.clear()
+    alone = integrate(rate, start, time, step)[:, 0]
+    assert 4 * few < sum(calls)
+    x = start[:, 0]
+    # From -0.2 the function ends, backwards, never; forwards at log 6.
+    wanted = x / (x + (1.0 - x) * np.exp(-time))
+    assert np.isfinite(wanted).sum() == 199
+    np.testing.assert_allclose(got, wanted, rtol=5e-15)
+    np.testing.assert_allclose(got, alone, rtol=5e-15)
+
+
+def test_times_after_the_end_of_a_motion_are_not_reached():
+    time = np.concatenate([np.linspace(0.0, 0.99, 30), np.linspace(1.01, 3.0, 20)])
+    found = follow(
+        lambda rows, y: y * y, np.ones((50, 1)), np.zeros(50, dtype=int), time, np.full(50, 0.1)
+    )[:, 0]
+    np.testing.assert_allclose(found[:30], 1.0 / (1.0 - time[:30]), rtol=1e-11)
+    assert np.isnan(found[30:]).all()
 
 
 def test_bad_formulas():

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import OrbitKind
-from phasekit.phase.numerical.collocation import integrate
+from phasekit.phase.numerical.collocation import follow
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.orbits import orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.quadrature import speeds
@@ -85,7 +85,7 @@ def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motio
         pace = np.sqrt(bend) + 1.0 / np.where(turning[rows], period[rows], 1e3)
         start = np.stack([out_x[rows], out_v[rows]], axis=-1)
         with np.errstate(all="ignore"):
-            end = integrate(rate, start, rest[rows], 0.5 / pace, trusted)
+            end = follow(rate, start, owner[rows], rest[rows], 0.5 / pace, trusted)
         out_x[rows], out_v[rows] = end.T
     turn = ground.systems.formula.period or 0.0
     rotating = kind == OrbitKind.ROTATION
@@ -158,7 +158,7 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
         size = np.max(np.abs(systems.take(own[few]).slope(x)), axis=1)
         return smooth(systems, own[few], np.min(x, axis=1), np.max(x, axis=1), size)
 
-    w = integrate(rate, start[rows, None], time[rows], step, trusted)[:, 0]
+    w = follow(rate, start[rows, None], own, time[rows], step, trusted)[:, 0]
     near, far, slope = _place(branch, own, w[:, None])
     pace = _pace(branch, own, w[:, None])
     u, d = near[:, 0], far[:, 0]
