@@ -475,6 +475,24 @@ def test_many_times_of_few_motions_are_reached_as_each_alone():
     np.testing.assert_allclose(got, alone, rtol=5e-15)
 
 
+@pytest.mark.parametrize("time", [1e-15, 3e-14, 1e-9, 0.1])
+def test_a_rate_that_vanishes_on_the_way_takes_no_more_steps(time):
+    """Through the bottom of a well the force is all rounding."""
+    calls = []
+
+    def rate(rows, y):
+        calls.append(1)
+        x, v = y[..., 0], y[..., 1]
+        force = 0.4 * np.sin(x) + 1.5 * np.sin(x) * np.cos(x) - 0.2 * np.cos(x)
+        return np.stack([v, -force], axis=-1)
+
+    start = np.array([[0.10533447, 1.68635812]])
+    end = integrate(rate, start, np.array([time]), np.array([0.065]))
+    assert len(calls) < 60
+    back = integrate(rate, end, np.array([-time]), np.array([0.065]))
+    np.testing.assert_allclose(back, start, rtol=1e-15)
+
+
 def test_times_after_the_end_of_a_motion_are_not_reached():
     time = np.concatenate([np.linspace(0.0, 0.99, 30), np.linspace(1.01, 3.0, 20)])
     found = follow(

@@ -24,6 +24,7 @@ _TAIL = 3e-9  # of the stages' series; the end of a step is known to the square 
 _NOISE = 1e-4
 _ITERATIONS = 40
 _MOST_STEPS = 20_000
+_EPS = float(np.finfo(float).eps)
 
 
 def _tables() -> tuple[Array, Array, Array]:
@@ -94,6 +95,10 @@ def integrate(
         length = (sign[rows] * h)[:, None]
         f, settled = _stages(rate, rows, y[rows], length)
         size = np.max(np.abs(f), axis=1)
+        # What rounds away beside y is no error: a rate that vanishes on the way is all noise.
+        with np.errstate(all="ignore"):
+            nothing = _EPS * np.abs(y[rows]) / (np.abs(length) * _TAIL)
+        size = np.maximum(size, np.where(np.isfinite(nothing), nothing, 0.0))
         tail = np.max(np.abs(np.einsum("ts,psc->ptc", TO_TAIL, f)), axis=1)
         tail = np.max(tail / np.where(size > 0.0, size, 1.0), axis=1)
         # A tail that shorter steps do not shrink is noise of the rate.
