@@ -155,7 +155,7 @@ def follow(
     np.maximum.at(far, which, np.where(np.isfinite(time), size, 0.0))
     sign = np.where(time[first] < 0.0, -1.0, 1.0)
     trail: list[Step] = []
-    integrate(
+    end = integrate(
         lambda few, y: rate(first[few], y), start[first], sign * far, step[first],
         None if trusted is None else lambda few, stages: trusted(first[few], stages), trail,
     )  # fmt: skip
@@ -176,9 +176,13 @@ def follow(
     begun = (found < count) & (steps.rows[np.minimum(found, count - 1)] == which)
     found = np.where(begun, found, 0)
     gone = np.where(begun, steps.gone[found], 0.0)
+    before = np.where(begun[:, None], steps.y[found], start)
+    # Nothing comes after the last step of a motion that does not last.
+    ended = np.isnan(end[which]).any(axis=1) & begun
+    before[ended & (size - gone > steps.length[found])] = np.nan
     return integrate(
         rate,
-        np.where(begun[:, None], steps.y[found], start),
+        before,
         np.where(time < 0.0, gone - size, size - gone),
         np.where(begun, steps.length[found], step),
         trusted,
