@@ -71,9 +71,7 @@ def scale_of(x: FloatArray) -> FloatArray:
     return np.asarray(np.where(size > 1e-6 * top, size, top if top > 0.0 else 1.0))
 
 
-def grown(
-    scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float
-) -> FloatArray:
+def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float) -> FloatArray:
     """Sizes of the states at rest or, where they are larger, of the orbits from a Hopf point.
 
     A state may rest next to zero and swing all the more. By the normal form the amplitudes are

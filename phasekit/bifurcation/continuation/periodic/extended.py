@@ -97,7 +97,7 @@ class Extended(Cycles):
         values, log = multipliers(W[:, last : last + n, :n])
         return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
 
-    def resolving(self, orbit: Orbit) -> Array | None:
+    def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """The orbit has no other mesh than its function."""
         return None
 
