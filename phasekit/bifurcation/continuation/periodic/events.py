@@ -21,6 +21,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.on_curves import tests_of
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
 from phasekit.bifurcation.special_points import KINDS
@@ -33,7 +34,6 @@ DEPTH = 6  # halvings of a step whose multipliers change more than its special p
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
 NODES = 9  # points of the family through which a branch point is interpolated
-EVENT = "event"
 
 
 def nontrivial(values: Complex, forced: bool) -> list[complex]:
@@ -154,7 +154,7 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
         here: list[Found] = []
         if signs[i] is not None and signs[i + 1] is not None and signs[i] != signs[i + 1]:
             here = _between(cycles, a, b, DEPTH)
-        if cycles.events:
+        if values[i]:
             # A special point between them parts the stretch: at a fold a parameter turns back.
             inside = [one.point for one in here if one.status == "converged"]
             inner = [_values(cycles, point) for point in inside]
@@ -167,7 +167,12 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
 
 def _values(cycles: Cycles, point: Point) -> list[float]:
     """The numbers whose zeros are events."""
-    return [event.value(cycles, point.orbit) for event in cycles.events]
+    return [event.value(cycles, point.orbit) for event in _looked_for(cycles)]
+
+
+def _looked_for(cycles: Cycles) -> tuple[Any, ...]:
+    """Events, and special points of curves in two parameters, which are found alike."""
+    return (*cycles.events, *tests_of(cycles))
 
 
 def _events(
@@ -175,7 +180,7 @@ def _events(
 ) -> list[Found]:
     """The zeros of the numbers of orbits after one point, up to another one."""
     found = []
-    for event, before, after in zip(cycles.events, left, right, strict=True):
+    for event, before, after in zip(_looked_for(cycles), left, right, strict=True):
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
 
@@ -189,7 +194,7 @@ def _events(
             point, status = b, "guess"
             message = "Newton's method did not converge between the points"
         found.append(
-            Found(EVENT, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
+            Found(event.kind, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
         )  # fmt: skip
     return found
 

@@ -1,0 +1,65 @@
+"""Special points on curves of folds and tori of cycles, at exact places."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+
+@pytest.mark.parametrize("forced", [False, True])
+def test_two_folds_of_cycles_meet_in_a_cusp(forced, tmp_path):
+    # With q = x^2 + y^2 - 1 the orbits have p1 + p2 q - q^3 = 0; forced, x = q + cos t.
+    if forced:
+        q = "(x - cos(t))"
+        system = pk.Problem(
+            [f"p1 + p2*{q} - {q}**3 - sin(t)"], "x", {"p1": -0.3, "p2": 0.5}, time="t",
+            period="2*pi",
+        )  # fmt: skip
+    else:
+        q = "(x**2 + y**2 - 1)"
+        rate = f"(p1 + p2*{q} - {q}**3)"
+        system = pk.Problem(
+            [f"x*{rate} - y*(1 + p2*{q}/3)", f"y*{rate} + x*(1 + p2*{q}/3)"], ("x", "y"),
+            {"p1": -0.3, "p2": 0.5},
+        )  # fmt: skip
+    orbit = pk.periodic_orbit(system, [0.1] if forced else [0.3, 0.0])
+    branch = pk.continuation(system, "p1", orbit=orbit, span=(-0.5, 0.5))
+    fold, _ = branch.special("LPC")
+    curve = fold.curve("p2", (-0.5, 1.0))
+    # Both folds, on both sides of the cusp.
+    assert np.allclose(27 * curve.points.p1**2, 4 * curve.points.p2**3, atol=1e-10)
+    assert float(curve.points.p1[0] * curve.points.p1[-1]) < 0.0
+    (cusp,) = curve.special("CP")
+    assert [s.kind for s in curve.special_points] == ["end", "cusp", "end"]
+    assert cusp.status == "converged"
+    assert abs(cusp["p1"]) < 1e-10
+    assert abs(cusp["p2"]) < 1e-7
+    curve.save(tmp_path / "curve.nc")
+    again = pk.Branch.load(tmp_path / "curve.nc")
+    assert again.points.identical(curve.points)
+    assert again.special("CP")[0]["p2"] == cusp["p2"]
+
+
+def test_strong_resonances_of_tori():
+    # It turns at the rate d, and in r and z it is at a Hopf point whatever d is.
+    rate = "l*z - z**3/3 - (x**2 + y**2)*(1 + z/4)"
+    system = pk.Problem(
+        ["(z - 0.7)*x - d*y", "d*x + (z - 0.7)*y", f"0.6 + {rate}"], ("x", "y", "z"),
+        {"l": 0.3, "d": 3.5},
+    )  # fmt: skip
+    flat = pk.Problem(
+        ["(z - 0.7)*r", "0.6 + l*z - z**3/3 - r**2*(1 + z/4)"], ("r", "z"), {"l": 0.3}
+    )
+    (hopf,) = pk.continuation(flat, "l", x0=[0.7, 0.7], span=(0.0, 1.0)).special("H")
+    omega = hopf.normal_form["omega"]
+    rest = pk.continuation(system, "l", x0=[0.0, 0.0, 1.0], span=(-1.0, 1.0))
+    (torus,) = rest.special("H")[0].switch().special("TR")
+    curve = torus.curve("d", (3.0, 6.0))
+    assert np.allclose(curve.points.l, hopf["l"], atol=1e-10)
+    assert [s.label for s in curve.special_points] == ["EP", "R3", "R4", "EP"]
+    (third,), (quarter,) = curve.special("R3"), curve.special("R4")
+    assert np.isclose(third["d"], 3.0 * omega, rtol=1e-10)
+    assert np.isclose(quarter["d"], 4.0 * omega, rtol=1e-10)
+    assert np.allclose(np.sort(quarter.eigenvalues.imag), [-1.0, 0.0, 1.0], atol=1e-8)
