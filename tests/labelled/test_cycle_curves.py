@@ -63,3 +63,30 @@ def test_strong_resonances_of_tori():
     assert np.isclose(third["d"], 3.0 * omega, rtol=1e-10)
     assert np.isclose(quarter["d"], 4.0 * omega, rtol=1e-10)
     assert np.allclose(np.sort(quarter.eigenvalues.imag), [-1.0, 0.0, 1.0], atol=1e-8)
+
+
+def test_curves_of_folds_and_tori_meet_at_a_resonance():
+    """A forced system, of which x - cos t and y stand next to a Bogdanov-Takens point."""
+    u = "(x - cos(t))"
+    system = pk.Problem(
+        ["y - sin(t)", f"p1 + p2*{u} + {u}**2 - {u}*y"], ("x", "y"), {"p1": 0.0005, "p2": -0.05},
+        time="t", period="2*pi",
+    )  # fmt: skip
+    orbit = pk.periodic_orbit(system, [1.0, 0.0], period=2 * np.pi)
+    branch = pk.continuation(system, "p1", orbit=orbit, span=(-0.01, 0.01))
+    (torus,), (fold,) = branch.special("TR"), branch.special("LPC")
+    # Tori at p1 = 0, of angles 2 pi sqrt(-p2); folds at 4 p1 = p2^2.
+    tori = torus.curve("p2", (-0.2, 0.1))
+    assert {stop.reason for stop in tori.stops} == {"bound", "resonance"}
+    assert sorted(s.label for s in tori.special_points) == ["EP", "EP", "R1", "R3", "R4"]
+    assert np.allclose(tori.points.p1, 0.0, atol=1e-10)
+    assert np.isclose(float(tori.points.p2.min()), -0.2, rtol=1e-12)
+    places = {"R1": 0.0, "R3": -1 / 9, "R4": -1 / 16}
+    for label, p2 in places.items():
+        assert abs(tori.special(label)[0]["p2"] - p2) < 1e-9
+    folds = fold.curve("p2", (-0.2, 0.1))
+    assert np.allclose(4 * folds.points.p1, folds.points.p2**2, atol=1e-10)
+    assert [s.label for s in folds.special_points] == ["EP", "R1", "EP"]
+    (meeting,) = folds.special("R1")
+    assert abs(meeting["p2"]) < 1e-8
+    assert abs(meeting["p1"]) < 1e-8

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.extended import TORUS, Extended
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
@@ -41,6 +42,10 @@ def end_of(
             f"both halves of the orbit become the same at a period doubling near {name} = "
             f"{made.orbit.y[1]:.9g}",
         )
+    if isinstance(cycles, Extended) and cycles.kind == TORUS:
+        met = _resonance(cycles, before, made)
+        if met is not None:
+            return met
     for k, place in enumerate(cycles.active):
         p = made.orbit.y[1 + k]
         if cycles.low[k] < p < cycles.high[k]:
@@ -65,6 +70,24 @@ def end_of(
         last = replace(start, arclength=made.arclength, step=made.step)
         return last, Stop("closed", "the family closed on its start")
     return None
+
+
+def _resonance(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, Stop] | None:
+    """The end of a curve of tori whose multipliers meet; it would go back on itself from there."""
+    turns = [float(o.y[-1] * o.y[0]) / np.pi for o in (before.orbit, made.orbit)]
+    low, high = sorted(turns)
+    half = np.floor(high)
+    if half == turns[0] or not (low < half or half == turns[1]):
+        return None
+    value = "1 (R1)" if half % 2 == 0 else "-1 (R2)"
+    last: Point | None = made
+    period = made.orbit.y[0]
+    for _ in range(20):
+        last = at_value(cycles, before, made, cycles.q - 2, half * np.pi / period)
+        if last is None or abs(last.orbit.y[0] - period) <= 1e-14 * period:
+            break
+        period = last.orbit.y[0]
+    return last, Stop("resonance", f"the multipliers of the tori meet at {value}")
 
 
 def _period_bounds(cycles: Cycles, period: float) -> list[tuple[float, str, bool]]:

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
-from phasekit.bifurcation.continuation.periodic.on_curves import tests_of
+from phasekit.bifurcation.continuation.periodic.on_curves import CurveTest, tests_of
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
 from phasekit.bifurcation.special_points import KINDS
@@ -33,6 +33,7 @@ Value = Callable[[Point, bool], float]
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
+JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 NODES = 9  # points of the family through which a branch point is interpolated
 
 
@@ -188,6 +189,9 @@ def _events(
             return float(event.value(cycles, point.orbit))
 
         point = b if after == 0.0 else _root(Stretch(cycles, a, b), value)
+        if isinstance(event, CurveTest) and point is not None:
+            if abs(value(point, False)) > JUMP * max(abs(before), abs(after)):
+                continue  # a coefficient that changes its sign without a zero
         p = sorted((float(a.orbit.y[1]), float(b.orbit.y[1])))
         status, message = "converged", ""
         if point is None:
