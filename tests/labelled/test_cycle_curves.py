@@ -56,12 +56,16 @@ def test_strong_resonances_of_tori():
     omega = hopf.normal_form["omega"]
     rest = pk.continuation(system, "l", x0=[0.0, 0.0, 1.0], span=(-1.0, 1.0))
     (torus,) = rest.special("H")[0].switch().special("TR")
-    curve = torus.curve("d", (3.0, 6.0))
+    curve = torus.curve("d", (2.0, 6.0))
     assert np.allclose(curve.points.l, hopf["l"], atol=1e-10)
-    assert [s.label for s in curve.special_points] == ["EP", "R3", "R4", "EP"]
-    (third,), (quarter,) = curve.special("R3"), curve.special("R4")
-    assert np.isclose(third["d"], 3.0 * omega, rtol=1e-10)
-    assert np.isclose(quarter["d"], 4.0 * omega, rtol=1e-10)
+    # The symmetry lets the multipliers pass each other at -1, where the equations are singular.
+    assert [s.label for s in curve.special_points] == ["EP", "R3", "R2", "R3", "R4", "EP"]
+    at = [s["d"] / omega for s in curve.special_points[1:-1]]
+    assert np.allclose(at[0::2] + at[3:], [1.5, 3.0, 4.0], rtol=1e-9)
+    status = [s.status for s in curve.special_points[1:-1]]
+    assert status == ["converged", "guess", "converged", "converged"]
+    assert 1.9 < at[1] < 2.1
+    (quarter,) = curve.special("R4")
     assert np.allclose(np.sort(quarter.eigenvalues.imag), [-1.0, 0.0, 1.0], atol=1e-8)
 
 
@@ -77,7 +81,7 @@ def test_curves_of_folds_and_tori_meet_at_a_resonance():
     (torus,), (fold,) = branch.special("TR"), branch.special("LPC")
     # Tori at p1 = 0, of angles 2 pi sqrt(-p2); folds at 4 p1 = p2^2.
     tori = torus.curve("p2", (-0.2, 0.1))
-    assert {stop.reason for stop in tori.stops} == {"bound", "resonance"}
+    assert {stop.reason for stop in tori.stops} == {"bound", "resonance_1"}
     assert sorted(s.label for s in tori.special_points) == ["EP", "EP", "R1", "R3", "R4"]
     assert np.allclose(tori.points.p1, 0.0, atol=1e-10)
     assert np.isclose(float(tori.points.p2.min()), -0.2, rtol=1e-12)
@@ -90,3 +94,23 @@ def test_curves_of_folds_and_tori_meet_at_a_resonance():
     (meeting,) = folds.special("R1")
     assert abs(meeting["p2"]) < 1e-8
     assert abs(meeting["p1"]) < 1e-8
+
+
+def test_a_curve_of_tori_ends_where_the_multipliers_meet_at_minus_one():
+    """An equilibrium seen from axes that turn by half a turn a period."""
+    c, s = "cos(t/2)", "sin(t/2)"
+    u, v = f"({c}*x + {s}*y)", f"({c}*y - {s}*x)"
+    f = f"(p1*{u} + p2*{v} - {u}**3 - {u}**2*{v})"
+    system = pk.Problem(
+        [f"-y/2 + {c}*{v} - {s}*{f}", f"x/2 + {s}*{v} + {c}*{f}"], ("x", "y"),
+        {"p2": -0.02, "p1": -0.05}, time="t", period="2*pi",
+    )  # fmt: skip
+    orbit = pk.periodic_orbit(system, [0.0, 0.0], period=2 * np.pi)
+    (torus,) = pk.continuation(system, "p2", orbit=orbit, span=(-0.1, 0.1)).special("TR")
+    curve = torus.curve("p1", (-0.1, 0.1))
+    assert np.allclose(curve.points.p2, 0.0, atol=1e-10)
+    assert {stop.reason for stop in curve.stops} == {"bound", "resonance_2"}
+    assert sorted(s.label for s in curve.special_points) == ["EP", "EP", "R2", "R3", "R4"]
+    # Their angle is pi - 2 pi sqrt(-p1).
+    for label, p1 in {"R2": 0.0, "R3": -1 / 36, "R4": -1 / 16}.items():
+        assert abs(curve.special(label)[0]["p1"] - p1) < 1e-9

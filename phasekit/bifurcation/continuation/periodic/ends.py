@@ -20,6 +20,7 @@ SLOW = 1e-4  # the same, where no step succeeds
 GROWS = 0.02  # part of its range by which no state grows beside a homoclinic orbit, a time e-fold
 REACH = 1e-3  # length along the family, on scaled axes, over which ranges are compared
 STEADY = 1e-6  # range, beside its scale, of a state that rests
+MEETING = 1e-5  # half turns between multipliers that are said to meet, and where they do
 FEW = 5  # points before which a family is not asked whether it closes
 NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
@@ -73,21 +74,27 @@ def end_of(
 
 
 def _resonance(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, Stop] | None:
-    """The end of a curve of tori whose multipliers meet; it would go back on itself from there."""
+    """The end of a curve of tori where their multipliers meet and it goes back on itself.
+
+    There its equations are singular, and parameters have their extremes: the end is next to it.
+    """
+    if before.dy[1:3] / cycles.width[:2] ** 2 @ made.dy[1:3] >= 0.0:
+        return None  # by a symmetry they pass each other
     turns = [float(o.y[-1] * o.y[0]) / np.pi for o in (before.orbit, made.orbit)]
     low, high = sorted(turns)
     half = np.floor(high)
     if half == turns[0] or not (low < half or half == turns[1]):
         return None
-    value = "1 (R1)" if half % 2 == 0 else "-1 (R2)"
+    kind, value = ("resonance_1", 1) if half % 2 == 0 else ("resonance_2", -1)
+    near = half + np.sign(turns[0] - half) * MEETING
     last: Point | None = made
     period = made.orbit.y[0]
     for _ in range(20):
-        last = at_value(cycles, before, made, cycles.q - 2, half * np.pi / period)
+        last = at_value(cycles, before, made, cycles.q - 2, near * np.pi / period)
         if last is None or abs(last.orbit.y[0] - period) <= 1e-14 * period:
             break
         period = last.orbit.y[0]
-    return last, Stop("resonance", f"the multipliers of the tori meet at {value}")
+    return last, Stop(kind, f"the multipliers of the tori meet at {value}")
 
 
 def _period_bounds(cycles: Cycles, period: float) -> list[tuple[float, str, bool]]:

@@ -17,7 +17,7 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import FOLD, TORUS, Extended
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_fold
 
-SAME = 1e-9  # angle within which multipliers meet
+SAME = 2e-5  # half the angle within which multipliers meet, at ends of curves
 
 
 @dataclass(frozen=True)
