@@ -54,11 +54,12 @@ def end_of(
         upper = p >= cycles.high[k]
         bound = float(cycles.high[k] if upper else cycles.low[k])
         name, side = cycles.field.parameters[place], "upper" if upper else "lower"
-        last = at_value(cycles, before, made, k, bound)
+        last = None if before.orbit.y[1 + k] == bound else at_value(cycles, before, made, k, bound)
         return last, Stop("bound", f"{name} met its {side} bound {bound:.9g}")
     for value, side, out in _period_bounds(cycles, made.orbit.y[0]):
         if out:
-            last = at_value(cycles, before, made, -1, value)
+            stays = before.orbit.y[0] == value
+            last = None if stays else at_value(cycles, before, made, -1, value)
             return last, Stop("bound", f"period met its {side} bound {value:.9g}")
     if not cycles.forced and len(cycles.active) == 1 and _homoclinic(cycles, made, start):
         name = cycles.field.parameters[cycles.active[0]]
