@@ -181,6 +181,18 @@ def test_fold_curve_of_the_normal_form(tmp_path):
     assert pk.Branch.load(tmp_path / "curve.nc").points.identical(curve.points)
 
 
+@pytest.mark.parametrize(("span", "end"), [((1.0, 1.2), 0), ((0.9, 1.0), -1)])
+def test_a_branch_that_starts_on_its_bound_has_its_start_once(span, end):
+    system = pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 1.0})
+    orbit = pk.periodic_orbit(system, [2.0, 0.0])
+    branch = pk.continuation(system, "mu", orbit=orbit, span=span)
+    assert branch.points.sizes["point"] > 3
+    assert np.all(np.diff(branch.points.arclength) > 0.0)
+    assert float(branch.points.mu[end]) == 1.0
+    assert [stop.reason for stop in branch.stops] == ["bound", "bound"]
+    assert [one.index for one in branch.special_points] == [0, branch.points.sizes["point"] - 1]
+
+
 def test_isola_closes():
     rate = "(0.04 - (x**2 + y**2 - 1)**2 - p**2)"
     system = pk.Problem([f"3*x*{rate} - y", f"3*y*{rate} + x"], ("x", "y"), {"p": 0.0})

@@ -165,6 +165,28 @@ def test_roessler_orbits():
     assert abs(orbit.multiplier.values[0] + 2.403953527) < 1e-8
 
 
+def test_roessler_orbit_of_three_turns():
+    """From one period of samples, against a shooting by another integrator."""
+
+    def f(t, x):
+        return [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - 5.7)]
+
+    # ChaosBook: 17.5157912663, of which eight digits agree with this shooting; -2.341923.
+    guess, at = 17.5157912663, np.linspace(0.0, 17.5157912663, 400)
+    samples = solve_ivp(
+        f, (0, guess), [-5.39165954, 6.63283758, 0.02015118], "DOP853", t_eval=at, rtol=1e-10,
+        atol=1e-12,
+    ).y.T  # fmt: skip
+    orbit = pk.periodic_orbit(roessler(5.7), samples, period=guess)
+    assert close(orbit.period, guess, 2e-8)
+    assert close(orbit.period, 17.51579107033588, 1e-11)
+    assert abs(orbit.multiplier.values[0] + 2.34192350364) < 1e-8
+    assert int(orbit.n_unstable) == 1
+    start = [float(orbit[name][0]) for name in "xyz"]
+    end = solve_ivp(f, (0, float(orbit.period)), start, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    assert np.allclose(end, start, atol=1e-7)
+
+
 def test_roessler_doubles():
     start = pk.periodic_orbit(roessler(2.0), [2.0, 2.0, 0.03], settle=100.0)
     first = checked(pk.continuation(roessler(2.0), "c", orbit=start, span=(2.0, 6.0)))

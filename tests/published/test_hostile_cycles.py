@@ -197,3 +197,14 @@ def test_a_family_that_begins_at_its_fold_holds_it():
     again = pk.continuation(begin, "m", orbit=fold.orbit, span=(-0.5, 0.5))
     (same,) = again.special("LPC")
     assert abs(same["m"] + 0.25) < 1e-10
+
+
+@pytest.mark.parametrize("rest", [[1e-5, 2.0], [-3.0, 1e-7]])
+def test_a_state_that_rests_next_to_zero_swings_all_the_same(rest):
+    problem = normal_form(2).replace(c0=rest[0], c1=rest[1], l=-0.3, p=0.0, a=0.5)
+    (hopf,) = pk.continuation(problem, "l", x0=rest, span=(-0.3, 0.6)).special("H")
+    branch = hopf.switch()
+    assert [stop.reason for stop in branch.stops] == ["hopf", "bound"]
+    half = 0.5 * (branch.points.x_max - branch.points.x_min)
+    assert np.allclose(half, np.sqrt(np.maximum(branch.points.l, 0.0) / 0.5), rtol=1e-7, atol=1e-9)
+    assert 10 < branch.points.sizes["point"] < 100

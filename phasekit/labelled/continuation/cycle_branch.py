@@ -45,10 +45,12 @@ class CycleBranch(Branch):
         ``q_max`` and ``q_mean``.
     special_points : tuple of SpecialPoint
         In order along the family: fold_of_cycles (LPC), period_doubling (PD), torus (TR),
-        cycle_branch_point (BPC), event (UZ) and end (EP).
+        cycle_branch_point (BPC), event (UZ) and end (EP); along curves of folds cusp (CP) and
+        resonance_1 (R1), along those of tori resonance_1 to resonance_4.
     stops : tuple of Stop
         Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, closed,
-        max_points, stuck, start) and ``message``.
+        max_points, stuck, start, period_doubling; of curves of tori resonance_1, resonance_2) and
+        ``message``.
     kind : str
         cycle, or fold_of_cycles, period_doubling, torus: a curve in two parameters.
 

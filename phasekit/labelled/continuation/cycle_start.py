@@ -71,6 +71,20 @@ def scale_of(x: FloatArray) -> FloatArray:
     return np.asarray(np.where(size > 1e-6 * top, size, top if top > 0.0 else 1.0))
 
 
+def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float) -> FloatArray:
+    """Sizes of the states at rest or, where they are larger, of the orbits from a Hopf point.
+
+    A state may rest next to zero and swing all the more. By the normal form the amplitudes are
+    ``2 |q| sqrt(d width/(omega |l1|))``. They are less where l1 is small, so that this only brings
+    the sizes in line with each other: it ends where no state would swing by less than its size.
+    """
+    with np.errstate(all="ignore"):
+        swing = 2.0 * np.sqrt(np.abs(form["d"] * width / (form["omega"] * form["l1"])))
+        most = np.max(scale / q)
+    swing = np.fmin(swing, most)
+    return np.maximum(scale, swing * q) if np.isfinite(swing) else scale.copy()
+
+
 def from_hopf(point: SpecialPoint[Branch], options: ContinuationOptions | None) -> CycleBranch:
     """The periodic orbits that a Hopf point gives rise to."""
     if point.kind != "hopf":
@@ -81,13 +95,14 @@ def from_hopf(point: SpecialPoint[Branch], options: ContinuationOptions | None) 
     options = curve.options if options is None else check_options(options)
     n, name = curve.n, point.branch.parameter
     span = float(curve.low[n]), float(curve.high[n])
-    cycles = cycles_of(problem, [name], [span], curve.scale[:n].copy(), np.zeros(n), options)
     slopes = curve.at(point.special.u)[1][:, :n]
     values, vectors = np.linalg.eig(slopes)
     pairs = np.flatnonzero(values.imag > 0.0)
     if not len(pairs):
         raise bad("point", "no pair of complex eigenvalues", "a Hopf point that has converged")
     k = pairs[np.argmin(np.abs(values.real[pairs]))]
+    scale = grown(curve.scale[:n], np.abs(vectors[:, k]), point.normal_form, span[1] - span[0])
+    cycles = cycles_of(problem, [name], [span], scale, np.zeros(n), options)
     p = point.parameters[name]
     found = starts.from_hopf(cycles, point.special.u[:n], p, float(values.imag[k]), vectors[:, k])
     start = _start(cycles, found, f"near the Hopf point at {name} = {p:.9g}")

@@ -19,7 +19,6 @@ from phasekit.bifurcation.continuation.periodic.multipliers import across, multi
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-SMOOTH = 2.5  # rate times length of an interval over which variational equations are resolved
 MOST = 20_000  # intervals of a mesh that resolves them
 
 
@@ -270,15 +269,18 @@ class Cycles:
         values, log = multipliers(G)
         return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
 
-    def resolving(self, orbit: Orbit) -> Array | None:
-        """A mesh on which the variational equations are smooth, too; None if it is too fine."""
+    def resolving(self, orbit: Orbit, reach: float) -> Array | None:
+        """A mesh that resolves the variational equations, too; None if it is too fine.
+
+        On each of its intervals rate times length is at most ``reach``.
+        """
         n = self.n
         found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
         slopes = found[:, n:].reshape(orbit.intervals, self.m, n, -1)[:, :, :, :n]
         rates = np.abs(slopes * self.scale / self.scale[:, None]).sum(axis=3).max(axis=(1, 2))
         if not np.isfinite(rates).all():
             return None
-        parts = np.ceil(np.diff(orbit.mesh) * orbit.y[0] * rates / SMOOTH)
+        parts = np.ceil(np.diff(orbit.mesh) * orbit.y[0] * rates / reach)
         if np.sum(parts) > MOST:
             return None
         counts = np.maximum(2, parts).astype(int)

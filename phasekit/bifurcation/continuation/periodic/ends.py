@@ -10,6 +10,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.extended import TORUS, Extended
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
@@ -19,6 +20,7 @@ SLOW = 1e-4  # the same, where no step succeeds
 GROWS = 0.02  # part of its range by which no state grows beside a homoclinic orbit, a time e-fold
 REACH = 1e-3  # length along the family, on scaled axes, over which ranges are compared
 STEADY = 1e-6  # range, beside its scale, of a state that rests
+MEETING = 1e-5  # half turns between multipliers that are said to meet, and where they do
 FEW = 5  # points before which a family is not asked whether it closes
 NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
@@ -41,6 +43,10 @@ def end_of(
             f"both halves of the orbit become the same at a period doubling near {name} = "
             f"{made.orbit.y[1]:.9g}",
         )
+    if isinstance(cycles, Extended) and cycles.kind == TORUS:
+        met = _resonance(cycles, before, made)
+        if met is not None:
+            return met
     for k, place in enumerate(cycles.active):
         p = made.orbit.y[1 + k]
         if cycles.low[k] < p < cycles.high[k]:
@@ -48,11 +54,12 @@ def end_of(
         upper = p >= cycles.high[k]
         bound = float(cycles.high[k] if upper else cycles.low[k])
         name, side = cycles.field.parameters[place], "upper" if upper else "lower"
-        last = at_value(cycles, before, made, k, bound)
+        last = None if before.orbit.y[1 + k] == bound else at_value(cycles, before, made, k, bound)
         return last, Stop("bound", f"{name} met its {side} bound {bound:.9g}")
     for value, side, out in _period_bounds(cycles, made.orbit.y[0]):
         if out:
-            last = at_value(cycles, before, made, -1, value)
+            stays = before.orbit.y[0] == value
+            last = None if stays else at_value(cycles, before, made, -1, value)
             return last, Stop("bound", f"period met its {side} bound {value:.9g}")
     if not cycles.forced and len(cycles.active) == 1 and _homoclinic(cycles, made, start):
         name = cycles.field.parameters[cycles.active[0]]
@@ -65,6 +72,30 @@ def end_of(
         last = replace(start, arclength=made.arclength, step=made.step)
         return last, Stop("closed", "the family closed on its start")
     return None
+
+
+def _resonance(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, Stop] | None:
+    """The end of a curve of tori where their multipliers meet and it goes back on itself.
+
+    There its equations are singular, and parameters have their extremes: the end is next to it.
+    """
+    if before.dy[1:3] / cycles.width[:2] ** 2 @ made.dy[1:3] >= 0.0:
+        return None  # by a symmetry they pass each other
+    turns = [float(o.y[-1] * o.y[0]) / np.pi for o in (before.orbit, made.orbit)]
+    low, high = sorted(turns)
+    half = np.floor(high)
+    if half == turns[0] or not (low < half or half == turns[1]):
+        return None
+    kind, value = ("resonance_1", 1) if half % 2 == 0 else ("resonance_2", -1)
+    near = half + np.sign(turns[0] - half) * MEETING
+    last: Point | None = made
+    period = made.orbit.y[0]
+    for _ in range(20):
+        last = at_value(cycles, before, made, cycles.q - 2, near * np.pi / period)
+        if last is None or abs(last.orbit.y[0] - period) <= 1e-14 * period:
+            break
+        period = last.orbit.y[0]
+    return last, Stop(kind, f"the multipliers of the tori meet at {value}")
 
 
 def _period_bounds(cycles: Cycles, period: float) -> list[tuple[float, str, bool]]:

@@ -9,8 +9,7 @@ bordered equations and det(M - 1) ([Kuznetsov2004] 10.3).
 from __future__ import annotations
 
 import cmath
-import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -18,9 +17,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.periodic.criteria import (
+    determinant,
+    doubling_test,
+    fold_test,
+    none_passes,
+    nontrivial,
+    torus_test,
+    unstable,
+)
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.on_curves import CurveTest, tests_of
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
 from phasekit.bifurcation.special_points import KINDS
@@ -30,67 +39,9 @@ Complex = npt.NDArray[np.complex128]
 Value = Callable[[Point, bool], float]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
-CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
+JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 NODES = 9  # points of the family through which a branch point is interpolated
-EVENT = "event"
-
-
-def nontrivial(values: Complex, forced: bool) -> list[complex]:
-    """Multipliers but for the one that is 1 for every orbit of an autonomous system."""
-    mu: list[complex] = values.tolist()
-    if not forced:
-        mu.remove(min(mu, key=lambda one: abs(one - 1.0)))
-    return mu
-
-
-def unstable(values: Complex, forced: bool) -> int:
-    """Number of multipliers outside the unit circle."""
-    return sum(abs(mu) > 1.0 for mu in nontrivial(values, forced))
-
-
-def _none_passes(a: Point, b: Point, forced: bool) -> bool:
-    """Whether the number of real multipliers beyond 1 stays odd or even, unlike at a fold.
-
-    Nothing is known of it next to a fold, where one is 1 but for errors.
-    """
-    beyond = 0
-    for point in (a, b):
-        mu = nontrivial(point.multipliers, forced)
-        if any(abs(one - 1.0) < CRITICAL for one in mu):
-            return False
-        beyond += sum(one.imag == 0.0 and one.real > 1.0 for one in mu)
-    return beyond % 2 == 0
-
-
-def fold_test(point: Point, forced: bool) -> float:
-    """The tangent's part along the parameter."""
-    return float(point.dy[1])
-
-
-def _parts(values: Iterable[complex], at: float) -> complex:
-    """Product of at - z, each beside its size."""
-    return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
-
-
-def doubling_test(point: Point, forced: bool) -> float:
-    """det(M + 1), each factor beside its size."""
-    return _parts((-mu for mu in point.multipliers.tolist()), 1.0).real
-
-
-def torus_test(point: Point, forced: bool) -> float:
-    """Product of 1 - mu_i mu_j over pairs, each beside its size."""
-    mu = nontrivial(point.multipliers, forced)
-    return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
-
-
-def determinant(point: Point, forced: bool) -> float:
-    """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
-    mu = point.multipliers.tolist()
-    if forced:
-        return _parts(mu, 1.0).real
-    n = len(mu)
-    return sum(_parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,11 +101,15 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
     critical = len(cycles.active) == 1
     signs = [_signs(cycles, point) if critical else None for point in path.points]
     values = [_values(cycles, point) for point in path.points]
+    for test, value in zip(_looked_for(cycles), values[0], strict=True):
+        if isinstance(test, CurveTest) and value == 0.0:  # what the curve ends for
+            p = float(path.points[0].orbit.y[1])
+            found.append(Found(test.kind, path.points[0], 0, (p, p), "converged", "", {}))
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
         here: list[Found] = []
         if signs[i] is not None and signs[i + 1] is not None and signs[i] != signs[i + 1]:
             here = _between(cycles, a, b, DEPTH)
-        if cycles.events:
+        if values[i]:
             # A special point between them parts the stretch: at a fold a parameter turns back.
             inside = [one.point for one in here if one.status == "converged"]
             inner = [_values(cycles, point) for point in inside]
@@ -167,7 +122,12 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
 
 def _values(cycles: Cycles, point: Point) -> list[float]:
     """The numbers whose zeros are events."""
-    return [event.value(cycles, point.orbit) for event in cycles.events]
+    return [event.value(cycles, point.orbit) for event in _looked_for(cycles)]
+
+
+def _looked_for(cycles: Cycles) -> tuple[Any, ...]:
+    """Events, and special points of curves in two parameters, which are found alike."""
+    return (*cycles.events, *tests_of(cycles))
 
 
 def _events(
@@ -175,7 +135,7 @@ def _events(
 ) -> list[Found]:
     """The zeros of the numbers of orbits after one point, up to another one."""
     found = []
-    for event, before, after in zip(cycles.events, left, right, strict=True):
+    for event, before, after in zip(_looked_for(cycles), left, right, strict=True):
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
 
@@ -183,13 +143,16 @@ def _events(
             return float(event.value(cycles, point.orbit))
 
         point = b if after == 0.0 else _root(Stretch(cycles, a, b), value)
+        if isinstance(event, CurveTest) and point is not None:
+            if abs(value(point, False)) > JUMP * max(abs(before), abs(after)):
+                continue  # a coefficient that changes its sign without a zero
         p = sorted((float(a.orbit.y[1]), float(b.orbit.y[1])))
         status, message = "converged", ""
         if point is None:
             point, status = b, "guess"
             message = "Newton's method did not converge between the points"
         found.append(
-            Found(EVENT, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
+            Found(event.kind, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
         )  # fmt: skip
     return found
 
@@ -212,7 +175,7 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
         # Conservative: a second multiplier is always 1, and the parameter never moves.
         changed = [test for test in changed if test is DOUBLING]
         return [one for one in (refined(Stretch(cycles, a, b), test) for test in changed) if one]
-    if FOLD in changed and BRANCHING not in changed and _none_passes(a, b, forced):
+    if FOLD in changed and BRANCHING not in changed and none_passes(a, b, forced):
         changed.remove(FOLD)  # the parameter stands still to rounding, and no multiplier passes 1
     gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
     if not changed and gap == 0:

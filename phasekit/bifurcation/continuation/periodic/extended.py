@@ -62,6 +62,18 @@ class Extended(Cycles):
         time = (len(self.par) - 1,) if self.forced else ()
         return _Both(self, Jets(self.field, self.par, (*time, *self.active), self.forced))
 
+    def plain(self, second: float) -> Cycles:
+        """The family of the orbits alone, at a value of the second parameter."""
+        n = self.own
+        kept = {f.name: getattr(self, f.name) for f in fields(Cycles)}
+        for name in ("turns", "period", "scale"):
+            kept[name] = kept[name][:n]
+        for name in ("width", "low", "high", "active"):
+            kept[name] = kept[name][:1]
+        par = self.par.copy()
+        par[self.active[1]] = second
+        return Cycles(**{**kept, "par": par, "clock": 0, "events": ()})
+
     def own_period(self, y: Array) -> tuple[float, Array]:
         """The period of the forcing, and its derivatives by all of y after the period."""
         k = len(self.active)
@@ -97,7 +109,7 @@ class Extended(Cycles):
         values, log = multipliers(W[:, last : last + n, :n])
         return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
 
-    def resolving(self, orbit: Orbit) -> Array | None:
+    def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """The orbit has no other mesh than its function."""
         return None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +26,7 @@ class Functional:
 
     name: str
     function: Formula | OfOrbit
+    kind: ClassVar[str] = "event"
 
     def value(self, cycles: Cycles, orbit: Orbit) -> float:
         """The number of an orbit."""

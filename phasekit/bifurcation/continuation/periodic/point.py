@@ -16,6 +16,8 @@ Complex = npt.NDArray[np.complex128]
 TRUSTED = 1e-5  # error by Liouville's formula above which no tests
 NEAR = 5e-7  # the same of the trivial multiplier
 UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are not resolved
+SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
+FINER = 3  # meshes that are tried for it
 ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
 LARGEST = 709.0  # logarithm of the largest numbers
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
@@ -80,15 +82,21 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
     error = cycles.mesh_error(s.orbit)
     # An orbit may be smooth where its variational equations are stiff.
     least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
-    unresolved = abs(log - divergence) > least * (1.0 + abs(divergence))
-    mesh = cycles.resolving(s.orbit) if unresolved else None
-    if mesh is not None:
+    reach = SMOOTH
+    for _ in range(FINER):
+        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
+        mesh = cycles.resolving(s.orbit, reach) if part > 1.0 else None
+        if mesh is None:
+            break
         orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
         fine = cycles.correct(orbit, *cycles.rows(orbit, dx, s.dy))
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
         values, log, trivial = cycles.multipliers(fine.W, fine.orbit)
         divergence = cycles.divergence(fine.divergence)
+        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
+        # The error of a decay goes with the power 2 m of the length of intervals.
+        reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
     # Where both are beyond all numbers, their logarithms are compared.
     apart = abs(log - divergence) / (1.0 + abs(divergence))
     defect = apart

@@ -71,9 +71,10 @@ def kept(cycles: Cycles, guess: Orbit, through: Array | None = None) -> Solution
 
 
 def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
-    """A mesh that meets the tolerance where that of the orbit does not."""
-    if cycles.options.intervals is not None:
-        return None
+    """A mesh that meets the tolerance, or has the number asked for, where the orbit's does not."""
+    fixed = cycles.options.intervals
+    if fixed is not None:
+        return None if orbit.intervals == fixed else fitted(cycles, orbit)
     wanted = count_for(cycles, orbit)
     rests = cycles.forced and wanted > 2 * orbit.intervals
     if cycles.mesh_error(orbit) <= cycles.options.mesh_tolerance and not rests:

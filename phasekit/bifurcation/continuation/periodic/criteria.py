@@ -1,0 +1,73 @@
+"""Functions of the multipliers and the tangent whose signs change at special points of families."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.periodic.point import Point
+
+Complex = npt.NDArray[np.complex128]
+
+CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
+
+
+def nontrivial(values: Complex, forced: bool) -> list[complex]:
+    """Multipliers but for the one that is 1 for every orbit of an autonomous system."""
+    mu: list[complex] = values.tolist()
+    if not forced:
+        mu.remove(min(mu, key=lambda one: abs(one - 1.0)))
+    return mu
+
+
+def unstable(values: Complex, forced: bool) -> int:
+    """Number of multipliers outside the unit circle."""
+    return sum(abs(mu) > 1.0 for mu in nontrivial(values, forced))
+
+
+def none_passes(a: Point, b: Point, forced: bool) -> bool:
+    """Whether the number of real multipliers beyond 1 stays odd or even, unlike at a fold.
+
+    Nothing is known of it next to a fold, where one is 1 but for errors.
+    """
+    beyond = 0
+    for point in (a, b):
+        mu = nontrivial(point.multipliers, forced)
+        if any(abs(one - 1.0) < CRITICAL for one in mu):
+            return False
+        beyond += sum(one.imag == 0.0 and one.real > 1.0 for one in mu)
+    return beyond % 2 == 0
+
+
+def fold_test(point: Point, forced: bool) -> float:
+    """The tangent's part along the parameter."""
+    return float(point.dy[1])
+
+
+def _parts(values: Iterable[complex], at: float) -> complex:
+    """Product of at - z, each beside its size."""
+    return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
+
+
+def doubling_test(point: Point, forced: bool) -> float:
+    """det(M + 1), each factor beside its size."""
+    return _parts((-mu for mu in point.multipliers.tolist()), 1.0).real
+
+
+def torus_test(point: Point, forced: bool) -> float:
+    """Product of 1 - mu_i mu_j over pairs, each beside its size."""
+    mu = nontrivial(point.multipliers, forced)
+    return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
+
+
+def determinant(point: Point, forced: bool) -> float:
+    """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
+    mu = point.multipliers.tolist()
+    if forced:
+        return _parts(mu, 1.0).real
+    n = len(mu)
+    return sum(_parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0
