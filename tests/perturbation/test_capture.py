@@ -197,7 +197,7 @@ DRIFTS = [
 @pytest.mark.parametrize(("system", "name", "ratio"), DRIFTS if ORBITS else DRIFTS[1:5:3])
 def test_ensembles_while_a_parameter_drifts(system, name, ratio):
     """The shares at the values that the parameter has when the orbits come to the separatrix."""
-    number, small = max(ORBITS, 400), 0.001 if ORBITS else 0.002
+    number, small = max(ORBITS, 400), 0.0005 if ORBITS else 0.002
     value = getattr(system, name)
     size = pk.separatrices(system).saddle_exponent.sel(saddle="lower").item()
     damping = small * size
