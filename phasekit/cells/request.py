@@ -17,7 +17,12 @@ from phasekit.labels.arguments import Value, bad
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import Grid, make_grid
 from phasekit.laws.ladder import Law
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    TiltedConservative,
+    TiltedTrigonometric,
+)
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.as_system import stands_on
 from phasekit.systems.system import Model
 from phasekit.table import quantities
@@ -181,11 +186,18 @@ def passes_of(
     rows = tuple(rows)
     for group in dict.fromkeys(row.group for row in rows):
         if not is_offered(system, group):
-            rungs = rungs_of(group)
-            plain = {one for one in rungs if not issubclass(one, PerturbedConservative)}
-            stands_on(system, max(plain or rungs, key=depth), group)
+            refuse(system, rungs_of(group), group)
     states = {*given, *system.parameters}
     return tuple(bound(one, system, states) for one in plan_passes(rows, system.rung))
+
+
+def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
+    """Raise a `ParameterError` that says on which of some rungs a system should stand."""
+    plain = {one for one in rungs if not issubclass(one, PerturbedConservative)}
+    own = getattr(system, "system", system).rung  # that of what is perturbed
+    near = {one for one in plain if issubclass(own, one)}
+    tilted = TiltedTrigonometric if issubclass(own, Trigonometric) else TiltedConservative
+    stands_on(system, max(near or plain or rungs, key=depth), what, tilted=tilted in rungs)
 
 
 def inputs_of(system: Model, rows: Iterable[Quantity]) -> tuple[Quantity, ...]:
@@ -257,6 +269,7 @@ def fitted(
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
+    labelled |= any(row.group == "equilibria" for row in kept)
     if issubclass(system.rung, PerturbedConservative) and not labelled:
         return numbered.worded(system, kept), passes  # no equilibrium is looked for
     counts = [one for one in quantities.PASSES if one.groups == ("labels",)]

@@ -13,11 +13,11 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
-from phasekit.cells.request import bound, depth
+from phasekit.cells.request import bound, depth, refuse
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, numeric, one_of
 from phasekit.labels.coordinates import AXES, LABELS
-from phasekit.systems.as_system import as_system, stands_on
+from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
 from phasekit.table import quantities
 from phasekit.table.row import Pass, Quantity
@@ -102,7 +102,7 @@ def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
     ]
     rungs = [one.of for one in fitting if issubclass(system.rung, one.of)]
     if not rungs:
-        stands_on(system, fitting[0].of, f"{group} from {start}")
+        refuse(system, {one.of for one in fitting}, f"{group} from {start}")
     best = max(rungs, key=depth)
     (one,) = (one for one in fitting if one.of is best)
     chosen = {name: _option(system, name, value) for name, value in options.items()}

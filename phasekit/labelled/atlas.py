@@ -17,8 +17,9 @@ from phasekit.errors import EquilibriumKind
 from phasekit.labels.arguments import FloatArray, bad, pair, unknown
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.laws.perturbed import PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.as_system import as_system
+from phasekit.systems.as_system import as_system, stands_on
 from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import FROM_MOTION
@@ -111,6 +112,8 @@ def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
         If it is not a system, or a parameter is an array.
     """
     system = as_system(system)
+    if issubclass(system.rung, PerturbedTrigonometric):
+        stands_on(system, Trigonometric, "exact folds")
     own = system.formula_inputs()
     reduced = all(isinstance(name, str) and name in ("lam", "psi") for name in names)
     if reduced and not all(name in own for name in names):

@@ -12,12 +12,14 @@ import xarray as xr
 from phasekit.cells.states import at_states
 from phasekit.errors import EquilibriumKind, ParameterError, Topology
 from phasekit.labelled.numerical_families import families_of_any
-from phasekit.labels.arguments import FloatArray, number, whole
+from phasekit.labels.arguments import FloatArray, bad, number, whole
 from phasekit.laws.ladder import Conservative
+from phasekit.laws.perturbed import TiltedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
 from phasekit.phase.exact.separatrices import phase_space
 from phasekit.systems.as_system import as_system
+from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Pass
 
@@ -78,7 +80,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     >>> ds.energy_level.sel(family="outer").diff("level").min().item() > 0
     True
     """
-    system = as_system(system, rung=Conservative, what="orbit_families")
+    system = with_families(system, "orbit_families")
     n = whole("n", n, "a number of orbits >= 1")
     wants = "one number, finite, in s^-2"
     top = None if energy_max is None else number("energy_max", energy_max, wants, "s-2")
@@ -98,6 +100,24 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     levels = (np.arange(n) + 0.5) / n
     ds = at_states(system, rows, {"n": ("level", levels)}, (one,))
     return ds.transpose(..., "family", "level")
+
+
+def with_families(system: Any, what: str) -> Model:
+    """Return a system whose orbits are in families from one separatrix to the next.
+
+    Raises
+    ------
+    ParameterError
+        If it is no system, or damped, driven or under a torque.
+    """
+    found = as_system(system)
+    if issubclass(found.rung, TiltedTrigonometric):
+        hint = (
+            "under a torque what rotates gains energy each turn and has no period; "
+            "pk.orbits(system, phi0, dphi0) takes a constant torque, perturbed.system has none"
+        )
+        raise bad("system", found, f"a system without damping and drive for {what}", hint)
+    return as_system(found, rung=Conservative, what=what)
 
 
 def families(

@@ -52,7 +52,7 @@ def flow(
         Of one motion of a `Perturbed` system: functions of (t, phi, dphi) whose zeros are looked
         for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True
         or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. Two zeros within
-        one step are not seen.
+        one step are not seen; a stretch on which one vanishes counts once, with a RuntimeWarning.
 
     Returns
     -------

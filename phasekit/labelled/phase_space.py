@@ -51,6 +51,9 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     that a cell has; there is no ``fold_margin``, which belongs to the coefficients (A, B, C), but
     ``complete``: whether it is proved that there are no others.
 
+    Of a `Perturbed` system they are those under its constant torque N, where ``V' = N``, with
+    frequencies and exponents as without damping; the drive does not count.
+
     Those of a `Problem` in a box are ``x`` on (``equilibrium``, ``state``), with ``eigenvalue``,
     ``n_unstable`` and ``complete``: interval arithmetic on the formulas proves that there are no
     others [MooreKearfottCloud2009]. Where it does not, ``complete`` is False and a warning says

@@ -137,6 +137,25 @@ class PerturbedConservative(Law):
 
 
 @dataclass(frozen=True)
+class TiltedConservative(PerturbedConservative):
+    """The same under a constant torque alone, which keeps an energy."""
+
+    called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
+
+    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
+        """What is said of a quantity: the torque has a part in the energy."""
+        words = dict(super().words(name, units, long_name))
+        x = self.base.coordinate
+        tilted = {
+            "potential": f"{words.get('equation', 'V')} - torque {x}",
+            "potential_gradient": "V' - torque",
+            "energy_integral": f"h = {x}'^2/2 + V - torque {x}",
+            "phase_velocity": f"{x}' = sqrt(2 (h - V + torque {x}))",
+        }
+        return words | ({"equation": tilted[name]} if name in tilted else {})
+
+
+@dataclass(frozen=True)
 class PerturbedTrigonometric(PerturbedConservative):
     """The same in the potential of (A, B, C)."""
 

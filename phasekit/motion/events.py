@@ -40,11 +40,28 @@ class Watch:
     times: list[float] = field(default_factory=list)
     """Its zeros so far."""
 
+    looked: bool = False
+    rest: float | None = None
+    """From where on it first vanished over a whole step."""
+    resting: float | None = None
+    """Up to where it did last."""
+
     def look(self, step: Step) -> float | None:
-        """Time of a zero in the next step."""
+        """Time of a zero in the next step; where it vanishes from the start on, the start."""
         before, self.value = self.value, self.event.function(step.stop, step.after)
+        first, self.looked = not self.looked, True
         if not self.event.passes(before, self.value):
             return None
+        if before == 0.0:
+            middle = 0.5 * (step.start + step.stop)
+            if self.value == 0.0 and self.event.function(middle, step.dense(middle)) == 0.0:
+                self.rest = step.start if self.rest is None else self.rest
+                self.resting = step.stop
+                if first:
+                    self.times.append(step.start)
+                return step.start if first else None
+            if self.resting == step.start and self.value != 0.0:
+                return None
         when = instant(lambda t: self.event.function(t, step.dense(t)), step.start, step.stop)
         if self.times and self.times[-1] == when:  # the end of the step before
             return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -78,6 +79,14 @@ def integrate(
             segments.append(step.dense)
         if last:
             break
+    for name, watch in watches.items():
+        if watch.rest is not None:
+            warnings.warn(
+                f"events: {name!r} vanishes on a stretch of time, from t = {watch.rest:.6g} on or "
+                "a little before, which counts once; wants a function whose zeros are single",
+                RuntimeWarning,
+                stacklevel=2,
+            )
     motion = OdeSolution(times, segments)
     when = np.array([t for _, t in found])
     states = motion(when) if found else np.empty((state.size, 0))

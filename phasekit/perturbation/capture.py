@@ -86,8 +86,11 @@ def regions(lobes: Array, winding: Array, torque: Any, rotation: bool) -> Captur
     share = np.where(np.isnan(arriving), np.nan, share)
     wells = np.asarray(np.isfinite(lobes).all(axis=-1))
     single = np.stack([np.where(forward, 0.0, 1.0), np.where(forward, 1.0, 0.0)], axis=-1)
-    parts = np.where(wells[..., None], _shares(lobes)[..., :2], single) * share[..., None]
-    probability = np.concatenate([parts, 1.0 - parts.sum(axis=-1, keepdims=True)], axis=-1)
+    shares = _shares(lobes)
+    parts = np.where(wells[..., None], shares[..., :2], single)
+    held = np.where(wells, 1.0 - shares[..., 2], 1.0)
+    none = 1.0 - share * held
+    probability = np.concatenate([parts * share[..., None], none[..., None]], axis=-1)
     flux = probability * np.maximum(arriving, 0.0)[..., None]
     return Capture(flux, probability)
 
@@ -98,5 +101,5 @@ def _shares(lobes: Array) -> Array:
     kept = np.maximum(lobes, 0.0)
     with np.errstate(all="ignore"):
         parts = np.where(total > 0.0, kept / kept.sum(axis=-1, keepdims=True), 0.0)
-    parts = np.where(np.isnan(total), np.nan, parts)
-    return np.concatenate([parts, 1.0 - parts.sum(axis=-1, keepdims=True)], axis=-1)
+    none = np.where(total > 0.0, 0.0, 1.0)  # not 1 less the parts, whose rounding may be negative
+    return np.where(np.isnan(total), np.nan, np.concatenate([parts, none], axis=-1))

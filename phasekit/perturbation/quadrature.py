@@ -94,13 +94,6 @@ class Paths:
         return np.where(good, fine * self.step, np.nan)
 
 
-def most(law: PerturbedConservative, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
-    """Greatest numbers of equilibria and saddles of the potential, and what is not proved."""
-    values = law.values(*parameters)
-    formula: Any = law.base
-    return functions.most(formula, *(values[name] for name in formula.names))
-
-
 def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov:
     """Melnikov's function along the separatrices of any potential."""
     refuse_prescribed(law, "melnikov")

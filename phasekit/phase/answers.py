@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from phasekit.errors import Loop, ParameterError
 from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
 from phasekit.phase.exact.orbits import orbits
@@ -99,6 +100,11 @@ def answers(law: Law, values: Mapping[str, float]) -> Answers:
     >>> answers(law, {"A": 2.0, "B": 1.0, "C": 0.0}).phi.round(3).tolist()
     [-1.047, 0.0, 1.047, 3.142]
     """
+    if isinstance(law, PerturbedConservative):
+        raise ParameterError(
+            f"system: got {law.called}, wants one whose energy stays, perturbed.system; "
+            "pk.plot.damped_portrait draws motions under damping and a torque"
+        )
     raise ParameterError(f"system: got {law.called}, wants one of one degree of freedom")
 
 

@@ -12,14 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.families import orbit_families
+from phasekit.labelled.families import orbit_families, with_families
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad
-from phasekit.laws.ladder import Conservative
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.parts.units import Units
-from phasekit.systems.as_system import as_system, single
+from phasekit.systems.as_system import single
 
 #: Energies of saddles, with the names of their looks.
 Walls: TypeAlias = list[tuple[str, float]]
@@ -186,7 +185,7 @@ def _families(
 ) -> tuple[xr.Dataset, xr.Dataset, xr.Dataset]:
     """Return the families of orbits of one system, its equilibria and its separatrices."""
     single(system)
-    model = as_system(system, rung=Conservative, what="a family of orbits")
+    model = with_families(system, "a family of orbits")
     if issubclass(model.rung, Trigonometric) and not any(model.coefficients()):
         raise bad("system", system, "a system with a force, for without one nothing oscillates")
     families = orbit_families(system, n, energy_max=energy_max)

@@ -8,7 +8,7 @@ from typing import Any
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad
 from phasekit.laws.ladder import Law, Lawful
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import PerturbedConservative, TiltedConservative
 from phasekit.systems.system import MODELS, Model
 
 
@@ -46,7 +46,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
     raise bad("system", system, f"one of {', '.join(MODELS)}", hint)
 
 
-def stands_on(system: Model, rung: type[Law], what: str) -> Model:
+def stands_on(system: Model, rung: type[Law], what: str, *, tilted: bool = False) -> Model:
     """Return a system whose law stands on a rung, or on a more special one.
 
     Raises
@@ -59,9 +59,12 @@ def stands_on(system: Model, rung: type[Law], what: str) -> Model:
     if issubclass(system.rung, PerturbedConservative):
         # What is a function of the potential alone.
         if issubclass(getattr(system, "system", system).rung, rung):
+            hint = ""
+            if issubclass(system.rung, TiltedConservative):
+                hint = "; on a line, the torque can be a part of its potential: V - torque*x"
             raise ParameterError(
-                f"system: got {system!r}, wants a system without damping and drive for {what}; "
-                "perturbed.system has it"
+                f"system: got {system!r}, wants a system without damping and drive"
+                f"{' but a constant torque' * tilted} for {what}; perturbed.system has none{hint}"
             )
     because = f"because {what} is in closed form" if rung.labels_fixed else f"for {what}"
     raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}")

@@ -136,11 +136,27 @@ def event_of(name: Any, event: Any, arguments: Sequence[str] = ARGUMENTS) -> Eve
         count = 0 if terminal is None else int(terminal)
         if count < 0 or (terminal is not None and count != terminal):
             raise ValueError
-        return Event(lambda t, state: event(t, *state), count, float(direction))
+        return Event(_numbers_of(name, event), count, float(direction))
     except (TypeError, ValueError):
         got = f"terminal = {describe(terminal)}, direction = {describe(direction)}"
         wants = "terminal of True, False or a count, and direction of 1, -1 or 0"
         raise ParameterError(f"events: got a function with {got}, wants {wants}") from None
+
+
+def _numbers_of(name: str, event: Any) -> Callable[..., float]:
+    """The function of an event, whose values are checked where it is asked."""
+
+    def value(t: float, state: Any) -> float:
+        found = event(t, *state)
+        at, kind = f"events: {name!r} at t = {float(t)!r}", np.asarray(found).dtype.kind
+        if kind == "b":
+            hint = "it says yes or no: give a difference that changes its sign, such as phi - 1"
+            raise bad(at, found, "a function whose zero is the event", hint)
+        if kind not in "iuf" or np.ndim(found) or not np.isfinite(found):
+            raise bad(at, found, "a function that returns one finite number")
+        return float(found)
+
+    return value
 
 
 def checked_number(argument: str, value: Any, wants: str, *, low: float = -np.inf) -> float:

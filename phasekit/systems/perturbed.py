@@ -162,6 +162,11 @@ class Perturbed(Model):
         raise AttributeError(f"'Perturbed' object has no attribute {name!r}")
 
     @property
+    def coordinate(self) -> str:
+        """Name of the coordinate."""
+        return getattr(self.system, "coordinate", "phi")
+
+    @property
     def parameters(self) -> dict[str, Value]:
         """All parameters by name: those of the system, and those of damping and drive."""
         values: dict[str, Value] = dict(self.system.parameters)

@@ -15,6 +15,7 @@ from phasekit.laws.ladder import Conservative, Law
 from phasekit.laws.perturbed import (
     PerturbedConservative,
     PerturbedTrigonometric,
+    TiltedConservative,
     TiltedTrigonometric,
     drift_name,
     forcing_names,
@@ -65,10 +66,11 @@ def base_of(system: Any) -> Model:
 
 def rung_of(base: Model, own: Mapping[str, Any], driven: bool) -> type[Law]:
     """Rung of the ladder of laws: the most special one that holds for all values."""
-    if not issubclass(base.rung, Trigonometric):
-        return PerturbedConservative
     still = all(isinstance(own[n], float) and own[n] == 0.0 for n in ("damping", "quadratic"))
-    return TiltedTrigonometric if still and not driven else PerturbedTrigonometric
+    alone = still and not driven
+    if not issubclass(base.rung, Trigonometric):
+        return TiltedConservative if alone else PerturbedConservative
+    return TiltedTrigonometric if alone else PerturbedTrigonometric
 
 
 class Drive:

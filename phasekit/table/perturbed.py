@@ -6,6 +6,7 @@ from phasekit.errors import EscapeRegime
 from phasekit.laws.perturbed import (
     PerturbedConservative,
     PerturbedTrigonometric,
+    TiltedConservative,
     TiltedTrigonometric,
 )
 from phasekit.table.row import ABC, LAW, SIDES, STATE, Pass, Quantity
@@ -111,6 +112,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 _CAPTURE = "phasekit.perturbation.capture:"
 _TORQUE = "phasekit.perturbation.torque:"
 _TILTED = "phasekit.perturbation.tilted_"
+_POTENTIAL = "phasekit.perturbation.tilted_potential:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
 
 PASSES: tuple[Pass, ...] = (
@@ -157,5 +159,16 @@ PASSES: tuple[Pass, ...] = (
         ("resonances",),
         PerturbedTrigonometric,
     ),
-    Pass("phasekit.perturbation.quadrature:most", (LAW,), ("labels",), _GENERAL),
+    Pass(_POTENTIAL + "most", (LAW,), ("labels",), _GENERAL),
+    Pass(_POTENTIAL + "equilibria", (LAW,), ("equilibria",), _GENERAL),
+    *(
+        Pass(_POTENTIAL + name, (LAW, *states), (group,), TiltedConservative)
+        for name, states, group in (
+            ("potential", ("state_phi",), "potential"),
+            ("gradient", ("state_phi",), "potential_gradient"),
+            ("curvature", ("state_phi",), "potential_curvature"),
+            ("energy", STATE, "energy_integral"),
+            ("phase_velocity", ("state_phi", "state_energy"), "phase_velocity"),
+        )
+    ),
 )

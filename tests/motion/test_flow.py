@@ -307,3 +307,41 @@ def test_events_of_what_has_none_are_refused():
         pk.flow(system, 0.1, 0.0, 1.0, events=lambda t: t)
     with pytest.raises(pk.ParameterError, match="events: got"):
         pk.flow(EIGHT, 0.1, 0.0, 1.0, events=lambda t, phi, dphi: dphi)
+
+
+@pytest.mark.parametrize(
+    ("event", "message"),
+    [
+        (lambda t, phi, dphi: np.nan, r"events: 'event' at t = 0\.0: got nan, wants .* finite"),
+        (lambda t, phi, dphi: phi if t < 1.0 else np.nan, "events: 'event' at t = .* got nan"),
+        (lambda t, phi, dphi: np.array([phi]), "a function that returns one finite number"),
+        (lambda t, phi, dphi: None, "a function that returns one finite number"),
+        (lambda t, phi, dphi: 1j * phi, "a function that returns one finite number"),
+        (lambda t, phi, dphi: phi > 0.2, "it says yes or no"),
+    ],
+)
+def test_events_that_give_no_number_are_refused(event, message):
+    system = pk.Perturbed(EIGHT, damping=0.1)
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.flow(system, 0.1, 0.0, 5.0, events=event)
+
+
+def test_an_event_that_vanishes_on_a_stretch_counts_once_and_is_announced():
+    system = pk.Perturbed(EIGHT, forcing=pk.Harmonic(0.2, 1.0))
+    times = [-8.0, 20.0]
+    with pytest.warns(RuntimeWarning, match="'event' vanishes on a stretch of time, from t = 0 on"):
+        ds = pk.flow(system, 0.4, 0.5, times, events=lambda t, phi, dphi: 0.0)
+    assert ds.event_time.values.tolist() == [0.0]
+
+    def after(t, phi, dphi):
+        return min(max(t - 12.0, 0.0), 1.0) if t > 6.0 else t - 6.0
+
+    with pytest.warns(RuntimeWarning, match="'after' vanishes on a stretch"):
+        ds = pk.flow(system, 0.4, 0.5, [20.0], events={"after": after, "turn": lambda t, x, v: v})
+    own = ds.event_time.values[ds.event_name.values == "after"]
+    assert own.size == 1
+    assert 6.0 <= own.item() < 12.0
+    alone = pk.flow(system, 0.4, 0.5, [20.0], events={"turn": lambda t, x, v: v})
+    turns = ds.event_time.values[ds.event_name.values == "turn"]
+    assert turns.tolist() == alone.event_time.values.tolist()
+    assert turns.size > 2

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.cells import tiling
 from phasekit.motion.attractors import find
 from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.shares import SIDE, SLOTS
@@ -106,3 +107,42 @@ def test_motions_that_take_too_many_steps_are_undecided_and_not_away(monkeypatch
     monkeypatch.setattr(basins, "strobe", worn)
     found = basins.basins(search, np.array([0.5]), np.array([0.0, 0.1]))
     assert found.basin.tolist() == [[basins.UNDECIDED, basins.ESCAPED]]
+
+
+def test_stored_shares_are_the_same_however_they_were_made(tmp_path, monkeypatch):
+    """Interrupted and resumed, extended, by processes and by dask: the same bits."""
+    pytest.importorskip("zarr")
+    amplitudes, of = [0.0, 0.2, 0.6, 0.3], ["basin_fractions", "lyapunov"]
+    start = {"phi": 0.1, "dphi": 0.2, "t": 20.0}
+    whole = pk.sweep(DRIVEN, forcing_amplitude=amplitudes, of=of, **BOX, **start)
+    assert np.nansum(whole.basin_fraction, axis=1) == pytest.approx(np.ones(4))
+    how = {"of": of, "chunks": {"forcing_amplitude": 1}, **BOX, **start}
+
+    def same(ds):
+        assert set(ds.data_vars) == set(whole.data_vars)
+        for name, values in whole.data_vars.items():
+            assert ds[name].values.tobytes() == values.values.tobytes(), name
+
+    def interrupted(tally, tile):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(tiling._NoBar, "update", interrupted)
+        with pytest.raises(KeyboardInterrupt, match=r"^1 of 2 tiles"):
+            pk.sweep(
+                DRIVEN, forcing_amplitude=amplitudes[:2], store=tmp_path / "map.zarr",
+                workers=1, progress=False, **how,
+            )  # fmt: skip
+    for count, workers in ((2, 1), (4, 2)):
+        pk.sweep(
+            DRIVEN, forcing_amplitude=amplitudes[:count], store=tmp_path / "map.zarr",
+            workers=workers, **how,
+        )  # fmt: skip
+    opened = pk.open_map(tmp_path / "map.zarr")
+    same(opened)
+    assert opened.isel(forcing_amplitude=2).phasekit.system() == DRIVEN.replace(
+        forcing_amplitude=0.6
+    )
+    assert opened.phasekit.system() == DRIVEN.replace(forcing_amplitude=amplitudes)
+    pytest.importorskip("dask")
+    same(pk.open_map(tmp_path / "map.zarr", chunks={}).compute())

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from witnesses import braked
+from witnesses import braked, drifting
 
 import phasekit as pk
 
@@ -168,3 +168,74 @@ def test_ensembles(abc, rate):
     want = odds(on)[:, 1].mean()
     right = (where[caught] == 2).mean()
     assert abs(right - want) <= 3 * np.sqrt(want * (1 - want) / ORBITS)
+
+
+def test_no_probability_is_negative():
+    B, rate = np.linspace(0.2, 0.45, 301), [-0.001, 0.0, 0.001]
+    p = pk.Perturbed(EIGHT.replace(B=B), damping=0.003, drift={"C": rate}, torque=-0.01)
+    for start in ("outside", "rotation"):
+        share = odds(p, start=start)
+        assert share.shape == (301, 3, 3)
+        assert (share >= 0.0).all()
+        if start == "outside":
+            assert np.isin(share[..., 2], [0.0, 1.0]).all()
+
+
+DISK = pk.GyroRotorDisk(beta=1.2, e=0.05, a=0.004, r=0.1, omega1=24.0)
+#: System, what drifts, at which rate in units of the damping and of its own value.
+DRIFTS = [
+    (EIGHT, "C", 1.0),
+    (EIGHT, "C", -1.0),
+    (pk.Coefficients(1.0, -0.2, 0.15), "C", -0.7),
+    (pk.Coefficients(1.0, 0.4, -0.1), "C", 0.5),
+    (DISK, "omega1", 0.1),
+    (DISK, "omega1", -0.1),
+    (DISK, "omega1", 0.3),
+]
+
+
+@pytest.mark.parametrize(("system", "name", "ratio"), DRIFTS if ORBITS else DRIFTS[1:5:3])
+def test_ensembles_while_a_parameter_drifts(system, name, ratio):
+    """The shares at the values that the parameter has when the orbits come to the separatrix."""
+    number, small = max(ORBITS, 400), 0.0005 if ORBITS else 0.002
+    value = getattr(system, name)
+    size = pk.separatrices(system).saddle_exponent.sel(saddle="lower").item()
+    damping = small * size
+    rate = ratio * damping * value
+    last = 1.2 / damping
+    grid = np.linspace(0.0, last, 401)
+    on = system.replace(**{name: value + rate * grid})
+    there = pk.separatrices(on)
+    loops = there.sel(saddle="lower")
+    eights = (loops.loop == pk.Loop.LOBES).values
+    assert eights[:40].all()
+    grid = grid[: eights.size if eights.all() else int(np.argmin(eights))]
+    coefficients = np.array([np.broadcast_to(x, 401) for x in on.coefficients()])[:, : grid.size]
+    quadratics = np.polynomial.polynomial.polyfit(grid / last, coefficients.T, 2).T
+    quadratics /= last ** np.arange(3)
+    euler = -rate * kappa(system) if name == "omega1" else 0.0
+    rise = float(there.saddle_energy.sel(saddle="upper")[0] - loops.saddle_energy[0])
+    bottom = pk.equilibria(system).energy.min().item()
+    rng = np.random.default_rng(7)
+    above = rng.uniform(0.1, 0.3, number) * min(rise, float(loops.saddle_energy[0]) - bottom)
+    where, met = drifting.fates(
+        quadratics, euler, damping, np.full(number, float(loops.saddle_phi[0])),
+        np.sqrt(2.0 * above) * rng.choice([-1.0, 1.0], number), 0.02 / size, grid,
+        loops.saddle_phi.values, loops.saddle_energy.values, 1e-3 * rise,
+    )  # fmt: skip
+    caught = where > 0
+    assert caught.mean() > 0.98
+    reached = system.replace(**{name: value + rate * met[caught]})
+    share = odds(pk.Perturbed(reached, damping=damping, drift={name: rate}))
+    assert (share[:, 2] == 0.0).all()
+    want = share[:, 1].mean()
+    right = (where[caught] == 2).mean()
+    assert 0.02 < want < 0.98
+    extra = 0.0 if ORBITS else 4.0 * small
+    assert abs(right - want) <= 3.0 * np.sqrt(want * (1.0 - want) / number) + extra
+
+
+def kappa(disk):
+    """Euler's torque of omega1' is -kappa cos phi."""
+    s, c, r, e = np.sin(disk.beta), np.cos(disk.beta), disk.r, disk.e
+    return (r * r + 4 * e * e) * s * c / (4 * e * e * s * s + r * r * (1 + s * s))
