@@ -29,7 +29,7 @@ from phasekit.bifurcation.continuation.periodic.criteria import (
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
-from phasekit.bifurcation.continuation.periodic.on_curves import CurveTest, tests_of
+from phasekit.bifurcation.continuation.periodic.on_curves import SAME, CurveTest, tests_of
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector
 from phasekit.bifurcation.special_points import KINDS
@@ -151,6 +151,9 @@ def _events(
         if point is None:
             point, status = b, "guess"
             message = "Newton's method did not converge between the points"
+        elif point is not b and isinstance(event, CurveTest) and event.blurred:
+            status = "guess"
+            message = f"multipliers meet, where the equations are singular: found to {2 * SAME:g} rad"
         found.append(
             Found(event.kind, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
         )  # fmt: skip
