@@ -153,7 +153,7 @@ def _events(
             message = "Newton's method did not converge between the points"
         elif point is not b and isinstance(event, CurveTest) and event.blurred:
             status = "guess"
-            message = f"multipliers meet, where the equations are singular: found to {2 * SAME:g} rad"
+            message = f"the equations are singular there: found to {2 * SAME:g} rad of the pair"
         found.append(
             Found(event.kind, point, -1, (p[0], p[1]), status, message, {}, name=event.name)
         )  # fmt: skip
