@@ -29,6 +29,7 @@ def test_two_folds_of_cycles_meet_in_a_cusp(forced, tmp_path):
     fold, _ = branch.special("LPC")
     curve = fold.curve("p2", (-0.5, 1.0))
     # Both folds, on both sides of the cusp.
+    assert curve.points.sizes["point"] > 10
     assert np.allclose(27 * curve.points.p1**2, 4 * curve.points.p2**3, atol=1e-10)
     assert float(curve.points.p1[0] * curve.points.p1[-1]) < 0.0
     (cusp,) = curve.special("CP")
@@ -57,6 +58,7 @@ def test_strong_resonances_of_tori():
     rest = pk.continuation(system, "l", x0=[0.0, 0.0, 1.0], span=(-1.0, 1.0))
     (torus,) = rest.special("H")[0].switch().special("TR")
     curve = torus.curve("d", (2.0, 6.0))
+    assert curve.points.sizes["point"] > 10
     assert np.allclose(curve.points.l, hopf["l"], atol=1e-10)
     # The symmetry lets the multipliers pass each other at -1, where the equations are singular.
     assert [s.label for s in curve.special_points] == ["EP", "R3", "R2", "R3", "R4", "EP"]
@@ -66,6 +68,7 @@ def test_strong_resonances_of_tori():
     assert status == ["converged", "guess", "converged", "converged"]
     assert 1.9 < at[1] < 2.1
     (quarter,) = curve.special("R4")
+    assert quarter.eigenvalues.shape == (3,)
     assert np.allclose(np.sort(quarter.eigenvalues.imag), [-1.0, 0.0, 1.0], atol=1e-8)
 
 
@@ -83,12 +86,14 @@ def test_curves_of_folds_and_tori_meet_at_a_resonance():
     tori = torus.curve("p2", (-0.2, 0.1))
     assert {stop.reason for stop in tori.stops} == {"bound", "resonance_1"}
     assert sorted(s.label for s in tori.special_points) == ["EP", "EP", "R1", "R3", "R4"]
+    assert tori.points.sizes["point"] > 10
     assert np.allclose(tori.points.p1, 0.0, atol=1e-10)
     assert np.isclose(float(tori.points.p2.min()), -0.2, rtol=1e-12)
     places = {"R1": 0.0, "R3": -1 / 9, "R4": -1 / 16}
     for label, p2 in places.items():
         assert abs(tori.special(label)[0]["p2"] - p2) < 1e-9
     folds = fold.curve("p2", (-0.2, 0.1))
+    assert folds.points.sizes["point"] > 10
     assert np.allclose(4 * folds.points.p1, folds.points.p2**2, atol=1e-10)
     assert [s.label for s in folds.special_points] == ["EP", "R1", "EP"]
     (meeting,) = folds.special("R1")
@@ -108,6 +113,7 @@ def test_a_curve_of_tori_ends_where_the_multipliers_meet_at_minus_one():
     orbit = pk.periodic_orbit(system, [0.0, 0.0], period=2 * np.pi)
     (torus,) = pk.continuation(system, "p2", orbit=orbit, span=(-0.1, 0.1)).special("TR")
     curve = torus.curve("p1", (-0.1, 0.1))
+    assert curve.points.sizes["point"] > 10
     assert np.allclose(curve.points.p2, 0.0, atol=1e-10)
     assert {stop.reason for stop in curve.stops} == {"bound", "resonance_2"}
     assert sorted(s.label for s in curve.special_points) == ["EP", "EP", "R2", "R3", "R4"]

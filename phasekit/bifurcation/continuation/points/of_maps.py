@@ -36,7 +36,7 @@ def torus(curve: Curve, u: Array, slopes: Array) -> Array:
     found = np.full(len(u), np.nan)
     k = u[:, curve.m + curve.n]
     off = np.min([np.abs(k - one) for one in RESONANT.values()], axis=0)
-    for i in np.flatnonzero((k > 0.0) & (k < 4.0) & (off > 1e-6)):
+    for i in np.flatnonzero((k > 0.0) & (k < 4.0) & (off > of_torus.RESONANT)):
         angle = float(np.arccos(1.0 - 0.5 * k[i]))
         found[i] = of_torus.normal_form(forms.Derivatives(curve, u[i]), angle)["d"]
     return found
@@ -44,7 +44,7 @@ def torus(curve: Curve, u: Array, slopes: Array) -> Array:
 
 def away(curve: Curve, s: Sample) -> bool:
     """Whether a zero of d is none of its poles, next to a third of a turn."""
-    return bool(abs(s.u[curve.m + curve.n] - RESONANT["resonance_3"]) > 1e-6)
+    return bool(abs(s.u[curve.m + curve.n] - RESONANT["resonance_3"]) > of_torus.RESONANT)
 
 
 def _resonance(kind: str, k: float) -> CurveTest:
