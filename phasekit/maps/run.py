@@ -63,7 +63,7 @@ def sweep_into(
             most = _most(job, workers, client)
             early = most > 1 and (workers is not None or job.cells > MANY_CELLS)
             staff = stack.enter_context(run.hired(most)) if early else None
-            processes = _weigh(job, most, workers, options.force)
+            processes = _weigh(job, most, workers, options.force, early)
             with _written(place):
                 if job.old is None:
                     place.clear({PLAN_KEY: plan_bytes(CLEARED)})
@@ -94,13 +94,14 @@ def _most(job: Job, workers: int | None, client: Any) -> int:
     return most
 
 
-def _weigh(job: Job, most: int, workers: int | None, force: bool) -> int:
+def _weigh(job: Job, most: int, workers: int | None, force: bool, hired: bool) -> int:
     """Refuse what will not fit, and return how many processes the work is worth."""
     freed = (job.place.size() or 0) if job.old is None and not job.place.empty else 0
     free = job.place.free_bytes()
     most_bytes = sum(left.raw + left.overhead for left in job.left if len(left))
     tight = not force and free is not None and most_bytes > free + freed
-    if not tight and (most <= 1 or job.cells <= SAMPLE_CELLS):
+    # Processes that are hired already would wait for samples that decide nothing.
+    if not tight and (most <= 1 or hired or job.cells <= SAMPLE_CELLS):
         return 1 if workers is None else most
     # Kernels that are not compiled yet are compiled here, before many processes do so.
     needed = job.estimate()

@@ -196,7 +196,8 @@ class OneTile:
     shape = (1024, 1024)
 
     def __init__(self, subject: str, dtype: str | None = None) -> None:
-        rows = select(SUBJECTS[subject])
+        disk = pk.GyroRotorDisk(**DISK)
+        rows = tuple(row for row in select(SUBJECTS[subject]) if issubclass(disk.rung, row.of))
         if dtype is not None:
             from dataclasses import replace
 
@@ -204,7 +205,6 @@ class OneTile:
                 replace(row, dtype=dtype) if row.dtype == "float64" else row for row in rows
             )
         self.rows, self.passes = rows, plan_passes(rows)
-        disk = pk.GyroRotorDisk(**DISK)
         self.model = type(disk)
         self.inputs = {name: np.full((1, 1), value) for name, value in disk.parameters.items()}
         self.inputs["beta"] = np.linspace(0.01, 1.5, self.shape[0])[:, None]
