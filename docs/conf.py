@@ -10,6 +10,7 @@ from typing import Any
 import phasekit
 
 sys.path.insert(0, str(Path(__file__).parent))
+import study_run  # noqa: E402
 import tables  # noqa: E402
 
 project = "phasekit"
@@ -81,6 +82,7 @@ html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"
 html_static_path = ["_static", "auto_explorer"]
 html_css_files = ["site.css"]
+html_js_files = ["tables.js"]
 html_theme_options = {"show_prev_next": False, "navigation_with_keys": False}
 
 default_role = "py:obj"  # `flow` in a docstring leads to its page
@@ -110,9 +112,10 @@ def _skip(app: Any, what: str, name: str, thing: Any, skip: bool, options: Any) 
 
 
 def setup(app: Any) -> None:
-    """Look at docstrings before numpydoc does, and at members."""
+    """Look at docstrings before numpydoc does, at members, and at the words of studies."""
     app.connect("autodoc-process-docstring", _link_papers, priority=400)
     app.connect("autodoc-skip-member", _skip)
+    app.connect("source-read", study_run.named)
 
 
 # Quantities, systems, special points and codes have pages that are made of the code.
