@@ -2,7 +2,8 @@
 document.addEventListener("DOMContentLoaded", () => {
   for (const table of document.querySelectorAll(".bd-article table.table:not(.autosummary)")) {
     const heads = [...table.querySelectorAll("thead th")].map((head) => head.textContent.trim());
-    if (heads.length < 3) continue;
+    const fits = table.offsetWidth <= table.parentElement.clientWidth;
+    if (heads.length < 2 || (heads.length === 2 && fits)) continue;
     table.classList.add("stacks");
     for (const row of table.tBodies[0].rows) {
       [...row.cells].forEach((cell, i) => {
