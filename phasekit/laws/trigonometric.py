@@ -69,6 +69,7 @@ class Trigonometric(Conservative):
 
     coordinate = "phi"
     period = 2.0 * math.pi
+    text = "-B cos φ + (A/2) cos² φ - C sin φ"
 
     products: Products
     domains: Mapping[str, tuple[float, float]]

@@ -7,7 +7,6 @@ one numerically, and motion at constant momenta along its arc length. One system
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Loop, ParameterError
-from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
@@ -81,7 +80,7 @@ class Answers:
     @property
     def is_angle(self) -> bool:
         """Whether the coordinate is an angle in rad."""
-        return _is_turn(self.period) or self.cut_at is not None
+        return is_turn(self.period) or self.cut_at is not None
 
 
 @functools.singledispatch
@@ -139,7 +138,7 @@ def _(law: Formula, values: Mapping[str, float]) -> Answers:
         coordinate=law.coordinate,
         period=law.period,
         ends=law.ends,
-        units="s-2" if _is_turn(law.period) else "",
+        units="s-2" if is_turn(law.period) else "",
         potential=lambda x: law.values(x, *own),
         orbit=lambda x, v: functions.orbits(law, *own, x, v),
         **present(points),
@@ -170,10 +169,6 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
         **present(law.equilibria()),
         **highest_first(loops._replace(saddle_phi=own, turning_offset=offset)),
     )
-
-
-def _is_turn(period: float | None) -> bool:
-    return period is not None and math.isclose(period, 2.0 * math.pi, rel_tol=1e-12)
 
 
 def present(points: Any) -> dict[str, Any]:
