@@ -54,7 +54,7 @@ class Units:
     @classmethod
     def of(cls, angles: Any, units: Any = None, own: Mapping[str, str] | None = None) -> Units:
         """Check what a picture got for `angles` and `units`; `own` are units of its own names."""
-        if angles not in ("rad", "deg"):
+        if not isinstance(angles, str) or angles not in ("rad", "deg"):
             raise bad("angles", angles, "'rad' or 'deg'")
         if units is None:
             return cls(angles)
