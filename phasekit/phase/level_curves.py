@@ -135,14 +135,22 @@ class LevelCurves:
         slack = _SAME * (float(np.max(np.abs(height))) + abs(energy))
         above = height - energy
         above[np.abs(above) <= slack] = 0.0
+        # Where V, monotone between knots, passes the energy.
+        falls = np.flatnonzero(np.sign(above[:-1]) * np.sign(above[1:]) < 0.0)
+        low, high = np.where(above[falls] < 0.0, (falls, falls + 1), (falls + 1, falls))
+        inner, outer = knots[low], knots[high]
+        for _ in range(_BISECTIONS if falls.size else 0):
+            middle = 0.5 * (inner + outer)
+            over = self.answers.potential(middle) > energy
+            inner, outer = np.where(over, inner, middle), np.where(over, middle, outer)
+        turning = dict(zip(falls.tolist(), (0.5 * (inner + outer)).tolist(), strict=True))
         arcs: list[Arc] = []
         for i in range(knots.size - 1):
             a, b = above[i], above[i + 1]
             if min(a, b) >= 0.0:
                 continue
-            left, right = float(knots[i]), float(knots[i + 1])
-            start = self._crossing(left, right, energy) if a > 0.0 else left
-            stop = self._crossing(left, right, energy) if b > 0.0 else right
+            start = turning[i] if a > 0.0 else float(knots[i])
+            stop = turning[i] if b > 0.0 else float(knots[i + 1])
             if arcs and arcs[-1][1] == start and a < 0.0:
                 start = arcs.pop()[0]
             arcs.append((start, stop))
@@ -156,17 +164,6 @@ class LevelCurves:
             return arcs
         distance, nearest = min((self._distance(arc, x), arc) for arc in arcs)
         return [nearest] if distance <= _NEAR * (self.window[1] - self.window[0]) else []
-
-    def _crossing(self, left: float, right: float, energy: float) -> float:
-        """Return where V, monotone between `left` and `right`, passes `energy`."""
-        rising = self.answers.potential(right) > self.answers.potential(left)
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (left + right)
-            if bool(self.answers.potential(middle) > energy) == bool(rising):
-                right = middle
-            else:
-                left = middle
-        return float(0.5 * (left + right))
 
     def _distance(self, arc: Arc, x: float) -> float:
         period = self.answers.period
