@@ -54,8 +54,9 @@ class Units:
     @classmethod
     def of(cls, angles: Any, units: Any = None, own: Mapping[str, str] | None = None) -> Units:
         """Check what a picture got for `angles` and `units`; `own` are units of its own names."""
-        if not isinstance(angles, str) or angles not in ("rad", "deg"):
-            raise bad("angles", angles, "'rad' or 'deg'")
+        asked: object = angles
+        if not isinstance(asked, str) or asked not in ("rad", "deg"):
+            raise bad("angles", asked, "'rad' or 'deg'")
         if units is None:
             return cls(angles)
         if not isinstance(units, Mapping):
