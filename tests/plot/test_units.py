@@ -336,7 +336,7 @@ def test_the_rate_of_an_angle_of_any_name_is_shown_in_the_unit_of_the_angle():
         )
         for name in ("phi", "theta")
     }
-    assert axes["theta"].get_ylabel() == r"$\dot{\theta}$ (°/s)"
+    assert axes["theta"].get_ylabel() == r"$\dot\theta$ (°/s)"
     lines, same = (axes[name].get_lines() for name in ("theta", "phi"))
     assert len(lines) == len(same) > 2
     for line, other in zip(lines, same, strict=True):
