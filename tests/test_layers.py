@@ -130,6 +130,25 @@ def test_nothing_knows_a_system_by_the_name_of_its_class():
     assert seen > 1000
 
 
+def test_no_function_asks_which_particular_system_it_got():
+    """What a function does follows from the rung of a law and from what is given."""
+    homes = {model.__module__ for model in models().values()}  # a system knows its own parts
+    names, seen = set(models()), 0
+    for module, path in modules().items():
+        if module in homes:
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+                continue
+            if node.func.id in ("isinstance", "issubclass") and len(node.args) == 2:
+                seen += 1
+                asked = {n.id for n in ast.walk(node.args[1]) if isinstance(n, ast.Name)}
+                asked |= {n.attr for n in ast.walk(node.args[1]) if isinstance(n, ast.Attribute)}
+                assert not asked & names, (module, node.lineno)
+    assert len(names) > 8
+    assert seen > 100
+
+
 def strongly_connected(arrows: dict[str, set[str]]) -> list[set[str]]:
     """Sets of nodes that reach each other."""
     reach: dict[str, set[str]] = {}

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from phasekit.explorer.law import is_machine
+from phasekit.laws.ladder import is_turn
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.potential import Potential
 from phasekit.systems.system import Model
 
 #: How far a slider goes beyond the value that it starts at, as a multiple of it.
@@ -23,17 +24,15 @@ def facts_of(system: Model, values: dict[str, float]) -> dict[str, Any]:
     >>> facts["parameters"][0]["low"], facts["parameters"][0]["high"], facts["python"]["start"]
     (0.04, 5.0, 'pk.Pendulum(')
     """
-    is_angle = not isinstance(system, Potential) or (
-        system.period is not None and abs(system.period - 2.0 * math.pi) < 1e-12
-    )
+    law: Any = system.law
     return {
         "model": type(system).__name__,
-        "law": _words(system),
-        "coordinate": system.coordinate if isinstance(system, Potential) else "phi",
-        "angle": is_angle,
+        "law": f"V = {law.text}",
+        "coordinate": law.coordinate,
+        "angle": is_turn(law.period),
         "parameters": [_parameter(p, values, system) for p in system.declared],
         "used": list(system.formula_inputs()),
-        "machine": any(parameter.name == "half_span" for parameter in system.declared),
+        "machine": is_machine(system),
         "python": _python(system),
     }
 
@@ -76,24 +75,22 @@ def slider(parameter: Parameter, value: float | None, size: float) -> tuple[floa
     return float(min(low, value if value is not None else low)), float(max(high, value or low))
 
 
-def _words(system: Model) -> str:
-    if isinstance(system, Potential):
-        return f"V = {system.formula.text}"
-    return "V = -B cos φ + (A/2) cos² φ - C sin φ"
-
-
 def _python(system: Model) -> dict[str, Any]:
     """Return what stands before and after the parameters where Python makes the system."""
     kind = type(system)
-    if isinstance(system, Potential):
-        circle = f", period={system.period!r}" if system.period is not None else ""
-        line = f", interval={system.interval!r}" if system.interval is not None else ""
-        start = f"pk.Potential({system.formula.text!r}, {system.coordinate!r}, {{"
-        return {"imports": "", "start": start, "end": f"}}{circle}{line})", "mapping": True}
     public = kind.__module__.startswith("phasekit.")
+    start, end = f"{'pk.' if public else ''}{kind.__name__}(", ")"
+    own = system.arguments
+    mapping = "parameters" in own
+    if mapping:  # what comes before them has its place, what comes after its keyword
+        names = list(own)
+        place = names.index("parameters")
+        start += "".join(f"{own[name]!r}, " for name in names[:place]) + "{"
+        after = [name for name in names[place + 1 :] if own[name] is not None]
+        end = "}" + "".join(f", {name}={own[name]!r}" for name in after) + end
     return {
         "imports": "" if public else f"from {kind.__module__} import {kind.__name__}",
-        "start": f"{'pk.' if public else ''}{kind.__name__}(",
-        "end": ")",
-        "mapping": False,
+        "start": start,
+        "end": end,
+        "mapping": mapping,
     }

@@ -7,10 +7,9 @@ from typing import Any
 from phasekit.explorer import javascript
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics import disk_states
-from phasekit.phase.numerical.formula import Formula, Shape
-from phasekit.systems.disk import GyroRotorDisk
-from phasekit.systems.potential import Potential
+from phasekit.phase.numerical.formula import Shape
 from phasekit.systems.system import Model
+from phasekit.table.loads import BORNE
 
 
 def law_of(system: Model) -> str:
@@ -25,15 +24,18 @@ def law_of(system: Model) -> str:
     >>> print(law_of(pk.Pendulum(length=1.0)).replace("\n", " "))
     {kind: "trigonometric", products: (p) => { return [0, p[1], 0, p[0]]; }, loads: null}
     """
-    if isinstance(system, Potential):
-        return _potential(system)
-    return _trigonometric(system)
+    law = system.law
+    return _trigonometric(system, law) if isinstance(law, Trigonometric) else _potential(law)
 
 
-def _trigonometric(system: Model) -> str:
+def is_machine(system: Model) -> bool:
+    """Whether a system has all that the forces at its bearings need."""
+    return set(BORNE) <= {parameter.name for parameter in system.declared}
+
+
+def _trigonometric(system: Model, law: Trigonometric) -> str:
     import sympy as sp
 
-    law = system.trigonometric()
     names: dict[Any, str] = {}
     values: dict[str, Any] = {}
     for i, parameter in enumerate(system.declared):
@@ -45,7 +47,7 @@ def _trigonometric(system: Model) -> str:
             names[turn[0]], names[turn[1]] = f"sine(p[{i}])", f"cosine(p[{i}])"
     products = [sp.sympify(part) for part in law.products(values)]
     text = javascript.function(products, names, "p")
-    loads = _loads(system, values, names, law) if isinstance(system, GyroRotorDisk) else "null"
+    loads = _loads(values, names, law) if is_machine(system) else "null"
     return f'{{kind: "trigonometric",\nproducts: {text},\nloads: {loads}}}'
 
 
@@ -65,17 +67,12 @@ class _Machine:
         return self.rows[key[0]]
 
 
-def _loads(
-    system: GyroRotorDisk, values: dict[str, Any], names: dict[Any, str], law: Trigonometric
-) -> str:
+def _loads(values: dict[str, Any], names: dict[Any, str], law: Trigonometric) -> str:
     """Forces at both bearings of the shaft, (u, v) of A2 and B2 and along n2, in free motion."""
     import sympy as sp
 
     s, c, dphi = sp.symbols("s c dphi", real=True)
-    sine, cosine, _ = values["beta"]
-    m, r, e, a, g, omega1, span = (
-        values[n] for n in ("m", "r", "e", "a", "g", "omega1", "half_span")
-    )
+    (sine, cosine, _), e, a, r, omega1, m, g, span = (values[name] for name in BORNE)
     A, B, C, scale = law.products(values)
     ju, thin = m * (r * r / 4 + e * e), m * r * r / 4
     table: Any = _Machine(
@@ -108,10 +105,9 @@ def _loads(
     return javascript.function([*parts, axial], known, "p, phi, dphi")
 
 
-def _potential(system: Potential) -> str:
+def _potential(formula: Any) -> str:
     import sympy as sp
 
-    formula: Formula = system.formula
     x = sp.Symbol(formula.coordinate, real=True)
     symbols = {symbol.name: symbol for symbol in formula.expression.free_symbols}
     x = symbols.get(formula.coordinate, x)

@@ -30,11 +30,12 @@ def perturbed_of(system: Any) -> Perturbed:
     ParameterError
         If it is another one.
     """
-    found = as_system(system)
-    if not isinstance(found, Perturbed):
+    found: Any = as_system(system)
+    if not issubclass(found.rung, PerturbedConservative):
         raise bad("perturbed", found, "a pk.Perturbed(system, damping=..., forcing=...)")
     refuse_noise(found)
-    return found
+    perturbed: Perturbed = found
+    return perturbed
 
 
 def stroboscopic(

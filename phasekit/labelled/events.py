@@ -15,13 +15,13 @@ from phasekit.motion.integrate import integrate
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import single
 from phasekit.systems.driven_rotor import event_of
-from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.system import Model
 
 ARGUMENTS = ("t", "phi", "dphi")
 
 
 def with_events(
-    ds: xr.Dataset, system: Perturbed, events: Any, tolerances: Mapping[str, Any]
+    ds: xr.Dataset, system: Model, events: Any, tolerances: Mapping[str, Any]
 ) -> xr.Dataset:
     """Add the events on one motion, and end it where they say so.
 
@@ -34,17 +34,18 @@ def with_events(
     """
     named = events if isinstance(events, Mapping) else {"event": events}
     watched = {name: event_of(name, event, ARGUMENTS) for name, event in named.items()}
-    _, parameters = single(system)
+    law: Any
+    law, parameters = single(system)
     if ds.state_phi.ndim or ds.state_dphi.ndim:
         raise bad("events", list(named), "nothing, or one motion: a single state")
     times = np.atleast_1d(ds.time.values)
-    values = system.law.values(*parameters.values())
+    values = law.values(*parameters.values())
     found: list[tuple[str, float, float, float]] = []
     phi, dphi = ds.motion_phi.values.copy(), ds.motion_dphi.values.copy()
     for stop in (float(times.min(initial=0.0)), float(times.max(initial=0.0))):
         if stop == 0.0:
             continue
-        rates = pointwise(system.law, values, min(stop, 0.0), max(stop, 0.0))
+        rates = pointwise(law, values, min(stop, 0.0), max(stop, 0.0))
         start = (ds.state_phi.item(), ds.state_dphi.item())
         motion = integrate(InitialValue(rates, start, **tolerances), stop, watched)
         own = list(zip(*motion.events[:2], *motion.events.state, strict=True))

@@ -16,9 +16,10 @@ from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states, pass_from
 from phasekit.labelled.orbits import noted
 from phasekit.labels.arguments import NumberLike, bad, number, state_arguments
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
 from phasekit.systems.as_system import as_system
-from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.system import Model
 from phasekit.table.quantities import select
 
 
@@ -86,7 +87,7 @@ def flow(
     """
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
     system = as_system(system)
-    if not isinstance(system, Perturbed):
+    if not issubclass(system.rung, PerturbedConservative):
         for name, value in (("rtol", rtol), ("atol", atol), ("events", events)):
             if value is not None:
                 raise bad(name, value, "nothing, because this system's motion is exact")
@@ -105,16 +106,16 @@ def flow(
     return at_states(system, select("motion"), states)
 
 
-def refuse_noise(system: Perturbed) -> None:
+def refuse_noise(system: Model) -> None:
     """Refuse a system with noise, which is not integrated.
 
     Raises
     ------
     ParameterError
     """
-    if np.any(np.asarray(system.kT) > 0.0):
-        hint = "use .replace(kT=0)"
-        raise bad("kT", system.kT, "0 for a motion: noise is not integrated", hint)
+    kT = system.parameters["kT"]
+    if np.any(np.asarray(kT) > 0.0):
+        raise bad("kT", kT, "0 for a motion: noise is not integrated", "use .replace(kT=0)")
 
 
 def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:

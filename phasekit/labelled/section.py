@@ -12,11 +12,12 @@ from phasekit.labelled.motion import checked_tolerances, refuse_noise
 from phasekit.labels.arguments import FloatArray, bad, number, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
+from phasekit.laws.ladder import Routhian
+from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import circle, pointwise
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import as_system, single
-from phasekit.systems.free_rotor import FreeGyroRotor
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.problem import Problem
 from phasekit.table.quantities import ROWS
@@ -95,14 +96,19 @@ def poincare_section(
     if direction > 1:
         raise bad("direction", direction, senses)
     tolerances = checked_tolerances(rtol, atol)
-    if isinstance(system, FreeGyroRotor):
+    own = isinstance(system, Problem)
+    found: Any = system if own else as_system(system)
+    if not own and issubclass(found.rung, Routhian):
         arguments |= {"direction": direction, **tolerances}
-        return system.poincare(phi0, _needed(dphi0), duration, section=section, **arguments)
+        ds: xr.Dataset = found.poincare(
+            phi0, _needed(dphi0), duration, section=section, **arguments
+        )
+        return ds
     if arguments:
         raise bad(*next(iter(arguments.items())), "nothing, except of a FreeGyroRotor")
-    if isinstance(system, Problem):
-        return _of_problem(system, phi0, duration, section, direction, tolerances)
-    return _of_system(as_system(system), phi0, dphi0, duration, section, direction, tolerances)
+    if own:
+        return _of_problem(found, phi0, duration, section, direction, tolerances)
+    return _of_system(found, phi0, dphi0, duration, section, direction, tolerances)
 
 
 def _needed(dphi0: float | None) -> float:
@@ -120,7 +126,9 @@ def _of_system(
     direction: int,
     tolerances: dict[str, Any],
 ) -> xr.Dataset:
-    perturbed = system if isinstance(system, Perturbed) else Perturbed(system)
+    perturbed = system
+    if not issubclass(system.rung, PerturbedConservative):
+        perturbed = Perturbed(system)
     refuse_noise(perturbed)
     level = number("section", section, "a finite number", system.unit_of("state_phi"))
     state = (

@@ -6,6 +6,7 @@ computes it, and the most special line that fits answers.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -76,13 +77,20 @@ class Conservative(Autonomous):
     """One degree of freedom in a potential: ``x'' = -V'(x; p)``."""
 
     called: ClassVar[str] = "a system in a potential"
-    #: Name of the coordinate, and its period where it is an angle.
+    #: Name of the coordinate, and its period on a circle.
     coordinate: str
     period: float | None
+    #: The potential for print.
+    text: str
 
     def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V' as a sympy expression of real symbols: of the coordinate and the parameters."""
         raise NotImplementedError
+
+
+def is_turn(period: float | None) -> bool:
+    """Whether a coordinate of a period is an angle in rad."""
+    return period is not None and math.isclose(period, 2.0 * math.pi, rel_tol=1e-12)
 
 
 class Lawful:

@@ -69,6 +69,7 @@ class Trigonometric(Conservative):
 
     coordinate = "phi"
     period = 2.0 * math.pi
+    text = "-B cos φ + (A/2) cos² φ - C sin φ"
 
     products: Products
     domains: Mapping[str, tuple[float, float]]
@@ -220,6 +221,8 @@ def checked_products(model: str, products: Products, units: Mapping[str, str]) -
         A, B, C, N = map(_product, products(_factors(units, angles)))
     except Exception as error:
         text = f"products of {model}: got {type(error).__name__}: {error}; wants {wants}"
+        if isinstance(error, TypeError):  # something else than sums and products
+            text += "; of a root make the parameter; pk.Potential takes any formula"
         raise ParameterError(text) from error
     if not any(product.powers for product in (A, B, C, N)):
         raise ParameterError(f"products of {model}: got numbers alone, wants {wants}")

@@ -17,7 +17,7 @@ from phasekit.laws.trigonometric import Trigonometric
 from phasekit.perturbation.tilted import tilted_phase_space
 from phasekit.perturbation.tilted_energy import height, tilt
 from phasekit.perturbation.tilted_orbits import TURN, orbits
-from phasekit.phase.answers import Answers, answers, highest_first, present
+from phasekit.phase.answers import Answers, answers, present
 
 
 @answers.register
@@ -48,6 +48,7 @@ def one_turn(law: TiltedTrigonometric, values: Mapping[str, float], low: float) 
     saddle_phi, saddle_energy = seen(loops.saddle_phi, loops.saddle_energy)
     return Answers(
         coordinate="phi",
+        is_angle=True,
         period=None,
         ends=(low, low + TURN),
         units="s-2",
@@ -55,6 +56,8 @@ def one_turn(law: TiltedTrigonometric, values: Mapping[str, float], low: float) 
         orbit=lambda x, v: orbits(law, *own, x, v),
         tilt=TURN * N,
         cut_at=functools.partial(one_turn, law, values),
-        **present(points._replace(phi=phi, energy=energy)),
-        **highest_first(loops._replace(saddle_phi=saddle_phi, saddle_energy=saddle_energy)),
+        **present(
+            points._replace(phi=phi, energy=energy),
+            loops._replace(saddle_phi=saddle_phi, saddle_energy=saddle_energy),
+        ),
     )

@@ -7,7 +7,6 @@ one numerically, and motion at constant momenta along its arc length. One system
 from __future__ import annotations
 
 import functools
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Loop, ParameterError
-from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
@@ -38,6 +37,8 @@ class Answers:
     ----------
     coordinate : str
         Name of x.
+    is_angle : bool
+        Whether x is an angle in rad.
     period : float or None
         Length of the circle, None on a line.
     ends : (float, float)
@@ -61,6 +62,7 @@ class Answers:
     """
 
     coordinate: str
+    is_angle: bool
     period: float | None
     ends: tuple[float, float]
     units: str
@@ -77,11 +79,6 @@ class Answers:
     momentum: tuple[str, float, str] | None = None
     tilt: float = 0.0
     cut_at: Callable[[float], Answers] | None = None
-
-    @property
-    def is_angle(self) -> bool:
-        """Whether the coordinate is an angle in rad."""
-        return _is_turn(self.period) or self.cut_at is not None
 
 
 @functools.singledispatch
@@ -120,13 +117,13 @@ def _(law: Trigonometric, values: Mapping[str, float]) -> Answers:
     points, loops = phase_space(A, B, C)
     return Answers(
         coordinate=law.coordinate,
+        is_angle=True,
         period=law.period,
         ends=(-np.pi, np.pi),
         units="s-2",
         potential=lambda x: closed_form.potential(A, B, C, x),
         orbit=lambda x, v: orbits(A, B, C, x, v),
-        **present(points),
-        **highest_first(loops),
+        **present(points, loops),
     )
 
 
@@ -137,13 +134,13 @@ def _(law: Formula, values: Mapping[str, float]) -> Answers:
     points, loops = functions.phase_space(law, *own)
     return Answers(
         coordinate=law.coordinate,
+        is_angle=is_turn(law.period),
         period=law.period,
         ends=law.ends,
-        units="s-2" if _is_turn(law.period) else "",
+        units="s-2" if is_turn(law.period) else "",
         potential=lambda x: law.values(x, *own),
         orbit=lambda x, v: functions.orbits(law, *own, x, v),
-        **present(points),
-        **highest_first(loops),
+        **present(points, loops),
     )
 
 
@@ -160,6 +157,7 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
     own = half - (half - own) % law.period
     return Answers(
         coordinate=law.coordinate,
+        is_angle=is_turn(law.period),
         period=law.period,
         ends=(-half, half),
         units="J",
@@ -167,25 +165,19 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
         orbit=functools.partial(path.orbit, ground),
         inertia=lambda x: np.asarray(law.inertia(x)[0]),
         momentum=law.momentum,
-        **present(law.equilibria()),
-        **highest_first(loops._replace(saddle_phi=own, turning_offset=offset)),
+        **present(law.equilibria(), loops._replace(saddle_phi=own, turning_offset=offset)),
     )
 
 
-def _is_turn(period: float | None) -> bool:
-    return period is not None and math.isclose(period, 2.0 * math.pi, rel_tol=1e-12)
-
-
-def present(points: Any) -> dict[str, Any]:
-    """Equilibria that are there, by phi."""
-    there = np.flatnonzero(np.isfinite(points.phi))
-    order = there[np.argsort(points.phi[there])]
-    return {name: getattr(points, name)[order] for name in ("phi", "kind", "energy")}
-
-
-def highest_first(loops: Any) -> dict[str, Any]:
-    """Saddles that are there, by their energy."""
-    there = np.flatnonzero(loops.loop > Loop.ABSENT)
-    order = there[np.argsort(-loops.saddle_energy[there], kind="stable")]
-    names = ("saddle_phi", "saddle_energy", "loop", "turning_offset")
-    return {name: getattr(loops, name)[order] for name in names}
+def present(points: Any, loops: Any) -> dict[str, Any]:
+    """Equilibria that are there, by phi, and saddles that are there, the highest first."""
+    found: dict[str, Any] = {}
+    for part, there, key, names in (
+        (points, np.isfinite(points.phi), points.phi, ("phi", "kind", "energy")),
+        (loops, loops.loop > Loop.ABSENT, -loops.saddle_energy,
+         ("saddle_phi", "saddle_energy", "loop", "turning_offset")),
+    ):  # fmt: skip
+        order = np.flatnonzero(there)
+        order = order[np.argsort(key[order], kind="stable")]
+        found.update((name, getattr(part, name)[order]) for name in names)
+    return found

@@ -47,45 +47,47 @@ class LevelCurves:
     ----------
     answers : Answers
         What is known of the system.
-    cut : float or None
-        Where a circle is cut open; None: where the answers cut it.
+    window : (float, float)
+        What is seen of the coordinate: all of it, or of a line what has a structure.
+    knots, height : numpy.ndarray
+        Points between which V is monotone, and V there: the equilibria and, on a line, the ends of
+        the window; on a circle the first comes once more after a turn.
+    hill, well : numpy.ndarray
+        Which of them are.
+    floor : float
+        Least potential that is seen.
+    summit : float
+        Energy of the highest saddle; where there is none, that of the lower end of a line.
     """
 
     answers: Answers
-    cut: float | None = None
+    window: Arc
+    knots: Array
+    height: Array
+    hill: npt.NDArray[np.bool_]
+    well: npt.NDArray[np.bool_]
+    floor: float
+    summit: float
 
-    # ---------------------------------------------------------------- where V is what
-
-    @cached_property
-    def window(self) -> Arc:
-        """What is seen of the coordinate: all of it, or of a line what has a structure."""
-        known = self.answers
-        if self.cut is not None and known.period is not None:
-            return self.cut, self.cut + known.period
-        if np.isfinite(known.ends).all():
-            return known.ends
-        turning = known.saddle_phi[:, np.newaxis] + known.turning_offset
-        marks = np.concatenate([known.phi, turning.ravel()])
-        marks = marks[np.isfinite(marks)]
-        low, high = (float(marks.min()), float(marks.max())) if marks.size else (0.0, 0.0)
-        margin = 0.3 * (high - low) or 2.0
-        return low - margin, high + margin
-
-    @cached_property
-    def _knots(self) -> tuple[Array, Array, npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
-        """Points between which V is monotone, V there, and which are hills and wells.
-
-        The equilibria and, on a line, the ends of the window; on a circle the first comes once
-        more after a turn.
-        """
-        known, (low, high) = self.answers, self.window
+    @classmethod
+    def of(cls, known: Answers, cut: float | None = None) -> LevelCurves:
+        """Make them of what is known of a system, which cuts a circle open unless told where."""
+        low, high = known.ends
+        if cut is not None and known.period is not None:
+            low, high = cut, cut + known.period
+        elif not np.isfinite(known.ends).all():
+            turning = known.saddle_phi[:, np.newaxis] + known.turning_offset
+            marks = np.concatenate([known.phi, turning.ravel()])
+            marks = marks[np.isfinite(marks)]
+            low, high = (float(marks.min()), float(marks.max())) if marks.size else (0.0, 0.0)
+            margin = 0.3 * (high - low) or 2.0
+            low, high = low - margin, high + margin
         x, height, kind = known.phi, known.energy, known.kind
         if known.period is None:
             inside = (x > low) & (x < high)
-            ends = np.array([low, high])
-            x = np.concatenate([ends[:1], x[inside], ends[1:]])
-            rim = known.potential(ends)
-            height = np.concatenate([rim[:1], height[inside], rim[1:]])
+            x = np.concatenate([[low], x[inside], [high]])
+            first, last = known.potential(x[[0, -1]])
+            height = np.concatenate([[first], height[inside], [last]])
             kind = np.concatenate([[0], kind[inside], [0]])
             sides = np.concatenate([[np.nan], height, [np.nan]])
         else:
@@ -99,26 +101,11 @@ class LevelCurves:
         if known.period is not None:
             x, height = np.append(x, x[:1] + known.period), np.append(height, height[:1])
             hill, well = np.append(hill, hill[:1]), np.append(well, well[:1])
-        return x, height, hill, well
-
-    @property
-    def _count(self) -> int:
-        """Number of knots, each counted once."""
-        return len(self._knots[0]) - (self.answers.period is not None)
-
-    @cached_property
-    def floor(self) -> float:
-        """Least potential that is seen."""
-        height = self._knots[1]
-        return float(np.min(height)) if height.size else float(self.answers.potential(0.0))
-
-    @cached_property
-    def summit(self) -> float:
-        """Energy of the highest saddle; where there is none, that of the lower end of a line."""
-        if self.answers.saddle_energy.size:
-            return float(self.answers.saddle_energy[0])
-        height = self._knots[1]
-        return float(min(height[0], height[-1])) if height.size else self.floor
+        floor = float(np.min(height)) if height.size else float(known.potential(0.0))
+        summit = float(min(height[0], height[-1])) if height.size else floor
+        if known.saddle_energy.size:
+            summit = float(known.saddle_energy[0])
+        return cls(known, (low, high), x, height, hill, well, floor, summit)
 
     def energy(self, x: float, speed: float) -> float:
         """Return the energy of a state."""
@@ -132,26 +119,38 @@ class LevelCurves:
 
     def fastest(self, energy: float) -> float:
         """Return the greatest speed on a level."""
-        x = np.concatenate([np.linspace(*self.window, 2 * _SAMPLES - 1), self._knots[0]])
+        x = np.concatenate([np.linspace(*self.window, 2 * _SAMPLES - 1), self.knots])
         return float(np.max(self.speed(x, energy)))
 
     # ---------------------------------------------------------------- arcs
 
-    def arcs(self, energy: float) -> list[Arc]:
-        """Return the arcs where V < energy, cut at saddles of that energy."""
-        x, height, _, _ = self._knots
-        if not x.size:
+    def arcs(self, energy: float, x: float | None = None) -> list[Arc]:
+        """Return the arcs where V < energy, cut at saddles of that energy; or that which holds x.
+
+        Where no arc holds x, within rounding, there is none.
+        """
+        knots, height = self.knots, self.height
+        if not knots.size:
             return [self.window] if energy >= self.floor else []
         slack = _SAME * (float(np.max(np.abs(height))) + abs(energy))
         above = height - energy
         above[np.abs(above) <= slack] = 0.0
+        # Where V, monotone between knots, passes the energy.
+        falls = np.flatnonzero(np.sign(above[:-1]) * np.sign(above[1:]) < 0.0)
+        low, high = np.where(above[falls] < 0.0, (falls, falls + 1), (falls + 1, falls))
+        inner, outer = knots[low], knots[high]
+        for _ in range(_BISECTIONS if falls.size else 0):
+            middle = 0.5 * (inner + outer)
+            over = self.answers.potential(middle) > energy
+            inner, outer = np.where(over, inner, middle), np.where(over, middle, outer)
+        turning = dict(zip(falls.tolist(), (0.5 * (inner + outer)).tolist(), strict=True))
         arcs: list[Arc] = []
-        for i in range(x.size - 1):
+        for i in range(knots.size - 1):
             a, b = above[i], above[i + 1]
             if min(a, b) >= 0.0:
                 continue
-            start = self._crossing(x[i], x[i + 1], energy) if a > 0.0 else float(x[i])
-            stop = self._crossing(x[i], x[i + 1], energy) if b > 0.0 else float(x[i + 1])
+            start = turning[i] if a > 0.0 else float(knots[i])
+            stop = turning[i] if b > 0.0 else float(knots[i + 1])
             if arcs and arcs[-1][1] == start and a < 0.0:
                 start = arcs.pop()[0]
             arcs.append((start, stop))
@@ -161,29 +160,10 @@ class LevelCurves:
                 return [self.window]
             first, last = arcs.pop(0), arcs.pop()
             arcs.append((last[0], first[1] + period))
-        return arcs
-
-    def _crossing(self, left: float, right: float, energy: float) -> float:
-        """Return where V, monotone between `left` and `right`, passes `energy`."""
-        rising = self.answers.potential(right) > self.answers.potential(left)
-        for _ in range(_BISECTIONS):
-            middle = 0.5 * (left + right)
-            if bool(self.answers.potential(middle) > energy) == bool(rising):
-                right = middle
-            else:
-                left = middle
-        return float(0.5 * (left + right))
-
-    def arcs_of(self, level: Level) -> list[Arc]:
-        """Return the arcs of a level: the one that holds its point, or all."""
-        energy, x = level
-        arcs = self.arcs(energy)
-        if x is None:
+        if x is None or not arcs:
             return arcs
-        distances = [self._distance(arc, x) for arc in arcs]
-        nearest = int(np.argmin(distances)) if arcs else 0
-        reach = _NEAR * (self.window[1] - self.window[0])
-        return arcs[nearest : nearest + 1] if arcs and distances[nearest] <= reach else []
+        distance, nearest = min((self._distance(arc, x), arc) for arc in arcs)
+        return [nearest] if distance <= _NEAR * (self.window[1] - self.window[0]) else []
 
     def _distance(self, arc: Arc, x: float) -> float:
         period = self.answers.period
@@ -197,6 +177,16 @@ class LevelCurves:
         size = 1e-3 * _NEAR * (self.window[1] - self.window[0])
         near = [self._distance((float(place),) * 2, x) <= size for place in self.answers.phi]
         return speed == 0.0 and any(near)
+
+    def orbit_levels(self, x: float, speed: float) -> list[tuple[float, Arc]]:
+        """Return energy and arc of the orbit through a state, and of its turns where they differ.
+
+        None where it is at rest or out of sight.
+        """
+        if self.at_rest(x, speed):
+            return []
+        energy = self.energy(x, speed)
+        return [level for arc in self.arcs(energy, x) for level in self.followed(energy, arc)]
 
     def comes_back(self, x: float, speed: float) -> bool:
         """Whether the orbit through a state turns somewhere, so that both halves are its own."""
@@ -215,8 +205,8 @@ class LevelCurves:
             return (arc != self.window,) * 2
         return arc[0] > self.window[0], arc[1] < self.window[1]
 
-    def curve(self, arc: Arc, energy: float) -> tuple[Array, Array]:
-        """Return x and x' >= 0 along the upper half of a level over an arc."""
+    def curve(self, arc: Arc, energy: float, *, whole: bool = False) -> tuple[Array, Array]:
+        """Return x and x' along the upper half of a level over an arc, or along the whole of it."""
         if self.turns(arc):
             x = np.linspace(*arc, 2 * _SAMPLES - 1)
         else:
@@ -225,11 +215,13 @@ class LevelCurves:
             x = 0.5 * (arc[0] + arc[1]) + 0.5 * (arc[1] - arc[0]) * share
         speed = self.speed(x, energy)
         speed[[0, -1]] = np.where(self.closes(arc), 0.0, speed[[0, -1]])
+        if whole:
+            return np.concatenate([x, x[::-1]]), np.concatenate([speed, -speed[::-1]])
         return x, speed
 
     def orbit(self, arc: Arc, energy: float, quantity: str) -> float:
         """Return what the orbit of a level over an arc has, such as its period."""
-        places = [x for x in self._knots[0] if self._distance(arc, x) == 0.0]
+        places = [x for x in self.knots if self._distance(arc, x) == 0.0]
         x = float(min([0.5 * (arc[0] + arc[1]), *places], key=self.answers.potential))
         return float(getattr(self.answers.orbit(x, float(self.speed(x, energy))), quantity))
 
@@ -299,13 +291,13 @@ class LevelCurves:
     @property
     def steps(self) -> list[Separatrix]:
         """The levels of degenerate equilibria on slopes, at which motions come to rest."""
-        x, height, hill, well = self._knots
+        x, height, hill, well = self.knots, self.height, self.hill, self.well
         known = self.answers
         merged = known.phi[known.kind == EquilibriumKind.DEGENERATE]
         return [
             Separatrix(float(height[i]), arc, Loop.LOBE)
             for i in np.flatnonzero(np.isin(x, merged) & ~hill & ~well)
-            for arc in self.arcs_of((float(height[i]), float(x[i])))
+            for arc in self.arcs(float(height[i]), float(x[i]))
         ]
 
     def levels(self, spacing: float = 1.0 / 6.0) -> list[Level]:
@@ -314,8 +306,8 @@ class LevelCurves:
         A region begins at the bottom of a well, or at a hill, and ends at the lower of the hills
         round it.
         """
-        x, height, hill, well = self._knots
-        own = np.arange(x.size) < self._count
+        x, height, hill, well = self.knots, self.height, self.hill, self.well
+        own = np.arange(x.size) < x.size - (self.answers.period is not None)
         top = float(np.sqrt(2.0 * max(self.summit - self.floor, 0.0))) or 1.0
         step = spacing * top
         chosen: dict[Any, list[Level]] = {}
@@ -339,8 +331,8 @@ class LevelCurves:
 
     def _region(self, i: int) -> tuple[tuple[int, ...], float]:
         """Return the hills that end the region which begins at a knot, and its least potential."""
-        _, height, hill, _ = self._knots
-        period, count = self.answers.period, self._count
+        height, hill, period = self.height, self.hill, self.answers.period
+        count = height.size - (period is not None)  # each once
         slack = _SAME * float(np.max(np.abs(height)))
         rims, bottom = [], float(height[i])
         for side in (-1, 1):

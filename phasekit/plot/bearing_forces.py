@@ -20,7 +20,7 @@ from phasekit.labelled.motion import flow
 from phasekit.labelled.orbits import orbits
 from phasekit.labels.arguments import bad, named
 from phasekit.phase.level_curves import LevelCurves
-from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import curves_of, starts_of
@@ -197,14 +197,14 @@ def _states(
     """Return the states of an orbit, forth and back if it swings."""
     kind = orbits(disk, phi0, dphi0).orbit_kind
     energy = land.energy(phi0, dphi0)
-    arcs = land.arcs_of((energy, phi0))
+    arcs = land.arcs(energy, phi0)
     if int(kind) == OrbitKind.EQUILIBRIUM or not arcs:
         return np.array([phi0]), np.array([dphi0]), [slice(0, 1)]
-    phi, speed = land.curve(arcs[0], energy)
-    if arcs[0] == land.window:
+    rotates = arcs[0] == land.window
+    phi, speed = land.curve(arcs[0], energy, whole=not rotates)
+    if rotates:
         way = slice(None) if dphi0 >= 0.0 else slice(None, None, -1)
         return phi[way], float(np.copysign(1.0, dphi0)) * speed[way], [slice(0, phi.size)]
-    phi, speed = strokes.closed(phi, speed)
     half = phi.size // 2
     return phi, speed, [slice(0, half), slice(half, phi.size)]
 

@@ -21,7 +21,7 @@ from phasekit.labelled.bifurcation_set import bifurcation_set
 from phasekit.labels.arguments import bad, flag, pair, whole
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import Circle, multiple_of_pi, quarters
-from phasekit.plot.parts.units import Units
+from phasekit.plot.parts.units import SYMBOLS, Units
 
 FloatArray = NDArray[np.float64]
 
@@ -162,7 +162,7 @@ def branch_surface(
 
 def _short(values: Any, units: Units) -> str:
     """Return symbol and unit: there is no room for more along a slanted axis."""
-    symbol = labels.SYMBOLS.get(str(values.name), str(values.name).replace("_", " "))
+    symbol = SYMBOLS.get(str(values.name), str(values.name).replace("_", " "))
     return labels.with_unit(symbol, units.text(str(values.name), values.attrs.get("units", "")))
 
 

@@ -18,7 +18,9 @@ from phasekit.labels.arguments import bad, flag, unknown
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.rotators import ROTATORS
 from phasekit.phase.exact.potential import gradient as slope
+from phasekit.phase.level_curves import Arc
 from phasekit.plot.parts import labels, strokes, style
+from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import curves_of, levels_of, starts_of
 from phasekit.plot.time_history import TIME, motions_of
@@ -177,13 +179,12 @@ class _Tip:
         first, second = (tips.sel(carrier_axis=n).values * self.scale for n in self.plane)
         return first, second
 
-    def branches(self, phi: FloatArray, speed: FloatArray, turning: bool) -> list[Any]:
-        """Return the curves over an arc, of which the upper half is given."""
-        if self.plane is None:
-            return [self(phi, speed)]
-        if turning:
-            return [self(phi, speed), self(phi, -speed)]
-        return [self(*strokes.closed(phi, speed))]
+    def branches(self, energy: float, arc: Arc, turning: bool) -> list[Any]:
+        """Return the curves of a level over an arc."""
+        if self.plane is not None and not turning:
+            return [self(*self.land.curve(arc, energy, whole=True))]
+        phi, speed = self.land.curve(arc, energy)
+        return [self(phi, sign * speed) for sign in ((1.0,) if self.plane is None else (1.0, -1.0))]
 
 
 def _draw_levels(
@@ -196,9 +197,9 @@ def _draw_levels(
     if energies is None and orbits is None:
         chosen = land.levels()
     for level in chosen:
-        for arc in land.arcs_of(level):
+        for arc in land.arcs(*level):
             look = strokes.level_look(land, arc)
-            for u, v in tip.branches(*land.curve(arc, level[0]), land.turns(arc)):
+            for u, v in tip.branches(level[0], arc, land.turns(arc)):
                 _stroke(ax, u, v, zorder=1, **look)
     handles = _draw_separatrices(ax, tip) if energies is None and orbits is None else []
     for number, start in enumerate(starts):
@@ -211,24 +212,24 @@ def _draw_levels(
 def _draw_separatrices(ax: Axes, tip: _Tip) -> list[Artist]:
     handles: dict[Loop, Artist] = {}
     for energy, arc, loop in tip.land.separatrices:
-        for u, v in tip.branches(*tip.land.curve(arc, energy), loop == Loop.WINDING):
+        for u, v in tip.branches(energy, arc, loop == Loop.WINDING):
             (handles[loop],) = _stroke(ax, u, v, zorder=3, **style.inked(strokes.LOOPS[loop]))
     return list(handles.values())
 
 
 def _draw_orbit(ax: Axes, tip: _Tip, start: tuple[float, float], number: int) -> list[Artist]:
     land, look = tip.land, strokes.orbit_look(number)
-    for energy, arc in strokes.orbit_levels(land, start):
-        phi, speed = land.curve(arc, energy)
+    for energy, arc in land.orbit_levels(*start):
         if arc == land.window:
-            curves = [tip(phi, speed if start[1] >= 0.0 else -speed)]
+            phi, speed = land.curve(arc, energy)
+            curves: list[Any] = [tip(phi, speed if start[1] >= 0.0 else -speed)]
         else:
-            curves = tip.branches(phi, speed, False)
+            curves = tip.branches(energy, arc, False)
         for u, v in curves:
             _stroke(ax, u, v, zorder=4, **look)
     u, v = tip(np.array([start[0]]), np.array([start[1]]))
     scale = (tip.units.scale("phi", "rad"), tip.units.scale("dphi", "s-1"))
-    name = strokes.start_name(land, start, scale)
+    name = strokes.start_name(Circle(), start, scale)
     (handle,) = ax.plot(u, v, zorder=6, label=name, **strokes.START, **look)
     return [handle]
 

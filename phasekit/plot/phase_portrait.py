@@ -17,7 +17,7 @@ from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
 from phasekit.plot.parts.circle import TURN, Circle
-from phasekit.plot.parts.units import Units, printed
+from phasekit.plot.parts.units import Units, coordinate_symbol, printed
 from phasekit.systems.as_system import single
 
 FloatArray = NDArray[np.float64]
@@ -109,17 +109,13 @@ def phase_portrait(
     picture = Picture.of(system, energies, orbits, shown, 2.0 if color_by is not None else 1.0)
     axes = style.axes_for(ax, legend=legend)
     land, scale = picture.land, picture.scale
-    curves = [(level[0], arc) for level in picture.levels for arc in land.arcs_of(level)]
+    drawn = strokes.Strokes(axes, land, picture.circle, scale)
+    curves = [(level[0], arc) for level in picture.levels for arc in land.arcs(*level)]
     colors = _colors(axes, picture, curves, color_by) if color_by else [None] * len(curves)
     for (energy, arc), color in zip(curves, colors, strict=True):
-        look = strokes.level_look(land, arc, color)
-        strokes.draw_level(axes, land, energy, arc, scale, zorder=1, **look)
-    handles = strokes.draw_separatrices(axes, land, scale)
-    handles += strokes.draw_points(axes, land, scale, on_potential=False)
-    handles += [
-        strokes.draw_orbit(axes, land, start, number, scale)
-        for number, start in enumerate(picture.starts)
-    ]
+        drawn.level(energy, arc, zorder=1, **strokes.level_look(land, arc, color))
+    handles = [*drawn.separatrices(), *drawn.points()]
+    handles += [drawn.orbit(start, number) for number, start in enumerate(picture.starts)]
     reach = scale[1] * picture.reach(given=energies is not None)
     axes.set_ylim(-reach, reach)
     picture.coordinate_axis(axes)
@@ -153,6 +149,8 @@ class Picture:
         The coordinate for print.
     scale : (float, float)
         What the coordinate and its rate are multiplied by to be shown.
+    circle : Circle
+        The circle on which the coordinate is shown; or its line.
     """
 
     land: LevelCurves
@@ -162,6 +160,7 @@ class Picture:
     rate: tuple[str, str]
     symbol: str
     scale: strokes.Scale
+    circle: Circle
 
     @classmethod
     def of(
@@ -176,7 +175,7 @@ class Picture:
         land = curves_of(system)
         known = land.answers
         place = known.coordinate, "rad" if known.is_angle else ""
-        rate = f"d{known.coordinate}", "s-1" if known.is_angle else ""
+        rate = f"d{known.coordinate}", "rad/s" if known.is_angle else ""
         units = Units.of(shown.angles, shown.units, dict((place, rate)))
         if units.angles != "rad" and not known.is_angle:
             wants = "'rad' for a coordinate that is not an angle of period 2 pi"
@@ -186,17 +185,16 @@ class Picture:
             if not known.is_angle and known.period is None:
                 raise bad("cut", shown.cut, "None, for the coordinate is not on a circle")
             low = Circle.cut_at(shown.cut, scale[0], known.period or TURN).low
-            land = (
-                LevelCurves(known, low) if known.cut_at is None else LevelCurves(known.cut_at(low))
-            )
+            land = LevelCurves.of(known if known.cut_at is None else known.cut_at(low), low)
         chosen = (
             land.levels(1.0 / (6.0 * density)) if energies is None else levels_of(land, energies)
         )
         starts = [] if orbits is None else starts_of(land, orbits)
         if known.cut_at is not None:  # angles, though the picture is one of a line
             starts = [(float(Circle(land.window[0]).home(x)), v) for x, v in starts]
-        symbol = labels.coordinate_symbol(known.coordinate)
-        return cls(land, chosen, starts, units, rate, symbol, scale)
+        symbol = coordinate_symbol(known.coordinate)
+        circle = Circle(land.window[0], known.period)
+        return cls(land, chosen, starts, units, rate, symbol, scale, circle)
 
     def reach(self, *, given: bool) -> float:
         """Return the greatest speed to show: past the separatrices, and past what was asked for."""
@@ -222,13 +220,14 @@ class Picture:
             name, value, unit = known.momentum
             number = f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
             text += f", at ${name}$ = {number} {printed(unit)}"
-        ax.set_xlabel(labels.wrap(text, style.letters(ax, "x")))
+            text = labels.wrap(text, style.letters(ax, "x"))
+        ax.set_xlabel(text)
 
 
 def curves_of(system: Any) -> LevelCurves:
     """Return the level curves of one system."""
     importlib.import_module("phasekit.perturbation.tilted_answers")  # registers there
-    return LevelCurves(answers(*single(system)))
+    return LevelCurves.of(answers(*single(system)))
 
 
 def _colors(

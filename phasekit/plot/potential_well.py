@@ -93,7 +93,7 @@ def _draw_well(well: Axes, picture: Picture) -> None:
     _draw_chords(well, picture)
     curve = style.inked({"color": style.BLACK, "linewidth": 1.8})
     well.plot(x * scale[0], height * rise, zorder=3, **curve)
-    strokes.draw_points(well, land, (scale[0], rise), on_potential=True)
+    strokes.Strokes(well, land, picture.circle, (scale[0], rise)).points(on_potential=True)
     # Where V falls without bound, or is steep at the window's ends, show what has a structure.
     marks = np.append(land.answers.energy, land.summit)
     span = float(np.ptp(marks)) or float(np.ptp(height)) or 1.0
@@ -124,14 +124,14 @@ def _draw_chords(ax: Axes, picture: Picture) -> None:
     """Draw every energy over the arcs where it is reached: levels, saddles, orbits."""
     land, (stretch, _) = picture.land, picture.scale
     rise = picture.units.scale("potential", land.answers.units)
-    circle = strokes.circle_of(land)
+    circle = picture.circle
 
     def chord(energy: float, arc: Arc, zorder: float, look: style.Look) -> None:
         x, y = circle.unrolled(np.array(arc), np.full(2, energy * rise))
         ax.plot(x * stretch, y, zorder=zorder, **look)
 
     for level in picture.levels:
-        for arc in land.arcs_of(level):
+        for arc in land.arcs(*level):
             chord(level[0], arc, 1, strokes.level_look(land, arc))
     for energy, arc, loop in land.separatrices:
         chord(energy, arc, 2.5 if loop == Loop.WINDING else 2.0, style.inked(strokes.LOOPS[loop]))
@@ -142,5 +142,5 @@ def _draw_chords(ax: Axes, picture: Picture) -> None:
                 x = (phi + turn) * stretch
                 ax.fill_between(x, height, energy * rise, zorder=0.5, **style.EIGHT_FILL)
     for number, start in enumerate(picture.starts):
-        for energy, arc in strokes.orbit_levels(land, start):
+        for energy, arc in land.orbit_levels(*start):
             chord(energy, arc, 4, strokes.orbit_look(number))

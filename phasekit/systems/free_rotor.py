@@ -2,34 +2,25 @@
 
 from __future__ import annotations
 
-import functools
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import xarray as xr
 
 from phasekit.labels.arguments import NumberLike, Value, bad, named_arguments, same, unknown
 from phasekit.laws.ladder import Law, Routhian
-from phasekit.mechanics import two_degrees as mechanics
-from phasekit.systems.amended import Amended, States, on_states
+from phasekit.systems.amended import Amended
 from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.driven_rotor import checked_number
 from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.rotor_motions import RotorMotions
+from phasekit.systems.rotor_states import RotorStates
 from phasekit.systems.system import MODELS
 
 
-class Accelerations(NamedTuple):
-    """Angular accelerations of support and disk, s^-2."""
-
-    domega1: Any
-    ddphi: Any
-
-
 @dataclass(frozen=True, eq=False)
-class FreeGyroRotor(RotorMotions):
+class FreeGyroRotor(RotorStates):
     """Heavy disk on a support that turns freely about the vertical, or under torques.
 
     The machine of `GyroRotorDisk` with two degrees of freedom: the support's angular velocity
@@ -227,155 +218,6 @@ class FreeGyroRotor(RotorMotions):
     def __hash__(self) -> int:
         """Hash of the parameters; a machine that holds DataArrays has none."""
         return hash((type(self).__name__, self.disk, self.carrier_inertia, self.momentum))
-
-    def accelerations(
-        self,
-        phi: States,
-        dphi: States,
-        omega1: States | None = None,
-        *,
-        torque1: States = 0.0,
-        torque2: States = 0.0,
-    ) -> Accelerations:
-        """Accelerations of support and disk in states.
-
-        Parameters
-        ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1. Arrays broadcast, DataArrays
-            by the names of their dims.
-        omega1 : float, array_like or xarray.DataArray, optional
-            Angular velocity of the support in s^-1; that of the disk's parameters by default.
-        torque1, torque2 : float, array_like or xarray.DataArray
-            Torques on the support and on the disk by its shaft, N m.
-
-        Returns
-        -------
-        Accelerations
-            domega1 and ddphi in s^-2; numbers, arrays or DataArrays as the states.
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
-
-        Notes
-        -----
-        Lagrange's equations; for a prescribed omega1 the second one is [Veljovic2015] (11),
-        corrected, with the term of omega1' that is missing there.
-
-        Examples
-        --------
-        >>> import phasekit as pk
-        >>> pendulum = pk.GyroRotorDisk(beta=90 * pk.deg, e=0.5, a=0, r=0, omega1=0, m=1, g=9.81)
-        >>> round(pk.FreeGyroRotor(pendulum, 1.0).accelerations(30 * pk.deg, 0.0).ddphi, 12)
-        -9.81
-        """
-        rows = {
-            "domega1": ("s-2", "angular acceleration of the support"),
-            "ddphi": ("s-2", "angular acceleration of the disk"),
-        }
-        states = {"phi": phi, "dphi": dphi, "omega1": self._omega1(omega1)}
-        return Accelerations(
-            *on_states(
-                functools.partial(mechanics.accelerations, self._machine),
-                rows,
-                **states,
-                torque1=torque1,
-                torque2=torque2,
-            )
-        )
-
-    def mass_matrix(self, phi: States) -> States:
-        """Matrix [[M11, M12], [M12, M22]] of the kinetic energy, kg m^2.
-
-        It multiplies (omega1', phi''). The last two axes, for a DataArray the dims ``row`` and
-        ``column``, are those of the matrix.
-
-        Parameters
-        ----------
-        phi : float, array_like or xarray.DataArray
-            Angle of the disk in rad.
-
-        Returns
-        -------
-        ndarray or xarray.DataArray
-            Shape (..., 2, 2).
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
-        """
-        rows = {"mass_matrix": ("kg m2", "mass matrix of support and disk")}
-        return on_states(
-            lambda x: (mechanics.mass_matrix(self._machine, x),),
-            rows,
-            dims=("row", "column"),
-            phi=phi,
-        )[0]
-
-    def energy(self, phi: States, dphi: States, omega1: States | None = None) -> States:
-        """Kinetic and potential energy, J; constant without torques.
-
-        The potential energy of the weight is 0 at ``phi = pi/2``.
-
-        Parameters
-        ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
-        omega1 : float, array_like or xarray.DataArray, optional
-            Angular velocity of the support in s^-1; that of the disk's parameters by default.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As the states.
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
-        """
-        rows = {"mechanical_energy": ("J", "kinetic and potential energy")}
-        return on_states(
-            lambda *state: (mechanics.energy(self._machine, *state),),
-            rows,
-            phi=phi,
-            dphi=dphi,
-            omega1=self._omega1(omega1),
-        )[0]
-
-    def angular_momentum(self, phi: States, dphi: States, omega1: States | None = None) -> States:
-        """Angular momentum ``M11 omega1 + M12 phi'`` about the vertical axis, kg m^2/s.
-
-        Its rate is the torque on the support: it is constant without one.
-
-        Parameters
-        ----------
-        phi, dphi : float, array_like or xarray.DataArray
-            Angle of the disk in rad and its angular velocity in s^-1, which broadcast.
-        omega1 : float, array_like or xarray.DataArray, optional
-            Angular velocity of the support in s^-1; that of the disk's parameters by default.
-
-        Returns
-        -------
-        float, ndarray or xarray.DataArray
-            As the states.
-
-        Raises
-        ------
-        ParameterError
-            If an argument is unusable, or shapes do not fit.
-        """
-        rows = {"angular_momentum": ("kg m2 s-1", "angular momentum about the vertical axis")}
-        return on_states(
-            lambda *state: (mechanics.angular_momentum(self._machine, *state),),
-            rows,
-            phi=phi,
-            dphi=dphi,
-            omega1=self._omega1(omega1),
-        )[0]
 
     def amended(self, p: float) -> Amended:
         """Reduction to phi alone at an angular momentum that no torque changes.

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 
@@ -25,20 +25,14 @@ from phasekit.labels.arguments import (
     same,
     unknown,
 )
-from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import combine
 from phasekit.laws.ladder import Law
 from phasekit.laws.perturbed import Rate
 from phasekit.laws.trigonometric import Trigonometric, Values, checked_products
 from phasekit.laws.trigonometric import law as make_law
-from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter, attrs_of
 from phasekit.systems.reduced_form import reduced_form
 from phasekit.systems.value import ModelValue
-
-if TYPE_CHECKING:
-    import xarray as xr
-
 
 #: Every model by its name, as maps store it.
 MODELS: dict[str, type[Model]] = {}
@@ -137,56 +131,11 @@ class Model(ModelValue):
         """
         return cls.trigonometric().parameters
 
-    def unit_of(self, name: str) -> str | None:
-        """Unit of a parameter or state; None where it may be any.
-
-        Parameters
-        ----------
-        name : str
-            The parameter or state.
-
-        Returns
-        -------
-        str or None
-        """
-        units = {p.name: p.units for p in self.declared}
-        return units.get(name) or STATES.get(name, (None,))[0]
-
-    @property
-    def definition(self) -> dict[str, str]:
-        """What maps store of the system beside its name and parameters."""
-        return {}
-
     @property
     def parameters(self) -> dict[str, Value]:
         """The parameters by name, those that are None left out."""
         values = {p.name: getattr(self, p.name) for p in self.declared}
         return {name: value for name, value in values.items() if value is not None}
-
-    @property
-    def arguments(self) -> dict[str, Any]:
-        """What makes it again, by keyword."""
-        return dict(self.parameters)
-
-    @classmethod
-    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
-        """Values of a parameter, NaN where they leave its domain.
-
-        Parameters
-        ----------
-        name : str
-            The parameter.
-        value : ndarray
-            Values in its unit, of any shape.
-
-        Returns
-        -------
-        ndarray
-        """
-        for parameter in cls.declared:
-            if parameter.name == name and not (valid := parameter.valid(value)).all():
-                return np.where(valid, value, np.nan)
-        return value
 
     @classmethod
     def valid_coefficients(
@@ -279,28 +228,6 @@ class Model(ModelValue):
             if name not in names:
                 raise unknown(f"parameter of {type(self).__name__}", name, names)
         return type(self)(**{**{n: getattr(self, n) for n in names}, **changes})
-
-    @classmethod
-    def from_dataset(cls, ds: xr.Dataset) -> Self:
-        """Rebuild the model from a map, or from any selection of it.
-
-        Parameters
-        ----------
-        ds : xarray.Dataset
-            A Dataset that phasekit made. Parameters that are scalar coordinates become scalars;
-            swept ones that were not selected stay arrays.
-
-        Returns
-        -------
-        Model
-
-        Raises
-        ------
-        ParameterError
-            If the map was made with another model, or a parameter's coordinate is gone.
-        """
-        refuse_another(ds, cls.__name__)
-        return cls(**parameter_values(ds, cls.declared))
 
 
 def model(cls: type[ModelType]) -> type[ModelType]:

@@ -1,15 +1,20 @@
-"""A system as a value: its parameters, compared, hashed, pickled and written."""
+"""A system as a value: its parameters, compared, hashed, pickled, written, rebuilt from a map."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from phasekit.labels.arguments import brief, same
+from phasekit.labels.arguments import FloatArray, brief, same
+from phasekit.labels.coordinates import STATES
 from phasekit.laws.ladder import Lawful
+from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.summary import summary
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 class ModelValue(Lawful):
@@ -18,6 +23,73 @@ class ModelValue(Lawful):
     __slots__ = ()
 
     declared: ClassVar[tuple[Parameter, ...]]
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a parameter or state; None where it may be any.
+
+        Parameters
+        ----------
+        name : str
+            The parameter or state.
+
+        Returns
+        -------
+        str or None
+        """
+        units = {p.name: p.units for p in self.declared}
+        return units.get(name) or STATES.get(name, (None,))[0]
+
+    @property
+    def definition(self) -> dict[str, str]:
+        """What maps store of the system beside its name and parameters."""
+        return {}
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """What makes it again, by keyword."""
+        return dict(self.parameters)
+
+    @classmethod
+    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
+        """Values of a parameter, NaN where they leave its domain.
+
+        Parameters
+        ----------
+        name : str
+            The parameter.
+        value : ndarray
+            Values in its unit, of any shape.
+
+        Returns
+        -------
+        ndarray
+        """
+        for parameter in cls.declared:
+            if parameter.name == name and not (valid := parameter.valid(value)).all():
+                return np.where(valid, value, np.nan)
+        return value
+
+    @classmethod
+    def from_dataset(cls, ds: xr.Dataset) -> Self:
+        """Rebuild the model from a map, or from any selection of it.
+
+        Parameters
+        ----------
+        ds : xarray.Dataset
+            A Dataset that phasekit made. Parameters that are scalar coordinates become scalars;
+            swept ones that were not selected stay arrays.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, or a parameter's coordinate is gone.
+        """
+        refuse_another(ds, cls.__name__)
+        return cls(**parameter_values(ds, cls.declared))
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Restore a pickled model; its arrays are read-only again."""

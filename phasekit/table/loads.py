@@ -14,7 +14,8 @@ FIXED_PRESSURES = "[HedrihVeljovic2013] (8), (9), corrected"
 #: What rotators need of a machine.
 DISK = ("beta", "e", "a", "r", "omega1", "g")
 _HEAVY = ("beta", "e", "a", "r", "omega1", "m", "g")
-_BORNE = (*_HEAVY, "half_span")
+#: What forces at its bearings need.
+BORNE = (*_HEAVY, "half_span")
 _LOOPS = ("saddle_phi", "saddle_exponent", "turning_offset", "loop")
 _MOVED = (("state_ddphi", "ddphi"), ("domega1", "domega1"))
 
@@ -146,7 +147,7 @@ PASSES: tuple[Pass, ...] = (
     ),
     Pass(
         "phasekit.mechanics.bearings:bearing_forces",
-        (*_BORNE, *STATE),
+        (*BORNE, *STATE),
         ("bearing_forces",),
         optional=_MOVED,
     ),
@@ -159,11 +160,11 @@ PASSES: tuple[Pass, ...] = (
     Pass(
         "phasekit.loads.functions:equilibrium_rotators", (*DISK, "phi"), ("equilibrium_rotators",)
     ),
-    Pass("phasekit.loads.functions:equilibrium_forces", (*_BORNE, "phi"), ("equilibrium_forces",)),
+    Pass("phasekit.loads.functions:equilibrium_forces", (*BORNE, "phi"), ("equilibrium_forces",)),
     Pass(
         "phasekit.loads.functions:separatrix_rotators", (*DISK, *_LOOPS), ("separatrix_rotators",)
     ),
-    Pass("phasekit.loads.functions:separatrix_forces", (*_BORNE, *_LOOPS), ("separatrix_forces",)),
+    Pass("phasekit.loads.functions:separatrix_forces", (*BORNE, *_LOOPS), ("separatrix_forces",)),
     Pass("phasekit.loads.functions:orbit_rotators", (*DISK, *STATE), ("orbit_rotators",)),
-    Pass("phasekit.loads.functions:orbit_forces", (*_BORNE, *STATE), ("orbit_forces",)),
+    Pass("phasekit.loads.functions:orbit_forces", (*BORNE, *STATE), ("orbit_forces",)),
 )

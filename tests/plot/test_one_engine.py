@@ -10,6 +10,7 @@ import phasekit as pk
 from phasekit.errors import Loop
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.phase.answers import answers
+from phasekit.phase.level_curves import LevelCurves
 from phasekit.plot.parts import style
 from phasekit.plot.phase_portrait import curves_of
 from phasekit.systems.potential import Potential
@@ -55,7 +56,7 @@ RUNGS = {
 def test_rungs_agree_on_the_same_law(rung):
     land, scale = RUNGS[rung]
     if land is None:
-        land = type(curves_of(ROTOR))(answers(EvenRouthian(), {}))
+        land = LevelCurves.of(answers(EvenRouthian(), {}))
     exact = curves_of(pk.Coefficients(3.7, 1.3, 0.4))
     known, other = exact.answers, land.answers
     for name in ("phi", "saddle_phi", "turning_offset"):
@@ -69,7 +70,7 @@ def test_rungs_agree_on_the_same_law(rung):
     assert len(levels) == len(wanted) == 7
     for (h, x), (g, y) in zip(levels, wanted, strict=True):
         assert (h, x) == pytest.approx((scale * g, y), abs=1e-11)
-        (one,), (two,) = land.arcs_of((h, x)), exact.arcs_of((g, y))
+        (one,), (two,) = land.arcs(h, x), exact.arcs(g, y)
         np.testing.assert_allclose(one, two, atol=1e-7)
         period = exact.orbit(two, g, "period")
         assert land.orbit(one, h, "period") == pytest.approx(period, rel=1e-8)

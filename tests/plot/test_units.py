@@ -327,3 +327,19 @@ def test_wrong_units_are_named(units, message):
 
 def test_names_of_other_pictures_are_understood():
     assert P.phase_portrait(EIGHT, units={"beta": "deg", "omega1": "rpm", "a": "mm"}).lines
+
+
+def test_the_rate_of_an_angle_of_any_name_is_shown_in_the_unit_of_the_angle():
+    axes = {
+        name: pk.plot.phase_portrait(
+            pk.Potential(f"-cos({name})", name, period=2 * np.pi), energies=[0.5], angles="deg"
+        )
+        for name in ("phi", "theta")
+    }
+    assert axes["theta"].get_ylabel() == r"$\dot\theta$ (°/s)"
+    lines, same = (axes[name].get_lines() for name in ("theta", "phi"))
+    assert len(lines) == len(same) > 2
+    for line, other in zip(lines, same, strict=True):
+        np.testing.assert_array_equal(line.get_xydata(), other.get_xydata())
+    fastest = max(np.nanmax(line.get_ydata()) for line in lines)
+    assert fastest == pytest.approx(2.0 * DEG, rel=1e-4)  # of the separatrix

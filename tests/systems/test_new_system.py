@@ -93,6 +93,8 @@ def test_every_picture_takes_it(Governor):
         (lambda v: (1, v["l"] ** 0.5, 0, 1), "power 0.5: a polynomial has whole powers"),
         (lambda v: (1, 9.81 / v["l"], 0, 1), "multiply all four by what is divided by"),
         (lambda v: (1, v["l"] / v["l"], 0, 1), "multiply all four by what is divided by"),
+        (lambda v: (1, v["l"] ** 0.5, 0, 1), "of a root make the parameter"),
+        (lambda v: (1, np.sqrt(v["l"]), 0, 1), "pk.Potential takes any formula"),
         (lambda v: (1, np.sin(v["l"]), 0, 1), "TypeError: .*sin.*; wants A N, B N, C N and N as"),
         (lambda v: (1, v["length"], 0, 1), "KeyError: 'length'; wants A N"),
         (lambda v: (1, v["l"], 0), "not enough values to unpack .*; wants A N, B N, C N and N as"),

@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.kernels import defining, newton, trace
 from phasekit.bifurcation.continuation.kernels import state as state_places
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
+from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.numerics import differences
 
@@ -370,9 +371,9 @@ class Curve:
                 newton.DIVERGED: f"Newton's method converged for no step longer than {step}",
                 newton.SINGULAR: f"the derivatives of f are singular beyond, for every step "
                 f"longer than {step}",
-                trace.TURNS: f"the curve turns by more than max_turn = {self.options.max_turn:g} "
+                TURNS: f"the curve turns by more than max_turn = {self.options.max_turn:g} "
                 f"within {step}",
-                trace.CROSSES: f"branches cross or pass each other within {step}",
+                CROSSES: f"branches cross or pass each other within {step}",
             }
             return Stop("stuck", f"{words[which]} at {where}{self._differences()}")
         if reason == trace.NOT_FINITE:

@@ -12,7 +12,10 @@ from phasekit.numerics.exact import exact_discriminant
 from phasekit.numerics.launch import Arrays, launch
 from phasekit.phase.exact.kernels.equilibria import UNDECIDED
 
+Array = npt.NDArray[np.float64]
 Shapes = tuple[tuple[tuple[int, ...], Any], ...]
+
+NOTHING: Array = np.empty(0)
 
 
 def solve(
@@ -21,29 +24,27 @@ def solve(
     count: int,
     coefficients: tuple[npt.ArrayLike, npt.ArrayLike, npt.ArrayLike],
     threads: int | None,
+    exact: Array = NOTHING,
 ) -> Iterator[Arrays]:
     """Run a kernel over broadcast coefficients.
 
     ``shapes`` gives, for each group of outputs, the trailing shape and dtype of its arrays, and
     ``count`` the place of n_equilibria in the first group. ``threads`` defaults to all cores.
+    Where the kernel leaves a number open, it is called again with the ``exact`` discriminants.
     """
     arrays = [np.asarray(value, dtype=float) for value in coefficients]
     shape = np.broadcast_shapes(*(array.shape for array in arrays))
     # Copies: numba compiles a kernel anew for arrays that are read-only or not contiguous.
     flat = tuple(np.array(np.broadcast_to(array, shape)).reshape(-1) for array in arrays)
-    groups = _allocate(flat[0].size, shapes)
-    launch(kernel, (*flat, np.empty(0)), flat[0].size, groups, threads)
+    size = flat[0].size
+    groups = [tuple(np.empty((size, *tail), dtype) for tail, dtype in group) for group in shapes]
+    launch(kernel, (*flat, exact), size, groups, threads)
     undecided = np.flatnonzero(groups[0][count] == UNDECIDED)
     if undecided.size:
-        few = tuple(array[undecided] for array in flat)
-        exact = np.array([exact_discriminant(*abc) for abc in zip(*few, strict=True)])
-        decided = _allocate(undecided.size, shapes)
-        launch(kernel, (*few, exact), undecided.size, decided, threads)
+        A, B, C = (array[undecided] for array in flat)
+        exact = np.array([exact_discriminant(*abc) for abc in zip(A, B, C, strict=True)])
+        decided = solve(kernel, shapes, count, (A, B, C), threads, exact)
         for group, part in zip(groups, decided, strict=True):
             for array, values in zip(group, part, strict=True):
                 array[undecided] = values
     return (tuple(array.reshape(shape + array.shape[1:]) for array in group) for group in groups)
-
-
-def _allocate(size: int, shapes: tuple[Shapes, ...]) -> list[Arrays]:
-    return [tuple(np.empty((size, *tail), dtype) for tail, dtype in group) for group in shapes]

@@ -19,7 +19,7 @@ from phasekit.errors import ParameterError
 from phasekit.inputs import reals
 from phasekit.laws.formulas import short_formula, symbols_of, take_formula, write_formula
 from phasekit.laws.grammar import FormulaError
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.ladder import Conservative, is_turn
 from phasekit.laws.size import derived_nodes, expanded_terms
 from phasekit.phase.numerical.code import array_code
 
@@ -97,8 +97,7 @@ class Formula(Conservative):
         words = {"source": f"V = {self.text}"}
         if name == "potential":
             words["equation"] = f"V = {self.text}"
-        on_angles = self.period is not None and abs(self.period - 2.0 * np.pi) < 1e-12
-        if units == "rad" and not on_angles:
+        if units == "rad" and not is_turn(self.period):
             distance = long_name.replace("signed angle", "signed distance")
             words |= {"units": "1", "long_name": distance.replace("angle", "coordinate")}
         return words

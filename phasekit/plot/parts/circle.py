@@ -16,7 +16,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MultipleLocator
 from numpy.typing import NDArray
 
 from phasekit.labels.arguments import bad, number
-from phasekit.plot.parts.units import Angles, Units, as_units
+from phasekit.plot.parts.units import Units
 
 FloatArray = NDArray[np.float64]
 
@@ -113,12 +113,12 @@ class Circle:
 def circle_axis(
     ax: Axes,
     which: Literal["x", "y"],
-    angles: Angles | Units,
+    units: Units,
     circle: Circle | None = None,
     name: str = "phi",
 ) -> None:
     """Show the whole circle on one axis, with ticks at multiples of a quarter turn."""
-    factor = as_units(angles).scale(name, "rad")
+    factor = units.scale(name, "rad")
     low, high = (circle or Circle()).ends
     axis = ax.xaxis if which == "x" else ax.yaxis
     axis.set_major_locator(FixedLocator([quarter * factor for quarter in quarters(low, high)]))
@@ -136,11 +136,9 @@ def quarters(low: float, high: float) -> list[float]:
     return [k * (np.pi / 2) for k in range(first, last + 1)]
 
 
-def unwrapped_axis(
-    ax: Axes, which: Literal["x", "y"], angles: Angles | Units, name: str = "phi"
-) -> None:
+def unwrapped_axis(ax: Axes, which: Literal["x", "y"], units: Units, name: str = "phi") -> None:
     """Put ticks at quarter turns or multiples of them, where an axis spans half a turn or more."""
-    factor = as_units(angles).scale(name, "rad")
+    factor = units.scale(name, "rad")
     axis = ax.xaxis if which == "x" else ax.yaxis
     low, high = sorted(ax.get_xlim() if which == "x" else ax.get_ylim())
     spanned = (high - low) / factor / (np.pi / 2)

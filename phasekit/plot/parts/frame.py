@@ -112,14 +112,20 @@ def legend_below(
     known = {**SHORT, **(short or {})}
     brief = [known.get(name, name.removeprefix("from ")) for name in names]  # of a start its state
     tried: dict[float, tuple[list[str], int]] = {}
-    width, height = _room(ax)
+    box, figure = ax.get_window_extent(), ax.figure
+    width, height = float(box.width), float(box.height)
+    if [*figure.axes] == [ax]:
+        # Before the layout these are narrower than after it, if no color bar stands beside them.
+        tight = ax.get_tightbbox()
+        beside = 0.0 if tight is None else max(box.x0 - tight.x0, 0) + max(tight.x1 - box.x1, 0)
+        width, height = 0.98 * float(figure.bbox.width - beside), float(figure.bbox.height)
     for texts in [names, brief] if brief != names else [names]:
         for columns in range(min(3, len(handles)), 0, -1):
-            box = _legend(ax, handles, texts, columns).get_window_extent()
-            if box.width <= width or columns == 1:
-                tried.setdefault(float(box.height), (texts, columns))
+            own = _legend(ax, handles, texts, columns).get_window_extent()
+            if own.width <= width or columns == 1:
+                tried.setdefault(float(own.height), (texts, columns))
                 break
-        if box.height <= TALL * height and box.width <= width:
+        if own.height <= TALL * height and own.width <= width:
             break
     texts, columns = tried[min(tried)]
     return _legend(ax, handles, texts, columns)
@@ -146,17 +152,3 @@ def _legend(ax: Axes, handles: list[Artist], texts: list[str], columns: int) -> 
         handletextpad=0.5 if small else 0.8,
         labelspacing=0.3 if small else 0.5,
     )
-
-
-def _room(ax: Axes) -> tuple[float, float]:
-    """Return the width that a legend may have, in pixels, and the height of the panel.
-
-    Before the layout Axes in a figure of their own are narrower than after it, if they have no
-    color bar beside them.
-    """
-    box, figure = ax.get_window_extent(), ax.figure
-    if [*figure.axes] != [ax]:
-        return float(box.width), float(box.height)
-    tight = ax.get_tightbbox()
-    beside = 0.0 if tight is None else max(box.x0 - tight.x0, 0.0) + max(tight.x1 - box.x1, 0.0)
-    return float(figure.bbox.width - beside) * 0.98, float(figure.bbox.height)

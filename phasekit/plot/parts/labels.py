@@ -11,22 +11,10 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
-from phasekit.plot.parts.units import Angles, Units, as_units
+from phasekit.plot.parts.units import SYMBOLS, Angles, Units, as_units
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION
 from phasekit.systems.registry import models
 from phasekit.systems.system import Model
-
-SYMBOLS = {
-    "beta": r"$\beta$",
-    "lam": r"$\lambda$",
-    "psi": r"$\psi$",
-    "phi": r"$\varphi$",
-    "omega1": r"$\omega_1$",
-    "state_phi": r"$\varphi_0$",
-    "state_dphi": r"$\dot\varphi_0$",
-    "Omega_sq": r"$\Omega^2$",
-    **{name: f"${name}$" for name in ("A", "B", "C", "a", "e", "g", "m", "r")},
-}
 
 #: Names of quantities where there is no room for their meaning, if they are not plain words.
 BRIEF = {"n_equilibria": "number of equilibria"}
@@ -56,15 +44,6 @@ def label(values: xr.DataArray, units: Angles | Units, width: int, extra: str = 
         ", ".join(filter(None, one)) for one in ((symbol, meaning, extra), (brief, extra))
     )
     return fitting(width, unit, long, short, brief)
-
-
-def coordinate_symbol(name: str) -> str:
-    """Return a coordinate for print, without the dollars."""
-    if name in SYMBOLS:
-        return SYMBOLS[name].strip("$")
-    import sympy as sp
-
-    return str(sp.latex(sp.Symbol(name)))
 
 
 def with_unit(text: str, unit: str) -> str:

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import labels
 from phasekit.plot.parts.circle import Circle
-from phasekit.plot.parts.units import Units
+from phasekit.plot.parts.units import Units, coordinate_symbol
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ class StatePlane:
 
     def name_axes(self, ax: Axes) -> None:
         """Write symbols and units on both axes."""
-        symbol = labels.coordinate_symbol("phi" if self.on_angle else self.coordinate)
+        symbol = coordinate_symbol("phi" if self.on_angle else self.coordinate)
         units = (self.units.text("phi", "rad"), self.units.text("dphi", "s-1"))
         across, up = units if self.on_angle else ("", "")
         dotted = symbol if symbol.startswith("\\") else f" {symbol}"  # \varphi needs no space

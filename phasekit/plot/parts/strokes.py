@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,14 +11,12 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from numpy.typing import NDArray
 
 from phasekit.errors import Loop
 from phasekit.phase.level_curves import Arc, LevelCurves
 from phasekit.plot.parts import style
 from phasekit.plot.parts.circle import Circle
 
-FloatArray = NDArray[np.float64]
 State = tuple[float, float]
 #: What the coordinate and its rate are multiplied by to be shown.
 Scale = tuple[float, float]
@@ -32,27 +31,83 @@ LOOPS: Mapping[Loop, style.Look] = {
 }
 
 
-def circle_of(land: LevelCurves) -> Circle:
-    """Return the circle on which a system's coordinate is shown; or its line."""
-    return Circle(land.window[0], land.answers.period)
+@dataclass(frozen=True)
+class Strokes:
+    """The level curves of one system, drawn in Axes.
 
+    Attributes
+    ----------
+    circle : Circle
+        The circle on which the coordinate is shown; or its line.
+    scale : (float, float)
+        What the coordinate and its rate, or its potential, are multiplied by to be shown.
+    """
 
-def closed(x: FloatArray, speed: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the closed curve whose upper half is given."""
-    return np.concatenate([x, x[::-1]]), np.concatenate([speed, -speed[::-1]])
+    ax: Axes
+    land: LevelCurves
+    circle: Circle
+    scale: Scale
 
+    def level(self, energy: float, arc: Arc, **look: Any) -> None:
+        """Draw both halves of a level curve over an arc, as one line where they join."""
+        closed = all(self.land.closes(arc))
+        x, speed = self.land.curve(arc, energy, whole=closed)
+        if closed:
+            x, speed = self.circle.unrolled(x, speed)
+        for sign in (1.0,) if closed else (1.0, -1.0):
+            self.ax.plot(x * self.scale[0], sign * speed * self.scale[1], **look)
 
-def draw_level(
-    ax: Axes, land: LevelCurves, energy: float, arc: Arc, scale: Scale, **look: Any
-) -> None:
-    """Draw both halves of a level curve over an arc, as one line where they join."""
-    x, speed = land.curve(arc, energy)
-    if all(land.closes(arc)):
-        x, speed = circle_of(land).unrolled(*closed(x, speed))
-        ax.plot(x * scale[0], speed * scale[1], **look)
-        return
-    for sign in (1.0, -1.0):
-        ax.plot(x * scale[0], sign * speed * scale[1], **look)
+    def separatrices(self) -> list[Artist]:
+        """Draw what leaves and reaches the saddles, fill an eight; return handles for a legend."""
+        handles: dict[str, Artist] = {}
+        stretch, rise = self.scale
+        for energy, arc, loop in self.land.separatrices:
+            look = style.inked(LOOPS[loop])
+            # The dashes of a winding separatrix show on an eight that all but touches it.
+            self.level(energy, arc, zorder=3.5 if "winding" in look["label"] else 3.0, **look)
+            key: Artist = Line2D([], [], **look)
+            if loop == Loop.LOBES:
+                key = Patch(**style.EIGHT_KEY)
+                x, y = self.land.curve(arc, energy, whole=True)
+                for turn in self.circle.turns(x):
+                    self.ax.fill((x + turn) * stretch, y * rise, zorder=0.5, **style.EIGHT_FILL)
+            handles.setdefault(look["label"], key)
+        for energy, arc, _ in self.land.steps:
+            self.level(energy, arc, zorder=3.0, **style.DEGENERATE)
+            handles["step"] = Line2D([], [], **style.DEGENERATE)
+        return list(handles.values())
+
+    def orbit(self, start: State, number: int) -> Artist:
+        """Draw the orbit through a start (x, x'), mark the start, return a handle."""
+        look, (stretch, rise) = orbit_look(number), self.scale
+        for energy, arc in self.land.orbit_levels(*start):
+            if self.land.comes_back(*start):
+                self.level(energy, arc, zorder=4, **look)
+            else:
+                x, speed = self.land.curve(arc, energy)
+                x, speed = self.circle.unrolled(x, speed if start[1] >= 0.0 else -speed)
+                self.ax.plot(x * stretch, speed * rise, zorder=4, **look)
+        where = self.circle.home(start[0]) * stretch
+        self.ax.plot([where], [start[1] * rise], zorder=6, color=look["color"], **START)
+        return Line2D([], [], label=start_name(self.circle, start, self.scale), **START, **look)
+
+    def points(self, *, on_potential: bool = False) -> list[Artist]:
+        """Mark the equilibria, on the axis or on the potential; return handles for a legend."""
+        handles: list[Artist] = []
+        known, (stretch, rise) = self.land.answers, self.scale
+        for kind, look in style.POINTS.items():
+            x, level = known.phi[known.kind == kind], known.energy[known.kind == kind]
+            if not x.size:
+                continue
+            x, level = self.circle.points(x, level)
+            height = level * rise if on_potential else np.zeros(x.shape)
+            handles += self.ax.plot(
+                x * stretch, height, linestyle="none", zorder=5, clip_on=False, **look
+            )
+        if not known.phi.size and known.period is not None and not on_potential:
+            ends = np.array(self.land.window) * stretch
+            handles += self.ax.plot(ends, [0.0, 0.0], zorder=5, **style.REST)
+        return handles
 
 
 def level_look(land: LevelCurves, arc: Arc, color: str | None = None) -> style.Look:
@@ -64,80 +119,10 @@ def level_look(land: LevelCurves, arc: Arc, color: str | None = None) -> style.L
     return {**look, "color": color, "linewidth": width, "solid_capstyle": "round"}
 
 
-def draw_separatrices(ax: Axes, land: LevelCurves, scale: Scale) -> list[Artist]:
-    """Draw what leaves and reaches the saddles, fill an eight; return handles for the legend."""
-    handles: dict[str, Artist] = {}
-    for energy, arc, loop in land.separatrices:
-        look = style.inked(LOOPS[loop])
-        # The dashes of a winding separatrix show on an eight that all but touches it.
-        draw_level(
-            ax, land, energy, arc, scale, zorder=3.5 if "winding" in look["label"] else 3.0, **look
-        )
-        key: Artist = Line2D([], [], **look)
-        if loop == Loop.LOBES:
-            key = Patch(**style.EIGHT_KEY)
-            x, y = closed(*land.curve(arc, energy))
-            for turn in circle_of(land).turns(x):
-                ax.fill((x + turn) * scale[0], y * scale[1], zorder=0.5, **style.EIGHT_FILL)
-        handles.setdefault(look["label"], key)
-    for energy, arc, _ in land.steps:
-        draw_level(ax, land, energy, arc, scale, zorder=3.0, **style.DEGENERATE)
-        handles["step"] = Line2D([], [], **style.DEGENERATE)
-    return list(handles.values())
-
-
-def draw_orbit(ax: Axes, land: LevelCurves, start: State, number: int, scale: Scale) -> Artist:
-    """Draw the orbit through a start (x, x'), mark the start, return a handle."""
-    look = orbit_look(number)
-    where = circle_of(land).home(start[0])
-    for energy, arc in orbit_levels(land, start):
-        if land.comes_back(*start):
-            draw_level(ax, land, energy, arc, scale, zorder=4, **look)
-        else:
-            x, speed = land.curve(arc, energy)
-            sign = 1.0 if start[1] >= 0.0 else -1.0
-            x, speed = circle_of(land).unrolled(x, sign * speed)
-            ax.plot(x * scale[0], speed * scale[1], zorder=4, **look)
-    ax.plot([where * scale[0]], [start[1] * scale[1]], zorder=6, color=look["color"], **START)
-    return Line2D([], [], label=start_name(land, start, scale), **START, **look)
-
-
-def orbit_levels(land: LevelCurves, start: State) -> list[tuple[float, Arc]]:
-    """Return energy and arc of the orbit through a start, and of its turns where they differ.
-
-    None where it is at rest or out of sight.
-    """
-    if land.at_rest(*start):
-        return []
-    energy = land.energy(*start)
-    arcs = land.arcs_of((energy, circle_of(land).home(start[0])))
-    return [level for arc in arcs for level in land.followed(energy, arc)]
-
-
-def start_name(land: LevelCurves, start: State, scale: Scale) -> str:
+def start_name(circle: Circle, start: State, scale: Scale) -> str:
     """Return a start (x, x') for print, its angle on the circle."""
-    where, speed = circle_of(land).home(start[0]) * scale[0], start[1] * scale[1]
-    text = f"from ({where:.4g}, {speed:.4g})"
+    text = f"from ({circle.home(start[0]) * scale[0]:.4g}, {start[1] * scale[1]:.4g})"
     return text.replace("-", "\N{MINUS SIGN}")
-
-
-def draw_points(
-    ax: Axes, land: LevelCurves, scale: Scale, *, on_potential: bool = False
-) -> list[Artist]:
-    """Mark the equilibria, on the axis or on the potential, which `scale` then ends with."""
-    handles: list[Artist] = []
-    known, period = land.answers, land.answers.period
-    for kind, look in style.POINTS.items():
-        x, level = known.phi[known.kind == kind], known.energy[known.kind == kind]
-        if not x.size:
-            continue
-        x, level = circle_of(land).points(x, level)
-        height = level * scale[1] if on_potential else np.zeros(x.shape)
-        handles += ax.plot(x * scale[0], height, linestyle="none", zorder=5, clip_on=False, **look)
-    if not known.phi.size and period is not None and not on_potential:
-        ends = np.array(land.window) * scale[0]
-        handles += ax.plot(ends, [0.0, 0.0], zorder=5, **style.REST)
-    return handles
 
 
 def orbit_look(number: int) -> style.Look:

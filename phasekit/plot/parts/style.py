@@ -27,8 +27,6 @@ from phasekit.plot.parts.frame import letters as letters
 from phasekit.plot.parts.frame import narrow as narrow
 from phasekit.plot.parts.frame import new_figure as new_figure
 from phasekit.plot.parts.units import Angles as Angles
-from phasekit.plot.parts.units import angle_factor as angle_factor
-from phasekit.plot.parts.units import angle_unit as angle_unit
 
 Look = dict[str, Any]
 

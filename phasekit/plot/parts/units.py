@@ -1,4 +1,4 @@
-"""The units in which a picture shows its quantities, by their names."""
+"""The symbols and units in which a picture shows its quantities, by their names."""
 
 from __future__ import annotations
 
@@ -7,18 +7,30 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.conversion import in_si
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.units import UNITS, UNITS_OF, converted, factor, usual
+from phasekit.labels.units import UNITS_OF, converted, factor, si_unit, usual
 from phasekit.systems.registry import models
 from phasekit.table.quantities import quantities
 
 Angles = Literal["rad", "deg"]
+
+#: Quantities and parameters for print.
+SYMBOLS = {
+    "beta": r"$\beta$",
+    "lam": r"$\lambda$",
+    "psi": r"$\psi$",
+    "phi": r"$\varphi$",
+    "omega1": r"$\omega_1$",
+    "state_phi": r"$\varphi_0$",
+    "state_dphi": r"$\dot\varphi_0$",
+    "Omega_sq": r"$\Omega^2$",
+    **{name: f"${name}$" for name in ("A", "B", "C", "a", "e", "g", "m", "r")},
+}
 
 PRINTED = {"deg": "°", "deg/s": "°/s", "deg/s2": "°/s$^2$", "um": "\N{MICRO SIGN}m", "1": ""}
 
@@ -42,7 +54,9 @@ class Units:
     @classmethod
     def of(cls, angles: Any, units: Any = None, own: Mapping[str, str] | None = None) -> Units:
         """Check what a picture got for `angles` and `units`; `own` are units of its own names."""
-        angle_factor(angles)
+        asked: object = angles
+        if not isinstance(asked, str) or asked not in ("rad", "deg"):
+            raise bad("angles", asked, "'rad' or 'deg'")
         if units is None:
             return cls(angles)
         if not isinstance(units, Mapping):
@@ -51,7 +65,7 @@ class Units:
         for name, unit in units.items():
             if not isinstance(name, str) or name not in known:
                 raise unknown("name in units", name, known)
-            converted(f"units: {name}", 1.0, _base(known[name]), unit)
+            converted(f"units: {name}", 1.0, si_unit(known[name]) or known[name], unit)
         return cls(angles, {name: usual(unit) for name, unit in units.items()})
 
     @classmethod
@@ -61,8 +75,9 @@ class Units:
         What it holds in another unit is shown in that one, if nothing else is asked for.
         """
         held = {str(name): str(one.attrs.get("units", "")) for name, one in ds.variables.items()}
-        asked = cls.of(angles, units, {name: _base(unit) for name, unit in held.items()})
-        others = {name: unit for name, unit in held.items() if _base(unit) != unit}
+        si = {name: si_unit(unit) or unit for name, unit in held.items()}
+        asked = cls.of(angles, units, si)
+        others = {name: unit for name, unit in held.items() if si[name] != unit}
         ds = in_si(ds)
         return ds, cls(asked.angles, {**others, **asked.chosen})
 
@@ -74,7 +89,7 @@ class Units:
         chosen = self.chosen.get(name, self.chosen.get(bare))
         if chosen is not None:
             return chosen
-        if held == "s-1" and bare == "dphi":
+        if held == "rad/s" or (held == "s-1" and bare == "dphi"):
             return f"{self.angles}/s"
         return self.angles if held == "rad" else held
 
@@ -83,7 +98,7 @@ class Units:
         unit = self.unit(name, held)
         if unit == held:
             return 1.0
-        base = _base(held)
+        base = si_unit(held) or held
         si = float(factor(name, held, base)) if held != base else 1.0
         return float(converted(f"units: {name}", si, base, unit))
 
@@ -112,23 +127,13 @@ def printed(unit: str) -> str:
     return PRINTED.get(unit, re.sub(r"(?<=[A-Za-z])(-?\d+)", r"$^{\1}$", unit))
 
 
-def angle_factor(angles: object) -> float:
-    """Return what radians are multiplied by to be shown in `angles`."""
-    factors = {"rad": 1.0, "deg": 180.0 / np.pi}
-    if not isinstance(angles, str) or angles not in factors:
-        raise bad("angles", angles, "'rad' or 'deg'")
-    return factors[angles]
+def coordinate_symbol(name: str) -> str:
+    """Return a coordinate for print, without the dollars."""
+    if name in SYMBOLS:
+        return SYMBOLS[name].strip("$")
+    import sympy as sp
 
-
-def angle_unit(angles: Angles) -> str:
-    """Return the symbol of the unit in which angles are shown."""
-    return printed(angles)
-
-
-def _base(held: str) -> str:
-    """Return the SI unit of the values of a unit; the unit itself where it is not known."""
-    fitting = (base for base, units in UNITS.items() if held == base or usual(held) in units)
-    return next(fitting, held)
+    return str(sp.latex(sp.Symbol(name)))
 
 
 def _known() -> dict[str, str]:
