@@ -313,7 +313,7 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
         forward = run(cycles, start, "forward")[1]
         origin = Stop("period_doubling", where)
         return make_cycles(problem, cycles, start, (None, forward), point.branch.record, origin)
-    dx = starts.null_vector(cycles, here.orbit, checked.W, 1.0, (here.dx, here.dy))
+    dx, _ = starts.other_tangent(cycles, here.orbit, checked.W, (here.dx, here.dy))
     sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
     one, two = (_start(cycles, side, f"beside {where}").orbit for side in sides)
     mesh = here.orbit.mesh
