@@ -46,7 +46,8 @@ def continuation(
     ----------
     problem : Problem or system
         The system, at the parameters of the start. A system of phasekit (a disk, coefficients, ...)
-        with scalar parameters is ``phi' = -V'(phi)`` on the circle.
+        with scalar parameters is ``phi' = -V'(phi)`` on the circle; with an orbit, and a
+        `FreeGyroRotor` always, it has the states phi and dphi.
     parameter : str
         The parameter that varies. It starts at the problem's own value.
     x0 : array_like or str, optional
@@ -62,7 +63,7 @@ def continuation(
     fix : {None, "period"}
         With "period" the periodic orbits keep their period, and a second parameter is free: give
         ``parameter=(first, second)`` and the span of the first, or both. Orbits of a long period
-        follow a homoclinic orbit so.
+        follow a homoclinic orbit so. Of a conservative problem one parameter is enough.
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function
@@ -115,7 +116,7 @@ def continuation(
     >>> point.label, point.x.item(), round(point["mu"], 12), branch.stops[1].reason
     ('UZ', -0.5, 0.375, 'half')
     """
-    problem = as_problem(problem)
+    problem = as_problem(problem, moving=orbit is not None)
     options = check_options(options)
     if orbit is not None:
         from phasekit.labelled.continuation.cycle_start import continue_orbit

@@ -21,13 +21,13 @@ SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hop
 
 
 def settled(
-    cycles: Cycles, guess: Orbit, *, second: bool = False, iterations: int = 40
+    cycles: Cycles, guess: Orbit, *, held: int | None = None, iterations: int = 40
 ) -> Solution:
     """The orbit that a guess leads to at fixed parameters, on a mesh that suits it.
 
-    Of two parameters only the ``second`` is held.
+    Of several parameters only one is held, by its place from 1 on; the last by default.
     """
-    held = 2 if second else len(cycles.active)
+    held = len(cycles.active) if held is None else held
     for _ in range(8):
         rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
         rows_y[-1, held], target[-1] = 1.0, guess.y[held]
