@@ -78,7 +78,7 @@ def continuation(
     stop : str, callable, or sequence of them, optional
         Where the branch ends before: at the first event of a name, special point of a kind or
         label, zero of a function ``q(x, **parameters)`` or change of one that says yes or no. The
-        start itself does not count.
+        start itself does not count. Of periodic orbits x is a whole orbit, as for events.
     options : ContinuationOptions, optional
         Steps, tolerances, bounds, directions.
 
@@ -128,12 +128,11 @@ def continuation(
                 "orbit", orbit, "None of a map",
                 "orbits of a map are fixed points of problem.iterated(times)",
             )  # fmt: skip
-        if stop is not None:
-            raise bad("stop", stop, "None with an orbit", "bounds= of the options end it, too")
         with said(f"following periodic orbits along {parameter}"):
             return continue_orbit(
-                problem, parameter, orbit, span, _record(problem, record), options, fix, events
-            )
+                problem, parameter, orbit, span, _record(problem, record), options, fix, events,
+                stop,
+            )  # fmt: skip
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)

@@ -11,8 +11,8 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.ending import run
 from phasekit.bifurcation.continuation.periodic.extended import extended
-from phasekit.bifurcation.continuation.periodic.family import run
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
 from phasekit.labelled.continuation.cycle_points import clock_code
@@ -34,7 +34,7 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
     options = _options(cycles, options)
     if isinstance(direction, bool) or direction != 0:
         raise bad("direction", direction, "0: there is one other branch")
-    cycles = cycles.replace(options=options)
+    cycles = cycles.replace(options=options, ends=())
     here = point.special.point
     name = point.branch.parameter
     where = f"the {point.kind.replace('_', ' ')} at {name} = {point.parameters[name]:.12g}"

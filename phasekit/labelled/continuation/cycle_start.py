@@ -12,12 +12,12 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.family import run
+from phasekit.bifurcation.continuation.periodic.ending import run
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
-from phasekit.labelled.continuation.cycle_events import orbit_events_of, try_events
+from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
 from phasekit.labelled.continuation.orbit_guess import (
     Given,
     cycles_of,
@@ -87,9 +87,11 @@ def continue_orbit(
     options: ContinuationOptions,
     fix: str | None = None,
     events: Any = None,
+    stop: Any = None,
 ) -> CycleBranch:
     """Follow the family of a periodic orbit along a parameter, or along two at a fixed period."""
     asked = orbit_events_of(problem, events)
+    asked, ends = orbit_stop_of(problem, stop, asked, critical=fix is None)
     if problem.conservative:
         if fix is None:
             options = by_period(parameter, span, options)
@@ -112,7 +114,7 @@ def continue_orbit(
     lead = start.dy[0] if cycles.vertical(start.dy) else start.dy[1]
     if lead < 0.0:
         start = start.flipped()
-    cycles = cycles.replace(events=asked)
+    cycles = cycles.replace(events=asked, ends=ends)
     try_events(cycles, start.orbit)
     return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
 

@@ -93,7 +93,7 @@ def root(stretch: Stretch, test: Value) -> Point | None:
         if point is None:
             return None
         value = test(point, forced)
-        if abs(value) < least:
+        if abs(value) <= least:  # of what jumps, the last one
             best, least = point, abs(value)
         if value == 0.0 or abs(s - before) <= 1e-14 * stretch.length:
             break
