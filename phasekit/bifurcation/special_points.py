@@ -178,7 +178,7 @@ for _kind in (
     PointKind(
         "cycle_branch_point", "BPC", "families of periodic orbits cross",
         "determinant of the collocation equations, bordered", "as of a fold of cycles, with one "
-        "null vector more", (), "^", 8, "white", None, crossing=1,
+        "null vector more", ("d", "a", "c"), "^", 8, "white", None, crossing=1,
     ),
     PointKind(
         "no_force", "NF", "A = B = C = 0: every angle is an equilibrium",

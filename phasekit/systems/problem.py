@@ -13,8 +13,10 @@ from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labels.arguments import bad, flag, reals, unknown, whole
 from phasekit.laws.formulas import symbols_of
+from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.maps import iterated
+from phasekit.systems.moving_problem import moving_formulas, moving_words
 from phasekit.systems.perturbed_problem import formulas_of, words_of
 from phasekit.systems.problem_parts import (
     angles_of,
@@ -343,10 +345,11 @@ def _made(
     return problem.described(words)
 
 
-def as_problem(problem: Any) -> Problem:
+def as_problem(problem: Any, *, moving: bool = False) -> Problem:
     """Return the problem that an argument is: a Problem, or a system.
 
-    Of a `Perturbed` system the states are the angle and its rate; forced, it depends on time.
+    Of a `Perturbed` system the states are the angle and its rate; forced, it depends on time. So
+    they are of a `FreeGyroRotor`, at its momentum, and of a ``moving`` system in a potential.
 
     Raises
     ------
@@ -358,6 +361,10 @@ def as_problem(problem: Any) -> Problem:
     if isinstance(problem, Model) and issubclass(problem.rung, PerturbedConservative):
         f, states, values, keywords = formulas_of(problem)
         return Problem(f, states, values, **keywords).described(words_of(problem, states, values))
+    if isinstance(problem, Model) and (moving or issubclass(problem.rung, Routhian)):
+        f, states, values, keywords = moving_formulas(problem)
+        made = Problem(f, states, values, **keywords)
+        return made.described(moving_words(problem, states, list(values)))
     if isinstance(problem, Model):
         return Problem.from_system(problem)
     convert = getattr(problem, "as_problem", None)

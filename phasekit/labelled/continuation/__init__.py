@@ -11,7 +11,7 @@ lead(
         "point.double": "phasekit.labelled.continuation.point_curves:doubled",
         "point.orbits": "phasekit.labelled.continuation.cycle_start:from_hopf",
         "point.curve": "phasekit.labelled.continuation.point_curves:point_curve",
-        "orbit.switch": "phasekit.labelled.continuation.cycle_start:switched",
-        "orbit.curve": "phasekit.labelled.continuation.cycle_start:point_curve",
+        "orbit.switch": "phasekit.labelled.continuation.cycle_onward:switched",
+        "orbit.curve": "phasekit.labelled.continuation.cycle_onward:point_curve",
     }
 )

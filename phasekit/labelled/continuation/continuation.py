@@ -46,7 +46,8 @@ def continuation(
     ----------
     problem : Problem or system
         The system, at the parameters of the start. A system of phasekit (a disk, coefficients, ...)
-        with scalar parameters is ``phi' = -V'(phi)`` on the circle.
+        with scalar parameters is ``phi' = -V'(phi)`` on the circle; with an orbit, and a
+        `FreeGyroRotor` always, it has the states phi and dphi.
     parameter : str
         The parameter that varies. It starts at the problem's own value.
     x0 : array_like or str, optional
@@ -62,7 +63,7 @@ def continuation(
     fix : {None, "period"}
         With "period" the periodic orbits keep their period, and a second parameter is free: give
         ``parameter=(first, second)`` and the span of the first, or both. Orbits of a long period
-        follow a homoclinic orbit so.
+        follow a homoclinic orbit so. Of a conservative problem one parameter is enough.
     record : mapping of str to callable, or sequence of str, optional
         Quantities to record at each point: functions ``q(x, **parameters)``, or, of a system,
         names of quantities. Of periodic orbits the least, largest and mean value of such a function
@@ -77,7 +78,7 @@ def continuation(
     stop : str, callable, or sequence of them, optional
         Where the branch ends before: at the first event of a name, special point of a kind or
         label, zero of a function ``q(x, **parameters)`` or change of one that says yes or no. The
-        start itself does not count.
+        start itself does not count. Of periodic orbits x is a whole orbit, as for events.
     options : ContinuationOptions, optional
         Steps, tolerances, bounds, directions.
 
@@ -115,7 +116,7 @@ def continuation(
     >>> point.label, point.x.item(), round(point["mu"], 12), branch.stops[1].reason
     ('UZ', -0.5, 0.375, 'half')
     """
-    problem = as_problem(problem)
+    problem = as_problem(problem, moving=orbit is not None)
     options = check_options(options)
     if orbit is not None:
         from phasekit.labelled.continuation.cycle_start import continue_orbit
@@ -127,12 +128,11 @@ def continuation(
                 "orbit", orbit, "None of a map",
                 "orbits of a map are fixed points of problem.iterated(times)",
             )  # fmt: skip
-        if stop is not None:
-            raise bad("stop", stop, "None with an orbit", "bounds= of the options end it, too")
         with said(f"following periodic orbits along {parameter}"):
             return continue_orbit(
-                problem, parameter, orbit, span, _record(problem, record), options, fix, events
-            )
+                problem, parameter, orbit, span, _record(problem, record), options, fix, events,
+                stop,
+            )  # fmt: skip
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)

@@ -13,8 +13,9 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.ending import cut, go_on, in_order
 from phasekit.bifurcation.continuation.periodic.events import find
-from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, go_on, join
+from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, join
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch
@@ -200,8 +201,8 @@ def make_cycles(
 ) -> CycleBranch:
     """A branch of what was traced: special points are looked for, quantities recorded."""
     path = join(start, tracks, origin)
-    found = [*find(cycles, path), *_ends(path)]
-    found.sort(key=lambda one: (one.index, one.point.arclength))
+    path, special = cut(cycles, path, in_order(find(cycles, path)))
+    found = in_order([*special, *_ends(path)])
     points, labels, places = list(path.points), [""] * len(path.points), []
     shift = 0
     for one in found:
@@ -216,7 +217,7 @@ def make_cycles(
     places = [len(points) - 1 if one.kind == "end" and one.index >= 0 else p
               for one, p in zip(found, places, strict=True)]  # fmt: skip
     for one, place in zip(found, places, strict=True):
-        if one.kind == "end":
+        if one.kind == "end" and not labels[place]:
             labels[place] = KINDS["end"].label
     names = tuple(cycles.field.parameters[i] for i in cycles.active)
     branch = CycleBranch(
@@ -236,10 +237,10 @@ def _ends(path: Any) -> list[Found]:
     if path.stops[1].reason == "closed":
         return []
     ends = []
+    points = [path.points[-k] if one is None else one.point for k, one in enumerate(path.ends)]
     for index, point, stop in (
-        (-1, path.points[0], path.stops[0]),
-        (len(path.points), path.points[-1], path.stops[1]),
-    ):
+        (-2, points[0], path.stops[0]), (len(path.points), points[1], path.stops[1]),
+    ):  # fmt: skip
         at = float(point.orbit.y[1])
         ends.append(Found("end", point, index, (at, at), "converged", stop.message, {}))
     return ends

@@ -16,11 +16,14 @@ from phasekit.bifurcation.continuation.periodic.functionals import (
     number_names,
 )
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.user_events import named
+from phasekit.labelled.continuation.user_events import ending, named
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import check_call
+
+#: Special points along one parameter.
+CRITICAL = ("fold_of_cycles", "period_doubling", "torus", "cycle_branch_point")
 
 
 def orbit_events_of(problem: Problem, events: Any) -> tuple[Functional, ...]:
@@ -35,6 +38,22 @@ def orbit_events_of(problem: Problem, events: Any) -> tuple[Functional, ...]:
         Functional(name, _function(problem, given, f"events[{name!r}]"))
         for name, given in named(events)
     )
+
+
+def orbit_stop_of(
+    problem: Problem, stop: Any, events: tuple[Functional, ...], *, critical: bool
+) -> tuple[tuple[Functional, ...], tuple[str, ...]]:
+    """All events, those with which a family ends as well, and the names at which it ends.
+
+    Kinds of special points are among them where multipliers are ``critical``: along one parameter.
+    """
+    if stop is None:
+        return events, ()
+
+    def made(name: str, given: Any) -> Functional:
+        return Functional(name, _function(problem, given, "stop"))
+
+    return ending(stop, events, made, ("event", *(CRITICAL if critical else ())))
 
 
 def _function(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:
@@ -69,13 +88,14 @@ def try_events(cycles: Cycles, orbit: Orbit) -> None:
     Raises
     ------
     ParameterError
-        If one raises, or returns anything else.
+        If one raises, or returns anything else; or says yes or no, unless the family ends there.
     """
     for event in cycles.events:
         if not isinstance(event.function, OfOrbit):
             continue
-        argument = f"events[{event.name!r}]"
+        argument = "stop" if event.name in cycles.ends else f"events[{event.name!r}]"
         try:
+            found = event.function.returned(cycles, orbit)
             event.value(cycles, orbit)
         except Exception as error:
             raise ParameterError(
@@ -83,3 +103,8 @@ def try_events(cycles: Cycles, orbit: Orbit) -> None:
                 "function q(x, **parameters) of one number, with x the states of a whole orbit, "
                 f"of shape {np.shape(orbit.x[:, : cycles.own].T)}"
             ) from error
+        if isinstance(found, (bool, np.bool_)) and event.name not in cycles.ends:
+            raise bad(
+                argument, found, "a function whose zero is the event",
+                "it says yes or no: give a difference that changes its sign",
+            )  # fmt: skip

@@ -39,16 +39,14 @@ def clock_code(problem: Problem, active: tuple[int, ...]) -> int:
 
 def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = False) -> int:
     """Number of multipliers outside the unit circle; -1 where they are not known."""
-    values = point.multipliers
-    if not np.isfinite(values).all() or not point.trusted:
+    if not point.trusted:
         return -1
+    values = point.multipliers.tolist()
     if not forced:
         # Where energy is conserved, two are always 1.
-        trivial = np.argsort(np.abs(values - 1.0), kind="stable")[: 2 if neutral else 1]
-        values = np.delete(values, trivial)
-    return int(
-        np.sum(np.abs(values) > 1.0 + (ON_CIRCLE if label not in ("", "UZ") or neutral else 0.0))
-    )
+        values = sorted(values, key=lambda one: abs(one - 1.0))[2 if neutral else 1 :]
+    limit = 1.0 + (ON_CIRCLE if label not in ("", "UZ") or neutral else 0.0)
+    return sum(abs(one) > limit for one in values)
 
 
 def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:

@@ -79,6 +79,8 @@ def save(branch: CycleBranch, path: str | PathLike[str], overwrite: bool) -> Non
     }
     if cycles.events:
         spec["events"] = written(cycles.events)
+    if cycles.ends:
+        spec["ends"] = list(cycles.ends)
     ds.attrs = {
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
@@ -92,7 +94,8 @@ def made_again(
     kind = stored.spec["kind"]
     asked = stored.events(problem, events, orbit_events_of)
     with damaged(stored.name, "its periodic orbits"):
-        cycles = _cycles(stored, problem, kind).replace(events=asked)
+        ends = tuple(str(name) for name in stored.spec.get("ends", ()))
+        cycles = _cycles(stored, problem, kind).replace(events=asked, ends=ends)
         (start,) = _unpacked(stored, "start", cycles)
         tracks: list[Track | None] = []
         for side, stop in zip(_SIDES, stored.spec["stops"], strict=True):

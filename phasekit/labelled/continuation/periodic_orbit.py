@@ -15,15 +15,14 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, starts
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.checks import check_options
-from phasekit.labelled.continuation.cycle_start import (
-    UNFOLDING,
+from phasekit.labelled.continuation.orbit_guess import (
     cycles_of,
     given_orbit,
     orbit_of,
     sampled,
     scale_of,
-    unfolded,
 )
+from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, number, reals
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
@@ -48,8 +47,8 @@ def periodic_orbit(
 
     Parameters
     ----------
-    problem : Problem
-        The system, at the parameters of the orbit.
+    problem : Problem or system
+        The system, at the parameters of the orbit; of a `FreeGyroRotor` the disk at its momentum.
     x0 : array_like, mapping or xarray.Dataset
         A state, from which the system is simulated; or one period of samples: an array of shape
         (samples, states), even in time, or a Dataset of the states on ``time``.
@@ -94,7 +93,7 @@ def periodic_orbit(
     >>> round(float(branch.points.period[-1]), 9)
     7.62987448
     """
-    problem = as_problem(problem)
+    problem = as_problem(problem, moving=True)
     if problem.map:
         raise bad(
             "problem", problem, "a flow x' = f(x)",
@@ -329,15 +328,17 @@ def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
         sizes = np.where(sizes > 0.0, sizes, 1.0)
         normal = run.f(0.0, x) / sizes**2
         side = gaps @ normal
-        near = np.sqrt(np.mean((gaps / sizes) ** 2, axis=1))
         crossing = np.flatnonzero((side[:-1] < 0.0) & (side[1:] >= 0.0))
-        crossing = crossing[(crossing > 0) & (near[crossing] < 0.25)]
-        if len(crossing):
-            close = near[crossing]
+        crossing = crossing[crossing > 0]
+        # In the plane, not beside it by a part of a step.
+        part = side[crossing] / (side[crossing] - side[crossing + 1])
+        there = gaps[crossing] + part[:, None] * (gaps[crossing + 1] - gaps[crossing])
+        close = np.sqrt(np.mean((there / sizes) ** 2, axis=1))
+        if np.any(close < 0.25):
             # The first return that is about as near as any.
-            k = crossing[np.flatnonzero(close <= 2.0 * np.min(close) + 0.01)[0]]
-            part = side[k] / (side[k] - side[k + 1])
-            return float(at[k] + part * (at[k + 1] - at[k]))
+            k = np.flatnonzero(close <= 2.0 * np.min(close) + 0.01)[0]
+            step = at[crossing[k] + 1] - at[crossing[k]]
+            return float(at[crossing[k]] + part[k] * step)
         length *= 3.0
     raise ConvergenceError(
         f"x0: the motion from {x.tolist()} does not return within {length / 3.0:.4g}; give a period"

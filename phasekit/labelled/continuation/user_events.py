@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,22 @@ def stop_of(
     """All events, those with which a branch ends as well, and the names at which it ends."""
     if stop is None:
         return events, ()
+    kinds = (*BOTH, *(MAP if problem.map else FLOW))
+
+    def made(name: str, given: Any) -> Event:
+        return _event(problem, name, given, "stop", x)
+
+    return ending(stop, events, made, kinds, detect)
+
+
+def ending(
+    stop: Any, events: tuple[Any, ...], made: Callable[[str, Any], Any], kinds: Sequence[str],
+    detect: Sequence[str] | None = None,
+) -> tuple[tuple[Any, ...], tuple[str, ...]]:  # fmt: skip
+    """All events, those that are ``made`` of functions as well, and the names at which it ends.
+
+    ``kinds`` of special points are there to end at, where ``detect`` looks for them.
+    """
     wants = "the name of an event, a kind or label of special points, or a function"
     given = stop if isinstance(stop, (list, tuple)) else [stop]
     if not given:
@@ -83,27 +99,27 @@ def stop_of(
             taken = [event.name for event in events]
             while name in taken:
                 name += "_"
-            events = (*events, _event(problem, name, one, "stop", x))
+            events = (*events, made(name, one))
             names.append(name)
             continue
         if not isinstance(one, str):
             raise bad("stop", one, wants)
-        _check_name(one, events, detect, problem.map)
+        _check_name(one, events, kinds, detect)
         names.append(one)
     return events, tuple(names)
 
 
 def _check_name(
-    name: str, events: tuple[Event, ...], detect: Sequence[str], discrete: bool
+    name: str, events: tuple[Any, ...], known: Sequence[str], detect: Sequence[str] | None
 ) -> None:
     if name in [event.name for event in events]:
         return
-    kinds = [KINDS[kind] for kind in (*BOTH, *(MAP if discrete else FLOW))]
+    kinds = [KINDS[kind] for kind in known]
     named = [kind for kind in kinds if name in (kind.name, kind.label)]
     if not named:
         valid = [*(event.name for event in events), *(kind.name for kind in kinds)]
         raise unknown("stop: event or special point", name, valid)
-    if not any(kind.detected in (None, *detect) for kind in named):
+    if detect is not None and not any(kind.detected in (None, *detect) for kind in named):
         raise bad(
             "stop", name, f"what is looked for: {', '.join(detect) or 'nothing'}",
             f"detect={named[0].detected!r} looks for it",

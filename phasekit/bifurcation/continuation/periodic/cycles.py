@@ -106,6 +106,8 @@ class Cycles:
         Whether the period keeps its value, for which one more parameter is free.
     events : tuple of Functional
         Numbers of orbits whose zeros are looked for.
+    ends : tuple of str
+        Names of events, kinds and labels of special points at which the family ends.
     """
 
     field: Field
@@ -123,6 +125,7 @@ class Cycles:
     options: ContinuationOptions
     fixed: bool = False
     events: tuple[Any, ...] = ()
+    ends: tuple[str, ...] = ()
 
     @property
     def n(self) -> int:

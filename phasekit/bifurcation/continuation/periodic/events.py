@@ -14,11 +14,13 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from phasekit.bifurcation.continuation.periodic.between import (
+    Stretch,
+    Value,
+    branching,
+    root,
+)
 from phasekit.bifurcation.continuation.periodic.criteria import (
-    determinant,
     doubling_test,
     fold_test,
     none_passes,
@@ -26,73 +28,23 @@ from phasekit.bifurcation.continuation.periodic.criteria import (
     torus_test,
     unstable,
 )
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
-from phasekit.bifurcation.continuation.periodic.normal_forms import at_doubling, at_fold, at_torus
+from phasekit.bifurcation.continuation.periodic.normal_forms import (
+    VERTICAL,
+    at_branching,
+    at_doubling,
+    at_fold,
+    at_torus,
+)
 from phasekit.bifurcation.continuation.periodic.on_curves import SAME, CurveTest, tests_of
-from phasekit.bifurcation.continuation.periodic.point import Point, point_of, vertical
-from phasekit.bifurcation.continuation.periodic.starts import null_vector
+from phasekit.bifurcation.continuation.periodic.point import Point, vertical
+from phasekit.bifurcation.continuation.periodic.starts import null_vector, other_tangent
 from phasekit.bifurcation.special_points import KINDS
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Value = Callable[[Point, bool], float]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
 JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
-NODES = 9  # points of the family through which a branch point is interpolated
-
-
-@dataclass(frozen=True, eq=False)
-class Stretch:
-    """The family between two of its points, by the distance s along the tangent of the first."""
-
-    cycles: Cycles
-    a: Point
-    b: Point
-
-    def __post_init__(self) -> None:
-        """Bring both ends to one mesh."""
-        mesh = self.b.orbit.mesh
-        if self.a.orbit.intervals > self.b.orbit.intervals:
-            mesh = self.a.orbit.mesh
-        a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
-        b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
-        rows, rows_y, target = self.cycles.rows(a, dx, self.a.dy)
-        length = float(np.sum(rows[-1] * (b.x - a.x)) + rows_y[-1] @ (b.y - a.y))
-        # db/ds of the second end, where its tangent has this part along that of the first.
-        rate = float(np.sum(rows[-1] * db) + rows_y[-1] @ self.b.dy)
-        own: dict[str, Any] = {
-            "ends": (a, b), "tangents": ((dx, self.a.dy), (db / rate, self.b.dy / rate)),
-            "rows": (rows, rows_y, target), "length": length,
-        }  # fmt: skip
-        for name, value in own.items():
-            object.__setattr__(self, name, value)
-
-    ends: tuple[Orbit, Orbit] = None  # type: ignore[assignment]
-    tangents: Any = None
-    rows: Any = None
-    length: float = 0.0
-
-    def at(self, s: float) -> Point | None:
-        """The point at a distance; None if Newton's method finds none."""
-        (a, b), ((dx, dy), (ex, ey)) = self.ends, self.tangents
-        t, h = s / self.length, self.length
-        # Cubic through both ends with their tangents.
-        c = (2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2)
-        x = c[0] * a.x + h * c[1] * dx + c[2] * b.x + h * c[3] * ex
-        y = c[0] * a.y + h * c[1] * dy + c[2] * b.y + h * c[3] * ey
-        rows, rows_y, target = self.rows
-        # The phase of the guess, which the second end may have measured by another orbit.
-        target = target.copy()
-        target[-1] += s
-        target[0] = np.sum(rows[0] * x)
-        found = self.cycles.correct(Orbit(a.mesh, x, y), rows, rows_y, target, iterations=12)
-        if not found.converged:
-            return None
-        made = point_of(self.cycles, found, self.a.arclength + s, s)
-        return made
 
 
 def find(cycles: Cycles, path: Path) -> list[Found]:
@@ -142,7 +94,7 @@ def _events(
         def value(point: Point, forced: bool, event: Any = event) -> float:
             return float(event.value(cycles, point.orbit))
 
-        point = b if after == 0.0 else _root(Stretch(cycles, a, b), value)
+        point = b if after == 0.0 else root(Stretch(cycles, a, b), value)
         if isinstance(event, CurveTest) and point is not None:
             if abs(value(point, False)) > JUMP * max(abs(before), abs(after)):
                 continue  # a coefficient that changes its sign without a zero
@@ -186,7 +138,10 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     stretch = Stretch(cycles, a, b)
     found = [refined(stretch, test) for test in changed]
     kept = [one for one in found if one is not None]
-    moves = [KINDS[one.kind].crossing or 0 for one in kept]
+    steep = [one for one in kept if one.kind == BRANCHING.kind and _stands(cycles, one.point)]
+    if steep:  # where the parameter turns back at a pitchfork is no fold
+        kept = [one for one in kept if one.kind != FOLD.kind]
+    moves = [KINDS[one.kind].crossing or 0 for one in kept if one not in steep]
     explained = abs(gap) <= sum(moves) and (gap - sum(moves)) % 2 == 0
     if explained or depth == 0:
         return sorted(kept, key=lambda one: one.point.arclength)
@@ -212,81 +167,9 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
     return Found(test.kind, point, -1, interval, "converged", "", form)
 
 
-def _root(stretch: Stretch, test: Value) -> Point | None:
-    """The point of a stretch where a test function vanishes, by secants within a bracket."""
-    forced = stretch.cycles.forced
-    low, high = 0.0, stretch.length
-    left, right = test(stretch.a, forced), test(stretch.b, forced)
-    best: Point | None = None
-    least = np.inf
-    s, before = high, np.inf
-    side = 0
-    f_left, f_right = left, right
-    for _ in range(60):
-        s = (
-            low + (high - low) * f_left / (f_left - f_right)
-            if f_left != f_right
-            else 0.5 * (low + high)
-        )
-        if not low < s < high:
-            s = 0.5 * (low + high)
-        point = stretch.at(s)
-        if point is None:
-            return None
-        value = test(point, forced)
-        if abs(value) < least:
-            best, least = point, abs(value)
-        if value == 0.0 or abs(s - before) <= 1e-14 * stretch.length:
-            break
-        before = s
-        if (value >= 0.0) == (left >= 0.0):
-            low, f_left = s, value
-            if side == -1:
-                f_right *= 0.5  # Illinois
-            side = -1
-        else:
-            high, f_right = s, value
-            if side == 1:
-                f_left *= 0.5
-            side = 1
-        if high - low <= 1e-14 * stretch.length:
-            break
-    return best
-
-
-def _branching(stretch: Stretch, test: Value) -> Point | None:
-    """A branch point, where the equations are singular: from the points to both of its sides.
-
-    The family is smooth through it, so its points at a distance say where it is to rounding.
-    """
-    cycles = stretch.cycles
-    nodes = 0.5 * stretch.length * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
-    points = [stretch.at(float(s)) for s in nodes]
-    made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
-    if len(made) < NODES - 2:
-        return None
-    at = np.array([s for s, _ in made]) / stretch.length
-    values = np.array([determinant(p, cycles.forced) for _, p in made])
-    fit = np.polynomial.Polynomial.fit(at, values, len(at) - 1, domain=[0.0, 1.0])
-    roots = fit.roots()
-    inside = roots[(np.abs(roots.imag) < 1e-6) & (roots.real > -1e-9) & (roots.real < 1.0 + 1e-9)]
-    if not len(inside):
-        return None
-    s = float(inside[np.argmin(np.abs(inside.real - 0.5))].real)
-    weights = np.array(
-        [np.prod((s - np.delete(at, k)) / (at[k] - np.delete(at, k))) for k in range(len(at))]
-    )
-    mixed = [
-        sum(w * getattr(p, name) for w, (_, p) in zip(weights, made, strict=True))
-        for name in ("dx", "dy")
-    ]
-    orbit = Orbit(
-        made[0][1].orbit.mesh,
-        np.asarray(sum(w * p.orbit.x for w, (_, p) in zip(weights, made, strict=True))),
-        np.asarray(sum(w * p.orbit.y for w, (_, p) in zip(weights, made, strict=True))),
-    )
-    checked = cycles.looked_at(orbit, *mixed)
-    return point_of(cycles, checked, stretch.a.arclength + s * stretch.length, s * stretch.length)
+def _stands(cycles: Cycles, point: Point) -> bool:
+    """Whether the parameter does not move along the family."""
+    return bool(abs(point.dy[1]) < VERTICAL * cycles.width[0])
 
 
 # ------------------------------------------------------------------------------ the kinds
@@ -314,11 +197,17 @@ class CycleTest:
     value: Value
     normal_form: Callable[[Cycles, Point], dict[str, float]] = lambda cycles, point: {}
     holds: Callable[[list[complex]], bool] = lambda multipliers: True
-    root: Callable[[Stretch, Value], Point | None] = _root
+    root: Callable[[Stretch, Value], Point | None] = root
 
 
 def _form_of_fold(cycles: Cycles, point: Point) -> dict[str, float]:
     return at_fold(cycles, point.orbit, point.dx, point.dy)
+
+
+def _form_of_branching(cycles: Cycles, point: Point) -> dict[str, float]:
+    own = point.dx, point.dy
+    W = cycles.looked_at(point.orbit, *own).W
+    return at_branching(cycles, point.orbit, own, other_tangent(cycles, point.orbit, W, own))
 
 
 def _form_of_doubling(cycles: Cycles, point: Point) -> dict[str, float]:
@@ -350,6 +239,7 @@ FOLD = CycleTest("fold_of_cycles", fold_test, _form_of_fold)
 DOUBLING = CycleTest("period_doubling", doubling_test, _form_of_doubling, _near(-1.0))
 TORUS = CycleTest("torus", torus_test, _form_of_torus, _conjugate)
 BRANCHING = CycleTest(
-    "cycle_branch_point", lambda point, forced: point.sign, holds=_near(1.0), root=_branching
-)
+    "cycle_branch_point", lambda point, forced: point.sign, _form_of_branching, _near(1.0),
+    branching,
+)  # fmt: skip
 TESTS = (FOLD, DOUBLING, TORUS, BRANCHING)

@@ -72,7 +72,7 @@ class Extended(Cycles):
             kept[name] = kept[name][:1]
         par = self.par.copy()
         par[self.active[1]] = second
-        return Cycles(**{**kept, "par": par, "clock": 0, "events": ()})
+        return Cycles(**{**kept, "par": par, "clock": 0, "events": (), "ends": ()})
 
     def own_period(self, y: Array) -> tuple[float, Array]:
         """The period of the forcing, and its derivatives by all of y after the period."""
@@ -196,6 +196,7 @@ def extended(
     low = np.array([first[0], span[0], *[-np.inf] * more])
     high = np.array([first[1], span[1], *[np.inf] * more])
     kept |= {
+        "ends": (),
         "active": (cycles.active[0], second),
         "clock": clock,
         "turns": np.append(cycles.turns, np.zeros(parts * n)),

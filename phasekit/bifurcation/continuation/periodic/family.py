@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.point import Point
-from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow
+from phasekit.bifurcation.continuation.periodic.trace import Track
 
 Array = npt.NDArray[np.float64]
 
@@ -56,6 +55,8 @@ class Path:
     points: tuple[Point, ...]
     start: int
     stops: tuple[Stop, Stop]
+    #: The special points at which it was told to end.
+    ends: tuple[Found | None, Found | None] = (None, None)
 
 
 def join(start: Point, tracks: Tracks, first: Stop) -> Path:
@@ -72,23 +73,3 @@ def join(start: Point, tracks: Tracks, first: Stop) -> Path:
     if stops[1].reason == "closed":
         stops = (stops[1], stops[1])
     return Path((*behind, start, *ahead), len(behind), stops)
-
-
-def run(cycles: Cycles, start: Point, directions: str) -> Tracks:
-    """Follow a family from its start, backward and forward; None where it was not asked for."""
-    most = cycles.options.max_points
-    backward = forward = None
-    if directions != "backward":
-        forward = follow(cycles, begin(cycles, start, True), most, start)
-    closed = forward is not None and forward.stop.reason == "closed"
-    if directions != "forward" and not closed:
-        backward = follow(cycles, begin(cycles, start, False), most, start)
-    return backward, forward
-
-
-def go_on(cycles: Cycles, track: Track | None, points: int, start: Point) -> Track | None:
-    """More points of a track that ended for their number, exactly as if it had never stopped."""
-    if track is None or track.stop.reason != "max_points":
-        return track
-    more = follow(cycles, track.state, points, start)
-    return Track((*track.points, *more.points), more.state, more.stop)

@@ -48,6 +48,13 @@ class OfOrbit:
 
     def value(self, cycles: Cycles, orbit: Orbit) -> float:
         """The number that it returns; NaN where it has none."""
+        found = self.returned(cycles, orbit)
+        if isinstance(found, (bool, np.bool_)):  # it jumps where what it says changes
+            return 1.0 if found else -1.0
+        return float(numbers_of("events", found, ()))
+
+    def returned(self, cycles: Cycles, orbit: Orbit) -> Any:
+        """What it returns; NaN where it is not defined."""
         x = np.ascontiguousarray(orbit.x[:, : cycles.own].T)
         values = parameters_of(cycles, orbit)
         parameters = {name: values[name] for name in self.parameters}
@@ -59,10 +66,9 @@ class OfOrbit:
         given = {k: v for k, v in more.items() if k not in parameters and (every or k in taken)}
         with np.errstate(all="ignore"):
             try:
-                found = self.function(x, **parameters, **given)
+                return self.function(x, **parameters, **given)
             except (ArithmeticError, ValueError):
                 return np.nan
-        return float(numbers_of("events", found, ()))
 
 
 @dataclass(frozen=True)

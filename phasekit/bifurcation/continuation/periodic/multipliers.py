@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,6 +15,7 @@ Complex = npt.NDArray[np.complex128]
 APART = 1e-14  # entries below the diagonal blocks that are rounding
 ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative error they are
 PASSES = 12
+LARGEST = 709.0  # logarithm of the largest numbers
 ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
 
 
@@ -123,15 +126,21 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     values, logs, first = [], 0.0, 0
     for last in (np.flatnonzero(cut) + 1).tolist():
         here = slice(first, last)
-        top = float(log[first]) if last == first + 1 else float(np.max(log[here]))
-        with np.errstate(all="ignore"):
-            block = turn[here, here] @ (np.exp(log[here] - top)[:, None] * R[here, here])
-            if not np.isfinite(block).all():
-                return unknown
-            found = block[0].tolist() if last == first + 1 else np.linalg.eigvals(block).tolist()
-            size = float(np.exp(top))
-            # Of the values found: the triangle's own would be right even where they are not.
-            logs += float(np.sum(np.log(np.abs(found)))) + (last - first) * top
+        if last == first + 1:
+            top, found = float(log[first]), [float(turn[first, first] * R[first, first])]
+            known = math.isfinite(found[0])
+        else:
+            top = float(np.max(log[here]))
+            with np.errstate(all="ignore"):
+                block = turn[here, here] @ (np.exp(log[here] - top)[:, None] * R[here, here])
+            known = bool(np.isfinite(block).all())
+            found = np.linalg.eigvals(block).tolist() if known else []
+        if not known:
+            return unknown
+        size = math.exp(top) if top < LARGEST else math.inf
+        # Of the values found: the triangle's own would be right even where they are not.
+        logs += sum(math.log(abs(one)) if one != 0.0 else -math.inf for one in found)
+        logs += (last - first) * top
         values += [complex(one) * size for one in found]
         first = last
     return np.array(sorted(values, key=abs, reverse=True)), logs

@@ -1,9 +1,10 @@
-"""Normal forms of periodic orbits at folds, period doublings and tori.
+"""Normal forms of periodic orbits at folds, branch points, period doublings and tori.
 
 On the center manifold of the orbit, with tau the time along it and xi the other coordinate,
 dtau/dt = 1 + ... and
 
     fold              xi' = b (p - p0) + a xi^2
+    branch point      xi' = d (p - p0) xi + a xi^2, or + c xi^3 at a pitchfork
     period doubling   xi' = c xi^3
     torus             xi' = i omega xi + d xi |xi|^2
 
@@ -18,136 +19,21 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.linear import Linear, wave
 
 Array = npt.NDArray[np.float64]
 
-REACH = 2.0**-8  # of differences along a function, beside the sizes of the states
+VERTICAL = 1e-5  # part along the parameter, beside its span, of a tangent that does not move it
 
 
-class Linear:
-    """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g."""
+def at_fold(
+    cycles: Cycles, orbit: Orbit, dx: Array, dy: Array, stretch: float | None = None
+) -> dict[str, float]:
+    """The coefficients a and b of a fold, from the tangent of its family.
 
-    def __init__(self, cycles: Cycles, orbit: Orbit) -> None:
-        self.cycles, self.orbit, self.m = cycles, orbit, cycles.m
-        n = self.n = cycles.n
-        whole = self._jets(orbit.x)
-        self.f = whole[:, :n]
-        slopes = whole[:, n:].reshape(len(whole), n, -1)
-        self.A = slopes[:, :, :n]
-        self.by_parameter = slopes[:, :, -1]
-        self._along: dict[bytes, tuple[Array, Array]] = {}
-
-    def _jets(self, x: Array) -> Array:
-        o = self.orbit
-        return self.cycles.jets(o.mesh, x, o.y, self.m, self.cycles.sizes)
-
-    def at(self, h: Array) -> Array:
-        """Values of a function at all Gauss points, one after another."""
-        return collocation.at_gauss(h, self.m).reshape(-1, h.shape[1])
-
-    def bends(self, v: Array) -> tuple[Array, Array]:
-        """First and second derivatives of the matrices f_x along a function."""
-        key = v.tobytes()
-        if key not in self._along:
-            length = float(np.max(np.abs(v) / self.cycles.scale))
-            h = REACH / length if length > 0.0 else 1.0
-            n = self.n
-
-            def matrix(k: float) -> Array:
-                whole = self._jets(self.orbit.x + k * h * v)
-                return whole[:, n:].reshape(len(whole), n, -1)[:, :, :n]
-
-            (a, b), (c, d) = ((matrix(k), matrix(-k)) for k in (1.0, 2.0))
-            first = (8.0 * (a - b) - (c - d)) / (12.0 * h)
-            second = (16.0 * (a + b) - (c + d) - 30.0 * self.A) / (12.0 * h * h)
-            self._along[key] = first, second
-        return self._along[key]
-
-    def second(self, v: Array, u: Array) -> Array:
-        """B(v, u) at all Gauss points."""
-        return np.asarray(np.einsum("kij,kj->ki", self.bends(v)[0], self.at(u)))
-
-    def third(self, v: Array, u: Array) -> Array:
-        """C(v, v, u) at all Gauss points."""
-        return np.asarray(np.einsum("kij,kj->ki", self.bends(v)[1], self.at(u)))
-
-    def times_A(self, v: Array) -> Array:
-        """A v at all Gauss points."""
-        return np.asarray(np.einsum("kij,kj->ki", self.A, self.at(v)))
-
-    def solve(
-        self, g: Array, columns: list[Array], rows: list[Array], sigma: float = 1.0,
-        turn: float = 0.0,
-        right: Array | None = None,
-    ) -> tuple[Array, Array]:  # fmt: skip
-        """H and the unknowns, with mean(row . h) = right, or 0; one column for each row.
-
-        With a turn, h is complex: its parts stand one after another, and h' + i turn h - A h is
-        what is meant.
-        """
-        n, q, parts = self.n, len(columns), 1 if turn == 0.0 else 2
-        wide = n * parts
-        count = len(self.A)
-        jets = np.zeros((count, wide * (1 + wide + q)))
-        jets[:, :wide] = g
-        slopes = jets[:, wide:].reshape(count, wide, wide + q)
-        for k in range(parts):
-            here = slice(k * n, (k + 1) * n)
-            slopes[:, here, here] = self.A
-        if parts == 2:
-            i = np.arange(n)
-            slopes[:, i, n + i] = turn
-            slopes[:, n + i, i] = -turn
-        for k, column in enumerate(columns):
-            slopes[:, :, wide + k] = -column
-        c, o = collocation.scheme(self.m), self.orbit
-        places = len(o.x)
-        x, y = np.zeros((places, wide)), np.zeros(1 + q)
-        y[0] = o.y[0]
-        W = np.empty((o.intervals, self.m * wide, wide + q + 2))
-        kernels.condense(
-            jets,
-            False,
-            o.mesh,
-            c.nodes,
-            c.weights,
-            c.value,
-            c.slope,
-            c.side,
-            np.ones(wide),
-            x,
-            y,
-            W,
-        )
-        border = np.zeros((1 + q, places, wide))
-        border_y = np.zeros((1 + q, 1 + q))
-        border_y[0, 0] = 1.0  # the period is what it is
-        for k, row in enumerate(rows):
-            border[1 + k] = collocation.functional(
-                o.mesh, row.reshape(o.intervals, self.m, wide), self.m
-            )
-        sides = np.zeros(1 + q)
-        if right is not None:
-            sides[1:] = right
-        dx, dy = np.empty((2, places, wide)), np.empty((2, 1 + q))
-        kernels.solve(
-            W, border, border_y, sides, np.zeros(wide), np.full(wide, sigma), self.m, dx,
-            dy,
-        )  # fmt: skip
-        return dx[0], dy[0, 1:]
-
-    def unit(self, v: Array) -> Array:
-        """A function of mean square 1."""
-        values = collocation.at_gauss(v, self.m)
-        weights = np.diff(self.orbit.mesh)[:, None] * collocation.scheme(self.m).weights
-        square = np.einsum("ji,jin,jin->", weights, values, values)
-        return np.asarray(v / np.sqrt(square))
-
-
-def at_fold(cycles: Cycles, orbit: Orbit, dx: Array, dy: Array) -> dict[str, float]:
-    """The coefficients a and b of a fold, from the tangent of its family."""
+    Of a forced system ``stretch`` is the part by which its period grows with the parameter.
+    """
     line = Linear(cycles, orbit)
     v = line.unit(dx)
     # v' = A v - rate F, where the family changes its period.
@@ -156,11 +42,53 @@ def at_fold(cycles: Cycles, orbit: Orbit, dx: Array, dy: Array) -> dict[str, flo
     if cycles.forced:
         columns, rows = [at], [at]
         rate = 0.0
+        if stretch is None:
+            stretch = float(cycles.own_period(orbit.y)[1][0]) / orbit.y[0]
     else:
         columns, rows = [at, line.f], [at, line.f]
+        stretch = 0.0
     a = line.solve(0.5 * line.second(v, v) - rate * line.times_A(v), columns, rows)[1][0]
-    b = line.solve(line.by_parameter, columns, rows)[1][0]
+    b = line.solve(line.by_parameter(stretch), columns, rows)[1][0]
     return {"a": float(a), "b": float(b)}
+
+
+def at_branching(
+    cycles: Cycles, orbit: Orbit, own: tuple[Array, Array], other: tuple[Array, Array]
+) -> dict[str, float]:
+    """The coefficients d and a at which two families cross, d and c at a pitchfork.
+
+    ``own`` is the tangent (dx, dy) of the family that is followed, ``other`` another solution of
+    the singular equations. With the parameter mu from its value and h along a family on which it
+    moves, x + xi v + mu h + ... goes with dtau/dt = 1 + alpha xi + ....
+    """
+    line = Linear(cycles, orbit)
+    (dx, dy), (ex, ey) = own, other
+    p, r = float(dy[1] / cycles.width[0]), float(ey[1] / cycles.width[0])
+    steep = abs(p) < VERTICAL
+    v = p * ex - r * dx
+    v = v * np.sign(v.flat[np.argmax(np.abs(v / cycles.scale))])
+    # The parameter moves by 1; where the own family does not move it, any other one will do.
+    k, j = (p, r) if steep else (p, 0.0)
+    moved = (k * p + j * r) * cycles.width[0]
+    h, h_y = (k * dx + j * ex) / moved, (k * dy + j * ey) / moved
+    v, alpha = (line.unit(v), 0.0) if cycles.forced else line.across(v)
+    at = line.at(v)
+    columns = rows = [at] if cycles.forced else [at, line.f]
+    stretch = float(h_y[0]) / orbit.y[0]
+    g = np.einsum("kij,kj->ki", line.bends_along(h, h_y), at) + stretch * line.times_A(v)
+    g -= alpha * (line.times_A(h) + line.by_parameter(stretch))
+    d = float(line.solve(g, columns, rows)[1][0])
+    bent = 0.5 * line.second(v, v)
+    w, unknowns = line.solve(bent - alpha * line.times_A(v), columns, rows)
+    a = float(unknowns[0])
+    nothing = np.zeros(cycles.q)
+    length = np.sqrt(cycles.inner(orbit.mesh, v, v, nothing, nothing))
+    if not steep and not abs(a) < VERTICAL * abs(d) * float(cycles.width[0]) * length:
+        return {"d": d, "a": a}
+    beta = 0.0 if cycles.forced else float(unknowns[1])
+    cubic = line.third(v, v) / 6.0 + line.second(v, w) - beta * line.times_A(v)
+    cubic -= alpha * (line.times_A(w) + bent - alpha * line.times_A(v))
+    return {"d": d, "c": float(line.solve(cubic, columns, rows)[1][0])}
 
 
 def at_doubling(cycles: Cycles, orbit: Orbit, v: Array) -> dict[str, float]:
@@ -209,19 +137,3 @@ def at_torus(cycles: Cycles, orbit: Orbit, angle: float) -> dict[str, float]:
     around = np.hstack([-at[:, n:], at[:, :n]])  # i v
     _, d = line.solve(np.hstack([real, imaginary]), [at, around], [at, around], turn=omega)
     return {"d": 0.5 * float(d[0]), "d_imag": 0.5 * float(d[1]), "angle": angle}
-
-
-def wave(line: Linear, omega: float) -> Array:
-    """The periodic v = u + i w with v' + i omega v = A v, of mean square 1, parts side by side."""
-    n = line.n
-    count = len(line.A)
-    at = np.random.default_rng(7).standard_normal((count, 2 * n))
-    for _ in range(3):
-        around = np.hstack([-at[:, n:], at[:, :n]])
-        v, _ = line.solve(
-            np.zeros((count, 2 * n)), [at, around], [at, around], turn=omega,
-            right=np.array([1.0, 0.0]),
-        )  # fmt: skip
-        v = line.unit(v)
-        at = line.at(v)
-    return v

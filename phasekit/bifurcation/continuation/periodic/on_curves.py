@@ -48,7 +48,10 @@ def _coefficients(cycles: Extended, orbit: Orbit) -> tuple[float, float]:
     dy = np.zeros(2)
     if not cycles.forced:
         dy[0] = orbit.y[-1] * orbit.y[0]
-    form = at_fold(one, alone, v, dy)
+    stretch = 0.0
+    if cycles.forced:
+        stretch = float(cycles.own_period(orbit.y)[1][0]) / float(orbit.y[0])
+    form = at_fold(one, alone, v, dy, stretch)
     nothing = np.zeros(2)
     parts = one.inner(orbit.mesh, v, v, nothing, nothing)
     whole = one.replace(scale=np.ones(n)).inner(orbit.mesh, v, v, nothing, nothing)

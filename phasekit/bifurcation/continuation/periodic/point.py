@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cmath
 import math
 from dataclasses import dataclass, replace
 
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.multipliers import LARGEST
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -19,7 +21,6 @@ UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are
 SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
 FINER = 3  # meshes that are tried for it
 ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
-LARGEST = 709.0  # logarithm of the largest numbers
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
 
@@ -47,8 +48,9 @@ class Point:
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
-        known = np.isfinite(self.multipliers).all()
-        return bool(known and self.trivial_error <= NEAR and self.liouville_error <= TRUSTED)
+        if not (self.trivial_error <= NEAR and self.liouville_error <= TRUSTED):
+            return False
+        return all(map(cmath.isfinite, self.multipliers.tolist()))
 
 
 def vertical(cycles: Cycles, point: Point) -> bool:

@@ -11,7 +11,7 @@ from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, Extended
-from phasekit.bifurcation.continuation.periodic.normal_forms import Linear, wave
+from phasekit.bifurcation.continuation.periodic.linear import Linear, wave
 from phasekit.bifurcation.continuation.periodic.point import Point
 
 Array = npt.NDArray[np.float64]
@@ -21,13 +21,13 @@ SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hop
 
 
 def settled(
-    cycles: Cycles, guess: Orbit, *, second: bool = False, iterations: int = 40
+    cycles: Cycles, guess: Orbit, *, held: int | None = None, iterations: int = 40
 ) -> Solution:
     """The orbit that a guess leads to at fixed parameters, on a mesh that suits it.
 
-    Of two parameters only the ``second`` is held.
+    Of several parameters only one is held, by its place from 1 on; the last by default.
     """
-    held = 2 if second else len(cycles.active)
+    held = len(cycles.active) if held is None else held
     for _ in range(8):
         rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
         rows_y[-1, held], target[-1] = 1.0, guess.y[held]
@@ -176,13 +176,24 @@ def doubled(cycles: Cycles, orbit: Orbit, W: Array) -> tuple[Cycles, Orbit, Arra
     return made, Orbit(mesh, x, y), np.concatenate([v, -v[1:]])
 
 
-def null_vector(
-    cycles: Cycles, orbit: Orbit, W: Array, sigma: float, tangent: tuple[Array, Array] | None = None
-) -> Array:
-    """The solution of the variational equations that closes with sigma, of length 1.
+def null_vector(cycles: Cycles, orbit: Orbit, W: Array, sigma: float) -> Array:
+    """The solution of the variational equations that closes with sigma, of length 1."""
+    return _null_vector(cycles, orbit, W, sigma, None)[0]
 
-    With a tangent, that of the equations with their free parameters which is orthogonal to it. The
-    singular equations are bordered by an arbitrary column and row; the column's factor vanishes.
+
+def other_tangent(
+    cycles: Cycles, orbit: Orbit, W: Array, tangent: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Where two families cross, the solution of their equations orthogonal to a tangent of one."""
+    return _null_vector(cycles, orbit, W, 1.0, tangent)
+
+
+def _null_vector(
+    cycles: Cycles, orbit: Orbit, W: Array, sigma: float, tangent: tuple[Array, Array] | None
+) -> tuple[Array, Array]:
+    """A solution of singular equations with states of length 1; with a tangent, of its equations.
+
+    They are bordered by an arbitrary column and row; the column's factor vanishes.
     """
     count, size, n = W.shape[0], W.shape[1], cycles.n
     q = 0 if tangent is None else cycles.q
@@ -210,5 +221,6 @@ def null_vector(
         kernels.solve(
             V, rows, rows_y, np.zeros(q + 1), np.zeros(n), np.full(n, sigma), cycles.m, dx, dy
         )
-        v = dx[1] / np.sqrt(cycles.inner(orbit.mesh, dx[1], dx[1], nothing, nothing))
-    return np.asarray(v)
+        length = np.sqrt(cycles.inner(orbit.mesh, dx[1], dx[1], nothing, nothing))
+        v = dx[1] / length
+    return np.asarray(v), dy[1, :q] / length

@@ -1,0 +1,193 @@
+"""Linear equations along a periodic orbit, and derivatives of f_x along functions of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+
+Array = npt.NDArray[np.float64]
+
+REACH = 2.0**-8  # of differences along a function, beside the sizes of the states
+CLOSE = 2.0**-10  # the same of a parameter, beside its span
+
+
+class Linear:
+    """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g."""
+
+    def __init__(self, cycles: Cycles, orbit: Orbit) -> None:
+        self.cycles, self.orbit, self.m = cycles, orbit, cycles.m
+        n = self.n = cycles.n
+        whole = self._jets(orbit.x)
+        self.f = whole[:, :n]
+        self.slopes = whole[:, n:].reshape(len(whole), n, -1)
+        self.A = self.slopes[:, :, :n]
+        self._along: dict[bytes, tuple[Array, Array]] = {}
+
+    def _jets(self, x: Array, y: Array | None = None) -> Array:
+        o = self.orbit
+        return self.cycles.jets(o.mesh, x, o.y if y is None else y, self.m, self.cycles.sizes)
+
+    def by_parameter(self, stretch: float) -> Array:
+        """Derivative of f by the parameter, at all Gauss points.
+
+        With the parameter the period grows by a part, ``stretch``; of a forced system time, too.
+        """
+        found = self.slopes[:, :, -1] + stretch * self.f
+        if self.cycles.forced:
+            o = self.orbit
+            at = o.mesh[:-1, None] + np.diff(o.mesh)[:, None] * collocation.scheme(self.m).nodes
+            found = found + stretch * o.y[0] * at.reshape(-1, 1) * self.slopes[:, :, self.n]
+        return np.asarray(found)
+
+    def at(self, h: Array) -> Array:
+        """Values of a function at all Gauss points, one after another."""
+        return collocation.at_gauss(h, self.m).reshape(-1, h.shape[1])
+
+    def bends(self, v: Array) -> tuple[Array, Array]:
+        """First and second derivatives of the matrices f_x along a function."""
+        key = v.tobytes()
+        if key not in self._along:
+            length = float(np.max(np.abs(v) / self.cycles.scale))
+            h = REACH / length if length > 0.0 else 1.0
+            n = self.n
+
+            def matrix(k: float) -> Array:
+                whole = self._jets(self.orbit.x + k * h * v)
+                return whole[:, n:].reshape(len(whole), n, -1)[:, :, :n]
+
+            (a, b), (c, d) = ((matrix(k), matrix(-k)) for k in (1.0, 2.0))
+            first = (8.0 * (a - b) - (c - d)) / (12.0 * h)
+            second = (16.0 * (a + b) - (c + d) - 30.0 * self.A) / (12.0 * h * h)
+            self._along[key] = first, second
+        return self._along[key]
+
+    def bends_along(self, dx: Array, dy: Array) -> Array:
+        """Derivative of the matrices f_x along a family, as period and parameter change, too."""
+        o = self.orbit
+        length = max(
+            float(np.max(np.abs(dx) / self.cycles.scale)) / REACH,
+            float(np.max(np.abs(dy[1:]) / self.cycles.width)) / CLOSE,
+        )
+        h = 1.0 / length
+
+        def matrix(k: float) -> Array:
+            whole = self._jets(o.x + k * h * dx, o.y + k * h * dy)
+            return whole[:, self.n :].reshape(len(whole), self.n, -1)[:, :, : self.n]
+
+        near, far = matrix(1.0) - matrix(-1.0), matrix(2.0) - matrix(-2.0)
+        return np.asarray((8.0 * near - far) / (12.0 * h))
+
+    def second(self, v: Array, u: Array) -> Array:
+        """B(v, u) at all Gauss points."""
+        return np.asarray(np.einsum("kij,kj->ki", self.bends(v)[0], self.at(u)))
+
+    def third(self, v: Array, u: Array) -> Array:
+        """C(v, v, u) at all Gauss points."""
+        return np.asarray(np.einsum("kij,kj->ki", self.bends(v)[1], self.at(u)))
+
+    def times_A(self, v: Array) -> Array:
+        """A v at all Gauss points."""
+        return np.asarray(np.einsum("kij,kj->ki", self.A, self.at(v)))
+
+    def solve(
+        self, g: Array, columns: list[Array], rows: list[Array], sigma: float = 1.0,
+        turn: float = 0.0,
+        right: Array | None = None,
+    ) -> tuple[Array, Array]:  # fmt: skip
+        """H and the unknowns, with mean(row . h) = right, or 0; one column for each row.
+
+        With a turn, h is complex: its parts stand one after another, and h' + i turn h - A h is
+        what is meant.
+        """
+        n, q, parts = self.n, len(columns), 1 if turn == 0.0 else 2
+        wide = n * parts
+        count = len(self.A)
+        jets = np.zeros((count, wide * (1 + wide + q)))
+        jets[:, :wide] = g
+        slopes = jets[:, wide:].reshape(count, wide, wide + q)
+        for k in range(parts):
+            here = slice(k * n, (k + 1) * n)
+            slopes[:, here, here] = self.A
+        if parts == 2:
+            i = np.arange(n)
+            slopes[:, i, n + i] = turn
+            slopes[:, n + i, i] = -turn
+        for k, column in enumerate(columns):
+            slopes[:, :, wide + k] = -column
+        c, o = collocation.scheme(self.m), self.orbit
+        places = len(o.x)
+        x, y = np.zeros((places, wide)), np.zeros(1 + q)
+        y[0] = o.y[0]
+        W = np.empty((o.intervals, self.m * wide, wide + q + 2))
+        kernels.condense(
+            jets,
+            False,
+            o.mesh,
+            c.nodes,
+            c.weights,
+            c.value,
+            c.slope,
+            c.side,
+            np.ones(wide),
+            x,
+            y,
+            W,
+        )
+        border = np.zeros((1 + q, places, wide))
+        border_y = np.zeros((1 + q, 1 + q))
+        border_y[0, 0] = 1.0  # the period is what it is
+        for k, row in enumerate(rows):
+            border[1 + k] = collocation.functional(
+                o.mesh, row.reshape(o.intervals, self.m, wide), self.m
+            )
+        sides = np.zeros(1 + q)
+        if right is not None:
+            sides[1:] = right
+        dx, dy = np.empty((2, places, wide)), np.empty((2, 1 + q))
+        kernels.solve(
+            W, border, border_y, sides, np.zeros(wide), np.full(wide, sigma), self.m, dx,
+            dy,
+        )  # fmt: skip
+        return dx[0], dy[0, 1:]
+
+    def across(self, v: Array) -> tuple[Array, float]:
+        """A critical function without a part along the flow, of mean square 1; and its alpha.
+
+        v' = A v - alpha f: a part along f, a shift of time, leaves that as it is.
+        """
+        at, alpha = self.at(self.unit(v)), 0.0
+        for _ in range(2):
+            nothing = np.zeros_like(self.f)
+            v, unknowns = self.solve(
+                nothing, [at, self.f], [at, self.f], right=np.array([1.0, 0.0])
+            )
+            one = self.unit(v)
+            alpha = float(unknowns[1] * np.max(np.abs(one)) / np.max(np.abs(v)))
+            at = self.at(one)
+        return one, alpha
+
+    def unit(self, v: Array) -> Array:
+        """A function of mean square 1."""
+        values = collocation.at_gauss(v, self.m)
+        weights = np.diff(self.orbit.mesh)[:, None] * collocation.scheme(self.m).weights
+        square = np.einsum("ji,jin,jin->", weights, values, values)
+        return np.asarray(v / np.sqrt(square))
+
+
+def wave(line: Linear, omega: float) -> Array:
+    """The periodic v = u + i w with v' + i omega v = A v, of mean square 1, parts side by side."""
+    n = line.n
+    count = len(line.A)
+    at = np.random.default_rng(7).standard_normal((count, 2 * n))
+    for _ in range(3):
+        around = np.hstack([-at[:, n:], at[:, :n]])
+        v, _ = line.solve(
+            np.zeros((count, 2 * n)), [at, around], [at, around], turn=omega,
+            right=np.array([1.0, 0.0]),
+        )  # fmt: skip
+        v = line.unit(v)
+        at = line.at(v)
+    return v

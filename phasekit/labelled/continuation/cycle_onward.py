@@ -1,0 +1,105 @@
+"""Where families of periodic orbits lead on to: other families, curves in two parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic import starts
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.ending import run
+from phasekit.bifurcation.continuation.periodic.extended import extended
+from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_points import clock_code
+from phasekit.labelled.continuation.cycle_special import CyclePoint
+from phasekit.labelled.continuation.orbit_guess import first_point
+from phasekit.labels.arguments import bad
+
+#: Special points that have curves in two parameters.
+CURVES = ("fold_of_cycles", "period_doubling", "torus")
+
+
+def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
+    """The other branch at a period doubling or a branch point of cycles."""
+    if point.kind not in ("period_doubling", "cycle_branch_point"):
+        raise bad("point", point.kind, "a period doubling or a branch point of cycles")
+    if point.status != "converged":
+        raise bad("point", point.status, "a point that has converged", point.message)
+    cycles, problem = point.branch.known()
+    options = _options(cycles, options)
+    if isinstance(direction, bool) or direction != 0:
+        raise bad("direction", direction, "0: there is one other branch")
+    cycles = cycles.replace(options=options, ends=())
+    here = point.special.point
+    name = point.branch.parameter
+    where = f"the {point.kind.replace('_', ' ')} at {name} = {point.parameters[name]:.12g}"
+    checked = cycles.looked_at(here.orbit, here.dx, here.dy)
+    size = options.initial_step
+    if point.kind == "period_doubling":
+        cycles, orbit, dx = starts.doubled(cycles, here.orbit, checked.W)
+        start = first_point(cycles, starts.off(cycles, orbit, dx, size), f"beside {where}")
+        forward = run(cycles, start, "forward")[1]
+        origin = Stop("period_doubling", where)
+        return make_cycles(problem, cycles, start, (None, forward), point.branch.record, origin)
+    dx, _ = starts.other_tangent(cycles, here.orbit, checked.W, (here.dx, here.dy))
+    sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
+    one, two = (first_point(cycles, side, f"beside {where}").orbit for side in sides)
+    mesh = here.orbit.mesh
+    one, two = cycles.on(mesh, one)[0], cycles.on(mesh, two)[0]
+    dx, dy = one.x - two.x, one.y - two.y
+    length = np.sqrt(cycles.inner(mesh, dx, dx, dy, dy))
+    start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
+    tracks = run(cycles, start, options.directions)
+    return make_cycles(problem, cycles, start, tracks, point.branch.record)
+
+
+def point_curve(
+    point: CyclePoint[CycleBranch], parameter: str, span: Any, options: Any
+) -> CycleBranch:
+    """The curve of folds, period doublings or tori of cycles through one, in two parameters."""
+    if point.kind not in CURVES:
+        raise bad("point", point.kind, f"one of {', '.join(CURVES)}")
+    if point.branch.kind != "cycle" or len(point.branch.free) != 1:
+        raise bad("point", point.branch.kind, "a point of a branch of periodic orbits")
+    if point.status != "converged":
+        raise bad("point", point.status, "a point that has converged", point.message)
+    cycles, problem = point.branch.known()
+    check_parameter(problem, parameter)
+    if parameter == point.branch.parameter:
+        raise bad("parameter", parameter, "another one than that of the branch")
+    low, high = check_span(span)
+    value = problem.parameters[parameter]
+    if not low <= value <= high:
+        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
+    options = _options(cycles, options)
+    first = float(cycles.low[0]), float(cycles.high[0])
+    reach = 10.0 * (first[1] - first[0])
+    first = options.bounds.get(point.branch.parameter, (first[0] - reach, first[1] + reach))
+    place = list(problem.parameters).index(parameter)
+    clock = clock_code(problem, (cycles.active[0], place))
+    made = extended(cycles.replace(options=options), point.kind, place, (low, high), clock, first)
+    here = point.special.point
+    guess = starts.with_function(made, cycles, here, value)
+    found = starts.settled(made, guess, held=2)
+    start = first_point(
+        made, found, f"of the curve of {point.kind} points at {parameter} = {value:.9g}"
+    )
+    if start.dy[2] < 0.0:
+        start = start.flipped()
+    tracks = run(made, start, options.directions)
+    return make_cycles(problem, made, start, tracks, point.branch.record, kind=point.kind)
+
+
+def _options(cycles: Cycles, options: Any) -> ContinuationOptions:
+    """Options of a branch that goes on from another one: its own, or others of the same degree."""
+    if options is None:
+        return cycles.options
+    options = check_options(options)
+    if options.degree != cycles.m:
+        raise bad("options", options.degree, f"the degree of the branch, {cycles.m}")
+    return options  # type: ignore[no-any-return]

@@ -1,0 +1,125 @@
+"""Orbits as they were given or found: what Newton's method starts from, and what it leaves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic import collocation, starts
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of
+from phasekit.errors import ConvergenceError
+from phasekit.labelled.continuation.cycle_points import clock_code, orbit_dataset
+from phasekit.labels.arguments import bad
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+#: A guess, its turns, and of a forced system how many periods of the forcing it takes.
+Given = tuple[Orbit, FloatArray, int]
+
+
+def cycles_of(
+    problem: Problem,
+    free: Sequence[str],
+    spans: Sequence[tuple[float, float]],
+    scale: FloatArray,
+    turns: FloatArray,
+    options: ContinuationOptions,
+    multiple: int = 1,
+    fixed: bool = False,
+) -> Cycles:
+    """The periodic orbits of a problem over some of its parameters."""
+    names = list(problem.parameters)
+    active = tuple(names.index(name) for name in free)
+    par = np.array(list(problem.parameters.values()))
+    forced = problem.time is not None
+    period = np.array([problem.periods.get(name, 0.0) for name in problem.state])
+    scale = np.where(period > 0.0, period / (2.0 * np.pi), scale)
+    for i, name in enumerate(problem.state):
+        scale[i] = options.scales.get(name, scale[i])
+    low, high = np.array(spans, dtype=float).T
+    return Cycles(
+        problem.field, np.append(par, 0.0) if forced else par, active, forced,
+        clock_code(problem, active), multiple, turns, scale, high - low, low, high, period,
+        options, fixed,
+    )  # fmt: skip
+
+
+def scale_of(x: FloatArray) -> FloatArray:
+    """Sizes of the states along an orbit."""
+    size = np.max(np.abs(x), axis=0)
+    top = float(np.max(size))
+    return np.asarray(np.where(size > 1e-6 * top, size, top if top > 0.0 else 1.0))
+
+
+def given_orbit(problem: Problem, orbit: Any, value: float, m: int) -> Given:
+    """An orbit that `periodic_orbit` or `Branch.orbit` returned, as a guess."""
+    if not isinstance(orbit, xr.Dataset) or "time" not in orbit.dims or "period" not in orbit:
+        raise bad("orbit", orbit, "what pk.periodic_orbit or branch.orbit(i) returns")
+    missing = [name for name in problem.state if name not in orbit]
+    if missing:
+        raise bad("orbit", list(map(str, orbit.data_vars)), f"the states {', '.join(missing)} too")
+    period = float(orbit["period"])
+    at = np.asarray(orbit["time"].values, dtype=float) / period
+    x = np.stack([np.asarray(orbit[name].values, dtype=float) for name in problem.state], axis=1)
+    return sampled(problem, at - at[0], x, period, value, m)
+
+
+def sampled(
+    problem: Problem, at: FloatArray, x: FloatArray, period: float, value: float, m: int
+) -> Given:
+    """A guess through samples over a period, with its turns and periods of the forcing."""
+    from scipy.interpolate import PchipInterpolator
+
+    turns = np.zeros(x.shape[1])
+    if at[-1] < 1.0 - 1e-9:
+        step = at[-1] - at[-2]
+        if step < 1.0 - at[-1] - 1e-9:
+            last = x[-1] + (x[-1] - x[-2]) * (1.0 - at[-1]) / step
+        else:
+            last = x[-1]
+        ends = last
+    else:
+        ends = x[-1]
+    for i, name in enumerate(problem.state):
+        angle = problem.periods.get(name, 0.0)
+        if angle > 0.0:
+            turns[i] = angle * np.round((ends[i] - x[0, i]) / angle)
+    if at[-1] < 1.0 - 1e-9:
+        at, x = np.append(at, 1.0), np.vstack([x, x[0] + turns])
+    else:
+        x = x.copy()
+        x[-1] = x[0] + turns
+    count = int(np.clip(len(at) // (4 * m), starts.FIRST, 200))
+    # Mesh points where the samples are dense.
+    mesh = np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(at)), at)
+    mesh[0], mesh[-1] = 0.0, 1.0
+    values = PchipInterpolator(at, x, axis=0)(collocation.times(mesh, m))
+    multiple = 1
+    if problem.time is not None:
+        multiple = max(1, round(period / problem.forcing_period))
+    return Orbit(mesh, np.ascontiguousarray(values), np.array([period, value])), turns, multiple
+
+
+def first_point(cycles: Cycles, found: Solution, where: str) -> Point:
+    """The point at which a family begins.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method found none.
+    """
+    if not found.converged:
+        raise ConvergenceError(f"no periodic orbit was found {where}: {found.message}")
+    return point_of(cycles, found, 0.0, 0.0)
+
+
+def orbit_of(cycles: Cycles, problem: Problem, found: Solution, where: str) -> xr.Dataset:
+    """The Dataset of an orbit that Newton's method found."""
+    return orbit_dataset(problem, cycles, first_point(cycles, found, where))
