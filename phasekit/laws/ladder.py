@@ -71,6 +71,10 @@ class Routhian(Autonomous):
         """phi, kind, energy and curvature of all equilibria, in the order of phi."""
         raise NotImplementedError
 
+    def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
+        """The acceleration x'' as a sympy expression, under a generalised force over the inertia of the rest."""
+        raise NotImplementedError
+
 
 class Conservative(Autonomous):
     """One degree of freedom in a potential: ``x'' = -V'(x; p)``."""
@@ -83,6 +87,10 @@ class Conservative(Autonomous):
     def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V' as a sympy expression of real symbols: of the coordinate and the parameters."""
         raise NotImplementedError
+
+    def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
+        """The acceleration x'' as a sympy expression, under a force over the inertia."""
+        return push - self.gradient_formula(symbols)
 
 
 class Lawful:

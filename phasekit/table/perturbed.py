@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from phasekit.errors import EscapeRegime
+from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import (
     PerturbedConservative,
+    PerturbedRouthian,
     PerturbedTrigonometric,
     TiltedConservative,
+    TiltedRouthian,
     TiltedTrigonometric,
 )
 from phasekit.table.row import ABC, LAW, SIDES, STATE, Pass, Quantity
@@ -114,6 +117,7 @@ _TORQUE = "phasekit.perturbation.torque:"
 _TILTED = "phasekit.perturbation.tilted_"
 _POTENTIAL = "phasekit.perturbation.tilted_potential:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
+_KEPT = "phasekit.perturbation.kept_momentum:"
 
 PASSES: tuple[Pass, ...] = (
     Pass(_MELNIKOV + "melnikov", (LAW,), ("melnikov",), PerturbedTrigonometric),
@@ -162,13 +166,27 @@ PASSES: tuple[Pass, ...] = (
     Pass(_POTENTIAL + "most", (LAW,), ("labels",), _GENERAL),
     Pass(_POTENTIAL + "equilibria", (LAW,), ("equilibria",), _GENERAL),
     *(
-        Pass(_POTENTIAL + name, (LAW, *states), (group,), TiltedConservative)
+        Pass(module + name, (LAW, *states), (group,), rung)
+        for module, rung in (
+            (_POTENTIAL, TiltedConservative),
+            (_KEPT, TiltedRouthian),
+            (_KEPT, Routhian),
+        )
         for name, states, group in (
             ("potential", ("state_phi",), "potential"),
             ("gradient", ("state_phi",), "potential_gradient"),
             ("curvature", ("state_phi",), "potential_curvature"),
             ("energy", STATE, "energy_integral"),
             ("phase_velocity", ("state_phi", "state_energy"), "phase_velocity"),
+        )
+    ),
+    *(
+        Pass(_KEPT + name, (LAW,), (group,), PerturbedRouthian)
+        for name, group in (
+            ("most", "labels"),
+            ("equilibria", "equilibria"),
+            ("melnikov", "melnikov"),
+            ("capture", "capture"),
         )
     ),
 )
