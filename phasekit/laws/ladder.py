@@ -72,7 +72,7 @@ class Routhian(Autonomous):
         raise NotImplementedError
 
     def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
-        """The acceleration x'' as a sympy expression, under a generalised force over the inertia of the rest."""
+        """The acceleration as a sympy expression; push is a torque over the inertia of x alone."""
         raise NotImplementedError
 
 
@@ -89,7 +89,7 @@ class Conservative(Autonomous):
         raise NotImplementedError
 
     def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
-        """The acceleration x'' as a sympy expression, under a force over the inertia."""
+        """The acceleration as a sympy expression; push is a force over the inertia."""
         return push - self.gradient_formula(symbols)
 
 

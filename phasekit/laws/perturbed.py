@@ -80,7 +80,7 @@ class PerturbedConservative(Law):
 
     called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
 
-    base: Conservative
+    base: Conservative | Routhian
     names: tuple[str, ...]
     inputs: tuple[str, ...]
     harmonics: int = 0
@@ -163,7 +163,7 @@ class PerturbedRouthian(PerturbedConservative):
     M0 being the inertia with all other coordinates held; energies are in J.
     """
 
-    base: Routhian  # type: ignore[assignment]
+    base: Routhian
 
     called: ClassVar[str] = "a perturbed system at a constant momentum"
 

@@ -108,11 +108,13 @@ class Machines(Routhian):
             machine = two_degrees(
                 v["beta"], v["e"], v["a"], v["r"], v["m"], v["carrier_inertia"], v["g"]
             )
-            p = v["momentum"] if "momentum" in v else v["omega1"] * support_inertia(machine, 0.0)[0]
-        return AtMomentum(machine, np.asarray(p)[()])
+            p: Any = (
+                v["momentum"] if "momentum" in v else v["omega1"] * support_inertia(machine, 0.0)[0]
+            )
+        return AtMomentum(machine, p)
 
     def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
-        """The acceleration of phi, of constants or parameters as symbols; push is a torque over M22.
+        """The acceleration, of constants or parameters as symbols; push is a torque over M22.
 
         From Lagrange's equations with omega1 = (p - M12 phi')/M11.
         """

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.laws.perturbed import (
     PerturbedConservative,
     drift_name,
@@ -111,7 +111,7 @@ class _Form:
 class _Same:
     """A law of a potential, of which there is one for equal formulas."""
 
-    base: Conservative
+    base: Conservative | Routhian
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Same) and self.base is other.base
@@ -154,6 +154,7 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
             if name in form.drifting:
                 symbols[name] += parameter(drift_name(name)) * t
         symbols[base.coordinate] = x
+        assert isinstance(base, Conservative)
         slope = base.gradient_formula(symbols)
     force = parameter("torque") - slope - parameter("damping") * v
     for number in range(form.harmonics):

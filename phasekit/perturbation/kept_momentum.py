@@ -8,6 +8,7 @@ machine.
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -103,7 +104,7 @@ def phase_velocity(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) ->
     one, _ = _at(law, inputs[:-2])
     kinetic = np.asarray(inputs[-1], float) - potential(law, *inputs[:-1])
     inertia = one.inertia(np.asarray(inputs[-2], float))[0]
-    return np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan) / inertia)
+    return np.asarray(np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan) / inertia))
 
 
 def _at(law: Machines | PerturbedRouthian, parameters: Any) -> tuple[AtMomentum, Any]:
@@ -116,8 +117,9 @@ def _at(law: Machines | PerturbedRouthian, parameters: Any) -> tuple[AtMomentum,
 
 
 def _machines(law: PerturbedRouthian) -> Machines:
-    base: Any = law.base
-    return base  # type: ignore[no-any-return]
+    base = law.base
+    assert isinstance(base, Machines)
+    return base
 
 
 # ------------------------------------------------------------------------- separatrices
@@ -134,7 +136,7 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
     which = which.reshape(-1)
-    followed = [Followed.of(column, alone=cells.shape[1] == 1) for column in cells.T]
+    followed = [_followed(column, cells.shape[1] == 1) for column in cells.T]
     width = max((len(each.loops.loop) for each in followed), default=0)
     loops = Loops(
         *(np.stack([_wide(getattr(each.loops, name), width) for each in followed])[which]
@@ -143,8 +145,11 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
     weight = np.asarray(one.machine.Jn).reshape(-1, 1, 1)
     found: Melnikov | None = None
     for points in POINTS:
-        paths = [each.paths(points, width) for each in followed]
-        time, phi, dphi = (np.stack(parts)[which] for parts in zip(*paths, strict=True))
+        moved = [motions_of(each, points) for each in followed]
+        time, phi, dphi = (
+            np.stack([_wide(part, width) for part in parts])[which]
+            for parts in zip(*moved, strict=True)
+        )
         better, lost = along(law, Paths(time, phi, dphi, []), flat, weight)
         if found is None:
             found, rows = better, np.flatnonzero(lost)
@@ -163,10 +168,11 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
 def _wide(values: Any, width: int) -> Any:
     """Values of the saddles, and nothing for those that other machines have more."""
     empty: Any = Loop.ABSENT if values.dtype == np.int8 else np.nan
-    return np.pad(values, (0, width - len(values)), constant_values=empty)
+    more = [(0, width - len(values)), *[(0, 0)] * (values.ndim - 1)]
+    return np.pad(values, more, constant_values=empty)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Followed:
     """The separatrices of one machine at a momentum, along arc length."""
 
@@ -176,44 +182,57 @@ class Followed:
     columns: npt.NDArray[np.intp]
     """Place of each saddle among the equilibria along arc length."""
 
-    @classmethod
-    def of(cls, column: Array, alone: bool) -> Followed:
-        """The machine of some constants; one of many may be invalid."""
-        law = AtMomentum(TwoDegrees(*(float(x) for x in column[:-2])), float(column[-2]))
-        nothing = Loops(np.empty(0), np.empty(0), np.empty(0, np.int8))
-        if not np.isfinite(column).all():
-            return cls(nothing, None, None, np.empty(0, np.intp))
-        try:
-            path = ArcLength.of(law)
-        except ParameterError:
-            if alone:
-                raise
-            return cls(nothing, None, None, np.empty(0, np.intp))
-        ground = path.ground()
-        found = separatrices(ground)
-        phi = np.pi - np.mod(np.pi - path.place(found.saddle_phi[0]), 2.0 * np.pi)
-        order = np.argsort(phi)
-        fields = (found.saddle_energy, found.saddle_exponent, found.loop)
-        return cls(
-            Loops(*(field[0][order] for field in fields)),
-            path,
-            ground,
-            saddles_of(ground)[1][order],
-        )
 
-    def paths(self, points: int, width: int) -> tuple[Array, Array, Array]:
-        """Times, angles and angular velocities along each separatrix."""
-        k = _wide(self.loops.saddle_exponent, width)
-        time = times_of(k, points)
-        phi, dphi = np.full((2, width, 2, points + 1), np.nan)
-        for saddle in np.flatnonzero(k > 0.0) if self.path else ():
-            column = self.columns[saddle : saddle + 1]
-            for side, way in enumerate(SIDES):
-                branch = branch_of(self.ground.take(np.zeros(1, np.intp)), column, way)
-                owner = np.zeros(points + 1, np.intp)
-                s, speed, *_ = motion.separatrix_motion(branch, owner, time[saddle])
-                assert self.path is not None
-                angle = self.path.place(s)
-                rate = speed / np.sqrt(self.path.law.inertia(angle)[0])
-                phi[saddle, side], dphi[saddle, side] = closed(angle, rate)
+NOTHING = Followed(
+    Loops(np.empty(0), np.empty(0), np.empty(0, np.int8)), None, None, np.empty(0, np.intp)
+)
+
+
+def _followed(column: Array, alone: bool) -> Followed:
+    """The machine of some constants; one of many may be invalid."""
+    try:
+        return separatrices_of(*map(float, column[:-1])) if np.isfinite(column).all() else NOTHING
+    except ParameterError:
+        if alone:
+            raise
+        return NOTHING
+
+
+@functools.lru_cache(maxsize=64)
+def separatrices_of(*constants: float) -> Followed:
+    """Separatrices of the machine of some constants, its momentum last.
+
+    Raises
+    ------
+    ParameterError
+        If its inertia or its energies are unusable.
+    """
+    path = ArcLength.of(AtMomentum(TwoDegrees(*constants[:-1]), constants[-1]))
+    ground = path.ground()
+    found = separatrices(ground)
+    phi = np.pi - np.mod(np.pi - path.place(found.saddle_phi[0]), 2.0 * np.pi)
+    order = np.argsort(phi)
+    fields = (found.saddle_energy, found.saddle_exponent, found.loop)
+    columns = saddles_of(ground)[1][order]
+    return Followed(Loops(*(field[0][order] for field in fields)), path, ground, columns)
+
+
+@functools.lru_cache(maxsize=64)
+def motions_of(one: Followed, points: int) -> tuple[Array, Array, Array]:
+    """Times, angles and angular velocities along each separatrix."""
+    k = one.loops.saddle_exponent
+    time = times_of(k, points)
+    phi, dphi = np.full((2, len(k), 2, points + 1), np.nan)
+    rows = np.flatnonzero(k > 0.0)
+    if one.path is None or not rows.size:
         return time, phi, dphi
+    ground = one.ground.take(np.zeros(rows.size, np.intp))
+    owner = np.repeat(np.arange(rows.size), points + 1)
+    for side, way in enumerate(SIDES):
+        branch = branch_of(ground, one.columns[rows], way)
+        found = motion.separatrix_motion(branch, owner, time[rows].reshape(-1))
+        s, speed = (x.reshape(rows.size, -1) for x in found[:2])
+        angle = one.path.place(s)
+        inertia = one.path.law.inertia(angle)[0]
+        phi[rows, side], dphi[rows, side] = closed(angle, speed / np.sqrt(inertia))
+    return time, phi, dphi

@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from witnesses import free_support
 
 import phasekit as pk
+from phasekit.systems.perturbed_problem import formulas_of
 
 ORBITS = int(os.environ.get("PHASEKIT_ENSEMBLES", "0"))
 DISK = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.01, r=0.1, omega1=15.0, m=2.0)
@@ -34,7 +35,9 @@ DRIVEN = {
         ROTOR, damping=0.3, quadratic=0.1, torque=2.0,
         forcing=[pk.Harmonic(1.5, 2.0, 0.3), pk.Harmonic(0.5, 3.1)],
     ),
-    "momentum": pk.Perturbed(ROTOR.replace(momentum=-0.8), damping=0.2, forcing=pk.Harmonic(3.0, 9.0)),
+    "momentum": pk.Perturbed(
+        ROTOR.replace(momentum=-0.8), damping=0.2, forcing=pk.Harmonic(3.0, 9.0)
+    ),
     "torque": pk.Perturbed(ROTOR.replace(a=-0.05, beta=0.4), torque=-1.0),
 }  # fmt: skip
 
@@ -78,7 +81,7 @@ def shifted(perturbed, t):
     return {n: h.phase + h.frequency * t for n, h in zip(names, perturbed.forcing, strict=True)}
 
 
-@pytest.mark.parametrize("torque", [0.0, 3.0, -1.5, 60.0])
+@pytest.mark.parametrize("torque", [0.0, 3.0, -1.5, 200.0])
 def test_equilibria_under_a_torque_are_steady_rotations(torque):
     ds = pk.equilibria(pk.Perturbed(ROTOR, damping=0.1, torque=torque))
     size, const = free_support.inertia(ROTOR), free_support.constants(ROTOR)
@@ -92,7 +95,7 @@ def test_equilibria_under_a_torque_are_steady_rotations(torque):
     values = [bend(x)[1] for x in grid]
     places = np.flatnonzero(np.diff(np.sign(values)))
     want = [brentq(lambda x: bend(x)[1], grid[i], grid[i + 1], xtol=1e-14) for i in places]
-    assert len(want) == {0.0: 4, 3.0: 2, -1.5: 2, 60.0: 0}[torque]
+    assert len(want) == {0.0: 4, 3.0: 2, -1.5: 4, 200.0: 0}[torque]
     assert ds.phi.values == pytest.approx(want, abs=1e-10)
     assert ds.n_equilibria == len(want)
     rising = [values[i] < 0.0 for i in places]
@@ -169,8 +172,11 @@ def test_melnikov_along_the_loops_of_the_whole_machine():
                     xtol=1e-14,
                 )
             passes = 2.0 if saddle == 1 else 1.0
-            sweep = [quad(lambda x, n=n, h=level: velocity(x, h) ** n, *sorted((phi, end)), limit=400)[0]
-                     for n in (1, 2)]  # fmt: skip
+            ends = sorted((phi, end))
+            sweep = [
+                quad(lambda x, n=n, h=level: velocity(x, h) ** n, *ends, limit=400)[0]
+                for n in (1, 2)
+            ]
             mean = -0.3 * passes * sweep[0] - 0.05 * passes * sweep[1]
             mean += 0.2 * (end - phi if saddle == 0 else 0.0)
             found = ds.isel(saddle=saddle, side=side)
@@ -242,17 +248,19 @@ def test_capture_of_the_whole_machine():
 
 
 def test_attractors_are_the_lower_steady_rotations():
-    damped = pk.Perturbed(ROTOR, damping=1.0)
+    rotor = ROTOR.replace(omega1=18.0)
+    damped, momentum = pk.Perturbed(rotor, damping=1.0), rotor.angular_momentum(0.0, 0.0)
     box = {"phi": np.linspace(-3.0, 3.0, 9), "dphi": np.linspace(-4.0, 4.0, 5)}
     ds = pk.basins(damped, **box)
-    points = pk.equilibria(ROTOR)
+    points = pk.equilibria(rotor)
     centers = points.phi.values[points.kind == KIND.CENTER]
+    assert centers.size == 2
     assert ds.attractor_phi.values[:, 0] == pytest.approx(centers, abs=1e-8)
     assert ds.basin_fraction.sum() == pytest.approx(1.0)
-    for i, j in ((0, 0), (4, 2), (7, 4)):
+    for i, j in ((0, 0), (4, 2), (7, 4), (2, 2)):
         start = (box["phi"][i], box["dphi"][j])
-        end = free_support.integrate(ROTOR, P, push(damped), start, np.array([0.0, 40.0])).y[0, -1]
-        off = np.abs(np.angle(np.exp(1j * (end - centers))))
+        ends = free_support.integrate(rotor, momentum, push(damped), start, np.array([0.0, 40.0])).y
+        off = np.abs(np.angle(np.exp(1j * (ends[0, -1] - centers))))
         assert off.min() < 1e-6
         assert ds.basin.values[i, j] == off.argmin()
 
@@ -296,13 +304,21 @@ def test_maps_and_back(tmp_path):
     assert np.isnan(several.melnikov_mean.isel(beta=[1, 2])).all()
 
 
-def test_continued_as_a_problem():
-    driven = pk.Perturbed(ROTOR, damping=0.5, torque=0.3, forcing=pk.Harmonic(4.0, 7.0))
-    cycle = pk.periodic_orbit(driven, [0.7, 0.0])
-    start = (cycle.phi.values[0], cycle.dphi.values[0])
-    t = np.array([0.0, 2.0 * np.pi / 7.0])
-    end = free_support.integrate(ROTOR, P, push(driven), start, t).y[:, -1]
-    assert end[[0, 2]] == pytest.approx(start, abs=1e-6)
+@pytest.mark.parametrize("momentum", [None, 0.4])
+def test_its_equations_as_a_problem(momentum):
+    rotor = ROTOR.replace(momentum=momentum)
+    perturbed = pk.Perturbed(rotor, damping=0.5, quadratic=0.2, torque=0.3)
+    (_, force), states, values, keywords = formulas_of(perturbed)
+    assert keywords["periods"] == {"phi": 2.0 * np.pi}
+    kept = P if momentum is None else momentum
+    for phi, dphi in ((0.3, 2.0), (-2.0, -1.5)):
+        at = {**values, **dict(zip(states, (phi, dphi), strict=True))}
+        found = float(force.subs({symbol: at[str(symbol)] for symbol in force.free_symbols}))
+        omega = free_support.speed(rotor, kept, phi, dphi)
+        torque = free_support.inertia(rotor) * push(perturbed)(0.0, phi, dphi)
+        const = free_support.constants(rotor)
+        want = free_support.rates(const, phi, omega, dphi, torque)[1]
+        assert found == pytest.approx(want, rel=1e-12)
 
 
 @pytest.mark.parametrize(
