@@ -45,7 +45,7 @@ def capture(
     joined = loops.loop[..., :1] == Loop.HETEROCLINIC
     lobes = loss[..., 0, :] + np.where(joined, loss[..., 1, ::-1], 0.0)
     winding = loss[..., 1, :] + np.where(joined, loss[..., 0, :], 0.0)  # a turn is both arcs
-    return regions(lobes, winding, values["torque"], rotation)
+    return regions(lobes, winding, rotation)
 
 
 def capture_numerical(
@@ -56,14 +56,14 @@ def capture_numerical(
     formula: Any = law.base
     loops = functions.separatrices(formula, *(values[name] for name in formula.names))
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
-    return of_loops(loops, loss, values["torque"], rotation)
+    return of_loops(loops, loss, rotation)
 
 
-def of_loops(loops: Any, loss: Array, torque: Any, rotation: bool) -> Capture:
+def of_loops(loops: Any, loss: Array, rotation: bool) -> Capture:
     """Capture by the separatrices of numbered saddles, and what they lose on each side."""
     if not loss.shape[-2]:
         nothing = np.full((*loss.shape[:-2], 2), np.nan)
-        return regions(nothing, nothing, torque, rotation)
+        return regions(nothing, nothing, rotation)
     winds = np.isin(loops.loop, (Loop.WINDING, Loop.HETEROCLINIC))
     height = np.broadcast_to(loops.saddle_energy, loss.shape[:-1])
     both = np.isfinite(loss).all(axis=-1)
@@ -77,19 +77,20 @@ def of_loops(loops: Any, loss: Array, torque: Any, rotation: bool) -> Capture:
     # A turn on a level of several saddles is an arc of each.
     arcs = winds & (top - highest <= LEVEL * np.abs(height).max(-1, keepdims=True, initial=0.0))
     winding = np.where(arcs[..., None], loss, 0.0).sum(axis=-2)
-    return regions(lobes, np.where(arcs.any(-1, keepdims=True), winding, np.nan), torque, rotation)
+    winding = np.where(arcs.any(-1, keepdims=True), winding, np.nan)
+    return regions(lobes, winding, rotation)
 
 
-def regions(lobes: Array, winding: Array, torque: Any, rotation: bool) -> Capture:
+def regions(lobes: Array, winding: Array, rotation: bool) -> Capture:
     """Fluxes and probabilities from the losses of the lobes and of both winding branches."""
     if not rotation:
         flux = np.concatenate([lobes, np.zeros((*lobes.shape[:-1], 1))], axis=-1)
         flux[np.isnan(lobes).any(axis=-1)] = np.nan
         flux[..., 2] -= np.minimum(lobes.sum(axis=-1), 0.0)
         return Capture(flux, _shares(lobes))
-    # Braked by the torque, or running forward where there is none.
-    forward = np.broadcast_to(np.asarray(torque) <= 0.0, winding.shape[:-1])
     with np.errstate(all="ignore"):
+        # What is braked loses more; forward where nothing tells, within rounding.
+        forward = ~(winding[..., 0] - winding[..., 1] > 1e-9 * np.abs(winding).max(axis=-1))
         arriving = np.where(forward, winding[..., 1], winding[..., 0])
         inside = winding.sum(axis=-1)
         share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)

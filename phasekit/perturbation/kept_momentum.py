@@ -66,8 +66,7 @@ def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
 def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
     loops, found = _along_separatrices(law, parameters)
-    torque = law.values(*parameters)["torque"]
-    return of_loops(loops, -found.melnikov_mean, torque, rotation)
+    return of_loops(loops, -found.melnikov_mean, rotation)
 
 
 # ------------------------------------------------------------------------- energies
