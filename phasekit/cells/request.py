@@ -270,6 +270,8 @@ def fitted(
 
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
     labelled |= any(row.group == "equilibria" for row in kept)
+    if issubclass(system.rung, TiltedConservative):
+        labelled |= any(row.group in ("orbits", "action_angle") for row in kept)
     if issubclass(system.rung, PerturbedConservative) and not labelled:
         return numbered.worded(system, kept), passes  # no equilibrium is looked for
     counts = [one for one in quantities.PASSES if one.groups == ("labels",)]

@@ -241,7 +241,7 @@ BRAKED = [
     (pk.Coefficients(0.0, 1.0, 0.0), "B", 0.4, -6.0),
     (pk.Coefficients(0.0, 1.0, 0.0), "B", -0.4, -4.0),
     (EIGHT, "A", -0.5, -3.0),
-    (EIGHT, "C", 1.5, -3.0),
+    (EIGHT, "B", 0.5, -3.0),
     (DISK, "omega1", 0.5, -4.0),
     (DISK, "omega1", -0.1, -4.0),
 ]
