@@ -17,7 +17,7 @@ from phasekit.errors import ParameterError
 from phasekit.labels.coordinates import LABELS, Labels
 from phasekit.labels.grid import make_grid
 from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import PerturbedConservative, PerturbedRouthian
 from phasekit.systems.system import Model
 from phasekit.table.numerical import NUMERICAL_ROWS
 from phasekit.table.quantities import ROWS, variant
@@ -52,7 +52,8 @@ def fitted(
         labels["saddle"] = (range(saddles), "saddle, by its coordinate")
     elif any(row.group in ("orbits", "motion") for row in rows) and system.law.may_be_incomplete:
         _most(system, count)  # says what is not proved, on which orbits and motion rest as well
-    if issubclass(system.rung, (Conservative, PerturbedConservative)):
+    searched = (Conservative, PerturbedConservative)
+    if issubclass(system.rung, searched) and not issubclass(system.rung, PerturbedRouthian):
         groups = dict.fromkeys(row.group for row in rows)
         rows = [*rows, *(row for group in groups for row in NUMERICAL_ROWS.get(group, ()))]
     found = [_worded(row, system, labels) for row in rows]

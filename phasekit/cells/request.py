@@ -233,7 +233,7 @@ def bound(one: Pass, system: Model, given: set[str], options: dict[str, Any] | N
     function = one.resolved
     inputs = one.inputs
     if LAW in inputs:
-        function = functools.partial(function, system.law)
+        function = functools.partial(function, system.law_of_parameters)
         own = tuple(system.parameters)
         inputs = tuple(x for name in inputs for x in (own if name == LAW else (name,)))
     if options:
@@ -270,8 +270,10 @@ def fitted(
 
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
     labelled |= any(row.group == "equilibria" for row in kept)
+    if issubclass(system.rung, TiltedConservative):
+        labelled |= any(row.group in ("orbits", "action_angle") for row in kept)
     if issubclass(system.rung, PerturbedConservative) and not labelled:
         return numbered.worded(system, kept), passes  # no equilibrium is looked for
     counts = [one for one in quantities.PASSES if one.groups == ("labels",)]
-    (count,) = (one for one in counts if issubclass(system.rung, one.of))
+    count = max((o for o in counts if issubclass(system.rung, o.of)), key=lambda o: depth(o.of))
     return numbered.fitted(system, kept, passes, bound(count, system, set(system.parameters)))

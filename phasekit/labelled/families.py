@@ -12,10 +12,12 @@ import xarray as xr
 from phasekit.cells.states import at_states
 from phasekit.errors import EquilibriumKind, ParameterError, Topology
 from phasekit.labelled.numerical_families import families_of_any
-from phasekit.labels.arguments import FloatArray, bad, number, whole
+from phasekit.labels.arguments import FloatArray, number, whole
 from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import TiltedTrigonometric
+from phasekit.laws.perturbed import TiltedConservative, TiltedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.perturbation.tilted_families import TiltedFamilies
+from phasekit.perturbation.tilted_families import families as tilted_families
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
 from phasekit.phase.exact.separatrices import phase_space
 from phasekit.systems.as_system import as_system
@@ -71,6 +73,12 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     ``well_2``, ... by the number of the center; ``wells_0_2``, round several; ``rotation``. Where
     no saddle is above them, orbits have no end, so that `energy_max` has to be given.
 
+    Under a constant torque alone, ``pk.Perturbed(system, torque=...)``, the energy is less torque
+    times the angle, at the center of the well in the turn where `equilibria` has it; of orbits
+    round several wells at the saddle between them, of a `Potential` at the center of the least
+    number. They are quadratures, with ``period_error`` and ``action_error``. What rotates gains
+    energy each turn: "rotation" is empty, or left out.
+
     Examples
     --------
     >>> import phasekit as pk
@@ -81,10 +89,11 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     True
     """
     system = with_families(system, "orbit_families")
+    tilted = issubclass(system.rung, TiltedTrigonometric)
     n = whole("n", n, "a number of orbits >= 1")
     wants = "one number, finite, in s^-2"
     top = None if energy_max is None else number("energy_max", energy_max, wants, "s-2")
-    if not issubclass(system.rung, Trigonometric):
+    if not tilted and not issubclass(system.rung, Trigonometric):
         return families_of_any(system, n, top)
     for name, value in system.parameters.items():
         if isinstance(value, xr.DataArray) and "level" in value.dims:
@@ -92,11 +101,13 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
                 f"{name}: got the dim 'level', which the result has; rename it with "
                 ".rename(level=...)"
             )
-    rows = [
-        replace(ROWS[name], group="orbit_families", dims=("family",)) for name in Families._fields
-    ]
-    function = functools.partial(families, top)
-    one = Pass(function, ("A", "B", "C", "level"), ("orbit_families",))
+    names = TiltedFamilies._fields if tilted else Families._fields
+    rows = [replace(ROWS[name], group="orbit_families", dims=("family",)) for name in names]
+    one = Pass(functools.partial(families, top), ("A", "B", "C", "level"), ("orbit_families",))
+    if tilted:
+        function = functools.partial(families_under_torque, top, system.law)
+        inputs = (*system.parameters, "level")
+        one = Pass(function, inputs, ("orbit_families",), TiltedTrigonometric)
     levels = (np.arange(n) + 0.5) / n
     ds = at_states(system, rows, {"n": ("level", levels)}, (one,))
     return ds.transpose(..., "family", "level")
@@ -108,16 +119,30 @@ def with_families(system: Any, what: str) -> Model:
     Raises
     ------
     ParameterError
-        If it is no system, or damped, driven or under a torque.
+        If it is no system, or damped or driven.
     """
     found = as_system(system)
-    if issubclass(found.rung, TiltedTrigonometric):
-        hint = (
-            "under a torque what rotates gains energy each turn and has no period; "
-            "pk.orbits(system, phi0, dphi0) takes a constant torque, perturbed.system has none"
-        )
-        raise bad("system", found, f"a system without damping and drive for {what}", hint)
+    if issubclass(found.rung, (TiltedTrigonometric, TiltedConservative)):
+        return found
     return as_system(found, rung=Conservative, what=what)
+
+
+def families_under_torque(
+    energy_max: float | None, law: TiltedTrigonometric, *inputs: FloatArray
+) -> TiltedFamilies:
+    """The same families where a torque may act; what rotates there has no period."""
+    *parameters, level = np.broadcast_arrays(*inputs)
+    values = law.values(*parameters)
+    A, B, C = law.coefficients(values)
+    still = families(energy_max, A, B, C, level)
+    errors = (np.where(np.isnan(x), np.nan, 0.0) for x in (still.period, still.action))
+    fields = [np.array(x) for x in (*still, *errors)]
+    tilted = np.broadcast_to(values["torque"] != 0.0, level.shape)
+    if tilted.any():
+        found = tilted_families(law, *(x[tilted] for x in (*parameters, level)))
+        for field, values_ in zip(fields, found, strict=True):
+            field[tilted] = values_
+    return TiltedFamilies(*fields)
 
 
 def families(

@@ -62,7 +62,10 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
     centers = [int(k) for k in np.flatnonzero(points.kind.values == EquilibriumKind.CENTER)]
     if not centers:
         raise bad("system", system, "a system with a center, for without one nothing oscillates")
-    barriers = energy[points.kind.values != EquilibriumKind.CENTER]
+    drop = fall_per_turn(system)
+    # Under a torque what bounds a well may be a saddle of the next turn.
+    marks = (energy[:, None] + drop * np.array([-1.0, 0.0, 1.0])) if drop else energy[:, None]
+    barriers = marks[points.kind.values != EquilibriumKind.CENTER]
     barriers = barriers[np.isfinite(barriers)]
     bottom = float(energy[centers].min())
     top = float(barriers.max()) if barriers.size else bottom
@@ -73,9 +76,11 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
                 "energy_max: got nothing, wants the energy up to which orbits are taken, for no "
                 "saddle bounds them"
             )
-    found = _families(system, phi, energy, centers, float(energy_max))
+    found = _families(system, phi, energy, marks, centers, float(energy_max))
     level = (np.arange(n) + 0.5) / n
-    deepest = [min(f.wells or centers, key=lambda k: energy[k]) for f in found]
+    deepest = [
+        min(f.wells) if drop else min(f.wells or centers, key=lambda k: energy[k]) for f in found
+    ]
     rises = [f.rises(energy[k], level) for f, k in zip(found, deepest, strict=True)]
     start = np.repeat(phi[deepest], n)
     orbit = orbits(system, start, np.sqrt(2.0 * np.concatenate([*rises, []])))
@@ -101,15 +106,27 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
     return xr.Dataset(variables, coords, dataset_attrs(system))
 
 
+def fall_per_turn(system: Model) -> float:
+    """What the potential of a system falls by in a turn under a torque; 0 on a line."""
+    period = getattr(getattr(system, "system", None), "period", None)
+    return float(system.parameters.get("torque", 0.0)) * period if period else 0.0
+
+
 def _families(
-    system: Model, phi: FloatArray, energy: FloatArray, centers: list[int], top: float
+    system: Model,
+    phi: FloatArray,
+    energy: FloatArray,
+    heights: FloatArray,
+    centers: list[int],
+    top: float,
 ) -> list[_Family]:
     """The families below an energy, from the lowest to the highest.
 
     Between two energies of equilibria nothing changes: there one orbit tells for each center
-    which wells it shares.
+    which wells it shares. Under a torque a family is seen from its center of the least number,
+    for from others its energies differ by those of turns.
     """
-    marks = np.unique(energy[np.isfinite(energy) & (energy < top)])
+    marks = np.unique(heights[np.isfinite(heights) & (heights < top)])
     scale = float(np.abs(marks).max(initial=0.0))
     marks = marks[np.diff(marks, prepend=-np.inf) > SAME * scale]
     edges = np.append(marks, top)
@@ -120,14 +137,21 @@ def _families(
         if not here:
             continue
         orbit = orbits(system, phi[here], np.sqrt(2.0 * (middle - energy[here])))
-        for wells in {_wells(orbit.isel(point=i), phi, here) for i in range(len(here))} - {None}:
+        sharing = [_wells(orbit.isel(point=i), phi, here, centers) for i in range(len(here))]
+        if heights.shape[1] > 1:
+            pairs = zip(sharing, here, strict=True)
+            sharing = [w if w and min(w) == k else None for w, k in pairs]
+        for wells in set(sharing) - {None}:
             family = found.setdefault(wells, _Family(wells, float(low), float(high)))
             family.high, family.open = float(high), high == top
     return sorted(found.values(), key=lambda f: (f.low, len(f.wells), f.wells))
 
 
-def _wells(orbit: xr.Dataset, phi: FloatArray, centers: list[int]) -> Any:
-    """The centers that an orbit goes round; None where it goes round none for ever."""
+def _wells(orbit: xr.Dataset, phi: FloatArray, here: list[int], every: list[int]) -> Any:
+    """The centers that an orbit goes round; None where it goes round none for ever.
+
+    On a circle these may be deeper in another turn than in their own.
+    """
     kind = orbit.orbit_kind.item()
     if kind == OrbitKind.ROTATION:
         return ()
@@ -135,6 +159,7 @@ def _wells(orbit: xr.Dataset, phi: FloatArray, centers: list[int]) -> Any:
         return None
     low, high = orbit.phi_min.item(), orbit.phi_max.item()
     period = orbit.attrs.get("phasekit_period", "None")
+    centers = here if period == "None" else every
     places = [phi[k] for k in centers]
     if period != "None":
         turn = float(period)

@@ -127,8 +127,8 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
         A system with damping, and parameters that drift or a constant torque.
     start : {"outside", "rotation"}
         Where the motion comes from: round both wells, from outside the figure-eight of the lower
-        saddle; or from rotation beyond the winding separatrix, braked by the torque (forward where
-        there is none).
+        saddle; or from rotation beyond the winding separatrix, in the sense that the torque brakes
+        (forward where there is none), or the inertial torque of a frame that drifts.
 
     Returns
     -------
@@ -136,7 +136,8 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
         On ``region`` (left, right, none): ``capture_flux`` in s^-2 and ``capture_probability``,
         which sums to 1. Left and right are the lobes of the lower saddle; in a system with one
         well it is the side from which the rotation came that stays empty. "none": it is not
-        captured, or never comes to the separatrix. NaN where there is no such separatrix.
+        captured, never comes to the separatrix, or stays round both wells because they shrink too
+        fast. NaN where there is no such separatrix.
 
     Raises
     ------
@@ -146,9 +147,12 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
     Notes
     -----
     Each region takes phase at the rate ``damping S + dS/dt`` of its area S; the probability is the
-    ratio of the fluxes if both are positive ([Neishtadt1975]). From rotation it is
-    ``2/(1 + 2 torque w/(damping S))`` with the width w = 2 pi of a cell
-    ([GoldreichPeale1966]), 1 where it would be more. First order in damping and drift, for motions
+    ratio of the fluxes if both are positive ([Neishtadt1975]). From rotation it is the phase that
+    the cell takes over that which the rotation loses: with the area S of the cell and its width
+    w = 2 pi, ``2/(1 + 2 |torque| w/(damping S + dS/dt))`` ([GoldreichPeale1966], with drift), 1
+    where it would be more, 0 where the cell shrinks faster than damping fills it; then the lobes
+    share it by their own fluxes. Of a parameter that drifts it is that for motions which come to
+    the separatrix at the value that the system has. First order in damping and drift, for motions
     whose actions are spread; right at the separatrix the error is of the order rate log(rate).
 
     Examples

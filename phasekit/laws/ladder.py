@@ -72,6 +72,10 @@ class Routhian(Autonomous):
         """phi, kind, energy and curvature of all equilibria, in the order of phi."""
         raise NotImplementedError
 
+    def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
+        """The acceleration as a sympy expression; push is a torque over the inertia of x alone."""
+        raise NotImplementedError
+
 
 class Conservative(Autonomous):
     """One degree of freedom in a potential: ``x'' = -V'(x; p)``."""
@@ -86,6 +90,10 @@ class Conservative(Autonomous):
     def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V' as a sympy expression of real symbols: of the coordinate and the parameters."""
         raise NotImplementedError
+
+    def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
+        """The acceleration as a sympy expression; push is a force over the inertia."""
+        return push - self.gradient_formula(symbols)
 
 
 def is_turn(period: float | None) -> bool:

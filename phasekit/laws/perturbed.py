@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from phasekit.laws.ladder import Conservative, Law
+from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 
 #: What every perturbed law has beside the parameters of its potential.
@@ -80,7 +80,7 @@ class PerturbedConservative(Law):
 
     called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
 
-    base: Conservative
+    base: Conservative | Routhian
     names: tuple[str, ...]
     inputs: tuple[str, ...]
     harmonics: int = 0
@@ -104,7 +104,7 @@ class PerturbedConservative(Law):
         words = dict(self.base.words(name, units, long_name))
         if name == "chaos_threshold" and self.unit != units:
             words["units"] = self.unit
-        if name in ("motion_phi", "motion_dphi"):
+        if name in _MOTION:
             words["equation"] = "phi'' + V'(phi; p(t)) = -d phi' - q |phi'| phi' + N + F(t)"
         return words
 
@@ -153,6 +153,47 @@ class TiltedConservative(PerturbedConservative):
             "phase_velocity": f"{x}' = sqrt(2 (h - V + torque {x}))",
         }
         return words | ({"equation": tilted[name]} if name in tilted else {})
+
+
+@dataclass(frozen=True)
+class PerturbedRouthian(PerturbedConservative):
+    """The same at constant momenta, where the inertia depends on the coordinate.
+
+    ``M(x) x'' + M'(x) x'^2/2 + V'(x) = M0 (-d x' - q |x'| x' + N + sum F cos(nu t + phase))``,
+    M0 being the inertia with all other coordinates held; energies are in J.
+    """
+
+    base: Routhian
+
+    called: ClassVar[str] = "a perturbed system at a constant momentum"
+
+    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
+        """What is said of a quantity: energies are no longer per unit of inertia."""
+        words = dict(self.base.words(name, units, long_name))
+        if name in _MOTION:
+            words["equation"] = (
+                "M phi'' + M' phi'^2/2 + V_p' = M22 (-d phi' - q |phi'| phi' + N + F(t))"
+            )
+        if name in _IN_JOULES:
+            words["units"] = _IN_JOULES[name]
+        return words
+
+
+@dataclass(frozen=True)
+class TiltedRouthian(PerturbedRouthian):
+    """The same under a constant torque alone, which keeps an energy."""
+
+    called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
+
+
+_MOTION = ("motion_phi", "motion_dphi")
+#: Units of what is an energy or an action where that is not per unit of inertia.
+_IN_JOULES = {
+    "melnikov_mean": "J",
+    "melnikov_amplitude": "J",
+    "turnstile_area": "kg m2 s-1",
+    "capture_flux": "J",
+}
 
 
 @dataclass(frozen=True)

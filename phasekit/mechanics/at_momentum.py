@@ -1,9 +1,14 @@
-"""The angle of the disk on a free support, at one momentum: the rotor's Routhian."""
+"""The angle of the disk on a free support, at one momentum: the rotor's Routhian.
+
+Of one machine, and of many by their parameters.
+"""
 
 from __future__ import annotations
 
+import functools
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +21,11 @@ from phasekit.mechanics.two_degrees import (
     effective_inertia,
     relative_equilibria,
     support_inertia,
+    two_degrees,
 )
+
+#: What the motion of the disk's angle depends on: the machine, and its momentum.
+CONSTANTS = (*TwoDegrees._fields, "p")
 
 
 @dataclass(frozen=True)
@@ -52,3 +61,102 @@ class AtMomentum(Routhian):
     def equilibria(self) -> RelativeEquilibria:
         """All steady rotations at this momentum."""
         return relative_equilibria(self.machine, self.p)
+
+
+@dataclass(frozen=True)
+class Machines(Routhian):
+    """The same of machines by their parameters, which may be arrays.
+
+    Attributes
+    ----------
+    names : tuple of str
+        All parameters, in the order of the values.
+    domains : mapping
+        Parameter -> its least and greatest value.
+    """
+
+    coordinate = "phi"
+    period = 2.0 * math.pi
+
+    names: tuple[str, ...]
+    domains: Mapping[str, tuple[float, float]] = field(compare=False)
+
+    def values(self, *arrays: Any) -> dict[str, Any]:
+        """Values by name, as arrays; NaN where they leave their domain."""
+        found = {}
+        for name, x in zip(self.names, arrays, strict=True):
+            low, high = self.domains[name]
+            value = np.asarray(x, float)
+            inside = np.isfinite(value) & (value >= low) & (value <= high)
+            found[name] = value if inside.all() else np.where(inside, value, np.nan)
+        return found
+
+    @property
+    def constants(self) -> tuple[str, ...]:
+        """Names of what is computed of the parameters, on which alone the motion depends."""
+        return CONSTANTS
+
+    def constants_of(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The constants of the parameters."""
+        one = self.at(values)
+        return {**one.machine._asdict(), "p": one.p}
+
+    def at(self, values: Mapping[str, Any]) -> AtMomentum:
+        """The machines of some values, at the momentum that they keep."""
+        v = {name: np.asarray(values[name], float) for name in self.names if name in values}
+        with np.errstate(all="ignore"):
+            machine = two_degrees(
+                v["beta"], v["e"], v["a"], v["r"], v["m"], v["carrier_inertia"], v["g"]
+            )
+            p: Any = (
+                v["momentum"] if "momentum" in v else v["omega1"] * support_inertia(machine, 0.0)[0]
+            )
+        return AtMomentum(machine, p)
+
+    def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
+        """The acceleration, of constants or parameters as symbols; push is a torque over M22.
+
+        From Lagrange's equations with omega1 = (p - M12 phi')/M11.
+        """
+        import sympy as sp
+
+        c = symbols if CONSTANTS[0] in symbols else {**symbols, **self._formulas(symbols)}
+        sine, cosine = sp.sin(symbols["phi"]), sp.cos(symbols["phi"])
+        reach = c["a"] + c["offset"] * sine
+        m11 = c["rest"] + c["tilt"] * cosine**2 + c["m"] * reach**2
+        half_slope = cosine * (c["m"] * c["offset"] * reach - c["tilt"] * sine)
+        m12 = c["Jvn"] * cosine
+        omega1 = (c["p"] - m12 * rate) / m11
+        right1 = c["Jvn"] * sine * rate**2 - 2 * half_slope * omega1 * rate
+        right2 = c["Jn"] * push + half_slope * omega1**2 - c["weight"] * sine
+        return (m11 * right2 - m12 * right1) / (m11 * c["Jn"] - m12**2)
+
+    def _formulas(self, symbols: Mapping[str, Any]) -> dict[str, Any]:
+        """The constants as formulas of the parameters: `two_degrees` in symbols."""
+        import sympy as sp
+
+        sine, cosine = sp.sin(symbols["beta"]), sp.cos(symbols["beta"])
+        m, e, a = (symbols[name] for name in ("m", "e", "a"))
+        J = m * symbols["r"] ** 2 / 4
+        turned = J + m * e**2
+        found = {
+            "rest": symbols["carrier_inertia"] + J + m * (e * cosine) ** 2,
+            "tilt": J * cosine**2,
+            "m": m,
+            "a": a,
+            "offset": e * sine,
+            "Jn": J + turned * sine**2,
+            "Jvn": turned * sine * cosine,
+            "weight": m * symbols["g"] * e * sine,
+        }
+        rest = found["rest"] + found["tilt"] + m * a**2
+        return {
+            **found,
+            "p": symbols["momentum"] if "momentum" in symbols else symbols["omega1"] * rest,
+        }
+
+
+@functools.cache
+def machines(names: tuple[str, ...], domains: tuple[tuple[str, float, float], ...]) -> Machines:
+    """The law of machines by their parameters, one for equal names."""
+    return Machines(names, {name: (low, high) for name, low, high in domains})

@@ -69,20 +69,35 @@ def steady(
     """
     given = (beta, e, a, r, m, g, carrier_inertia, omega1, np.nan if momentum is None else momentum)
     arrays = np.broadcast_arrays(*(np.asarray(value, dtype=float) for value in given))
-    shape = arrays[0].shape
-    beta_, e_, a_, r_, m_, g_, own, speed, fixed = (x.reshape(-1) for x in arrays)
+    beta_, e_, a_, r_, m_, g_, own, speed, fixed = arrays
     with np.errstate(all="ignore"):
         machines = two_degrees(beta_, e_, a_, r_, m_, own, g_)
         p = speed * support_inertia(machines, 0.0)[0] if momentum is None else fixed
-        usable = np.isfinite(p * p) & np.isfinite(sum(machines))
-    size = p.size
+    return steady_at(machines, p)
+
+
+def steady_at(machines: TwoDegrees, p: npt.ArrayLike, torque: npt.ArrayLike = 0.0) -> Steady:
+    """The same of machines at momenta, under torques on the shaft in N m; all broadcast.
+
+    Examples
+    --------
+    >>> machine = two_degrees(1.0, 0.1, 0.0, 0.1, 2.0, 0.02)
+    >>> [int(steady_at(machine, 0.5, torque).n_equilibria) for torque in (0.0, 5.0)]
+    [4, 0]
+    """
+    arrays = np.broadcast_arrays(*machines, p, torque)
+    shape = arrays[0].shape
+    *fields, momenta, torques = (np.asarray(x, float).reshape(-1) for x in arrays)
+    with np.errstate(all="ignore"):
+        usable = np.isfinite(momenta * momenta) & np.isfinite(sum(fields)) & np.isfinite(torques)
+    size = momenta.size
     columns = np.full((5, size, MOST), np.nan)
     kind = np.full((size, MOST), EquilibriumKind.NOT_COMPUTED, np.int8)
     count = np.full(size, -1, np.int8)
     for i in np.flatnonzero(usable):
-        one = TwoDegrees(*(float(np.broadcast_to(x, size)[i]) for x in machines))
+        one = TwoDegrees(*(float(x[i]) for x in fields))
         with np.errstate(all="ignore"):
-            one_has = relative_equilibria(one, float(p[i]))
+            one_has = relative_equilibria(one, float(momenta[i]), float(torques[i]))
             n = count[i] = one_has.phi.size
             kind[i, :n], kind[i, n:] = one_has.kind, EquilibriumKind.ABSENT
             saddle = one_has.kind == EquilibriumKind.SADDLE

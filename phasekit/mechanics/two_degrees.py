@@ -207,13 +207,13 @@ class RelativeEquilibria(NamedTuple):
     """Angular velocity p/M11 of the support, rad/s."""
 
 
-def relative_equilibria(machine: TwoDegrees, p: float) -> RelativeEquilibria:
+def relative_equilibria(machine: TwoDegrees, p: float, torque: float = 0.0) -> RelativeEquilibria:
     """All equilibria of the amended potential, with their types.
 
-    The equation M11^2 V' = p^2 M11'/2 is a polynomial of degree 10 in exp(i phi). The zeros of its
-    derivative, from the eigenvalues of a companion pencil, cut the circle into arcs on which it is
-    monotone; bisection finds the root of each arc on whose ends its signs differ. An extremum
-    that is zero within rounding is a degenerate equilibrium.
+    The equation M11^2 (V' - torque) = p^2 M11'/2 is a polynomial of degree 10 in exp(i phi). The
+    zeros of its derivative, from the eigenvalues of a companion pencil, cut the circle into arcs on
+    which it is monotone; bisection finds the root of each arc on whose ends its signs differ. An
+    extremum that is zero within rounding is a degenerate equilibrium.
 
     Parameters
     ----------
@@ -221,6 +221,8 @@ def relative_equilibria(machine: TwoDegrees, p: float) -> RelativeEquilibria:
         One machine: its fields are numbers.
     p : float
         Momentum about n1, kg m^2/s.
+    torque : float
+        Constant torque on the disk by its shaft, N m; energies are less torque times phi.
 
     Examples
     --------
@@ -228,7 +230,7 @@ def relative_equilibria(machine: TwoDegrees, p: float) -> RelativeEquilibria:
     >>> [relative_equilibria(machine, p).phi.size for p in (0.0, 0.1, 0.3)]
     [2, 2, 4]
     """
-    simple, rising, merged = _zeros(machine, p)
+    simple, rising, merged = _zeros(machine, p, torque)
     phi = np.concatenate([simple, merged])
     phi = np.pi - np.mod(np.pi - phi, 2.0 * np.pi)  # to (-pi, pi]
     kind = np.full(phi.size, EquilibriumKind.DEGENERATE, np.int8)
@@ -236,6 +238,7 @@ def relative_equilibria(machine: TwoDegrees, p: float) -> RelativeEquilibria:
     order = np.argsort(phi)
     phi, kind = phi[order], kind[order]
     potential, _, curvature = amended_potential(machine, p, phi)
+    potential = potential - torque * phi
     curvature = np.where(kind == EquilibriumKind.DEGENERATE, 0.0, curvature)
     center = kind == EquilibriumKind.CENTER
     ratio = np.where(center, np.maximum(curvature, 0.0), np.nan) / effective_inertia(machine, phi)
@@ -243,10 +246,12 @@ def relative_equilibria(machine: TwoDegrees, p: float) -> RelativeEquilibria:
     return RelativeEquilibria(phi, kind, potential, curvature, np.sqrt(ratio), omega1)
 
 
-def _zeros(machine: TwoDegrees, p: float) -> tuple[Array, npt.NDArray[np.bool_], Array]:
+def _zeros(
+    machine: TwoDegrees, p: float, torque: float
+) -> tuple[Array, npt.NDArray[np.bool_], Array]:
     """Zeros of `_condition`: the simple ones, whether it rises there, and the merged ones."""
-    ends = _extrema(machine, p)
-    value, rounding = _condition(machine, p, ends)
+    ends = _extrema(machine, p, torque)
+    value, rounding = _condition(machine, p, torque, ends)
     sign = np.where(np.abs(value) <= rounding, 0, np.sign(value))
     if not sign.any():
         return np.empty(0), np.empty(0, bool), np.empty(0)
@@ -257,7 +262,7 @@ def _zeros(machine: TwoDegrees, p: float) -> tuple[Array, npt.NDArray[np.bool_],
     sign = np.append(sign, sign[0])
 
     # Neighboring zero extrema are one merged point if the condition vanishes between them too.
-    middle, rounding = _condition(machine, p, 0.5 * (ends[1:] + ends[:-1]))
+    middle, rounding = _condition(machine, p, torque, 0.5 * (ends[1:] + ends[:-1]))
     joined = np.append(False, (sign[1:] == 0) & (sign[:-1] == 0) & (np.abs(middle) <= rounding))
     merged = ends[(sign == 0) & ~joined]
 
@@ -265,7 +270,7 @@ def _zeros(machine: TwoDegrees, p: float) -> tuple[Array, npt.NDArray[np.bool_],
     low, high, rising = ends[:-1][crossing], ends[1:][crossing], sign[1:][crossing] > 0
     for _ in range(HALVINGS):
         half = 0.5 * (low + high)
-        beyond = (_condition(machine, p, half)[0] > 0) == rising
+        beyond = (_condition(machine, p, torque, half)[0] > 0) == rising
         low, high = np.where(beyond, low, half), np.where(beyond, half, high)
     simple = 0.5 * (low + high)
     # A particle over n1 on a support without inertia: M11 = 0 there, where nothing can stand.
@@ -274,16 +279,16 @@ def _zeros(machine: TwoDegrees, p: float) -> tuple[Array, npt.NDArray[np.bool_],
     return simple[inert], rising[inert], merged
 
 
-def _condition(machine: TwoDegrees, p: float, phi: Array) -> tuple[Array, Array]:
+def _condition(machine: TwoDegrees, p: float, torque: float, phi: Array) -> tuple[Array, Array]:
     """Amended gradient times M11^2, and what may be its rounding."""
     m11, slope, _ = support_inertia(machine, phi)
-    value = m11**2 * machine.weight * np.sin(phi) - 0.5 * p**2 * slope
+    value = m11**2 * (machine.weight * np.sin(phi) - torque) - 0.5 * p**2 * slope
     arm, difference = _variation(machine)
-    terms = m11**2 * abs(machine.weight) + p**2 * (abs(arm) + abs(difference))
+    terms = m11**2 * (abs(machine.weight) + abs(torque)) + p**2 * (abs(arm) + abs(difference))
     return value, ROUNDING * terms
 
 
-def _extrema(machine: TwoDegrees, p: float) -> Array:
+def _extrema(machine: TwoDegrees, p: float, torque: float) -> Array:
     """Zeros in [0, 2 pi) of the derivative of `_condition`, in order."""
     # Coefficients of exp(i k phi), k = -d...d; a product of functions is a convolution.
     sin, cos, one = np.array([0.5j, 0.0, -0.5j]), np.array([0.5, 0.0, 0.5]), np.eye(1, 5, 2)[0]
@@ -291,7 +296,8 @@ def _extrema(machine: TwoDegrees, p: float) -> Array:
     m11 = (machine.rest + machine.tilt + machine.m * machine.a**2) * one
     m11 = m11 + difference * np.convolve(sin, sin) + 2.0 * arm * np.pad(sin, 1)
     slope = 2.0 * arm * np.pad(cos, 1) + 2.0 * difference * np.convolve(sin, cos)
-    series = machine.weight * np.convolve(np.convolve(m11, m11), sin)
+    square = np.convolve(m11, m11)
+    series = machine.weight * np.convolve(square, sin) - torque * np.pad(square, 1)
     series = 1j * np.arange(-5, 6) * (series - 0.5 * p**2 * np.pad(slope, 3))
 
     largest = np.abs(series).max()

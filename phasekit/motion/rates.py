@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.laws.ladder import Conservative
+from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.laws.perturbed import (
     PerturbedConservative,
     drift_name,
@@ -24,6 +24,7 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.mechanics.at_momentum import Machines
 
 Array = npt.NDArray[np.float64]
 
@@ -72,6 +73,10 @@ def rates_of(
     if "euler_0" in code.names:
         euler = law.euler({name: np.asarray(value, float) for name, value in values.items()})
         known.update(zip(_EULER, euler, strict=True))
+    elif isinstance(law.base, Machines):
+        known.update(law.base.constants_of(values))
+    elif isinstance(law.base, Machines):
+        known.update(law.base.constants_of(values))
     known["sign"] = 0.0
     columns = [np.atleast_1d(np.asarray(known[name], float)) for name in code.names]
     return code, np.stack(np.broadcast_arrays(*columns))
@@ -106,7 +111,7 @@ class _Form:
 class _Same:
     """A law of a potential, of which there is one for equal formulas."""
 
-    base: Conservative
+    base: Conservative | Routhian
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, _Same) and self.base is other.base
@@ -135,6 +140,9 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
     if isinstance(base, Trigonometric) and not form.varies:
         A, B, C = map(parameter, "ABC")
         slope = (B - A * sp.cos(x)) * sp.sin(x) - C * sp.cos(x)
+    elif isinstance(base, Machines):
+        constants = {base.coordinate: x, **{name: parameter(name) for name in base.constants}}
+        slope = 0
     else:
         symbols = {}
         for name in form.inputs:
@@ -146,6 +154,7 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
             if name in form.drifting:
                 symbols[name] += parameter(drift_name(name)) * t
         symbols[base.coordinate] = x
+        assert isinstance(base, Conservative)
         slope = base.gradient_formula(symbols)
     force = parameter("torque") - slope - parameter("damping") * v
     for number in range(form.harmonics):
@@ -156,6 +165,8 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
     if quadratic:
         force -= parameter("quadratic") * parameter("sign") * v * v
         kink = list(used).index("sign")
+    if isinstance(base, Machines):
+        force = base.acceleration_formula(constants, v, force)
     expressions = [v, force]
     places = {x: (_STATE, 0), v: (_STATE, 1), t: (_TIME, 0), w: (_TIME, 1), dw: (_TIME, 2)}
     slopes = force.diff(x), force.diff(v)

@@ -22,6 +22,10 @@ from phasekit.phase.numerical import functions
 Array = npt.NDArray[np.float64]
 
 
+#: Energies of saddles that differ by less, relative to their size, are one.
+LEVEL = 16.0 * 2.0**-52
+
+
 class Capture(NamedTuple):
     """Capture; the last axis is the region (left, right, none)."""
 
@@ -40,7 +44,8 @@ def capture(
     # Between two saddles of one energy a region ends in an arc of each, one there and one back.
     joined = loops.loop[..., :1] == Loop.HETEROCLINIC
     lobes = loss[..., 0, :] + np.where(joined, loss[..., 1, ::-1], 0.0)
-    return regions(lobes, loss[..., 1, :], values["torque"], rotation)
+    winding = loss[..., 1, :] + np.where(joined, loss[..., 0, :], 0.0)  # a turn is both arcs
+    return regions(lobes, winding, rotation)
 
 
 def capture_numerical(
@@ -51,35 +56,41 @@ def capture_numerical(
     formula: Any = law.base
     loops = functions.separatrices(formula, *(values[name] for name in formula.names))
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
+    return of_loops(loops, loss, rotation)
+
+
+def of_loops(loops: Any, loss: Array, rotation: bool) -> Capture:
+    """Capture by the separatrices of numbered saddles, and what they lose on each side."""
     if not loss.shape[-2]:
         nothing = np.full((*loss.shape[:-2], 2), np.nan)
-        return regions(nothing, nothing, values["torque"], rotation)
-    winds = np.isin(loops.loop, (2, 3))
+        return regions(nothing, nothing, rotation)
+    winds = np.isin(loops.loop, (Loop.WINDING, Loop.HETEROCLINIC))
     height = np.broadcast_to(loops.saddle_energy, loss.shape[:-1])
     both = np.isfinite(loss).all(axis=-1)
-    lowest = np.where(both & ~np.broadcast_to(winds, both.shape), height, np.inf)
-    highest = np.where(both & np.broadcast_to(winds, both.shape), height, -np.inf)
-    lobes, winding = (
-        np.where(
-            np.isfinite(np.take_along_axis(which, at[..., None], -1)),
-            np.take_along_axis(loss, at[..., None, None], -2)[..., 0, :],
-            np.nan,
-        )
-        for which, at in ((lowest, lowest.argmin(-1)), (highest, highest.argmax(-1)))
-    )
-    return regions(lobes, winding, values["torque"], rotation)
+    winds = both & np.broadcast_to(winds, both.shape)
+    lowest = np.where(both & ~winds, height, np.inf)
+    highest = np.where(winds, height, -np.inf)
+    at = lowest.argmin(-1)[..., None]
+    found = np.isfinite(np.take_along_axis(lowest, at, -1))
+    lobes = np.where(found, np.take_along_axis(loss, at[..., None], -2)[..., 0, :], np.nan)
+    top = highest.max(-1, keepdims=True)
+    # A turn on a level of several saddles is an arc of each.
+    arcs = winds & (top - highest <= LEVEL * np.abs(height).max(-1, keepdims=True, initial=0.0))
+    winding = np.where(arcs[..., None], loss, 0.0).sum(axis=-2)
+    winding = np.where(arcs.any(-1, keepdims=True), winding, np.nan)
+    return regions(lobes, winding, rotation)
 
 
-def regions(lobes: Array, winding: Array, torque: Any, rotation: bool) -> Capture:
+def regions(lobes: Array, winding: Array, rotation: bool) -> Capture:
     """Fluxes and probabilities from the losses of the lobes and of both winding branches."""
     if not rotation:
         flux = np.concatenate([lobes, np.zeros((*lobes.shape[:-1], 1))], axis=-1)
         flux[np.isnan(lobes).any(axis=-1)] = np.nan
         flux[..., 2] -= np.minimum(lobes.sum(axis=-1), 0.0)
         return Capture(flux, _shares(lobes))
-    # Braked by the torque, or running forward where there is none.
-    forward = np.broadcast_to(np.asarray(torque) <= 0.0, winding.shape[:-1])
     with np.errstate(all="ignore"):
+        # What is braked loses more; forward where nothing tells, within rounding.
+        forward = ~(winding[..., 0] - winding[..., 1] > 1e-9 * np.abs(winding).max(axis=-1))
         arriving = np.where(forward, winding[..., 1], winding[..., 0])
         inside = winding.sum(axis=-1)
         share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)

@@ -7,6 +7,7 @@ next to the real axis and decays at both ends.
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -44,18 +45,23 @@ def derivative(formula: Formula, parameter: str) -> Formula:
 class Paths:
     """Motions along all separatrices of some cells: the axes are cell, saddle, side, time."""
 
-    def __init__(
-        self, formula: Formula, parameters: list[Array], loops: Separatrices, points: int
-    ) -> None:
+    def __init__(self, time: Array, phi: Array, dphi: Array, parameters: Sequence[Array]) -> None:
+        self.time, self.phi, self.dphi = time[:, :, None, :], phi, dphi
+        self.step = self.time[..., 1] - self.time[..., 0]
+        self.parameters = [p[:, None, None, None] for p in parameters]
+
+    @classmethod
+    def of(
+        cls, formula: Formula, parameters: list[Array], loops: Separatrices, points: int
+    ) -> Paths:
+        """Follow the separatrices of a potential."""
         # Cells of one potential, under many drives, have the same motions.
         keys = np.stack([*parameters, np.zeros(len(loops.saddle_phi))], axis=1)
         _, first, which = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         which = which.reshape(-1)
         k = loops.saddle_exponent[first]
-        grid = np.linspace(-REACH, REACH, points + 1)
-        with np.errstate(all="ignore"):
-            times = grid / k[..., None]
-        shape = (len(first), k.shape[-1], 2, grid.size)
+        times = times_of(k, points)
+        shape = (len(first), k.shape[-1], 2, times.shape[-1])
         phi, dphi = np.full(shape, np.nan), np.full(shape, np.nan)
         for saddle in range(k.shape[-1]):
             there = np.flatnonzero(np.isfinite(k[:, saddle]) & (k[:, saddle] > 0.0))
@@ -64,16 +70,9 @@ class Paths:
                 found = functions.separatrix_motion(
                     formula, *own, times[there, saddle], saddle=saddle, side=side
                 )
-                speed = np.abs(found.motion_dphi)
-                size = speed.max(axis=-1, keepdims=True, initial=0.0)
-                closed = np.isfinite(found.motion_phi).all(axis=-1, keepdims=True)
-                closed &= speed[:, [0, -1]].max(-1, keepdims=True) < 1e-9 * size
-                phi[there, saddle, side] = np.where(closed, found.motion_phi, np.nan)
-                dphi[there, saddle, side] = np.where(closed, found.motion_dphi, np.nan)
-        self.parameters = [p[:, None, None, None] for p in parameters]
-        self.time = times[which][:, :, None, :]
-        self.step = self.time[..., 1] - self.time[..., 0]
-        self.phi, self.dphi = phi[which], dphi[which]
+                moved = closed(found.motion_phi, found.motion_dphi)
+                phi[there, saddle, side], dphi[there, saddle, side] = moved
+        return cls(times[which], phi[which], dphi[which], parameters)
 
     def integral(self, values: Any) -> Any:
         """Integral over time, NaN where it has lost too many digits."""
@@ -92,6 +91,22 @@ class Paths:
         fine, coarse = at.sum(axis=-1), 2.0 * at[..., ::2].sum(axis=-1)
         good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
         return np.where(good, fine * self.step, np.nan)
+
+
+def times_of(k: Array, points: int) -> Array:
+    """Times from one end of a separatrix to the other, on a new axis; NaN without a saddle."""
+    grid = np.linspace(-REACH, REACH, points + 1)
+    with np.errstate(all="ignore"):
+        return np.asarray(grid / k[..., None])
+
+
+def closed(phi: Array, dphi: Array) -> tuple[Array, Array]:
+    """Motions that come to rest at both ends, NaN for the others."""
+    speed = np.abs(dphi)
+    size = speed.max(axis=-1, keepdims=True, initial=0.0)
+    good = np.isfinite(phi).all(axis=-1, keepdims=True)
+    good &= speed[..., [0, -1]].max(-1, keepdims=True) < 1e-9 * size
+    return np.where(good, phi, np.nan), np.where(good, dphi, np.nan)
 
 
 def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov:
@@ -130,7 +145,18 @@ def _cells(
     points: int,
 ) -> tuple[Melnikov, Any]:  # fmt: skip
     """Melnikov's function by so many points in time, and in which cells they were too few."""
-    paths = Paths(formula, [values[name] for name in formula.names], loops, points)
+    paths = Paths.of(formula, [values[name] for name in formula.names], loops, points)
+    return along(law, paths, values)
+
+
+def along(
+    law: PerturbedConservative, paths: Paths, values: dict[str, Array], weight: Any = 1.0
+) -> tuple[Melnikov, Any]:
+    """Melnikov's function along motions, and in which cells they have too few points.
+
+    Forces are per unit of inertia, of which there are `weight`.
+    """
+    formula: Any = law.base
     each = {name: x[:, None, None] for name, x in values.items()}
     square = paths.dphi**2
     mean = -each["damping"] * paths.integral(square)
@@ -148,14 +174,14 @@ def _cells(
             rate[:, None, None] * _area_loss(paths, formula, parameter),
         )
     parts: list[Part] = [
-        (paths.transform(1.0, nu), amplitude, nu, phase)
+        (weight * paths.transform(1.0, nu), amplitude, nu, phase)
         for amplitude, nu, phase in law.forcing(values)
     ]
     for parameter in law.modulated:
         amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
         slope = -derivative(formula, parameter).slopes(paths.phi, *paths.parameters)
-        parts.append((paths.transform(slope, nu), amplitude, nu, phase))
-    found = assembled(mean, parts, undamped(law, values))
+        parts.append((weight * paths.transform(slope, nu), amplitude, nu, phase))
+    found = assembled(weight * mean, parts, undamped(law, values))
     closed = np.isfinite(paths.phi[..., 0])
     lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
     return found, lost.any(axis=(1, 2))

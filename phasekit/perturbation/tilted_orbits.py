@@ -152,9 +152,9 @@ def ground_of(cells: Cells, systems: Index) -> Ground:
     return survey(Systems(TILTED, (A, B, C, N), len(N)), found)
 
 
-def home(phi: Array) -> tuple[Array, Array]:
+def home(phi: Array, period: float = TURN) -> tuple[Array, Array]:
     """Angles in one turn, and what has been taken away."""
-    turns = np.where(np.abs(phi) <= np.pi, 0.0, TURN * np.round(phi / TURN))
+    turns = np.where(np.abs(phi) <= 0.5 * period, 0.0, period * np.round(phi / period))
     return phi - turns, turns
 
 
@@ -162,15 +162,15 @@ def orbits(law: PerturbedTrigonometric, *inputs: npt.ArrayLike) -> TiltedOrbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
     cells = Cells.of(law, inputs[:-2], inputs[-2:])
     phi, dphi = cells.states
-    out = _room(phi.size)
+    out = room(phi.size)
     flat, parts = cells.parts()
-    _enter_level(out, flat, level.orbits(*cells.at(flat), phi[flat], dphi[flat]))
+    enter_level(out, flat, level.orbits(*cells.at(flat), phi[flat], dphi[flat]))
     for ground, some, system in parts:
         x, turns = home(phi[some])
         v = dphi[some]
         states = rounds.states_of(ground, x, v)._replace(turns=turns)
         energy = 0.5 * v * v + height(phi[some], *(p for p in ground.systems.parameters))
-        _enter(out, some, _followed(ground, states, v, cells.N[system]), energy, cells.N[system])
+        enter(out, some, followed(ground, states, v, cells.N[system]), energy, cells.N[system])
     return TiltedOrbits._make(cells.shaped(out))
 
 
@@ -180,14 +180,14 @@ def orbits_at_energy(
     """Orbits of an energy, the last of the inputs, round the lower center (0) or the upper (1)."""
     cells = Cells.of(law, inputs[:-1], inputs[-1:])
     (h,) = cells.states
-    out = _room(h.size)
+    out = room(h.size)
     flat, parts = cells.parts()
-    _enter_level(out, flat, level.orbits_at_energy(*cells.at(flat), h[flat], center))
+    enter_level(out, flat, level.orbits_at_energy(*cells.at(flat), h[flat], center))
     for ground, some, system in parts:
         column, there = _column(cells, ground, system, 2 * (center or 0))
         states = states_at_energy(ground, h[some], column, there)
-        found = _followed(ground, states, np.sqrt(2.0 * states.kinetic), cells.N[system])
-        _enter(out, some, found, h[some], cells.N[system])
+        found = followed(ground, states, np.sqrt(2.0 * states.kinetic), cells.N[system])
+        enter(out, some, found, h[some], cells.N[system])
     return TiltedOrbits._make(cells.shaped(out))
 
 
@@ -200,16 +200,16 @@ def orbits_at_gap(
     """Orbits by their energy above a saddle, the last of the inputs; side 0 left, 1 right."""
     cells = Cells.of(law, inputs[:-1], inputs[-1:])
     (gap,) = cells.states
-    out = _room(gap.size)
+    out = room(gap.size)
     flat, parts = cells.parts()
-    _enter_level(out, flat, level.orbits_at_gap(*cells.at(flat), gap[flat], saddle, side))
+    enter_level(out, flat, level.orbits_at_gap(*cells.at(flat), gap[flat], saddle, side))
     for ground, some, system in parts:
         column, there = _saddle(cells, ground, system, saddle)
         rows = np.arange(some.size)
         base = ground.points.energy[rows, column]
         states = states_at_gap(ground, gap[some], column, there, side)
-        found = _followed(ground, states, np.sqrt(2.0 * states.kinetic), cells.N[system])
-        _enter(out, some, found, base + gap[some], cells.N[system])
+        found = followed(ground, states, np.sqrt(2.0 * states.kinetic), cells.N[system])
+        enter(out, some, found, base + gap[some], cells.N[system])
     return TiltedOrbits._make(cells.shaped(out))
 
 
@@ -264,12 +264,14 @@ def separatrix_motion(
 # ------------------------------------------------------------------------- parts
 
 
-def _followed(ground: Ground, states: rounds.States, v: Array, N: Array) -> Any:
+def followed(
+    ground: Ground, states: rounds.States, v: Array, N: Array, period: float = TURN
+) -> Any:
     """Orbits of states; what runs is followed back to where it was turned."""
     side = -np.sign(N)
-    turn = TURN * np.abs(N)
+    turn = period * np.abs(N)
     way = side[:, None] * (ground.points.phi - states.x[:, None])
-    ahead = (way > 0.0) & (way <= TURN)
+    ahead = (way > 0.0) & (way <= period)
     with np.errstate(all="ignore"):
         rise = np.where(ahead, states.kinetic[:, None] - states.excess, -np.inf)
         highest = np.maximum(np.max(rise, axis=1), turn)
@@ -279,7 +281,7 @@ def _followed(ground: Ground, states: rounds.States, v: Array, N: Array) -> Any:
         kinetic = np.where(back > 0.0, kinetic, states.kinetic)
         blur = states.blur + np.where(back > 0.0, 4.0 * 2.0**-52 * states.kinetic, 0.0)[:, None]
         moved = states._replace(
-            turns=states.turns + side * TURN * back,
+            turns=states.turns + side * period * back,
             kinetic=kinetic,
             excess=states.excess - (states.kinetic - kinetic)[:, None],
             blur=blur,
@@ -301,24 +303,28 @@ def _followed(ground: Ground, states: rounds.States, v: Array, N: Array) -> Any:
     )
 
 
-def _room(size: int) -> list[Any]:
+def room(size: int) -> list[Any]:
+    """Fields of orbits, to be filled."""
     return [
         np.full(size, OrbitKind.NOT_COMPUTED, np.int8),
         *(np.full(size, np.nan) for _ in TiltedOrbits._fields[1:]),
     ]
 
 
-def _enter_level(out: list[Any], cells: Index, found: Any) -> None:
-    """Write down orbits without a torque, which are exact."""
+def enter_level(out: list[Any], cells: Index, found: Any) -> None:
+    """Write down orbits without a torque, with their errors if they are not exact."""
     errors = (np.where(np.isnan(x), np.nan, 0.0) for x in (found.period, found.action))
     gain = np.where(found.orbit_kind >= 0, 0.0, np.nan)
-    for field, values in zip(out, (*found, *errors, gain), strict=True):
+    own = found if hasattr(found, "period_error") else (*found, *errors)
+    for field, values in zip(out, (*own, gain), strict=True):
         field[cells] = values
 
 
-def _enter(out: list[Any], cells: Index, found: Any, energy: Array, N: Array) -> None:
+def enter(
+    out: list[Any], cells: Index, found: Any, energy: Array, N: Array, period: float = TURN
+) -> None:
     """Write down orbits under a torque."""
-    gain = np.where(found.orbit_kind == OrbitKind.RUNNING, TURN * np.abs(N), 0.0)
+    gain = np.where(found.orbit_kind == OrbitKind.RUNNING, period * np.abs(N), 0.0)
     gain = np.where(found.orbit_kind >= 0, gain, np.nan)
     values = (found.orbit_kind, np.where(found.orbit_kind >= 0, energy, np.nan), *found[2:], gain)
     for field, one in zip(out, values, strict=True):

@@ -48,11 +48,12 @@ def equilibria(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Equili
     columns = np.stack([np.broadcast_to(values[n], shape).reshape(-1) for n in names]) + 0.0
     # Cells that differ in damping and drive alone have the same equilibria.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
-    found = _of_cells(formula, list(cells[:-1]), cells[-1])
+    found = equilibria_of_cells(formula, list(cells[:-1]), cells[-1])
     return Equilibria._make(x[which.reshape(-1)].reshape(shape + x.shape[1:]) for x in found)
 
 
-def _of_cells(formula: Formula, own: list[Array], torque: Array) -> Equilibria:
+def equilibria_of_cells(formula: Formula, own: list[Array], torque: Array) -> Equilibria:
+    """Equilibria of cells in a row, each with its parameters and torque."""
     still = torque == 0.0
     sorts = [(still, formula, own)]
     if not still.all():

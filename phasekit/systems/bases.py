@@ -15,6 +15,7 @@ HOMES = (
     "phasekit.systems.analogues",
     "phasekit.systems.field_analogues",
     "phasekit.systems.potential",
+    "phasekit.systems.free_rotor",
 )
 
 

@@ -10,6 +10,7 @@ import xarray as xr
 
 from phasekit.labels.arguments import NumberLike, Value, bad, named_arguments, same, unknown
 from phasekit.laws.ladder import Law, Routhian
+from phasekit.mechanics.at_momentum import Machines, machines
 from phasekit.systems.amended import Amended
 from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.driven_rotor import checked_number
@@ -126,6 +127,26 @@ class FreeGyroRotor(RotorStates):
             return Routhian()  # many machines
         kept: Any = self.momentum
         return self.amended(self.angular_momentum(0.0, 0.0) if kept is None else kept).law
+
+    @property
+    def law_of_parameters(self) -> Machines:
+        """The law of the disk's angle as a function of the parameters."""
+        domains = ((p.name, p.least, p.high) for p in self.declared)
+        return machines(tuple(self.parameters), tuple(domains))
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a parameter or state; None where it may be any.
+
+        Parameters
+        ----------
+        name : str
+            The parameter or state.
+
+        Returns
+        -------
+        str or None
+        """
+        return "J" if name == "state_energy" else super().unit_of(name)
 
     @property
     def parameters(self) -> dict[str, Value]:

@@ -130,6 +130,7 @@ class Perturbed(Model):
         kT: NumberLike = 0.0,
     ) -> None:
         base = parts.base_of(system)
+        parts.refuse_varying(base, modulation=modulation, drift=drift, omega1=omega1)
         given = {"damping": damping, "quadratic": quadratic, "torque": torque, "kT": kT}
         own = {p.name: p.check(given[p.name]) for p in parts.OWN}
         drive = parts.Drive(base, forcing, modulation, drift)
@@ -181,12 +182,13 @@ class Perturbed(Model):
     @property
     def law(self) -> PerturbedConservative:
         """The law, and what is added to it."""
-        base: Any = self.system.law
+        base: Any = self.system.law_of_parameters
         rung: Any = self.rung
+        known = self.system.parameters
         law: PerturbedConservative = rung(
             base=base,
             names=tuple(self.parameters),
-            inputs=self.system.formula_inputs(),
+            inputs=tuple(name for name in self.system.formula_inputs() if name in known),
             harmonics=len(self.forcing),
             modulated=tuple(self.modulation),
             drifting=tuple(self.drift),

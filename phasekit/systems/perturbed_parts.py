@@ -11,11 +11,13 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, describe, reals, unknown
-from phasekit.laws.ladder import Conservative, Law
+from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.perturbed import (
     PerturbedConservative,
+    PerturbedRouthian,
     PerturbedTrigonometric,
     TiltedConservative,
+    TiltedRouthian,
     TiltedTrigonometric,
     drift_name,
     forcing_names,
@@ -51,23 +53,38 @@ def base_of(system: Any) -> Model:
         If it is none in a potential, or perturbed itself.
     """
     found = as_system(system)
-    wants = "a system in a potential: a disk, an analogue, a pk.Potential"
+    wants = "a system in a potential: a disk, an analogue, a pk.Potential, a pk.FreeGyroRotor"
     if issubclass(found.rung, PerturbedConservative):
         raise bad("system", found, wants, "it is perturbed already; use .replace(...)")
-    if not issubclass(found.rung, Conservative):
-        hint = (
-            "it has two degrees of freedom, and separatrices of one only at a constant momentum: "
-            "simulate it with .simulate(..., torque1=..., torque2=...), or perturb the disk of a "
-            "prescribed omega1"
-        )
-        raise bad("system", found, wants, hint)
+    if not issubclass(found.rung, (Conservative, Routhian)):
+        raise bad("system", found, wants)
     return found
+
+
+def refuse_varying(base: Model, **arguments: Any) -> None:
+    """Refuse to vary parameters of a system that is perturbed at a constant momentum.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if not issubclass(base.rung, Routhian):
+        return
+    for name, value in arguments.items():
+        if value is not None and not (isinstance(value, Mapping) and not value):
+            hint = (
+                "what is perturbed is the motion at a momentum that stays, of which omega1 follows;"
+                " rotor.simulate(..., torque1=...) takes torques on the support"
+            )
+            raise bad(name, value, f"nothing, of a {type(base).__name__}", hint)
 
 
 def rung_of(base: Model, own: Mapping[str, Any], driven: bool) -> type[Law]:
     """Rung of the ladder of laws: the most special one that holds for all values."""
     still = all(isinstance(own[n], float) and own[n] == 0.0 for n in ("damping", "quadratic"))
     alone = still and not driven
+    if issubclass(base.rung, Routhian):
+        return TiltedRouthian if alone else PerturbedRouthian
     if not issubclass(base.rung, Trigonometric):
         return TiltedConservative if alone else PerturbedConservative
     return TiltedTrigonometric if alone else PerturbedTrigonometric

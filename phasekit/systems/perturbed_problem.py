@@ -9,6 +9,7 @@ from typing import Any
 
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of
+from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import forcing_names
 from phasekit.laws.trigonometric import Trigonometric
 
@@ -44,22 +45,22 @@ def formulas_of(system: Any) -> tuple[list[Any], tuple[str, str], dict[str, floa
     time = next(name for name in ("t", "time", "_t") if name not in (*states, *names))
     of = symbols_of([*states, *names, time])
     v = of[states[1]]
-    force = -law.base.gradient_formula(symbols_of([x, *law.inputs]))
-    force += of["torque"] - of["damping"] * v - of["quadratic"] * abs(v) * v
+    force = of["torque"] - of["damping"] * v - of["quadratic"] * abs(v) * v
     keywords: dict[str, Any] = {"periods": {} if law.base.period is None else {x: law.base.period}}
     if number:
         ratios = ratios_of([given[forcing_names(i)[1]] for i in range(number)])
         force += _forcing(of, ratios, of[time])
         turns = math.lcm(*(ratio.denominator for ratio in ratios))
         keywords.update(time=time, period=f"{2 * turns}*pi/forcing_frequency")
-    return [v, force], states, values, keywords
+    law_of_motion = law.base.acceleration_formula(symbols_of([x, *law.inputs]), v, force)
+    return [v, law_of_motion], states, values, keywords
 
 
 def words_of(system: Any, states: Sequence[str], names: Iterable[str]) -> dict[str, Any]:
     """Long names and units of the states and parameters of the `Problem` of a system."""
     declared = {p.name: {"long_name": p.long_name, "units": p.units} for p in system.declared}
     words = {name: declared[name] for name in names}
-    if isinstance(system.law.base, Trigonometric):
+    if isinstance(system.law.base, (Trigonometric, Routhian)):
         words[states[0]] = {"long_name": "angle", "units": "rad"}
         words[states[1]] = {"long_name": "angular velocity", "units": "s-1"}
     return words

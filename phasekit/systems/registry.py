@@ -8,7 +8,7 @@ from phasekit.systems import bases
 from phasekit.systems.system import Model
 
 #: Where models are; each registers itself when it is imported.
-HOMES = (*bases.HOMES, "phasekit.systems.free_rotor", "phasekit.systems.perturbed")
+HOMES = (*bases.HOMES, "phasekit.systems.perturbed")
 
 
 def models() -> Mapping[str, type[Model]]:

@@ -107,6 +107,11 @@ class Model(ModelValue):
         """The law, and what follows from it."""
         return self.trigonometric()
 
+    @property
+    def law_of_parameters(self) -> Law:
+        """The law as a function of the parameters, where `law` is that of one system."""
+        return self.law
+
     @classmethod
     @functools.cache
     def trigonometric(cls) -> Trigonometric:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from phasekit.errors import EscapeRegime
+from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import (
     PerturbedConservative,
+    PerturbedRouthian,
     PerturbedTrigonometric,
     TiltedConservative,
+    TiltedRouthian,
     TiltedTrigonometric,
 )
 from phasekit.table.row import ABC, LAW, SIDES, STATE, Pass, Quantity
@@ -60,7 +63,7 @@ QUANTITIES: tuple[Quantity, ...] = (
              "angle at which equilibria merge under the critical torque", "V''(phi) = 0", TORQUE),
     Quantity("energy_per_turn", "separatrices", (), "float64", "s-2",
              "energy that a turn forward gains under the torque", "2 pi torque", TORQUE,
-             of=TiltedTrigonometric),
+             of=_GENERAL),
     Quantity("lobe_area_error", "separatrices", SIDES, "float64", "s-1",
              "estimated error of the area inside the separatrix", "of its quadrature", TORQUE,
              of=TiltedTrigonometric),
@@ -70,7 +73,7 @@ QUANTITIES: tuple[Quantity, ...] = (
              "of its quadrature", TORQUE, of=TiltedTrigonometric),
     Quantity("gain_per_turn", "orbits", (), "float64", "s-2",
              "energy that an orbit which runs gains each turn, 0 for others", "2 pi |torque|",
-             TORQUE, of=TiltedTrigonometric),
+             TORQUE, of=_GENERAL),
     Quantity("angle_error", "action_angle", (), "float64", "rad",
              "estimated error of the angle variable", "distance from the orbit found back", TORQUE,
              of=TiltedTrigonometric),
@@ -114,6 +117,8 @@ _TORQUE = "phasekit.perturbation.torque:"
 _TILTED = "phasekit.perturbation.tilted_"
 _POTENTIAL = "phasekit.perturbation.tilted_potential:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
+_NUMERICAL = "phasekit.perturbation.tilted_numerical:"
+_KEPT = "phasekit.perturbation.kept_momentum:"
 
 PASSES: tuple[Pass, ...] = (
     Pass(_MELNIKOV + "melnikov", (LAW,), ("melnikov",), PerturbedTrigonometric),
@@ -162,13 +167,39 @@ PASSES: tuple[Pass, ...] = (
     Pass(_POTENTIAL + "most", (LAW,), ("labels",), _GENERAL),
     Pass(_POTENTIAL + "equilibria", (LAW,), ("equilibria",), _GENERAL),
     *(
-        Pass(_POTENTIAL + name, (LAW, *states), (group,), TiltedConservative)
+        Pass(module + name, (LAW, *states), (group,), rung)
+        for module, rung in (
+            (_POTENTIAL, TiltedConservative),
+            (_KEPT, TiltedRouthian),
+            (_KEPT, Routhian),
+        )
         for name, states, group in (
             ("potential", ("state_phi",), "potential"),
             ("gradient", ("state_phi",), "potential_gradient"),
             ("curvature", ("state_phi",), "potential_curvature"),
             ("energy", STATE, "energy_integral"),
             ("phase_velocity", ("state_phi", "state_energy"), "phase_velocity"),
+        )
+    ),
+    *(
+        Pass(_NUMERICAL + name, (LAW, *states), groups, TiltedConservative, options)
+        for name, states, groups, options in (
+            ("most", (), ("labels",), ()),
+            ("separatrices", (), ("separatrices",), ()),
+            ("orbits", STATE, ("orbits",), ()),
+            ("angle_variables", STATE, ("action_angle",), ()),
+            ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
+            ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
+            ("separatrix_motion", ("time",), ("motion",), ("saddle", "side")),
+        )
+    ),
+    *(
+        Pass(_KEPT + name, (LAW,), (group,), PerturbedRouthian)
+        for name, group in (
+            ("most", "labels"),
+            ("equilibria", "equilibria"),
+            ("melnikov", "melnikov"),
+            ("capture", "capture"),
         )
     ),
 )

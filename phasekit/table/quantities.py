@@ -15,6 +15,7 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
+from phasekit.laws.perturbed import PerturbedRouthian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.table import loads, motion, numerical, orbits, perturbed, phase_space, steady
 from phasekit.table.row import REGISTERED, Pass, Quantity
@@ -45,7 +46,7 @@ PASSES: tuple[Pass, ...] = (
 
 def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
     """What is said of a row on a rung below that of (A, B, C): equation, source, units, ..."""
-    if issubclass(rung, Routhian):
+    if issubclass(rung, (Routhian, PerturbedRouthian)):
         return steady.ROUTH.get(row.name, {})
     return {"equation": row.general} if row.general else {}
 

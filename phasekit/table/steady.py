@@ -30,6 +30,14 @@ ROUTH: dict[str, dict[str, str]] = {
     "natural_frequency": {"equation": "sqrt(V_p''/(M22 - M12^2/M11))"},
     "exponent": {"equation": "sqrt(-V_p''/(M22 - M12^2/M11))"},
     "n_equilibria": {"equation": "zeros of M11^2 V' - p^2 M11'/2"},
+    "potential": {"units": "J", "long_name": "amended potential", "equation": "V + p^2/(2 M11)"},
+    "potential_gradient": {"units": "J", "long_name": "gradient of the amended potential",
+                           "equation": "V' - p^2 M11'/(2 M11^2)"},
+    "potential_curvature": {"units": "J", "long_name": "curvature of the amended potential",
+                            "equation": "V_p''"},
+    "energy_integral": {"units": "J", "long_name": "energy at the momentum",
+                        "equation": "(M22 - M12^2/M11) phi'^2/2 + V_p"},
+    "phase_velocity": {"equation": "sqrt(2 (h - V_p)/(M22 - M12^2/M11))"},
 }  # fmt: skip
 for _words in ROUTH.values():
     _words["source"] = ROUTH_OF

@@ -235,6 +235,104 @@ def test_ensembles_while_a_parameter_drifts(system, name, ratio):
     assert abs(right - want) <= 3.0 * np.sqrt(want * (1.0 - want) / number) + extra
 
 
+#: System, what drifts, at which rate in units of the damping and of its own value; torque over
+#: damping and exponent.
+BRAKED = [
+    (pk.Coefficients(0.0, 1.0, 0.0), "B", 0.4, -6.0),
+    (pk.Coefficients(0.0, 1.0, 0.0), "B", -0.4, -4.0),
+    (EIGHT, "A", -0.5, -3.0),
+    (EIGHT, "B", 0.5, -3.0),
+    (DISK, "omega1", 0.5, -4.0),
+    (DISK, "omega1", -0.1, -4.0),
+]
+
+
+@pytest.mark.parametrize(
+    ("system", "name", "ratio", "brake"), BRAKED if ORBITS else BRAKED[:2] + BRAKED[4:]
+)
+def test_rotations_that_are_braked_while_a_parameter_drifts(system, name, ratio, brake):
+    """Captured in the share of the formula at the values when they come to the separatrix."""
+    number, small = max(ORBITS, 400), 0.0005 if ORBITS else 0.002
+    value = getattr(system, name)
+    loops = pk.separatrices(system)
+    size = loops.saddle_exponent.sel(saddle="upper").item()
+    damping = small * size
+    rate, torque = ratio * damping * value, brake * damping * size
+    points = pk.equilibria(system)
+    depth = float(points.energy.max() - points.energy.min())
+    fast = np.sqrt(2.0 * depth)
+    last = 2.5 * fast / abs(torque) + 3.0 / damping
+    if ratio < 0.0:
+        last = min(last, 0.8 / damping / -ratio)
+    grid = np.linspace(0.0, last, 401)
+    on = system.replace(**{name: value + rate * grid})
+    coefficients = np.array([np.broadcast_to(x, 401) for x in on.coefficients()])
+    quadratics = np.polynomial.polynomial.polyfit(grid / last, coefficients.T, 2).T
+    quadratics /= last ** np.arange(3)
+    energy = pk.separatrices(on).saddle_energy.sel(saddle="upper").values
+    euler = -rate * kappa(system) if name == "omega1" else 0.0
+    rng = np.random.default_rng(5)
+    found, met = drifting.braked(
+        quadratics, euler, torque, damping, rng.uniform(0.0, 2.0 * np.pi, number),
+        fast * rng.uniform(1.15, 1.35, number), 0.02 / size, grid, energy, 0.1 * depth, 1.2 * fast,
+    )  # fmt: skip
+    assert (found != 0).mean() > 0.99
+    reached = system.replace(**{name: value + rate * met[found != 0]})
+    share = odds(
+        pk.Perturbed(reached, damping=damping, torque=torque, drift={name: rate}), start="rotation"
+    )
+    want = (1.0 - share[:, 2]).mean()
+    assert 0.1 < want < 0.9
+    still = 1.0 - odds(pk.Perturbed(system, damping=damping, torque=torque), start="rotation")[2]
+    caught = (found[found != 0] == 1).mean()
+    error = np.sqrt(want * (1.0 - want) / number)
+    assert abs(caught - want) <= 3.0 * error + (0.0 if ORBITS else 4.0 * small)
+    assert abs(want - still) > 0.01  # the drift shows
+
+
+def test_a_cell_that_shrinks_faster_than_damping_fills_it_catches_none():
+    pendulum = pk.Coefficients(0.0, 1.0, 0.0)
+    slow, fast = (
+        pk.Perturbed(pendulum, damping=0.01, torque=-0.05, drift={"B": rate})
+        for rate in (-0.015, -0.025)  # dS/dt = S B'/(2 B)
+    )
+    assert 0.0 < 1.0 - odds(slow, start="rotation")[2] < 1.0
+    assert odds(fast, start="rotation").tolist() == [0.0, 0.0, 1.0]
+    grows = pk.Perturbed(pendulum, drift={"B": 0.01})  # without damping and torque: into the well
+    assert odds(grows, start="rotation")[2] == 0.0
+    assert odds(grows.replace(drift_B=-0.01), start="rotation")[2] == 1.0
+
+
+@pytest.mark.parametrize("rate", [0.2, -0.2])
+def test_the_inertial_torque_of_a_frame_brakes(rate):
+    """A ring whose speed changes pushes as a constant torque does, so it says what is braked."""
+    ring = pk.ParticleOnCircle(radius=1.0, omega=2.0, tilt=0.7, offset=0.0, normal_offset=0.0)
+    E0 = ring.frame_rate.euler(ring.parameters)[0]
+    damped = {"damping": 0.05, "drift": {"omega": rate}}
+    drifted = odds(pk.Perturbed(ring, **damped), start="rotation")
+    assert abs(E0) > 0.1
+    assert drifted.sum() == pytest.approx(1.0)
+    other = pk.Perturbed(ring, **damped, torque=-2.0 * E0 * rate)  # brakes the other sense as much
+    assert odds(other, start="rotation")[2] == pytest.approx(drifted[2], abs=1e-9)
+
+
+@pytest.mark.parametrize("torque", [-0.006, 0.004])
+def test_a_turn_on_one_level_is_both_its_arcs(torque):
+    """Wells of unequal size between saddles of one energy: 2/(1 + 2 N w/(damping S)), S of both."""
+    system = pk.Coefficients(1.0, 0.0, 0.4)
+    loops = pk.separatrices(system)
+    assert loops.topology == pk.Topology.HETEROCLINIC
+    areas = loops.lobe_area.sel(saddle="lower").values
+    assert abs(areas[0] - areas[1]) > 0.5
+    damping = 0.002
+    want = 2.0 / (1.0 + 2.0 * abs(torque) * 2.0 * np.pi / (damping * areas.sum()))
+    formula = pk.Potential("cos(phi)^2/2 - 0.4*sin(phi)", "phi", period="2*pi")
+    for one in (system, formula):
+        found = odds(pk.Perturbed(one, damping=damping, torque=torque), start="rotation")
+        assert 1.0 - found[2] == pytest.approx(want, rel=1e-9)
+    assert 0.1 < want < 0.9
+
+
 def kappa(disk):
     """Euler's torque of omega1' is -kappa cos phi."""
     s, c, r, e = np.sin(disk.beta), np.cos(disk.beta), disk.r, disk.e

@@ -82,8 +82,11 @@ def test_a_map_of_any_potential_and_back():
         ({"dampin": 0.1}, "did you mean 'damping'"),
         ({"system": pk.Potential("torque*x^2", "x", {"torque": 1.0})}, "another name"),
         (
-            {"system": pk.FreeGyroRotor(DISK.replace(m=1.0), 0.1)},
-            "a system in a potential",
+            {
+                "system": pk.FreeGyroRotor(DISK.replace(m=1.0), 0.1),
+                "modulation": {"omega1": pk.Harmonic(1.0, 1.0)},
+            },
+            "wants nothing, of a FreeGyroRotor",
         ),
     ],
 )

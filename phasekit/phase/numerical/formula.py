@@ -269,6 +269,7 @@ def _harmonics(slope: Any, x: Any, period: float) -> list[Any] | None:
         rest = exponent - rate * x
         if (
             rest.has(x)
+            or not ratio.is_number  # of a parameter
             or not ratio.is_real
             or abs(ratio - round(ratio)) > 1e-12 * max(1, abs(ratio))
         ):

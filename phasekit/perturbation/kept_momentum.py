@@ -1,0 +1,237 @@
+"""A rotor on a free support, damped and driven about its shaft: at the momentum that it keeps.
+
+Torques on the shaft react on the support, so that they leave the momentum about the vertical as it
+is: what holds at a momentum holds for the whole machine. By arc length, ``ds = sqrt(M) dphi``, the
+undisturbed motion is that in a potential; separatrices are followed there, in the time of the
+machine.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import Loop, ParameterError
+from phasekit.laws.perturbed import PerturbedRouthian
+from phasekit.mechanics.at_momentum import AtMomentum, Machines
+from phasekit.mechanics.steady import Steady, steady_at
+from phasekit.mechanics.two_degrees import TwoDegrees
+from phasekit.perturbation.capture import Capture, of_loops
+from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
+from phasekit.perturbation.quadrature import POINTS, Paths, along, closed, times_of
+from phasekit.phase.numerical import motion
+from phasekit.phase.numerical.arc_length import ArcLength
+from phasekit.phase.numerical.separatrices import SIDES, branch_of, saddles_of, separatrices
+
+Array = npt.NDArray[np.float64]
+
+
+class Loops(NamedTuple):
+    """Separatrices of machines in a row; the last axis is the saddle, by its angle."""
+
+    saddle_energy: Array
+    saddle_exponent: Array
+    loop: npt.NDArray[np.int8]
+
+
+def equilibria(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Steady:
+    """All steady rotations under a constant torque on the shaft."""
+    values = law.values(*parameters)
+    one = _machines(law).at(values)
+    return steady_at(one.machine, one.p, values["torque"] * one.machine.Jn)
+
+
+def most(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
+    """Greatest number of equilibria under the torque, and of saddles without it.
+
+    The third, stretches in which some may be missed, is empty: none is.
+    """
+    values = law.values(*parameters)
+    one = _machines(law).at(values)
+    free = steady_at(one.machine, one.p, np.zeros(()))
+    saddles = int((np.isfinite(free.exponent)).sum(axis=-1).max(initial=0))
+    number = int(equilibria(law, *parameters).n_equilibria.max(initial=0))
+    return max(number, 0), saddles, np.empty((0, 2))
+
+
+def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
+    """Melnikov's function along the separatrices of the amended potential, in J."""
+    return _along_separatrices(law, parameters)[1]
+
+
+def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
+    """Capture into the lobes of the lowest saddle that has two, or from rotation."""
+    loops, found = _along_separatrices(law, parameters)
+    return of_loops(loops, -found.melnikov_mean, rotation)
+
+
+# ------------------------------------------------------------------------- energies
+
+
+def potential(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+    """Amended potential less torque times phi at phi, the last of the inputs, in J."""
+    one, torque = _at(law, inputs[:-1])
+    phi = np.asarray(inputs[-1], float)
+    return np.asarray(one.potential(phi)[0] - torque * phi)
+
+
+def gradient(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+    """Its first derivative at phi, the last of the inputs."""
+    one, torque = _at(law, inputs[:-1])
+    return np.asarray(one.potential(np.asarray(inputs[-1], float))[1] - torque)
+
+
+def curvature(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+    """Its second derivative at phi, the last of the inputs."""
+    one, torque = _at(law, inputs[:-1])
+    return np.asarray(one.potential(np.asarray(inputs[-1], float))[2] + 0.0 * torque)
+
+
+def energy(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+    """Energy of states (phi, dphi), the last of the inputs."""
+    one, _ = _at(law, inputs[:-2])
+    phi, speed = (np.asarray(x, float) for x in inputs[-2:])
+    return np.asarray(0.5 * one.inertia(phi)[0] * speed * speed + potential(law, *inputs[:-1]))
+
+
+def phase_velocity(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+    """Speed at phi on the level of an energy, the last of the inputs; NaN where out of reach."""
+    one, _ = _at(law, inputs[:-2])
+    kinetic = np.asarray(inputs[-1], float) - potential(law, *inputs[:-1])
+    inertia = one.inertia(np.asarray(inputs[-2], float))[0]
+    return np.asarray(np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan) / inertia))
+
+
+def _at(law: Machines | PerturbedRouthian, parameters: Any) -> tuple[AtMomentum, Any]:
+    """The machines, and the torques on their shafts in N m."""
+    if isinstance(law, Machines):
+        return law.at(law.values(*parameters)), 0.0
+    values = law.values(*parameters)
+    one = _machines(law).at(values)
+    return one, values["torque"] * one.machine.Jn
+
+
+def _machines(law: PerturbedRouthian) -> Machines:
+    base = law.base
+    assert isinstance(base, Machines)
+    return base
+
+
+# ------------------------------------------------------------------------- separatrices
+
+
+def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops, Melnikov]:
+    """Separatrices of the cells, and Melnikov's function along them."""
+    refuse_prescribed(law, "melnikov")
+    values = law.values(*parameters)
+    shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
+    flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
+    one = _machines(law).at(flat)
+    columns = np.stack(np.broadcast_arrays(*one.machine, one.p, np.zeros(flat["torque"].shape)))
+    # Cells of one machine and momentum, under many drives, have the same motions.
+    cells, which = np.unique(columns, axis=1, return_inverse=True)
+    which = which.reshape(-1)
+    followed = [_followed(column, cells.shape[1] == 1) for column in cells.T]
+    width = max((len(each.loops.loop) for each in followed), default=0)
+    loops = Loops(
+        *(np.stack([_wide(getattr(each.loops, name), width) for each in followed])[which]
+          for name in Loops._fields)
+    )  # fmt: skip
+    weight = np.asarray(one.machine.Jn).reshape(-1, 1, 1)
+    found: Melnikov | None = None
+    for points in POINTS:
+        moved = [motions_of(each, points) for each in followed]
+        time, phi, dphi = (
+            np.stack([_wide(part, width) for part in parts])[which]
+            for parts in zip(*moved, strict=True)
+        )
+        better, lost = along(law, Paths(time, phi, dphi, []), flat, weight)
+        if found is None:
+            found, rows = better, np.flatnonzero(lost)
+        else:
+            for field, values_ in zip(found, better, strict=True):
+                field[rows] = values_[rows]
+        if not rows.size:
+            break
+    assert found is not None
+    return (
+        Loops._make(x.reshape(*shape, width) for x in loops),
+        Melnikov._make(x.reshape(shape + x.shape[1:]) for x in found),
+    )
+
+
+def _wide(values: Any, width: int) -> Any:
+    """Values of the saddles, and nothing for those that other machines have more."""
+    empty: Any = Loop.ABSENT if values.dtype == np.int8 else np.nan
+    more = [(0, width - len(values)), *[(0, 0)] * (values.ndim - 1)]
+    return np.pad(values, more, constant_values=empty)
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """The separatrices of one machine at a momentum, along arc length."""
+
+    loops: Loops
+    path: ArcLength | None
+    ground: Any
+    columns: npt.NDArray[np.intp]
+    """Place of each saddle among the equilibria along arc length."""
+
+
+NOTHING = Followed(
+    Loops(np.empty(0), np.empty(0), np.empty(0, np.int8)), None, None, np.empty(0, np.intp)
+)
+
+
+def _followed(column: Array, alone: bool) -> Followed:
+    """The machine of some constants; one of many may be invalid."""
+    try:
+        return separatrices_of(*map(float, column[:-1])) if np.isfinite(column).all() else NOTHING
+    except ParameterError:
+        if alone:
+            raise
+        return NOTHING
+
+
+@functools.lru_cache(maxsize=64)
+def separatrices_of(*constants: float) -> Followed:
+    """Separatrices of the machine of some constants, its momentum last.
+
+    Raises
+    ------
+    ParameterError
+        If its inertia or its energies are unusable.
+    """
+    path = ArcLength.of(AtMomentum(TwoDegrees(*constants[:-1]), constants[-1]))
+    ground = path.ground()
+    found = separatrices(ground)
+    phi = np.pi - np.mod(np.pi - path.place(found.saddle_phi[0]), 2.0 * np.pi)
+    order = np.argsort(phi)
+    fields = (found.saddle_energy, found.saddle_exponent, found.loop)
+    columns = saddles_of(ground)[1][order]
+    return Followed(Loops(*(field[0][order] for field in fields)), path, ground, columns)
+
+
+@functools.lru_cache(maxsize=64)
+def motions_of(one: Followed, points: int) -> tuple[Array, Array, Array]:
+    """Times, angles and angular velocities along each separatrix."""
+    k = one.loops.saddle_exponent
+    time = times_of(k, points)
+    phi, dphi = np.full((2, len(k), 2, points + 1), np.nan)
+    rows = np.flatnonzero(k > 0.0)
+    if one.path is None or not rows.size:
+        return time, phi, dphi
+    ground = one.ground.take(np.zeros(rows.size, np.intp))
+    owner = np.repeat(np.arange(rows.size), points + 1)
+    for side, way in enumerate(SIDES):
+        branch = branch_of(ground, one.columns[rows], way)
+        found = motion.separatrix_motion(branch, owner, time[rows].reshape(-1))
+        s, speed = (x.reshape(rows.size, -1) for x in found[:2])
+        angle = one.path.place(s)
+        inertia = one.path.law.inertia(angle)[0]
+        phi[rows, side], dphi[rows, side] = closed(angle, speed / np.sqrt(inertia))
+    return time, phi, dphi
