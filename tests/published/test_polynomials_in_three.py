@@ -62,7 +62,8 @@ def system(seed):
 
 
 def passed(path, u, v):
-    """How far the path stays from a point."""
+    """How far the path stays from a point; two special points of it may be one."""
+    path = path[np.append(True, np.any(np.diff(path, axis=0) != 0.0, axis=1))]
     a, chord = path[:-1], np.diff(path, axis=0)
     here = np.array([u, v])
     along = np.sum((here - a) * chord, axis=1) / np.sum(chord**2, axis=1)

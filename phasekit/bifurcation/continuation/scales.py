@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.derivatives import Derivatives
-from phasekit.bifurcation.continuation.fields import SymbolicField
 
 Array = npt.NDArray[np.float64]
 
@@ -65,7 +64,7 @@ def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
         there = curve.replace(scale=np.where(np.isnan(scale), middle, scale))
         scale[:n] = _balanced(there.at(u)[1][:, :n], scale[:n])
     low, high = curve.low.copy(), curve.high.copy()
-    for i in np.flatnonzero(curve.period[:n] == 0.0):
+    for i in np.flatnonzero(curve.period[:n] == 0.0).tolist():
         if not np.isfinite(low[i]) and not np.isfinite(high[i]):
             reach = LARGE * max(scale[i], at[i], 1.0)
             low[i], high[i] = u[i] - reach, u[i] + reach

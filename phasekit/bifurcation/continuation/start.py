@@ -52,7 +52,7 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     from scipy.optimize import root
 
     def f(x: Array) -> Array:
-        return curve.at(np.append(x, u[n:]))[0]
+        return curve.values(np.append(x, u[n:])[None])[0]
 
     def jacobian(x: Array) -> Array:
         return curve.at(np.append(x, u[n:]))[1][:, :n]
