@@ -42,6 +42,16 @@ def plain(function: Any, n: int, w: Array, x: int, par: Array, active: Any, out:
 
 
 @routine
+def coarse(x: float, scale: float) -> float:
+    """What steps of an unknown are measured by: its scale, a little more where it is far from 0.
+
+    The square of a step is left out, and rounding of x over the step: least where the third power
+    of the step is that of both together. A power of two.
+    """
+    return float(2.0 ** np.floor(np.log2(scale * max(1.0, abs(x) / scale) ** (1.0 / 3.0))))
+
+
+@routine
 def across(
     function: Any, n: int, w: Array, x: int, j: int, step: float, par: Array, active: Any,
     value: int, slope: int, bend_: int,
@@ -93,7 +103,8 @@ def _jet(
         size = 2.0 ** np.floor(np.log2(max(abs(w[u + j]), w[scale + j])))
         place = out + n + j
         if mode == PLAIN:
-            across(first, n, w, x, j, COARSE * size, par, active, value, near, bend_)
+            step = COARSE * coarse(w[u + j], w[scale + j])
+            across(first, n, w, x, j, step, par, active, value, near, bend_)
             for i in range(n):
                 w[place + i * m] = w[near + i]
             continue

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from published.compare import state_of
+from published.elimination import common_zeros
 
 import phasekit as pk
 
@@ -24,20 +25,6 @@ def polynomial(rng, degree, *symbols):
     """A random polynomial with small whole coefficients."""
     monomials = sorted(sp.itermonomials(symbols, degree), key=str)
     return sum(int(c) * q for c, q in zip(rng.integers(-3, 4, len(monomials)), monomials))  # noqa: B905
-
-
-def critical(f):
-    """All real points with f = f_x = 0 in the box, in 30 digits."""
-    eliminated = sp.Poly(sp.resultant(f, f.diff(x), x), p)
-    points = []
-    for value in set(eliminated.sqf_part().nroots(n=40, maxsteps=500)):
-        if abs(sp.im(value)) > 1e-20 or abs(value) > BOX:
-            continue
-        of_x = sp.Poly(f.diff(x).subs(p, sp.re(value)), x)
-        for root in of_x.nroots(n=40, maxsteps=500):
-            if abs(sp.im(root)) < 1e-10 and abs(f.subs({x: sp.re(root), p: sp.re(value)})) < 1e-15:
-                points.append((float(sp.re(root)), float(sp.re(value))))
-    return points
 
 
 def systems(seed):
@@ -65,9 +52,11 @@ def test_folds_are_those_of_exact_elimination(seed):
     problem = pk.Problem([str(e) for e in equations], state=states, parameters={"p": at})
     options = pk.ContinuationOptions(bounds={"x": (-BOX, BOX)}, max_points=1000)
     branch = pk.continuation(problem, "p", x0=start, span=(-2.0, 2.0), options=options)
+    zeros = common_zeros(f, f.diff(x), x, p, BOX)
+    assert zeros is not None
     wanted = [
         (a, b, float(f.diff(x, 2).subs({x: a, p: b})), float(f.diff(p).subs({x: a, p: b})))
-        for a, b in critical(f)
+        for a, b in zeros
     ]
     assert branch.points.sizes["point"] > 1
     kinds = ("fold", "branch_point", "transcritical", "pitchfork")

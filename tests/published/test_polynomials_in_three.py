@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from published.compare import state_of
+from published.elimination import common_zeros
 
 import phasekit as pk
 
@@ -29,9 +30,8 @@ def quadratic(rng, *monomials):
     )
 
 
-def system(seed):
+def drawn(rng):
     """Three quadratic equations in (x, y, z, p), and the y and z of their solutions."""
-    rng = np.random.default_rng(seed)
     of_y = quadratic(rng, 1, x, p, x**2, x * p)
     of_z = quadratic(rng, 1, x, p, y, x * p, x**2) + int(rng.choice([-1, 1])) * x * y
     law = quadratic(rng, 1, x, y, p, x**2, x * y, x * p, y * p) + int(rng.choice([-1, 1])) * z
@@ -42,28 +42,28 @@ def system(seed):
             break
     equations = [sp.expand(e) for e in mixed * parts]
     assert all(sp.Poly(e, x, y, z, p).total_degree() <= 2 for e in equations)
-    return equations, of_y, sp.expand(of_z.subs(y, of_y)), law + p / 7, rng
+    return equations, of_y, sp.expand(of_z.subs(y, of_y)), law + p / 7
 
 
-def common_roots(f, g):
-    """All real (x, p) in the box with f = g = 0, to 15 digits or more."""
-    eliminated = sp.Poly(sp.resultant(f, g, x), p)
-    if eliminated.is_zero:
-        return None
-    points = []
-    for value in set(eliminated.sqf_part().nroots(n=50, maxsteps=2000)):
-        if abs(sp.im(value)) > 1e-20 or abs(value) > BOX:
-            continue
-        at = sp.re(value)
-        for root in sp.Poly(f.subs(p, at), x).nroots(n=30, maxsteps=2000):
-            there = {x: sp.re(root), p: at}
-            if abs(sp.im(root)) < 1e-10 and abs(g.subs(there)) < 1e-12 * (1 + abs(root)) ** 9:
-                points.append((float(sp.re(root)), float(at)))
-    return points
+def system(seed):
+    """The first drawn that has an equilibrium at one of some p, and the equilibrium."""
+    rng = np.random.default_rng(seed)
+    while True:
+        equations, of_y, of_z, law = drawn(rng)
+        reduced = sp.expand(law.subs({z: of_z, y: of_y}))
+        for at in rng.uniform(-1.0, 1.0, 8).tolist():
+            of_x = sp.Poly(reduced.subs(p, at), x).all_coeffs()
+            roots = np.roots([float(c) for c in of_x])
+            real = roots.real[(abs(roots.imag) < 1e-9) & (abs(roots.real) < BOX)]
+            if real.size:
+                u = float(real[0])
+                start = [u, float(of_y.subs({x: u, p: at})), float(of_z.subs({x: u, p: at}))]
+                return equations, (of_y, of_z, reduced), at, start
 
 
 def passed(path, u, v):
-    """How far the path stays from a point."""
+    """How far the path stays from a point; two special points of it may be one."""
+    path = path[np.append(True, np.any(np.diff(path, axis=0) != 0.0, axis=1))]
     a, chord = path[:-1], np.diff(path, axis=0)
     here = np.array([u, v])
     along = np.sum((here - a) * chord, axis=1) / np.sum(chord**2, axis=1)
@@ -73,28 +73,15 @@ def passed(path, u, v):
 
 @pytest.mark.parametrize("seed", range(PATHS))
 def test_points_are_those_of_exact_elimination(seed):
-    equations, of_y, of_z, law, rng = system(seed)
-    reduced = sp.expand(law.subs({z: of_z, y: of_y}))
-    if sp.degree(reduced, x) < 2:
-        pytest.skip("the equations are linear in x once y and z are eliminated")
+    equations, (of_y, of_z, reduced), at, start = system(seed)
     jacobian = sp.Matrix(equations).jacobian([x, y, z])
     trace = jacobian.trace()
     minors = sum(jacobian.minor(i, i) for i in range(3))
     # Two eigenvalues of opposite sign: of a pair on the imaginary axis if the minors are positive.
     opposite = sp.expand((trace * minors - jacobian.det()).subs({z: of_z, y: of_y}))
     minors = sp.expand(minors.subs({z: of_z, y: of_y}))
-    folds = common_roots(reduced, reduced.diff(x))
-    pairs = common_roots(reduced, opposite)
-    for at in rng.uniform(-1.0, 1.0, 8):
-        of_x = sp.Poly(reduced.subs(p, float(at)), x).all_coeffs()
-        roots = np.roots([float(c) for c in of_x])
-        real = roots.real[(abs(roots.imag) < 1e-9) & (abs(roots.real) < BOX)]
-        if real.size:
-            break
-    else:
-        pytest.skip("there is no equilibrium to begin with")
-    at, u = float(at), float(real[0])
-    start = [u, float(of_y.subs({x: u, p: at})), float(of_z.subs({x: u, p: at}))]
+    folds = common_zeros(reduced, reduced.diff(x), x, p, BOX)
+    pairs = common_zeros(reduced, opposite, x, p, BOX)
     problem = pk.Problem([str(e) for e in equations], state=["x", "y", "z"], parameters={"p": at})
     options = pk.ContinuationOptions(bounds={"x": (-BOX, BOX)}, max_points=1000)
     branch = pk.continuation(problem, "p", x0=start, span=(-2.0, 2.0), options=options)

@@ -41,6 +41,10 @@ def accepted(
     vain = 0
     poor = np.flatnonzero(~(residual <= bound))
     if curve.options.tolerance < RAISED:
+        for i in (k for k in fixed if 0.0 < residual[k] <= bound):  # ends are special points
+            found, value = nearer(curve, u[i], tangent[i], float(residual[i]), fixed[i])
+            if value < residual[i]:
+                better[i], left[i] = found, value
         for i in poor.tolist():
             found, value = nearer(curve, u[i], tangent[i], float(residual[i]), fixed.get(i))
             if value < residual[i]:

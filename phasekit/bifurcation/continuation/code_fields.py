@@ -13,7 +13,17 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
-from phasekit.numerics.differences import COARSE, EPSILON, FINE, KNOWN, PLAIN, SHORTER, STEP, TRIES
+from phasekit.numerics.differences import (
+    COARSE,
+    EPSILON,
+    FINE,
+    KNOWN,
+    PLAIN,
+    SHORTER,
+    STEP,
+    TRIES,
+    coarse,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -196,8 +206,6 @@ class PythonField(Field):
             if begin == m:
                 return
 
-            unit = [_power(max(abs(values[j]), self.sizes[j])) for j in range(begin, m)]
-
             def at(j: int, h: float) -> Array:
                 if j < n:
                     shifted = x.copy()
@@ -209,11 +217,12 @@ class PythonField(Field):
                 return value
 
             if sharp:
+                unit = [_power(max(abs(values[j]), self.sizes[j])) for j in range(begin, m)]
                 lines = [functools.partial(at, j) for j in range(begin, m)]
                 slopes[:, begin:] = _slopes(lines, middle, unit)
                 return
-            for j, size in enumerate(unit, begin):
-                h = COARSE * size
+            for j in range(begin, m):
+                h = COARSE * coarse(values[j], self.sizes[j])
                 slopes[:, j] = (at(j, h) - at(j, -h)) / (2.0 * h)
 
         return first

@@ -137,6 +137,12 @@ class Curve:
         return self.kind != EQUILIBRIUM or self.n <= KEPT
 
     @property
+    def knows_slopes(self) -> bool:
+        """Whether derivatives by the states are given, and no differences."""
+        given = getattr(self.field, "jacobian", None) is not None
+        return given or isinstance(self.field, SymbolicField)
+
+    @property
     def weight(self) -> Array:
         """Weights of lengths: of the mean square of states, and of free parameters."""
         weight = np.zeros(self.size)
@@ -386,7 +392,7 @@ class Curve:
 
     def _differences(self) -> str:
         """What else may end a curve whose derivatives are differences, in words."""
-        if isinstance(self.field, SymbolicField) or getattr(self.field, "jacobian", None):
+        if self.knows_slopes:
             return ""
         width = 2.0 * differences.COARSE
         return (

@@ -29,7 +29,7 @@ EPSILON = 2.0**-52
 APART = 7.7e-13  # neighbours that show rounding; no power of two, which would hide it
 LEVELS = 24  # steps of a line: from half the size of the unknowns, each half the one before
 MORE = 10  # further ones, where the best lie at an end
-FARTHEST = 44
+FARTHEST, WIDEST = 44, -19
 POOR = 1e-7  # relative error that wider steps might bring down
 CAUTION = 3.0  # errors that are said, over errors that were seen
 SLACK = 6.0  # noise of the worst among hundreds of samples, over its estimate from a few
@@ -86,6 +86,7 @@ class Derivatives:
         # By line: samples by level, and derivatives by order.
         self._lines: dict[bytes, tuple[dict[int, tuple[Array, Array]], dict[int, Estimate]]] = {}
         self._noise: Array | None = None
+        self.widest = WIDEST
 
     def first(self, a: Vector) -> Estimate:
         """The derivative of f along a."""
@@ -138,6 +139,14 @@ class Derivatives:
         """Size of the rounding errors of f near the point, of whatever it does inside as well."""
         return self._noise_of(self.reach, None)
 
+    def rounding(self) -> Array:
+        """Size of the rounding errors of f, as they show between neighbours in relative size."""
+        return self._noise_of(np.abs(self.u), lambda u: self.curve.values(u[None])[0])
+
+    def doubt(self, noise: Array) -> None:
+        """Take rounding errors of f for no smaller than these."""
+        self._noise = np.maximum(self.noise(), noise)
+
     def _full(self, z: Array) -> Array:
         full = np.zeros(self.curve.m)
         full[: len(z)] = z
@@ -187,7 +196,7 @@ class Derivatives:
             estimate, finest, wide = ladder.derivative(order if given is None else order - 1)
             if finest >= len(ladder.steps) - 3 and last < FARTHEST:
                 last += MORE
-            elif wide and first > 1 - 2 * MORE:
+            elif wide and first > self.widest:
                 first -= MORE
             else:
                 return estimate

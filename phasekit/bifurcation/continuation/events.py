@@ -20,6 +20,7 @@ from phasekit.bifurcation.continuation.spectrum import (
 DEPTH = 10
 TOUCH = 1e-3  # part of its values at the ends to which a determinant falls that touches zero
 ON_END = 1e-5  # part of its value a little before at which a test function of an end is zero
+MEET = 4  # halvings that tell where real eigenvalues meet
 TESTS = ("fold", "branch", "pair", "flip")
 
 
@@ -156,6 +157,9 @@ class _Seek:
                 marked.update((int(i), int(i) + 1))
         if self.pairs or self.curve.n > 1:
             marked.update(np.flatnonzero(np.diff(tests.unstable) != 0).tolist())
+        if self.pairs:
+            known = (tests.below[1:] >= 0) & (tests.below[:-1] >= 0)
+            marked.update(np.flatnonzero(known & (np.diff(tests.below) != 0)).tolist())
         return sorted(marked)
 
     @staticmethod
@@ -195,10 +199,12 @@ class _Seek:
         simple = len(changes & {"fold", "branch", "flip"})
         crosses = "pair" in changes and any(nearest_is_complex(self.curve, t) for t in (one, two))
         explained = simple + 2 * crosses
+        pairs = self._sums(one, two, depth)
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)
         # Where the path turns at a pitchfork, both change at once: halving finds nothing between.
         turns = changes == {"fold", "branch"} and jump in (0, 2)
         several = jump > explained or (len(changes) > 1 and not turns) or (odd and self.curve.n > 1)
+        several |= pairs > 1
         if several and depth > 0:
             middle = between(self.curve, a, b, 0.5)
             if middle is not None:
@@ -214,6 +220,17 @@ class _Seek:
             elif split is not None:
                 yield from self.explore(a, split, depth - 1, force=False)
                 yield from self.explore(split, b, depth - 1, force=False)
+
+    def _sums(self, one: Tests, two: Tests, depth: int) -> int:
+        """How many sums of two eigenvalues change their sign, at least, as far as counts tell.
+
+        Where real eigenvalues meet, or part, others count: then a shorter interval tells more.
+        """
+        if not self.pairs or min(int(one.below), int(two.below)) < 0:
+            return 0
+        if int(one.real) == int(two.real) or depth > DEPTH - MEET:
+            return abs(int(one.below) - int(two.below))
+        return 0
 
     def _dip(self, a: Sample, b: Sample) -> tuple[Sample | None, Sample | None]:
         """A point between with the other sign of a test function that almost vanishes, if any.

@@ -45,9 +45,14 @@ def locate(curve: Curve, bracket: Bracket) -> list[Special]:
     """The special points of one bracket."""
     with np.errstate(all="ignore"):
         found = _locate(curve, bracket)
-    ends = [abs(s.tangent[curve.n]) / curve.scale[curve.n] for s in (bracket.a, bracket.b)]
+    n = curve.n
+    ends = [abs(s.tangent[n]) / curve.scale[n] for s in (bracket.a, bracket.b)]
+    values = [abs(s.u[n]) for s in (bracket.a, bracket.b)]
+    moved = abs(bracket.a.u[n] - bracket.b.u[n])
     if max(ends) < FLAT:  # the parameter does not move: signs are those of rounding errors
         found = [one for one in found if one.status == CONVERGED and one.kind != "fold"]
+    elif moved <= FLAT * max(values):  # nor beside where it is
+        found = [one for one in found if one.status == CONVERGED or one.kind != "fold"]
     return found
 
 

@@ -14,6 +14,7 @@ Array = npt.NDArray[np.float64]
 OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding
 ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
 KEPT = 1e-7  # the same where areas are kept: multipliers that meet part with the root of rounding
+SAME = 1e-10  # part of the largest eigenvalue by which two others are told apart
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
 
 
@@ -33,6 +34,10 @@ class Tests:
     pair : ndarray
         Sum of two real or two conjugate eigenvalues, the smallest in size, with the sign of the
         product of all: zero at Hopf points and neutral saddles.
+    below : ndarray of int
+        Number of such sums that are negative; -1 where rounding tells.
+    real : ndarray of int
+        Number of real eigenvalues: where it changes, so do the sums that count.
     flip : ndarray
         Of maps: 1 + mu of the multiplier next to -1, with the sign of the product of all.
     unstable : ndarray of int
@@ -45,6 +50,8 @@ class Tests:
     branch: Array
     volume: Array
     pair: Array
+    below: npt.NDArray[np.int64]
+    real: npt.NDArray[np.int64]
     flip: Array
     unstable: npt.NDArray[np.int64]
     eigenvalues: npt.NDArray[np.complex128]
@@ -101,25 +108,29 @@ def _in_even_units(matrices: Array) -> Array:
     both = np.sqrt(sizes * sizes.T)
     if not np.any(both):
         return matrices
-    from scipy.sparse.csgraph import breadth_first_order
-
-    n = len(sizes)
-    log = np.zeros(n)
-    seen = np.zeros(n, dtype=bool)
     # Zeros by differences are zeros but for rounding.
-    joined = both > 1e-12 * np.max(both)
-    for root in range(n):
-        if seen[root]:
-            continue
-        order, before = breadth_first_order(joined, root, directed=False)
-        seen[order] = True
-        for j in order[1:]:
-            i = before[j]
-            log[j] = log[i] + 0.5 * (np.log(sizes[j, i]) - np.log(sizes[i, j]))
+    log = _along_a_forest(both > 1e-12 * np.max(both), sizes)
     with np.errstate(all="ignore"):
         unit = np.exp(log - np.mean(log))
         even = matrices * unit / unit[:, None]
     return even if np.isfinite(even).all() else matrices
+
+
+def _along_a_forest(joined: npt.NDArray[np.bool_], sizes: Array) -> Array:
+    """Logarithms of units d with d_j/d_i = (|A_ji/A_ij|)^(1/2) along the edges of a forest."""
+    with np.errstate(all="ignore"):
+        half = 0.5 * (np.log(sizes.T) - np.log(sizes))
+    log = np.full(len(sizes), np.nan)
+    for root in range(len(sizes)):
+        if not np.isnan(log[root]):
+            continue
+        log[root] = 0.0
+        reached = [root]
+        for i in reached:
+            new = np.flatnonzero(joined[i] & np.isnan(log))
+            log[new] = log[i] + half[i, new]
+            reached.extend(new.tolist())
+    return log
 
 
 def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
@@ -170,12 +181,16 @@ def test_functions(
     if values is None:
         values = eigenvalues_of(curve.linear(slopes), accuracy=curve.field.accuracy)
     nothing = np.ones(slopes.shape[:-2])
-    pair = product_function if curve.discrete else pair_function
+    pair, below = nothing, np.full(nothing.shape, -1)
+    if pairs and n > 1:
+        pair, below = (product_function(values), below) if curve.discrete else pair_sums(values)
     return Tests(
         tangent[..., n] / curve.scale[n],
         sign,
         log,
-        pair(values) if pairs and n > 1 else nothing,
+        pair,
+        below,
+        np.asarray(np.sum(values.imag == 0.0, axis=-1)),
         flip_function(values) if curve.discrete else nothing,
         unstable_of(curve, values, neutral=neutral),
         values,
@@ -215,24 +230,37 @@ def product_function(values: npt.NDArray[np.complex128]) -> Array:
 
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
     """Smallest real sum of two eigenvalues with the sign of the product of all such sums."""
+    return pair_sums(values)[0]
+
+
+def pair_sums(values: npt.NDArray[np.complex128]) -> tuple[Array, npt.NDArray[np.int64]]:
+    """The pair function, and how many sums are negative, -1 where rounding tells.
+
+    Sums of two real and of two conjugate eigenvalues count.
+    """
     n = values.shape[-1]
     if n > 8:  # all pairs of many eigenvalues would cost more than the eigenvalues
-        rows = [_least_sum(row) for row in values.reshape(-1, n)]
-        return np.array(rows).reshape(values.shape[:-1])
-    i, j = np.triu_indices(n, 1)
-    sums = values[..., i] + values[..., j]
-    both_real = (values[..., i].imag == 0.0) & (values[..., j].imag == 0.0)
-    conjugate = (values[..., i] == np.conj(values[..., j])) & ~both_real
-    real = both_real | conjugate
-    sizes = np.where(real, np.abs(sums.real), np.inf)
-    negative = np.sum(real & (sums.real < 0.0), axis=-1)
-    least = np.min(sizes, axis=-1, initial=np.inf)
-    least = np.where(np.isfinite(least), least, 1.0)
-    return np.asarray(np.where(negative % 2 == 1, -least, least))
+        rows = np.array([_least_sum(row) for row in values.reshape(-1, n)])
+        least = rows[:, 0].reshape(values.shape[:-1])
+        negative = rows[:, 1].astype(int).reshape(values.shape[:-1])
+    else:
+        i, j = np.triu_indices(n, 1)
+        a, b = values[..., i], values[..., j]
+        sums = a.real + b.real
+        real = a.imag == -b.imag
+        real &= (a.imag == 0.0) | (a.real == b.real)
+        negative = np.sum(real & (sums < 0.0), axis=-1)
+        least = np.min(np.where(real, np.abs(sums), np.inf), axis=-1, initial=np.inf)
+        least = np.where(np.isfinite(least), least, 1.0)
+    tiny = least <= SAME * np.max(np.abs(values), axis=-1)
+    return np.asarray(np.where(negative % 2 == 1, -least, least)), np.where(tiny, -1, negative)
 
 
-def _least_sum(values: npt.NDArray[np.complex128]) -> float:
-    """`pair_function` of one point, by sorting: of real eigenvalues neighbours of -r count."""
+def _least_sum(values: npt.NDArray[np.complex128]) -> tuple[float, int]:
+    """The least sum of one point, in size, and how many are negative, by sorting.
+
+    Of real eigenvalues neighbours of -r count.
+    """
     real = np.sort(values.real[values.imag == 0.0])
     above = values.real[values.imag > 0.0]  # one of each conjugate pair
     sums = [2.0 * above]
@@ -250,7 +278,7 @@ def _least_sum(values: npt.NDArray[np.complex128]) -> float:
             sums.append(real[there] + real[other[there]])
     sizes = np.abs(np.concatenate(sums))
     least = float(np.min(sizes)) if len(sizes) and np.isfinite(sizes).all() else 1.0
-    return -least if negative % 2 else least
+    return least, negative
 
 
 def is_conservative(values: npt.NDArray[np.complex128], *, discrete: bool = False) -> bool:

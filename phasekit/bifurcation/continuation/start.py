@@ -1,4 +1,4 @@
-"""From a guess to a curve: the first equilibrium, its scales and its tangent."""
+"""From a guess to a curve: the first equilibrium, its tangent, and both ways from it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.acceptance import rounded
 from phasekit.bifurcation.continuation.curve import Curve, Track
-from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.ending import followed
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
@@ -15,11 +14,6 @@ from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
 
 Array = npt.NDArray[np.float64]
-
-EPSILON = 2.0**-52
-FAR = 1e3  # a state that moves by less than this part of its size counts by its motion
-MANY = 20  # states up to which each is looked at by itself
-LARGE = 1e8  # a state that grows so many times beyond its scale leaves the picture
 
 
 def settle(curve: Curve, u: Array, names: str) -> Array:
@@ -58,7 +52,7 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     from scipy.optimize import root
 
     def f(x: Array) -> Array:
-        return curve.at(np.append(x, u[n:]))[0]
+        return curve.values(np.append(x, u[n:])[None])[0]
 
     def jacobian(x: Array) -> Array:
         return curve.at(np.append(x, u[n:]))[1][:, :n]
@@ -85,56 +79,6 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
 def _at(found: Array, asked: Array, n: int) -> Array:
     """The point with the parameters that were asked for, to the last bit."""
     return np.concatenate([found[:n], asked[n:]])
-
-
-def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
-    """The curve with scales of its states: given, of angles, or from the start and its slope."""
-    n = curve.n
-    scale = curve.scale.copy()
-    _, slopes = curve.at(u)
-    # By how much the states move along the span, and by how much they are known.
-    rounding = EPSILON * np.abs(slopes) @ np.abs(u[: curve.m])
-    signs = np.where(np.arange(n) % 2, -1.0, 1.0)
-    sides = np.stack([-slopes[:, n] * scale[n], rounding, signs * rounding], axis=1)
-    with np.errstate(all="ignore"):
-        try:  # elimination leaves zero what is zero
-            motion, *noise = np.linalg.solve(slopes[:, :n], sides).T
-        except np.linalg.LinAlgError:
-            motion, *noise = np.linalg.lstsq(slopes[:, :n], sides, rcond=1e-10)[0].T
-    unknown = 100.0 * np.max(np.abs(noise), axis=0)
-    motion = np.where(np.isfinite(motion), np.abs(motion), 0.0)
-    for i in range(n):
-        if curve.period[i] > 0.0:
-            scale[i] = curve.period[i] / (2.0 * np.pi)
-        elif i in given:
-            scale[i] = given[i]
-        else:
-            size = max(abs(u[i]), min(motion[i], 1.0))
-            if unknown[i] < motion[i] < abs(u[i]) / FAR:  # what it does is small beside where it is
-                size = max(FAR * motion[i], 1e-6 * abs(u[i]))
-            scale[i] = size if size > unknown[i] else _natural(curve, u, i)
-    low, high = curve.low.copy(), curve.high.copy()
-    for i in range(n):
-        if curve.period[i] == 0.0 and not np.isfinite(low[i]) and not np.isfinite(high[i]):
-            reach = LARGE * max(scale[i], abs(u[i]), 1.0)
-            low[i], high[i] = u[i] - reach, u[i] + reach
-    return curve.replace(scale=scale, low=low, high=high)
-
-
-def _natural(curve: Curve, u: Array, i: int) -> float:
-    """Where a state is zero and stays so: the size at which f ceases to be linear in it, or 1."""
-    if curve.n > MANY:
-        return 1.0
-    d = Derivatives(curve, u)
-    e = np.zeros(curve.n)
-    e[i] = 1.0
-    slope = np.abs(d.slopes[:, i])
-    sizes: list[float] = []
-    for order, form in ((1, d.second(e, e)), (2, d.third(e, e, e))):
-        known = (np.abs(form.value) > 10.0 * form.error) & (slope > 0.0)
-        ratio = slope[known] / np.abs(form.value[known])
-        sizes.extend((ratio ** (1.0 / order)).tolist())
-    return min(sizes, default=1.0)
 
 
 def tangent_of(curve: Curve, u: Array) -> Array:

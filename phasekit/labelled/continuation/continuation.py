@@ -12,7 +12,8 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
-from phasekit.bifurcation.continuation.start import run, scaled, settle, tangent_of
+from phasekit.bifurcation.continuation.scales import guessed, scaled
+from phasekit.bifurcation.continuation.start import run, settle, tangent_of
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
@@ -151,12 +152,9 @@ def continuation(
     for i, name in enumerate(problem.state):
         if not curve.low[i] <= guess[i] <= curve.high[i]:
             raise bad("x0", guess, f"{name} within its bounds {options.bounds[name]}")
-    for i, name in enumerate(problem.state):
-        curve.scale[i] = options.scales.get(name, max(abs(guess[i]), 1e-3))
-        if curve.period[i] > 0.0:
-            curve.scale[i] = curve.period[i] / (2.0 * np.pi)
+    given = {i: options.scales[s] for i, s in enumerate(problem.state) if s in options.scales}
+    curve = guessed(curve, u, given)
     u = settle(curve, u, where)
-    given = {problem.state.index(name): s for name, s in options.scales.items()}
     curve = scaled(curve, u, given)
     start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
     with said(f"following equilibria along {parameter}"):

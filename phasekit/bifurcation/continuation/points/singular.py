@@ -87,7 +87,10 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     u = np.array(start[:m])
     rows = force_sizes(curve, u)
     accuracy = accuracy_of(curve)
-    left, _, right = np.linalg.svd(curve.at(u)[1] * scale / rows[:, None])
+    scaled = curve.at(u)[1] * scale / rows[:, None]
+    if not np.isfinite(scaled).all():
+        return None
+    left, _, right = np.linalg.svd(scaled)
     W, V = left[:, n - k :], right[n - k :]
     b = np.zeros(k)
     least, last, idle, fast = np.inf, np.inf, 0, True
