@@ -52,6 +52,20 @@ FIRST = (
     "docs/test_pages.py",
     "test_studies.py",
 )
+FAST = "not slow"
+
+
+def pytest_configure(config):
+    """Leave out what is slow where neither files nor a selection are asked for."""
+    everything = config.args_source is config.ArgsSource.TESTPATHS
+    if everything and not (config.option.markexpr or config.option.keyword):
+        config.option.markexpr = FAST
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Say what was left out."""
+    if config.option.markexpr == FAST:
+        terminalreporter.write_line("slow tests were left out: pytest -n auto -m slow runs them")
 
 
 @pytest.hookimpl(trylast=True)

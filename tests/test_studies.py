@@ -25,6 +25,7 @@ import matplotlib.pyplot as plt
 import pytest
 
 matplotlib.use("Agg")
+pytestmark = pytest.mark.slow
 FOLDER = Path(__file__).parents[1] / "studies"
 STUDIES = [
     path for path in sorted(FOLDER.glob("*/*.py")) if "__main__" in path.read_text(encoding="utf-8")

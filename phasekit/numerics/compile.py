@@ -20,6 +20,7 @@ from numba import njit
 from numba.extending import overload
 
 from phasekit.numerics import compiling as compiling  # says so to who waits for it
+from phasekit.numerics import linked
 
 Array = npt.NDArray[np.float64]
 Outputs = tuple[npt.NDArray[Any], ...]
@@ -36,20 +37,18 @@ def kernel(function: Function) -> Function:
 
 def inline(function: Function) -> Function:
     """Compile as part of each caller, always inlined; integer literals are constants inside."""
-    options: Any = {"forceinline": True, **OPTIONS}
-    overload(function, jit_options=options, strict=False, prefer_literal=True)(
-        lambda *args: function
-    )
+    linked.link(function, function, literal=True, forceinline=True, **OPTIONS)
     return function
 
 
 def routine(function: Function) -> Function:
     """Compile as a function of its own: for what is long, or called at several places."""
-    overload(function, jit_options=OPTIONS, strict=False)(lambda *args: function)
+    linked.link(function, function, forceinline=False, **OPTIONS)
     return function
 
 
 def compose(function: Function) -> Function:
     """Paste into the caller before compilation: for what only strings functions together."""
-    overload(function, inline="always", strict=False)(lambda *args: function)
+    options: Any = {**linked.OPTIONS, **OPTIONS}
+    overload(function, jit_options=options, inline="always", strict=False)(lambda *args: function)
     return function

@@ -15,9 +15,10 @@ from typing import Any, cast
 import numpy as np
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.extending import intrinsic
 
 from phasekit.numerics.compile import OPTIONS, Array, Function
+from phasekit.numerics.linked import link
 
 OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
 
@@ -26,7 +27,7 @@ def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
     """Give a function that is interpreted as it stands another body for the compiler."""
 
     def decorate(function: Function) -> Function:
-        overload(function, jit_options=OPTIONS, strict=False)(lambda *args: compiled)
+        link(function, compiled, forceinline=False, **OPTIONS)
         return function
 
     return decorate

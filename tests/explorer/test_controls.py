@@ -12,7 +12,7 @@ import pytest
 
 import phasekit as pk
 
-pytestmark = pytest.mark.usefixtures("silent")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("silent")]
 
 DISK = pk.GyroRotorDisk(
     beta=40 * pk.deg, e=0.05, a=0.024, r=0.2, omega1=300 * pk.rpm, m=2.0, half_span=0.15

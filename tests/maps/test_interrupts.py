@@ -43,6 +43,7 @@ ALL = list(
 )
 
 
+@pytest.mark.slow
 @in_proc
 @pytest.mark.parametrize(
     ("call", "workers", "to", "waits"), ALL if "PHASEKIT_KILLS" in os.environ else SOME
@@ -76,6 +77,7 @@ def test_interrupts_end_a_sweep(call, workers, to, waits, tmp_path):
         assert "leaked" not in said
 
 
+@pytest.mark.slow
 @in_proc
 def test_no_worker_outlives_a_terminated_sweep(tmp_path):
     store, log = tmp_path / "map.zarr", tmp_path / "log"

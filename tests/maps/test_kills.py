@@ -19,9 +19,10 @@ from witnesses.kill_harness import LOG, Group, Map, content, processes_of, stamp
 import phasekit as pk
 
 pytest.importorskip("zarr")
-pytestmark = pytest.mark.skipif(
-    not Path("/proc/self/stat").exists(), reason="looks for processes in /proc"
-)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks for processes in /proc"),
+]
 
 SMALL, DELAY = Map(), 0.25
 LARGE = Map((360, 330), (100, 90))

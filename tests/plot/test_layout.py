@@ -240,7 +240,13 @@ CASES = {
         "all NaN": lambda: P.time_history(without_values(motions()).isel(point=0)),
     },
 }
-EVERY = [(name, case) for name, cases in CASES.items() for case in cases]
+#: All of them narrow, where room is short; wide, one of each picture, and the others at leisure.
+EVERY = [
+    pytest.param(name, case, width, marks=[pytest.mark.slow] if width > 4.0 and others else [])
+    for name, cases in CASES.items()
+    for others, case in enumerate(cases)
+    for width in WIDTHS
+]
 
 
 def drawn(name, case, width, style="default"):
@@ -267,8 +273,7 @@ def test_names_under_plot_are_pictures():
             assert "did you mean 'p" in str(caught.value)
 
 
-@pytest.mark.parametrize("width", WIDTHS)
-@pytest.mark.parametrize(("name", "case"), EVERY)
+@pytest.mark.parametrize(("name", "case", "width"), EVERY)
 def test_texts_are_inside_and_clear_of_each_other(name, case, width):
     figure = drawn(name, case, width)
     with warnings.catch_warnings():

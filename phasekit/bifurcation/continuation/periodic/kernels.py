@@ -366,8 +366,11 @@ def newton(
             for k in range(1, q):
                 length += (dy[1, k] / width[k - 1]) ** 2
             length = np.sqrt(length) if length > 0.0 else 1.0
-            dx[1] /= length
-            dy[1] /= length
+            for i in range(places):
+                for c in range(n):
+                    dx[1, i, c] /= length
+            for k in range(q):
+                dy[1, k] /= length
             return FOUND, step, sign, residual, divergence, size, length
         if not damped and before < np.inf and size > 2.0 * before:
             return DIVERGED, step, sign, residual, divergence, size, 1.0
