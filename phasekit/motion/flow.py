@@ -17,7 +17,7 @@ from phasekit.laws.perturbed import (
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.motion.lost import MOST, judged, tell
 from phasekit.motion.prescribed import span, table_of
-from phasekit.motion.rates import rates_of
+from phasekit.motion.rates import order_of, rates_of
 
 Array = npt.NDArray[np.float64]
 
@@ -161,6 +161,7 @@ def motions(
     threads: int | None = None,
     most: int = MOST,
     tangents: int = 0,
+    series: bool = True,
 ) -> Cells:
     """Integrate from t = 0 to times of either sign, in any order.
 
@@ -174,11 +175,15 @@ def motions(
         Times of each cell, or of all.
     most : int
         Steps that a motion may take.
+    series : bool
+        Take steps by Taylor series where the law has them, and there are no tangent vectors; by
+        Runge-Kutta otherwise.
     """
     from phasekit.motion.kernels.motions import motions as kernel
     from phasekit.numerics.launch import launch
 
-    code, parameters = rates_of(law, values, tangents)
+    degree = order_of(rtol) if series and not tangents else 0
+    code, parameters = rates_of(law, values, tangents, degree)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     table = table_of(law.prescribed, *span(times))
@@ -194,20 +199,17 @@ def motions(
         out = np.empty(result.shape)
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
-            arrays = (
-                code.address,
-                table,
-                0.0,
-                rising,
-                unit_of(law),
-                rtol,
-                atol,
-                most,
-                code.kink,
-                np.array(states),
-            )
+            limits = limits_of(law, rtol, atol, most, once=True)
+            arrays = (*code.steps, table, limits, 0.0, rising)
             groups: Any = (out, reached, taken)
-            launch(kernel, (*arrays, parameters), count, groups, threads, WEIGHT)
+            launch(
+                kernel,
+                (*arrays, code.kink, np.array(states), parameters),
+                count,
+                groups,
+                threads,
+                WEIGHT,
+            )
         back = np.argsort(order, axis=1)[..., None]
         out = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
         wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]
@@ -220,6 +222,16 @@ def motions(
 def circle(law: PerturbedConservative) -> float:
     """Period of the coordinate; 0 on a line."""
     return 0.0 if law.base.period is None else float(law.base.period)
+
+
+def limits_of(
+    law: PerturbedConservative, rtol: float, atol: float, most: int = MOST, *, once: bool = False
+) -> Array:
+    """What bounds the steps of the kernels, in all lanes."""
+    from phasekit.numerics.lanes import LANES
+
+    rows = rtol, atol, unit_of(law), float(most), float(once)
+    return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
 
 
 def unit_of(law: PerturbedConservative) -> float:

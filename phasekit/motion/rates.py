@@ -41,10 +41,25 @@ class Rates:
     """Its parameters: names of the law's, of its coefficients, or of the torque of omega'."""
     kink: int
     """Place of the sign of the rate among the parameters; -1 without quadratic damping."""
+    series: int
+    """Machine code of steps by Taylor series; 0: none is asked for, or the law has none."""
+    room: int
+    """Coefficients of a step."""
+
+    @property
+    def steps(self) -> tuple[int, int, int | None]:
+        """What the kernels take of it: one or other machine code for the steps.
+
+        Without an address they are compiled without the Runge-Kutta method.
+        """
+        return self.series, self.room, None if self.series else self.address
 
 
 def rates_of(
-    law: PerturbedConservative, values: Mapping[str, Array], tangents: int = 0
+    law: PerturbedConservative,
+    values: Mapping[str, Array],
+    tangents: int = 0,
+    order: int = 0,
 ) -> tuple[Rates, Array]:
     """Return the machine code of a law, and its parameters, of shape (parameters, cells).
 
@@ -56,6 +71,8 @@ def rates_of(
         Values of its parameters in the cells, that broadcast.
     tangents : int
         How many tangent vectors move along.
+    order : int
+        Order of Taylor series by which to take steps, where the law has them; 0: it need not.
 
     Raises
     ------
@@ -64,7 +81,7 @@ def rates_of(
         angular velocity of its frame.
     """
     quadratic = bool(np.any(np.asarray(values["quadratic"]) != 0.0))
-    code = _compiled(_Form.of(law), _Same(law.base), law.rate, quadratic, tangents)
+    code = _compiled(_Form.of(law), _Same(law.base), law.rate, quadratic, tangents, order)
     known: dict[str, Any] = dict(values)
     if {"A", "B", "C"} <= set(code.names) and isinstance(law.base, Trigonometric):
         inputs = {name: np.asarray(values[name], float) for name in law.inputs}
@@ -80,6 +97,17 @@ def rates_of(
     known["sign"] = 0.0
     columns = [np.atleast_1d(np.asarray(known[name], float)) for name in code.names]
     return code, np.stack(np.broadcast_arrays(*columns))
+
+
+def order_of(rtol: float) -> int:
+    """Order of Taylor series that takes least time, as measured; even, to be one of few.
+
+    Examples
+    --------
+    >>> [order_of(rtol) for rtol in (1e-4, 1e-10, 1e-14)]
+    [10, 16, 20]
+    """
+    return 2 * round(0.5 * (4.5 - 0.5 * float(np.log(rtol))))
 
 
 _EULER = ("euler_0", "euler_s", "euler_c")
@@ -121,7 +149,9 @@ class _Same:
 
 
 @functools.lru_cache(maxsize=128)
-def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: int) -> Rates:
+def _compiled(
+    form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: int, order: int
+) -> Rates:
     import sympy as sp
 
     from phasekit.numerics.lanes import compile_lanes
@@ -169,9 +199,10 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
         force = base.acceleration_formula(constants, v, force)
     expressions = [v, force]
     places = {x: (_STATE, 0), v: (_STATE, 1), t: (_TIME, 0), w: (_TIME, 1), dw: (_TIME, 2)}
-    slopes = force.diff(x), force.diff(v)
+    slopes, pairs = (force.diff(x), force.diff(v)), [(x, v)]
     for i in range(tangents):
         pair = sp.symbols(f"_u{i} _w{i}", real=True)
+        pairs.append(pair)
         expressions += [pair[1], slopes[0] * pair[0] + slopes[1] * pair[1]]
         places.update({symbol: (_STATE, 2 + 2 * i + j) for j, symbol in enumerate(pair)})
     places.update({symbol: (_PARAMETER, i) for i, symbol in enumerate(used.values())})
@@ -179,7 +210,29 @@ def _compiled(form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: in
         address = compile_lanes(expressions, places)
     except ParameterError as error:
         raise ParameterError(f"system: {error}") from None
-    return Rates(address, tuple(used), kink)
+    series = room = 0
+    if order and not (quadratic or form.prescribed):
+        parameters = {symbol: i for i, symbol in enumerate(used.values())}
+        series = _series(order, t, pairs, expressions[1::2], parameters)
+        room = len(pairs) * (order + 1)
+    return Rates(address, tuple(used), kink, series, room)
+
+
+def _series(
+    order: int,
+    time: Any,
+    pairs: Sequence[tuple[Any, Any]],
+    forces: Sequence[Any],
+    parameters: Mapping[Any, int],
+) -> int:
+    """Machine code of steps by series, of a law that has them."""
+    from phasekit.motion.kernels.taylor import Law, compile_steps
+    from phasekit.numerics.series import has_series
+
+    varying = {time, *(symbol for pair in pairs for symbol in pair)}
+    if not all(has_series(force, varying) for force in forces):
+        return 0
+    return compile_steps(Law(time, pairs, forces, parameters), order)
 
 
 def _euler(form: _Form, rate: Any, parameter: Any, harmonic: Any, x: Any, t: Any, dw: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 from typing import Any, NamedTuple
 
@@ -12,10 +12,10 @@ import numpy.typing as npt
 
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
-from phasekit.motion.flow import ATOL, RTOL, WEIGHT, circle, unit_of
-from phasekit.motion.lost import MOST, judged, tell
+from phasekit.motion.flow import ATOL, RTOL, WEIGHT, circle, limits_of
+from phasekit.motion.lost import judged, tell
 from phasekit.motion.prescribed import table_of
-from phasekit.motion.rates import rates_of
+from phasekit.motion.rates import order_of, rates_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -101,6 +101,7 @@ def strobe(
     rtol: float = RTOL,
     atol: float = ATOL,
     threads: int | None = None,
+    series: bool = True,
 ) -> Strobed:
     """States after skip, skip + 1, ... legs.
 
@@ -119,11 +120,13 @@ def strobe(
         Where motions end early.
     most_legs : int, optional
         Legs of a motion; default: as many as the states that are kept need.
+    series : bool
+        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
     from phasekit.numerics.launch import launch
 
-    code, parameters = rates_of(law, values)
+    code, parameters = rates_of(law, values, order=order_of(rtol) if series else 0)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     legs = np.array(np.broadcast_to(np.asarray(legs, float), (count,)))
@@ -140,8 +143,8 @@ def strobe(
     found = np.full(count, -1, np.int64)
     taken, status = np.zeros(count, np.int64), np.zeros(count, np.int64)
     if count and many:
-        how = (unit_of(law), rtol, atol, MOST, code.kink, skip, many, circle(law))
-        arrays: Any = (code.address, table, legs, again, *how, targets.scale, targets.points)
+        how = (again, code.kink, skip, many, circle(law), targets.scale, targets.points)
+        arrays: Any = (*code.steps, table, limits_of(law, rtol, atol), legs, *how)
         arrays += (targets.box, targets.boxes, targets.visits, np.array(states), parameters)
         groups: Any = (out, found, taken, status)
         launch(kernel, arrays, count, groups, threads, WEIGHT)
@@ -187,6 +190,19 @@ def lyapunov(
     they are no longer nearly so. The first tenth of the time is not counted. The error is that of
     the mean over the parts of the time, and the trend in them.
     """
+    return _exponents(law, arrays, rtol, atol, threads, series=True)
+
+
+def _exponents(
+    law: PerturbedConservative,
+    arrays: Sequence[npt.ArrayLike],
+    rtol: float,
+    atol: float,
+    threads: int | None,
+    *,
+    series: bool,
+) -> Exponents:
+    """Lyapunov exponents, by series where the law has them, or by Runge-Kutta steps."""
     from phasekit.motion.kernels.tangents import growth
     from phasekit.numerics.launch import launch
 
@@ -196,7 +212,7 @@ def lyapunov(
         x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).reshape(-1) for x in given
     )
     values = law.values(*flat)
-    code, parameters = rates_of(law, values, 2)
+    code, parameters = rates_of(law, values, 2, order_of(rtol) if series else 0)
     count = int(np.prod(shape, dtype=int))
     states = np.zeros((count, 6))
     states[:, 0], states[:, 1], states[:, 2], states[:, 5] = phi, dphi, 1.0, 1.0
@@ -207,8 +223,9 @@ def lyapunov(
     table = table_of(law.prescribed, 0.0, float(np.max(np.where(valid, time, 0.0), initial=0.0)))
     out, status = np.full((count, PARTS, 2), np.nan), np.zeros(count, np.int64)
     if count:
-        how = (unit_of(law), rtol, atol, MOST, code.kink)
-        arguments: Any = (code.address, table, legs, *how, states, parameters)
+        limits = limits_of(law, rtol, atol, once=True)
+        arguments: Any = (*code.steps, table, limits, legs, code.kink)
+        arguments += (states, parameters)
         groups: Any = (out, status)
         launch(growth, arguments, count, groups, threads, WEIGHT)
         judged(status, parameters)

@@ -58,10 +58,14 @@ class LaneWriter(Writer):
     def __init__(self, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.turned: dict[Any, tuple[Any, Any]] = {}
+        self.constants: dict[str, Any] = {}  # written as text once each
 
     def constant(self, value: float) -> Any:
         """The same number in all lanes."""
-        return ir.Constant(self.kind, [value] * LANES)
+        bits = float(value).hex()  # 0 and -0 apart
+        if bits not in self.constants:
+            self.constants[bits] = ir.Constant(self.kind, [value] * LANES)
+        return self.constants[bits]
 
     def known(self, value: bool) -> Any:
         """The same truth in all lanes."""

@@ -96,7 +96,7 @@ def compile_expressions(
     for i, result in zip(expressions, results, strict=True):
         writer.store(writer.write(result), i)
     builder.ret_void()
-    return _machine_code(str(module), host=writer.host)
+    return machine_code(str(module), host=writer.host)
 
 
 @functools.cache
@@ -109,7 +109,8 @@ def _target() -> Any:
     return llvm.Target.from_triple(llvm.get_process_triple())
 
 
-def _machine_code(text: str, *, host: bool) -> int:
+def machine_code(text: str, *, host: bool) -> int:
+    """Compile a module as text; return the address of its function ``fill``."""
     target = _target()
     module = llvm.parse_assembly(text)
     module.verify()

@@ -10,15 +10,20 @@ from phasekit.motion.kernels.stepping import (
     ARRIVED,
     CELL,
     END,
+    GONE,
     IDLE,
     REALS,
     RUNNING,
+    SCALE,
+    START,
     STATE,
     STEPS,
+    TERMS,
     TRY,
     WHOLES,
     T,
     advance,
+    by_series,
     commit,
     load,
     renew,
@@ -44,6 +49,30 @@ def write(
     return done
 
 
+@routine
+def write_series(lane: int, times: Array, done: int, x: Array, real: Array, out: Array) -> int:
+    """The same of a step by series that was taken."""
+    start, step, end = real[START, lane], real[GONE, lane], real[T, lane]
+    sense = 1.0 if step > 0.0 else -1.0
+    while done < times.size and sense * (times[done] - end) <= 0.0:
+        s = (times[done] - start) / real[SCALE, lane]
+        for i in range(out.shape[1] // 2):
+            if times[done] == end:
+                out[done, 2 * i] = x[2 * i * LANES + lane]
+                out[done, 2 * i + 1] = x[(2 * i + 1) * LANES + lane]
+                continue
+            terms = (real.shape[0] - TERMS) // (out.shape[1] // 2)
+            first = TERMS + i * terms
+            value = slope = 0.0
+            for row in range(first + terms - 1, first - 1, -1):
+                slope = slope * s + value
+                value = value * s + real[row, lane]
+            out[done, 2 * i] = value
+            out[done, 2 * i + 1] = slope / real[SCALE, lane]
+        done += 1
+    return done
+
+
 @inline
 def swap(p: Array, kink: int, signs: Array) -> None:
     """Exchange the signs of quadratic damping; a turn at the end of a step changes them there."""
@@ -54,14 +83,13 @@ def swap(p: Array, kink: int, signs: Array) -> None:
 
 @kernel
 def motions(
-    address: int,
+    series: int,
+    room: int,
+    address: int | None,
     table: Array,
+    limits: Array,
     start: float,
     times: Array,
-    unit: float,
-    rtol: float,
-    atol: float,
-    most: int,
     kink: int,
     states: Array,
     parameters: Array,
@@ -83,7 +111,7 @@ def motions(
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
     signs = np.zeros(LANES)  # those within the step
     z = np.zeros(3 * LANES)
-    real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
+    real, whole = np.zeros((REALS + room, LANES)), np.zeros((WHOLES, LANES), np.int64)
     written = np.zeros(LANES, np.int64)
     cell = first
     while True:
@@ -95,7 +123,9 @@ def motions(
                 old = whole[CELL, lane]
                 status[old] = whole[STATE, lane]
                 steps[old] = whole[STEPS, lane]
-                out[old, written[lane] :] = np.nan
+                for i in range(written[lane], out.shape[1]):
+                    for c in range(out.shape[2]):
+                        out[old, i, c] = np.nan
                 whole[STATE, lane] = IDLE
             if cell < stop:
                 load(lane, cell, states, parameters, x, p, kink, real, whole)
@@ -104,14 +134,15 @@ def motions(
                 real[END, lane] = own_times[-1]
                 written[lane] = 0
                 while written[lane] < own_times.size and own_times[written[lane]] == start:
-                    out[cell, written[lane]] = states[cell]
+                    for c in range(out.shape[2]):
+                        out[cell, written[lane], c] = states[cell, c]
                     written[lane] += 1
                 if written[lane] == own_times.size:
                     whole[STATE, lane] = ARRIVED
                 fresh += 1
                 cell += 1
-        if fresh > 0:
-            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
+        if address is not None and fresh > 0:
+            renew(address, table, limits, x, k, p, z, kink, h, real, whole)
         running = False
         for lane in range(LANES):
             running = running or whole[STATE, lane] == RUNNING
@@ -119,9 +150,17 @@ def motions(
             if fresh > 0:
                 continue
             break
+        if address is None:
+            by_series(series, x, p, real, limits, whole)
+            for lane in range(LANES):
+                if real[GONE, lane] != 0.0:
+                    own = out[whole[CELL, lane]]
+                    row = whole[CELL, lane] if times.shape[0] > 1 else 0
+                    written[lane] = write_series(lane, times[row], written[lane], x, real, own)
+            continue
         for lane in range(LANES if kink >= 0 else 0):
             signs[lane] = p[kink * LANES + lane]
-        advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
+        advance(address, table, limits, x, k, y, p, z, kink, h, real, whole)
         dense = False
         for lane in range(LANES):
             if whole[ACCEPTED, lane] == 1 and written[lane] < times.shape[1]:

@@ -19,18 +19,24 @@ from phasekit.motion.kernels.dop853 import (
     rates,
 )
 from phasekit.numerics.compile import Array, inline, routine
-from phasekit.numerics.lanes import LANES
+from phasekit.numerics.lanes import LANES, invoke
 
 Whole = npt.NDArray[np.int64]
 
 #: Rows of `real`: time, next step, the step that is tried, where the lane stops, error of the
-#: step over what is allowed, step that is tried to end at a turn.
-T, H, TRY, END, ERROR, AIM = range(6)
-REALS = 6
+#: step over what is allowed, step that is tried to end at a turn. Of steps by series their number,
+#: the state, and whether the last was rejected; of one alone what was gone, 0 where it was
+#: rejected, when it began, the unit of its time, and further rows with its coefficients.
+T, H, TRY, END, ERROR, AIM, COUNT, OUTCOME, REFUSED, GONE, START, SCALE, TERMS = range(13)
+REALS, KEPT = TERMS, GONE
 #: Rows of `whole`: cell, state, whether the step was accepted, steps so far, whether the last was
 #: rejected, tries to end at a turn.
 CELL, STATE, ACCEPTED, STEPS, REJECTED, AIMS = range(6)
 WHOLES = 6
+
+#: Rows of limits: errors that are allowed, value from which on a coordinate is held as closely as
+#: there, most steps; and, for steps by series, whether to take one alone, and keep its series.
+RTOL, ATOL, UNIT, MOST, ONCE = range(5)
 
 #: In place of `ACCEPTED`: its state was changed between steps.
 CHANGED = 2
@@ -65,6 +71,7 @@ def load(
     if kink >= 0:
         p[kink * LANES + lane] = np.sign(states[cell, 1])
     real[T, lane] = real[H, lane] = real[AIM, lane] = 0.0
+    real[COUNT, lane] = real[REFUSED, lane] = 0.0
     whole[ACCEPTED, lane] = CHANGED
 
 
@@ -174,10 +181,7 @@ def judge(
 def advance(
     address: int,
     table: Array,
-    unit: float,
-    rtol: float,
-    atol: float,
-    most: int,
+    limits: Array,
     x: Array,
     k: Array,
     y: Array,
@@ -203,10 +207,11 @@ def advance(
     for m in range(x.size):
         h[m] = real[TRY, m % LANES]
     attempt(address, table, real[T], h, x, k, y, p, z)
+    rtol, atol, unit, most = limits[RTOL, 0], limits[ATOL, 0], limits[UNIT, 0], limits[MOST, 0]
     errors(h, x, y, k, unit, rtol, atol, k[13:], real[ERROR])
     for lane in range(LANES):
         if whole[STATE, lane] == RUNNING:
-            judge(lane, most, x, k, y, p, kink, real, whole)
+            judge(lane, int(most), x, k, y, p, kink, real, whole)
 
 
 @routine
@@ -229,8 +234,7 @@ def commit(x: Array, k: Array, y: Array, real: Array, whole: Whole) -> None:
 def renew(
     address: int,
     table: Array,
-    rtol: float,
-    atol: float,
+    limits: Array,
     x: Array,
     k: Array,
     p: Array,
@@ -248,4 +252,20 @@ def renew(
         for m in range(lane, x.size, LANES):
             k[0, m] = k[13, m]
         if real[H, lane] == 0.0:
-            begin(lane, x, k, p, kink, real, rtol, atol)
+            begin(lane, x, k, p, kink, real, limits[RTOL, 0], limits[ATOL, 0])
+
+
+@inline
+def _run(series: int, x: Array, p: Array, real: Array, limits: Array) -> None:
+    invoke(series, x, p, real, limits)  # type: ignore[call-arg]
+
+
+@routine
+def by_series(series: int, x: Array, p: Array, real: Array, limits: Array, whole: Whole) -> None:
+    """Take steps by the machine code of `taylor`."""
+    for lane in range(LANES):
+        real[OUTCOME, lane] = whole[STATE, lane]
+    _run(series, x, p, real, limits)
+    for lane in range(LANES):
+        whole[STATE, lane] = int(real[OUTCOME, lane])
+        whole[STEPS, lane] = int(real[COUNT, lane])

@@ -21,6 +21,7 @@ from phasekit.motion.kernels.stepping import (
     WHOLES,
     T,
     advance,
+    by_series,
     commit,
     load,
     renew,
@@ -82,14 +83,13 @@ def resume(lane: int, done: int, leg: float, again: bool, real: Array, whole: In
 
 @kernel
 def strobe(
-    address: int,
+    series: int,
+    room: int,
+    address: int | None,
     table: Array,
+    limits: Array,
     legs: Array,
     again: bool,
-    unit: float,
-    rtol: float,
-    atol: float,
-    most: int,
     kink: int,
     skip: int,
     many: int,
@@ -121,7 +121,7 @@ def strobe(
     k = np.zeros((ROWS, size))
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
     z = np.zeros(3 * LANES)
-    real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
+    real, whole = np.zeros((REALS + room, LANES)), np.zeros((WHOLES, LANES), np.int64)
     counts = np.zeros((3, LANES), np.int64)
     done, last, same = counts[0], counts[1], counts[2]
     cell = first
@@ -161,8 +161,11 @@ def strobe(
                 done[lane] = last[lane] = same[lane] = 0
                 fresh = True
                 cell += 1
-        if fresh:
-            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
+        if address is not None and fresh:
+            renew(address, table, limits, x, k, p, z, kink, h, real, whole)
         if left > 0:
-            advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
-            commit(x, k, y, real, whole)
+            if address is not None:
+                advance(address, table, limits, x, k, y, p, z, kink, h, real, whole)
+                commit(x, k, y, real, whole)
+            else:
+                by_series(series, x, p, real, limits, whole)

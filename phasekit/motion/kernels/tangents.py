@@ -20,6 +20,7 @@ from phasekit.motion.kernels.stepping import (
     STATE,
     WHOLES,
     advance,
+    by_series,
     commit,
     load,
     renew,
@@ -54,13 +55,12 @@ def is_skewed(lane: int, x: Array) -> bool:
 
 @kernel
 def growth(
-    address: int,
+    series: int,
+    room: int,
+    address: int | None,
     table: Array,
+    limits: Array,
     legs: Array,
-    unit: float,
-    rtol: float,
-    atol: float,
-    most: int,
     kink: int,
     states: Array,
     parameters: Array,
@@ -77,7 +77,7 @@ def growth(
     k = np.zeros((ROWS, 6 * LANES))
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
     z = np.zeros(3 * LANES)
-    real, whole = np.zeros((REALS, LANES)), np.zeros((WHOLES, LANES), np.int64)
+    real, whole = np.zeros((REALS + room, LANES)), np.zeros((WHOLES, LANES), np.int64)
     done = np.zeros(LANES, np.int64)
     sums = np.zeros((LANES, 2))
     cell = first
@@ -105,7 +105,8 @@ def growth(
                 real[END, lane] = (done[lane] + 1) * legs[own]
             if ended:
                 status[own] = state
-                out[own, done[lane] :] = np.nan
+                for i in range(done[lane], out.shape[1]):
+                    out[own, i, 0] = out[own, i, 1] = np.nan
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:
@@ -115,8 +116,11 @@ def growth(
                 sums[lane, 0] = sums[lane, 1] = 0.0
                 fresh = True
                 cell += 1
-        if fresh:
-            renew(address, table, rtol, atol, x, k, p, z, kink, h, real, whole)
+        if address is not None and fresh:
+            renew(address, table, limits, x, k, p, z, kink, h, real, whole)
         if left > 0:
-            advance(address, table, unit, rtol, atol, most, x, k, y, p, z, kink, h, real, whole)
-            commit(x, k, y, real, whole)
+            if address is not None:
+                advance(address, table, limits, x, k, y, p, z, kink, h, real, whole)
+                commit(x, k, y, real, whole)
+            else:
+                by_series(series, x, p, real, limits, whole)

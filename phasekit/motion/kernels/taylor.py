@@ -1,0 +1,292 @@
+"""Steps of eight motions by their Taylor series in time, written as machine code for each law.
+
+A motion x'' = f(t, x, x') has the coefficients x_(k+2) = f_k/((k + 1)(k + 2)), in units of the
+step before, so that no power of a time over- or underflows. The step is as long as the last two
+coefficients allow [JorbaZou2005]; whether the series holds at its end, the law says there: the
+series' own x'' must be f, to what the error of the state allows. [JorbaZou2005] section 3.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import llvmlite.binding as llvm
+import numpy as np
+import sympy as sp
+from llvmlite import ir
+
+from phasekit.motion.kernels.dop853 import CLOSEST, LONGEST
+from phasekit.motion.kernels.stepping import (
+    ARRIVED,
+    ATOL,
+    COUNT,
+    END,
+    EXHAUSTED,
+    FAILED,
+    KEPT,
+    MOST,
+    ONCE,
+    OUTCOME,
+    REFUSED,
+    RTOL,
+    RUNNING,
+    UNIT,
+    H,
+    T,
+)
+from phasekit.numerics.lanes import LANES, LaneWriter
+from phasekit.numerics.machine_code import machine_code
+from phasekit.numerics.series import Series
+
+_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+_LONG = ir.VectorType(ir.IntType(64), LANES)
+_FACTOR = float(np.log2(LONGEST))
+
+
+class Law:
+    """The law of a motion, and where its symbols stand.
+
+    Pairs of symbols are a coordinate and its rate, then tangent vectors; each has its force.
+    Parameters have a place each in the array p.
+    """
+
+    def __init__(
+        self,
+        time: Any,
+        pairs: Sequence[tuple[Any, Any]],
+        forces: Sequence[Any],
+        parameters: Mapping[Any, int],
+    ) -> None:
+        self.time, self.pairs = time, pairs
+        self.inputs = {symbol: (1, place) for symbol, place in parameters.items()}
+        symbols = sp.numbered_symbols("_c")
+        self.shared, self.forces = sp.cse(list(forces), symbols=symbols, list=True)
+
+
+def compile_steps(law: Law, order: int) -> int:
+    """Address of ``void (double *x, double *p, double *real, double *limits)``.
+
+    It takes steps, of all lanes at once, until a lane ends. Or it takes one, and leaves the
+    coefficients of the coordinates in further rows of `real`.
+    """
+    pointer = ir.DoubleType().as_pointer()
+    module = ir.Module(name="phasekit")
+    module.triple = llvm.get_process_triple()
+    kind = ir.FunctionType(ir.VoidType(), [pointer] * 4)
+    function = ir.Function(module, kind, name="fill")
+    entry, step, end = (function.append_basic_block() for _ in range(3))
+    builder = ir.IRBuilder(entry)
+    builder.branch(step)
+    builder.position_at_end(step)
+    writer = StepWriter(module, builder, function.args, law.inputs)
+    builder.cbranch(writer.step(law, order), step, end)
+    builder.position_at_end(end)
+    builder.ret_void()
+    return machine_code(str(module), host=True)
+
+
+class StepWriter(LaneWriter):
+    """Writes one step."""
+
+    def step(self, law: Law, order: int) -> Any:
+        """Try a step of every lane; return whether to go on with all of them."""
+        b, (x, _, real, limits) = self.builder, self.arrays
+        start = [self.load(x, i) for i in range(2 * len(law.pairs))]
+        t, end, count, state, refused = (
+            self.load(real, row) for row in (T, END, COUNT, OUTCOME, REFUSED)
+        )
+        first = b.load(super(LaneWriter, self).place(limits, ONCE * LANES))
+        once = b.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
+        rest, h = b.fsub(end, t), self.load(real, H)
+        h = b.select(b.fcmp_unordered("==", h, self.constant(0.0)), rest, h)
+        running = b.fcmp_ordered("==", state, self.constant(RUNNING))
+        per = b.fdiv(self.constant(1.0), h)
+        curves = self._curves(law, order, t, start, h, per)
+        allowed = [
+            self._allowed(i, curve, h, per, [self.load(limits, i) for i in (RTOL, ATOL, UNIT)])
+            for i, curve in enumerate(curves)
+        ]
+        next_ = self._mul(self._part(order, curves, allowed, per, refused), h)
+        far, long = self._size(rest), self._size(next_)
+        last = b.fcmp_ordered(">=", long, far)
+        # Rather than leave a short one.
+        halves = b.fcmp_ordered(">", long, self._mul(self.constant(0.5), far))
+        taken = b.select(halves, self._mul(self.constant(0.5), rest), next_)
+        taken = b.select(last, rest, taken)
+        then = b.select(last, end, b.fadd(t, taken))
+        ends, error = self._end(law, curves, allowed, then, taken, per)
+        good = b.fcmp_ordered("<=", error, self.constant(1.0))
+        going = b.and_(good, running)
+        for i, (old, new) in enumerate(zip(start, ends, strict=True)):
+            b.store(b.select(going, new, old), self.place(x, i), align=8)
+        self._keep(
+            once, [b.select(going, taken, self.constant(0.0)), t, h, *itertools.chain(*curves)]
+        )
+        h = b.select(good, next_, self._mul(self.constant(0.5), taken))
+        now = b.select(going, then, t)
+        count = b.fadd(count, self.constant(1.0))
+        least = self._mul(self.constant(4.0 * _EPS), self._size(now))
+        short = b.or_(
+            b.fcmp_unordered("<=", self._size(h), least),
+            b.fcmp_unordered("==", h, self.constant(0.0)),
+        )
+        new = b.select(
+            b.fcmp_ordered(">=", count, self.load(limits, MOST)),
+            self.constant(EXHAUSTED),
+            self.constant(RUNNING),
+        )
+        new = b.select(b.and_(going, last), self.constant(ARRIVED), new)
+        new = b.select(b.and_(b.not_(good), short), self.constant(FAILED), new)
+        refused = b.select(good, self.constant(0.0), self.constant(1.0))
+        for row, value in ((T, now), (H, h), (COUNT, count), (REFUSED, refused)):
+            b.store(value, self.place(real, row), align=8)
+        new = b.select(running, new, state)
+        b.store(new, self.place(real, OUTCOME), align=8)
+        ended = b.bitcast(b.fcmp_ordered("!=", new, state), ir.IntType(LANES))
+        none = b.icmp_unsigned("==", ended, ir.Constant(ended.type, 0))
+        return b.and_(none, b.not_(once))
+
+    def _keep(self, once: Any, values: Iterable[Any]) -> None:
+        """Leave a step that is the only one where the caller finds it."""
+        with self.builder.if_then(once):
+            for row, value in enumerate(values):
+                self.builder.store(value, self.place(self.arrays[2], KEPT + row), align=8)
+
+    def _curves(
+        self, law: Law, order: int, t: Any, start: Sequence[Any], h: Any, per: Any
+    ) -> list[list[Any]]:
+        """Coefficients of the coordinates in powers of the time over h."""
+        pairs = range(len(law.pairs))
+        curves = [[start[2 * i], self._mul(start[2 * i + 1], h)] for i in pairs]
+
+        def rate(i: int, k: int) -> Any:
+            if k == 0:
+                return start[2 * i + 1]
+            return self._mul(self._mul(self.constant(k + 1), per), curves[i][k + 1])
+
+        varying: dict[Any, Any] = {law.time: lambda k: (t, h)[k] if k < 2 else None}
+        for i, (x, v) in enumerate(law.pairs):
+            varying[x] = functools.partial(lambda i, k: curves[i][k], i)
+            varying[v] = functools.partial(rate, i)
+        series = Series(self, varying, law.shared)
+        square = self._mul(h, h)
+        for k in range(order - 1):
+            scale = self._mul(square, self.constant(1.0 / ((k + 1) * (k + 2))))
+            for curve, force in zip(curves, law.forces, strict=True):
+                term = series.term(force, k)
+                curve.append(self.constant(0.0) if term is None else self._mul(term, scale))
+        return curves
+
+    def _allowed(
+        self, i: int, curve: Sequence[Any], h: Any, per: Any, limits: Sequence[Any]
+    ) -> tuple[Any, Any]:
+        """Errors of a pair that are allowed, as of Runge-Kutta steps.
+
+        What a step adds counts as the size of what is zero at its start. The rounding of a far
+        coordinate is no error of the rate.
+        """
+        rtol, atol, unit = limits
+        x, v = curve[0], self._mul(curve[1], per)
+        if i == 0:
+            size = self._larger(self._size(x), self._size(curve[1]))
+            change = self._size(self._mul(self._mul(self.constant(2.0), curve[2]), per))
+            sizes = self._smaller(size, unit), self._larger(self._size(v), change)
+            a, c = (self._sum(self._mul(rtol, size), atol) for size in sizes)
+            noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
+            return a, self._larger(c, noise)
+        length = self._intrinsic("sqrt", self._sum(self._mul(x, x), self._mul(v, v)))
+        second = self._smaller(self._size(h), self.constant(1.0))
+        part = self._mul(self._sum(self._mul(rtol, length), atol), second)
+        part = self._larger(part, self._mul(self.constant(CLOSEST), length))
+        return part, part
+
+    def _part(
+        self,
+        order: int,
+        curves: Sequence[Sequence[Any]],
+        allowed: Sequence[tuple[Any, Any]],
+        per: Any,
+        refused: Any,
+    ) -> Any:
+        """How many times as long as the step before the next may be: by the last two terms."""
+        found = None
+        for k in (order, order - 1):
+            most = None
+            for curve, (a, c) in zip(curves, allowed, strict=True):
+                term = self._size(curve[k])
+                rate = self._mul(self._mul(self.constant(k), self._size(per)), term)
+                for part in (self.builder.fdiv(term, a), self.builder.fdiv(rate, c)):
+                    most = part if most is None else self._larger(part, most)
+            root = self._mul(self._log2(most), self.constant(-1.0 / (k - 1)))
+            found = root if found is None else self._smaller(root, found)
+        # After one that was refused, not longer than half of that.
+        again = self.builder.fcmp_ordered(">", refused, self.constant(0.0))
+        most = self.builder.select(again, self.constant(0.0), self.constant(_FACTOR))
+        return self._exp2(self._larger(self._smaller(found, most), self.constant(-1000.0)))
+
+    def _end(
+        self,
+        law: Law,
+        curves: Sequence[Sequence[Any]],
+        allowed: Sequence[tuple[Any, Any]],
+        then: Any,
+        taken: Any,
+        per: Any,
+    ) -> tuple[list[Any], Any]:
+        """States at the end of the step, and their error over what is allowed."""
+        s = self._mul(taken, per)
+        ends, bends = [], []
+        for curve in curves:
+            # Horner's scheme with the first derivative, and half of the second.
+            value, slope, bend = curve[-1], self.constant(0.0), self.constant(0.0)
+            for term in curve[-2::-1]:
+                bend = self._sum(self._mul(bend, s), slope)
+                slope = self._sum(self._mul(slope, s), value)
+                value = self._sum(self._mul(value, s), term)
+            ends += [value, self._mul(slope, per)]
+            bends.append(self._mul(self._mul(self.constant(2.0), bend), self._mul(per, per)))
+        there = type(self)(self.module, self.builder, self.arrays, self.inputs)
+        there.values.update(self.values)  # what does not vary
+        there.values[law.time] = then
+        for i, (x, v) in enumerate(law.pairs):
+            there.values[x], there.values[v] = ends[2 * i], ends[2 * i + 1]
+        for symbol, part in law.shared:
+            there.values.setdefault(symbol, there.write(part))
+        # What is missing of x'' grows as the power order - 1 of the time.
+        error, order = None, len(curves[0]) - 1
+        for force, bend, (a, c) in zip(law.forces, bends, allowed, strict=True):
+            missing = self._size(self._mul(self.builder.fsub(there.write(force), bend), taken))
+            rate = self._mul(missing, self.constant(1.0 / order))
+            value = self._mul(rate, self._mul(self._size(taken), self.constant(1.0 / (order + 1))))
+            for part in (self.builder.fdiv(rate, c), self.builder.fdiv(value, a)):
+                error = part if error is None else self._sum(part, error)
+        return ends, error
+
+    def _size(self, x: Any) -> Any:
+        return self._intrinsic("fabs", x)
+
+    def _mul(self, x: Any, y: Any) -> Any:
+        return self.builder.fmul(x, y, flags=self.flags)
+
+    def _larger(self, x: Any, y: Any) -> Any:
+        return self.builder.select(self.builder.fcmp_ordered(">", x, y), x, y)
+
+    def _smaller(self, x: Any, y: Any) -> Any:
+        return self.builder.select(self.builder.fcmp_ordered("<", x, y), x, y)
+
+    def _log2(self, x: Any) -> Any:
+        """Logarithm of a positive number within 0.09, from its bits; large of NaN."""
+        bits = self.builder.sitofp(self.builder.bitcast(x, _LONG), self.kind)
+        return self._sum(self._mul(bits, self.constant(2.0**-52)), self.constant(-1023.0))
+
+    def _exp2(self, x: Any) -> Any:
+        """Power of two within a hundredth, of an exponent of a size below 1000."""
+        b, whole = self.builder, self._intrinsic("floor", x)
+        part = b.fsub(x, whole)
+        factor = self._sum(self._mul(part, self.constant(0.34)), self.constant(0.66))
+        factor = self._sum(self._mul(part, factor), self.constant(1.0))
+        shift = b.shl(b.fptosi(whole, _LONG), ir.Constant(_LONG, [52] * LANES))
+        return b.bitcast(b.add(b.bitcast(factor, _LONG), shift), self.kind)
