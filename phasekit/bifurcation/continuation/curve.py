@@ -23,6 +23,7 @@ CHUNK = 256
 MOST = 1 << 20  # derivatives at a time, where they are not kept
 KEPT = 16  # states up to which derivatives are kept at each point
 TIGHT = 1e-13
+BESIDE = 1e-6  # farthest, on scaled axes, that a bound lies from a last point
 
 
 @dataclass(frozen=True)
@@ -354,7 +355,29 @@ class Curve:
                 left -= count
         record = np.concatenate(records) if records else np.empty((0, columns))
         slopes = np.concatenate([np.empty((0, n * self.m if self.keeps else 0)), *kept])
+        if reason == trace.STUCK and self.kind == EQUILIBRIUM and len(record):
+            reason, which = self._at_bound(record[-1], w, reason, which)
         return Track(record, slopes, w[: state.size].copy(), self._stop(reason, which, record, w))
+
+    def _at_bound(self, last: Array, w: Array, reason: int, which: int) -> tuple[int, int]:
+        """Put the last point on a bound next to it where f vanishes, too: a branch point there.
+
+        Newton's method has nothing to hold on to where f_x is singular.
+        """
+        u, t = last[: self.size], last[self.size : 2 * self.size]
+        with np.errstate(all="ignore"):
+            bound = np.where(t > 0.0, self.high, self.low)
+            length = np.where(t != 0.0, (bound - u) / t, np.inf)
+        j = int(np.argmin(length))
+        if not 0.0 <= length[j] <= BESIDE:
+            return reason, which
+        moved = u + length[j] * t
+        moved[j] = bound[j]
+        value, slopes = self.at(moved)
+        if not np.all(np.abs(value) <= newton.ROUNDING * (np.abs(slopes) @ np.abs(moved))):
+            return reason, which
+        last[: self.size] = w[: self.size] = moved
+        return trace.BOUND, j
 
     def _stop(self, reason: int, which: int, record: Array, w: Array) -> Stop:
         names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]
