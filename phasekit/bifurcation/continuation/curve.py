@@ -23,7 +23,6 @@ CHUNK = 256
 MOST = 1 << 20  # derivatives at a time, where they are not kept
 KEPT = 16  # states up to which derivatives are kept at each point
 TIGHT = 1e-13
-BESIDE = 1e-6  # farthest, on scaled axes, that a bound lies from a last point
 
 
 @dataclass(frozen=True)
@@ -139,8 +138,7 @@ class Curve:
     @property
     def knows_slopes(self) -> bool:
         """Whether derivatives by the states are given, and no differences."""
-        given = getattr(self.field, "jacobian", None) is not None
-        return given or isinstance(self.field, SymbolicField)
+        return isinstance(self.field, SymbolicField) or bool(getattr(self.field, "jacobian", None))
 
     @property
     def weight(self) -> Array:
@@ -161,10 +159,8 @@ class Curve:
         self.field.prepare(self.scale[: self.m])
         first = self.field.first(self.active, sharp=sharp)
         second = first if self.kind == EQUILIBRIUM else self.field.second(self.active)
-        mode = (
-            differences.SHARP if sharp and self.field.mode == differences.PLAIN else self.field.mode
-        )
-        return first, second, mode
+        differs = sharp and self.field.mode == differences.PLAIN
+        return first, second, differences.SHARP if differs else self.field.mode
 
     def refine(
         self,
@@ -340,9 +336,7 @@ class Curve:
         chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
         records = []
         kept = []
-        reason = trace.FULL
-        which = 0
-        left = points
+        reason, which, left = trace.FULL, 0, points
         with np.errstate(all="ignore"):
             while reason == trace.FULL and left > 0:
                 record = np.empty((min(left, chunk), columns))
@@ -355,31 +349,10 @@ class Curve:
                 left -= count
         record = np.concatenate(records) if records else np.empty((0, columns))
         slopes = np.concatenate([np.empty((0, n * self.m if self.keeps else 0)), *kept])
-        if reason == trace.STUCK and self.kind == EQUILIBRIUM and len(record):
-            reason, which = self._at_bound(record[-1], w, reason, which)
-        return Track(record, slopes, w[: state.size].copy(), self._stop(reason, which, record, w))
+        return Track(record, slopes, w[: state.size].copy(), self.stop_of(reason, which, w))
 
-    def _at_bound(self, last: Array, w: Array, reason: int, which: int) -> tuple[int, int]:
-        """Put the last point on a bound next to it where f vanishes, too: a branch point there.
-
-        Newton's method has nothing to hold on to where f_x is singular.
-        """
-        u, t = last[: self.size], last[self.size : 2 * self.size]
-        with np.errstate(all="ignore"):
-            bound = np.where(t > 0.0, self.high, self.low)
-            length = np.where(t != 0.0, (bound - u) / t, np.inf)
-        j = int(np.argmin(length))
-        if not 0.0 <= length[j] <= BESIDE:
-            return reason, which
-        moved = u + length[j] * t
-        moved[j] = bound[j]
-        value, slopes = self.at(moved)
-        if not np.all(np.abs(value) <= newton.ROUNDING * (np.abs(slopes) @ np.abs(moved))):
-            return reason, which
-        last[: self.size] = w[: self.size] = moved
-        return trace.BOUND, j
-
-    def _stop(self, reason: int, which: int, record: Array, w: Array) -> Stop:
+    def stop_of(self, reason: int, which: int, w: Array) -> Stop:
+        """Say why a track ends in the state w."""
         names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]
         where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
         where += ", ..." if len(names) > 4 else ""
