@@ -254,6 +254,33 @@ def test_a_start_at_the_end_of_the_span():
         assert not specials(branch)
 
 
+@pytest.mark.parametrize("high", [0.0, 0.5])
+@pytest.mark.parametrize("form", ["formula", "function"])
+def test_a_branch_point_on_the_end_of_the_span(form, high):
+    """f_x is singular there, and the branch ends on it all the same."""
+    f = {"formula": ["(p - h)*x - x**3"], "function": lambda x, p, h: [(p - h) * x[0] - x[0] ** 3]}
+    problem = one_state(f[form], {"p": -1.0, "h": high})
+    branch = pk.continuation(problem, "p", x0=[0.0], span=(-1.0, high))
+    assert [stop.reason for stop in branch.stops] == ["bound", "bound"]
+    assert branch.points.p.max() == high
+    assert abs(*values(branch, "p", "branch_point") - np.array(high)) < 1e-12
+
+
+def test_a_start_where_f_has_no_derivatives_is_refused():
+    problem = one_state(lambda x, p: [math.log(x[0] + 1) - p + 0 * math.sqrt(x[0])], {"p": 0.0})
+    with pytest.raises(pk.ConvergenceError, match=r"x0: the derivatives of f are not finite"):
+        pk.continuation(problem, "p", x0=[0.0], span=(0.0, 2.0))
+
+
+def test_four_branches_whose_point_is_known_to_few_digits_say_so():
+    problem = one_state(lambda x, p: [x[0] * (x[0] - p) * (x[0] + p) * (x[0] - 2 * p)], {"p": -1.0})
+    (point,) = specials(pk.continuation(problem, "p", x0=[0.0], span=(-1.0, 1.0)))
+    assert kind_of(point) == "branch_point"
+    assert abs(point.parameters["p"]) < 1e-6
+    assert point.status == "guess"
+    assert "4 branches meet" in point.message
+
+
 def test_a_start_that_is_far_is_corrected_and_a_hopeless_one_refused():
     branch = pk.continuation(
         one_state(["mu - x**3 - x"], {"mu": 2.0}), "mu", x0=[40.0], span=(0.0, 3.0)

@@ -6,19 +6,23 @@ scales; here f itself is held against its terms. What is larger is brought down,
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.curve import TIGHT, Curve
+from phasekit.bifurcation.continuation.curve import TIGHT, Curve, Track
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.kernels.newton import RAISED, ROUNDING
+from phasekit.bifurcation.continuation.kernels.trace import BOUND
 
 Array = npt.NDArray[np.float64]
 
 EPSILON = 2.0**-52
 INSIDE = 1e-12  # of a function, whose inner terms are not seen
+BESIDE = 1e-6  # farthest, on scaled axes, that a bound lies from a last point
 NEAR = 1e-8  # farthest, on scaled axes, that a point is moved
 VAIN = 3  # points in a row that cannot be brought nearer: f is no better known
 
@@ -54,6 +58,31 @@ def accepted(
                 break
     poor = np.flatnonzero(~(left <= bound))
     return better, _said(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
+
+
+def on_bound(curve: Curve, track: Track) -> Track:
+    """A track that is stuck next to a branch point on a bound, brought there.
+
+    Newton's method has nothing to hold on to where f_x is singular.
+    """
+    if track.stop.reason != "stuck" or curve.kind != EQUILIBRIUM or not len(track.record):
+        return track
+    m = curve.m
+    u, t = track.record[-1, :m], track.record[-1, m : 2 * m]
+    with np.errstate(all="ignore"):
+        bound = np.where(t > 0.0, curve.high, curve.low)
+        length = np.where(t != 0.0, (bound - u) / t, np.inf)
+    j = int(np.argmin(length))
+    if not 0.0 <= length[j] <= BESIDE:
+        return track
+    u = u + length[j] * t
+    u[j] = bound[j]
+    value, slopes = curve.at(u)
+    if not np.all(np.abs(value) <= ROUNDING * (np.abs(slopes) @ np.abs(u))):
+        return track
+    record, state = track.record.copy(), track.state.copy()
+    record[-1, :m] = state[:m] = u
+    return replace(track, record=record, state=state, stop=curve.stop_of(BOUND, j, state))
 
 
 def nearer(

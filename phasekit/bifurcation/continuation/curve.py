@@ -139,8 +139,7 @@ class Curve:
     @property
     def knows_slopes(self) -> bool:
         """Whether derivatives by the states are given, and no differences."""
-        given = getattr(self.field, "jacobian", None) is not None
-        return given or isinstance(self.field, SymbolicField)
+        return isinstance(self.field, SymbolicField) or bool(getattr(self.field, "jacobian", None))
 
     @property
     def weight(self) -> Array:
@@ -161,10 +160,8 @@ class Curve:
         self.field.prepare(self.scale[: self.m])
         first = self.field.first(self.active, sharp=sharp)
         second = first if self.kind == EQUILIBRIUM else self.field.second(self.active)
-        mode = (
-            differences.SHARP if sharp and self.field.mode == differences.PLAIN else self.field.mode
-        )
-        return first, second, mode
+        differs = sharp and self.field.mode == differences.PLAIN
+        return first, second, differences.SHARP if differs else self.field.mode
 
     def refine(
         self,
@@ -340,9 +337,7 @@ class Curve:
         chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
         records = []
         kept = []
-        reason = trace.FULL
-        which = 0
-        left = points
+        reason, which, left = trace.FULL, 0, points
         with np.errstate(all="ignore"):
             while reason == trace.FULL and left > 0:
                 record = np.empty((min(left, chunk), columns))
@@ -355,9 +350,10 @@ class Curve:
                 left -= count
         record = np.concatenate(records) if records else np.empty((0, columns))
         slopes = np.concatenate([np.empty((0, n * self.m if self.keeps else 0)), *kept])
-        return Track(record, slopes, w[: state.size].copy(), self._stop(reason, which, record, w))
+        return Track(record, slopes, w[: state.size].copy(), self.stop_of(reason, which, w))
 
-    def _stop(self, reason: int, which: int, record: Array, w: Array) -> Stop:
+    def stop_of(self, reason: int, which: int, w: Array) -> Stop:
+        """Say why a track ends in the state w."""
         names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]
         where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
         where += ", ..." if len(names) > 4 else ""

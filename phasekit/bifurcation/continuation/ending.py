@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from phasekit.bifurcation.continuation.acceptance import on_bound
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.path import Path, Sample, Slopes, join
 from phasekit.bifurcation.continuation.placed import Placed
@@ -35,6 +36,7 @@ def followed(
     chunk = FIRST if curve.ends else points
     while True:
         more = curve.follow(state if track is None else track.state, min(chunk, points))
+        more = on_bound(curve, more)
         track = more if track is None else _joined(track, more)
         ended = _ended(curve, start, track) if curve.ends else None
         points -= len(more.record)

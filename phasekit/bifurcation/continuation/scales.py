@@ -15,7 +15,7 @@ from phasekit.bifurcation.continuation.derivatives import Derivatives
 Array = npt.NDArray[np.float64]
 
 EPSILON = 2.0**-52
-FAR = 30.0  # a state that moves by less than this part of its size counts by its motion
+FAR = 10.0  # a state that moves by less than this part of its size counts by its motion
 MANY = 20  # states that are looked at by themselves; others follow from them
 LARGE = 1e8  # a state that grows so many times beyond its scale leaves the picture
 SMALL = 1e-3  # guesses below tell little of the size of a state

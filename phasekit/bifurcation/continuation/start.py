@@ -22,8 +22,19 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     Raises
     ------
     ConvergenceError
-        If neither Newton's method nor SciPy's hybrid and Levenberg-Marquardt methods find one.
+        If f or its derivatives are not finite there, or if neither Newton's method nor SciPy's
+        hybrid and Levenberg-Marquardt methods find one.
     """
+    found = _settled(curve, u, names)
+    if not np.isfinite(curve.at(found)[1]).all():
+        raise ConvergenceError(
+            f"x0: the derivatives of f are not finite at the equilibrium x = "
+            f"{found[: curve.n].tolist()} that {names} leads to; give another x0, or start beside"
+        )
+    return found
+
+
+def _settled(curve: Curve, u: Array, names: str) -> Array:
     n = curve.n
     value, _ = curve.at(u)
     if not np.isfinite(value).all():
@@ -52,7 +63,7 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     from scipy.optimize import root
 
     def f(x: Array) -> Array:
-        return curve.values(np.append(x, u[n:])[None])[0]
+        return np.asarray(curve.values(np.append(x, u[n:])[None])[0])
 
     def jacobian(x: Array) -> Array:
         return curve.at(np.append(x, u[n:]))[1][:, :n]

@@ -114,6 +114,8 @@ def described(curve: Curve, bracket: Bracket, best: Sample, point: Singular) -> 
         kind, note = "branch_point", f"transcritical or a pitchfork: {note}"
     if len(others) > 1 and corank == 1:
         note = f"{len(others) + 1} branches meet"
+        if not curve.knows_slopes:  # all second derivatives vanish: by differences, not quite
+            message = note = f"{note}: by differences of f, the point is known to few digits"
     return Special(
         kind, u, interval_of(curve, bracket), point.residual,
         GUESS if message else CONVERGED, note, form,
