@@ -30,16 +30,22 @@ def expected(tmp_path_factory):
     return content(path)
 
 
-@pytest.fixture
-def part(tmp_path, monkeypatch):
+@pytest.fixture(scope="module")
+def begun(tmp_path_factory):
     """A map whose tiles from the third row on are missing."""
-    path = tmp_path / "map.zarr"
-    with monkeypatch.context() as patch:
+    path = tmp_path_factory.mktemp("begun") / "map.zarr"
+    with pytest.MonkeyPatch.context() as patch:
         patch.setenv(FAIL, f"{SHAPE.axes['beta'][4]} raise")
         with pytest.raises(pk.StoreError):
             SHAPE.sweep(path, workers=1)
     assert SHAPE.done(path) == {(i, j) for i in (0, 1) for j in (0, 1)}
     return path
+
+
+@pytest.fixture
+def part(tmp_path, begun):
+    """A copy of it, to be changed."""
+    return shutil.copytree(begun, tmp_path / "map.zarr")
 
 
 def python(code: str, *before: str, **options) -> str:

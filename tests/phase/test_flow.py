@@ -49,7 +49,7 @@ def sensitivity(A, B, C, phi0, v0, t):
 
 def check(A, B, C, phi0, v0, t, factor=4, roundings=256):
     """Compare one motion with the oracle."""
-    want = taylor(A, B, C, phi0, v0, t)
+    want = taylor(A, B, C, phi0, v0, t, dps=22)
     got = flow(A, B, C, phi0, v0, t)
     moved = sensitivity(A, B, C, phi0, v0, t)
     speed = mp.sqrt(max(abs(A), abs(B), abs(C), mpf(v0) ** 2))

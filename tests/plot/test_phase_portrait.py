@@ -360,7 +360,10 @@ def test_levels_are_colored_by_the_period_of_their_orbits():
     np.testing.assert_allclose((low, high), (min(period), max(period)), rtol=1e-6)
 
 
-@pytest.mark.parametrize("quantity", ["period", "frequency", "action"])
+@pytest.mark.parametrize(
+    "quantity",
+    ["period", *(pytest.param(x, marks=pytest.mark.slow) for x in ("frequency", "action"))],
+)
 @pytest.mark.parametrize("name", [*SYSTEMS, "forceless"])
 def test_colors_for_every_system(quantity, name):
     system = SYSTEMS.get(name, FORCELESS)
