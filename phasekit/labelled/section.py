@@ -12,7 +12,8 @@ from phasekit.labelled.motion import checked_tolerances, refuse_noise
 from phasekit.labels.arguments import FloatArray, bad, number, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
-from phasekit.motion.flow import circle, pointwise
+from phasekit.motion.flow import pointwise
+from phasekit.motion.method import circle
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import as_system, single
