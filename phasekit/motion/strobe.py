@@ -122,7 +122,8 @@ def strobe(
     most_legs : int, optional
         Legs of a motion; default: as many as the states that are kept need.
     series : bool
-        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise.
+        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
+        series would take too many.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
 
