@@ -71,10 +71,12 @@ def flow(
     Notes
     -----
     Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones. Damped
-    and driven motions are integrated by the Runge-Kutta method DOP853 of order 8
-    ([HairerNorsettWanner1993] II.5) in compiled code, eight at a time, on all cores; times within
-    a step come from its interpolation of the seventh order. With quadratic damping, which is not
-    smooth where the motion turns, steps end there. Where damping, torque and drive are all zero,
+    and driven motions are integrated in compiled code, eight at a time, on all cores: by their
+    Taylor series, of an order from 6 to 20 by rtol [JorbaZou2005], where the law is made of sums,
+    products, whole powers up to 16, sin, cos, exp, sinh, cosh and tanh. Otherwise, and with
+    quadratic damping, the Runge-Kutta method DOP853 of order 8 is used ([HairerNorsettWanner1993]
+    II.5), whose steps are interpolated to the seventh order. Quadratic damping is not smooth where
+    the motion turns: steps end there. Where damping, torque and drive are all zero,
     the motion in the potential of (A, B, C) is the exact one.
 
     Examples

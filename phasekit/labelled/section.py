@@ -14,7 +14,8 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.flow import circle, pointwise
+from phasekit.motion.flow import pointwise
+from phasekit.motion.method import circle
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import as_system, single

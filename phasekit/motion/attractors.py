@@ -10,7 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.flow import circle, motions
+from phasekit.motion.flow import motions
+from phasekit.motion.method import circle
 from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]

@@ -16,6 +16,7 @@ from phasekit.laws.perturbed import (
 )
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.motion.lost import MOST, judged, tell
+from phasekit.motion.method import limits_of, run
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import order_of, rates_of
 
@@ -23,8 +24,6 @@ Array = npt.NDArray[np.float64]
 
 #: Error of a step that is allowed, relative and absolute.
 RTOL, ATOL = 1e-10, 1e-12
-#: Work of a motion, in the cells by which `launch` counts.
-WEIGHT = 5_000
 
 
 class Motion(NamedTuple):
@@ -111,9 +110,6 @@ def _motions(
         return found.states
     from phasekit.phase.exact.flow import flow as exact
 
-    def some(array: Array, which: Any) -> Array:
-        return array[which] if array.ndim and len(array) > 1 else array
-
     result = np.empty((len(states), times.shape[1], 2))
     own = {name: some(value, still) for name, value in values.items()}
     assert isinstance(law.base, Trigonometric)
@@ -126,6 +122,11 @@ def _motions(
         tell("motion_phi", found.status, states[~still])
         result[~still] = found.states
     return result
+
+
+def some(array: Array, which: Any) -> Array:
+    """Entries of cells, of what may be the same in all."""
+    return array[which] if array.ndim and len(array) > 1 else array
 
 
 def _is_still(law: PerturbedConservative, values: Mapping[str, Array], count: int) -> Any:
@@ -177,10 +178,9 @@ def motions(
         Steps that a motion may take.
     series : bool
         Take steps by Taylor series where the law has them, and there are no tangent vectors; by
-        Runge-Kutta otherwise.
+        Runge-Kutta otherwise, and where series would take too many.
     """
     from phasekit.motion.kernels.motions import motions as kernel
-    from phasekit.numerics.launch import launch
 
     degree = order_of(rtol) if series and not tangents else 0
     code, parameters = rates_of(law, values, tangents, degree)
@@ -193,23 +193,15 @@ def motions(
         ahead = sense * times > 0.0
         if sense < 0.0 and not ahead.any():
             continue
-        own = np.where(ahead, times, 0.0)
-        order = np.argsort(sense * own, axis=1)
-        rising = np.array(np.take_along_axis(own, order, axis=1))
+        later = np.where(ahead, times, 0.0)
+        order = np.argsort(sense * later, axis=1)
+        rising = np.array(np.take_along_axis(later, order, axis=1))
         out = np.empty(result.shape)
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
             limits = limits_of(law, rtol, atol, most, once=True)
-            arrays = (*code.steps, table, limits, 0.0, rising)
-            groups: Any = (out, reached, taken)
-            launch(
-                kernel,
-                (*arrays, code.kink, np.array(states), parameters),
-                count,
-                groups,
-                threads,
-                WEIGHT,
-            )
+            shared, cells = (table, limits, 0.0, code.kink), (rising, np.array(states))
+            run(kernel, code, shared, cells, parameters, (out, reached, taken), reached, threads)
         back = np.argsort(order, axis=1)[..., None]
         out = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
         wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]
@@ -217,26 +209,6 @@ def motions(
         status, steps = np.maximum(status, reached), steps + taken
     judged(status, parameters)
     return Cells(result, status, steps)
-
-
-def circle(law: PerturbedConservative) -> float:
-    """Period of the coordinate; 0 on a line."""
-    return 0.0 if law.base.period is None else float(law.base.period)
-
-
-def limits_of(
-    law: PerturbedConservative, rtol: float, atol: float, most: int = MOST, *, once: bool = False
-) -> Array:
-    """What bounds the steps of the kernels, in all lanes."""
-    from phasekit.numerics.lanes import LANES
-
-    rows = rtol, atol, unit_of(law), float(most), float(once)
-    return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
-
-
-def unit_of(law: PerturbedConservative) -> float:
-    """Value from which on a coordinate is held as closely as there: a radian; none on a line."""
-    return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf
 
 
 def accelerations(

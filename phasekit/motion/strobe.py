@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
-from phasekit.motion.flow import ATOL, RTOL, WEIGHT, circle, limits_of
+from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import judged, tell
+from phasekit.motion.method import circle, limits_of, run
 from phasekit.motion.prescribed import table_of
 from phasekit.motion.rates import order_of, rates_of
 
@@ -121,10 +122,10 @@ def strobe(
     most_legs : int, optional
         Legs of a motion; default: as many as the states that are kept need.
     series : bool
-        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise.
+        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
+        series would take too many.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
-    from phasekit.numerics.launch import launch
 
     code, parameters = rates_of(law, values, order=order_of(rtol) if series else 0)
     count = len(states)
@@ -143,11 +144,10 @@ def strobe(
     found = np.full(count, -1, np.int64)
     taken, status = np.zeros(count, np.int64), np.zeros(count, np.int64)
     if count and many:
-        how = (again, code.kink, skip, many, circle(law), targets.scale, targets.points)
-        arrays: Any = (*code.steps, table, limits_of(law, rtol, atol), legs, *how)
-        arrays += (targets.box, targets.boxes, targets.visits, np.array(states), parameters)
-        groups: Any = (out, found, taken, status)
-        launch(kernel, arrays, count, groups, threads, WEIGHT)
+        shared: Any = (table, limits_of(law, rtol, atol), again, code.kink, skip, many, circle(law))
+        shared += targets.scale, targets.points, targets.box, targets.boxes, targets.visits
+        cells, groups = (legs, np.array(states)), (out, found, taken, status)
+        run(kernel, code, shared, cells, parameters, groups, status, threads)
         judged(status, parameters)
     return Strobed(out, found, taken, status)
 
@@ -204,7 +204,6 @@ def _exponents(
 ) -> Exponents:
     """Lyapunov exponents, by series where the law has them, or by Runge-Kutta steps."""
     from phasekit.motion.kernels.tangents import growth
-    from phasekit.numerics.launch import launch
 
     given = [np.asarray(array, dtype=float) for array in arrays]
     shape = np.broadcast_shapes(*(array.shape for array in given))
@@ -223,11 +222,8 @@ def _exponents(
     table = table_of(law.prescribed, 0.0, float(np.max(np.where(valid, time, 0.0), initial=0.0)))
     out, status = np.full((count, PARTS, 2), np.nan), np.zeros(count, np.int64)
     if count:
-        limits = limits_of(law, rtol, atol, once=True)
-        arguments: Any = (*code.steps, table, limits, legs, code.kink)
-        arguments += (states, parameters)
-        groups: Any = (out, status)
-        launch(growth, arguments, count, groups, threads, WEIGHT)
+        shared = table, limits_of(law, rtol, atol, once=True), code.kink
+        run(growth, code, shared, (legs, states), parameters, (out, status), status, threads)
         judged(status, parameters)
         tell("lyapunov_exponent", status, states)
     means = np.diff(out[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]

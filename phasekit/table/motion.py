@@ -6,7 +6,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.table.row import LAW, STATE, Pass, Quantity
 
-RUNGE_KUTTA = "[HairerNorsettWanner1993] II.5"
+STEPS = "[JorbaZou2005]; [HairerNorsettWanner1993] II.5"
 EXPONENTS = "[BenettinGalganiGiorgilliStrelcyn1980]"
 RECURRENCE = "[DatserisWagemakers2022]"
 
@@ -27,14 +27,14 @@ QUANTITIES: tuple[Quantity, ...] = (
              "sum of the Lyapunov exponents: -damping, without quadratic damping",
              "mean of -d - 2 q |phi'|", EXPONENTS, of=_OF),
     Quantity("section_time", "stroboscopic", ("crossing",), "float64", "s",
-             "time of the crossing", "n T", RUNGE_KUTTA, of=_OF),
+             "time of the crossing", "n T", STEPS, of=_OF),
     Quantity("section_phi", "stroboscopic", ("crossing",), "float64", "rad",
-             "angle in the section", "phi(n T), wrapped", RUNGE_KUTTA, of=_OF),
+             "angle in the section", "phi(n T), wrapped", STEPS, of=_OF),
     Quantity("section_dphi", "stroboscopic", ("crossing",), "float64", "s-1",
-             "angular velocity in the section", "phi'(n T)", RUNGE_KUTTA, of=_OF),
+             "angular velocity in the section", "phi'(n T)", STEPS, of=_OF),
     Quantity("rotation_number", "stroboscopic", (), "float64", "1",
              "turns in a period, the mean over the section", "(phi(n T) - phi(0))/(2 pi n)",
-             RUNGE_KUTTA, of=_OF),
+             STEPS, of=_OF),
     Quantity("attractor_phi", "attractors", (*_ATTRACTOR, "crossing"), "float64", "rad",
              "angle on the attractor, once a period", "phi(n T), wrapped", RECURRENCE, of=_OF),
     Quantity("attractor_dphi", "attractors", (*_ATTRACTOR, "crossing"), "float64", "s-1",

@@ -54,21 +54,21 @@ def write_series(lane: int, times: Array, done: int, x: Array, real: Array, out:
     """The same of a step by series that was taken."""
     start, step, end = real[START, lane], real[GONE, lane], real[T, lane]
     sense = 1.0 if step > 0.0 else -1.0
+    pairs = out.shape[1] // 2
+    terms = (real.shape[0] - TERMS) // pairs
+    per = 1.0 / real[SCALE, lane]
     while done < times.size and sense * (times[done] - end) <= 0.0:
-        s = (times[done] - start) / real[SCALE, lane]
-        for i in range(out.shape[1] // 2):
-            if times[done] == end:
-                out[done, 2 * i] = x[2 * i * LANES + lane]
-                out[done, 2 * i + 1] = x[(2 * i + 1) * LANES + lane]
-                continue
-            terms = (real.shape[0] - TERMS) // (out.shape[1] // 2)
-            first = TERMS + i * terms
+        s = (times[done] - start) * per
+        for i in range(pairs):
             value = slope = 0.0
-            for row in range(first + terms - 1, first - 1, -1):
+            for row in range(TERMS + (i + 1) * terms - 1, TERMS + i * terms - 1, -1):
                 slope = slope * s + value
                 value = value * s + real[row, lane]
             out[done, 2 * i] = value
-            out[done, 2 * i + 1] = slope / real[SCALE, lane]
+            out[done, 2 * i + 1] = slope * per
+        if times[done] == end:
+            for c in range(2 * pairs):
+                out[done, c] = x[c * LANES + lane]
         done += 1
     return done
 
@@ -89,8 +89,8 @@ def motions(
     table: Array,
     limits: Array,
     start: float,
-    times: Array,
     kink: int,
+    times: Array,
     states: Array,
     parameters: Array,
     first: int,

@@ -41,7 +41,10 @@ from phasekit.numerics.lanes import LANES, LaneWriter
 from phasekit.numerics.machine_code import machine_code
 from phasekit.numerics.series import Series
 
-_EPS, _TINY = float(np.finfo(float).eps), float(np.finfo(float).tiny)
+#: Steps after which it is foreseen that too many would be needed.
+TRIAL = 4096
+
+_EPS = float(np.finfo(float).eps)
 _LONG = ir.VectorType(ir.IntType(64), LANES)
 _FACTOR = float(np.log2(LONGEST))
 
@@ -133,11 +136,13 @@ class StepWriter(LaneWriter):
             b.fcmp_unordered("<=", self._size(h), least),
             b.fcmp_unordered("==", h, self.constant(0.0)),
         )
-        new = b.select(
-            b.fcmp_ordered(">=", count, self.load(limits, MOST)),
-            self.constant(EXHAUSTED),
-            self.constant(RUNNING),
+        most = self.load(limits, MOST)
+        ahead = self._size(b.fdiv(rest, h))
+        foreseen = b.and_(
+            b.fcmp_ordered(">=", count, self.constant(TRIAL)), b.fcmp_ordered(">", ahead, most)
         )
+        many = b.or_(b.fcmp_ordered(">=", count, most), foreseen)
+        new = b.select(many, self.constant(EXHAUSTED), self.constant(RUNNING))
         new = b.select(b.and_(going, last), self.constant(ARRIVED), new)
         new = b.select(b.and_(b.not_(good), short), self.constant(FAILED), new)
         refused = b.select(good, self.constant(0.0), self.constant(1.0))

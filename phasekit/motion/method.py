@@ -1,0 +1,80 @@
+"""Runs of the kernels over cells, by Taylor series or by the Runge-Kutta method DOP853.
+
+Series are several times as fast, and need a law that is analytic. They resolve all of it, even
+turns so fast that they matter to no digit: motions of which that would take too many steps are
+left to Runge-Kutta.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.motion.lost import EXHAUSTED, MOST
+from phasekit.motion.rates import Rates
+
+Array = npt.NDArray[np.float64]
+
+#: Work of a motion, in the cells by which `launch` counts.
+WEIGHT = 5_000
+
+
+def run(
+    kernel: Callable[..., None],
+    code: Rates,
+    shared: tuple[Any, ...],
+    cells: tuple[Array, ...],
+    parameters: Array,
+    groups: Any,
+    status: npt.NDArray[np.int64],
+    threads: int | None,
+) -> None:
+    """Run a kernel over cells.
+
+    Parameters
+    ----------
+    shared, cells : tuple
+        Its arguments after the machine code: the same in all cells, then arrays with the cells on
+        their first axis, or with one row for all.
+    parameters : array, shape (parameters, cells)
+        Parameters of the machine code.
+    groups : tuple of array
+        What it fills, the status among them.
+    """
+    from phasekit.numerics.launch import launch
+
+    count = len(status)
+    launch(kernel, (*code.steps, *shared, *cells, parameters), count, groups, threads, WEIGHT)
+    lost = np.flatnonzero(status == EXHAUSTED)
+    if not (code.series and lost.size):
+        return
+    own = tuple(array[lost] if len(array) == count else array for array in cells)
+    arguments = (0, 0, code.address, *shared, *own, np.array(parameters[:, lost]))
+    parts = tuple(group[lost] for group in groups)
+    launch(kernel, arguments, lost.size, parts, threads, WEIGHT)
+    for group, part in zip(groups, parts, strict=True):
+        group[lost] = part
+
+
+def limits_of(
+    law: PerturbedConservative, rtol: float, atol: float, most: int = MOST, *, once: bool = False
+) -> Array:
+    """What bounds the steps of the kernels, in all lanes."""
+    from phasekit.numerics.lanes import LANES
+
+    rows = rtol, atol, unit_of(law), float(most), float(once)
+    return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
+
+
+def circle(law: PerturbedConservative) -> float:
+    """Period of the coordinate; 0 on a line."""
+    return 0.0 if law.base.period is None else float(law.base.period)
+
+
+def unit_of(law: PerturbedConservative) -> float:
+    """Value from which on a coordinate is held as closely as there: a radian; none on a line."""
+    return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf
