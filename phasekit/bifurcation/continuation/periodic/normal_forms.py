@@ -108,14 +108,18 @@ def at_doubling(cycles: Cycles, orbit: Orbit, v: Array) -> dict[str, float]:
     return {"c": float(c)}
 
 
-def at_torus(cycles: Cycles, orbit: Orbit, angle: float) -> dict[str, float]:
+def at_torus(
+    cycles: Cycles, orbit: Orbit, angle: float, v: Array | None = None
+) -> dict[str, float]:
     """The coefficient d of a torus bifurcation, of a pair of multipliers with an angle.
+
+    Its critical function, real and imaginary part side by side, is ``v`` where it is known.
 
     The torus is stable beside it if the real part of d is negative.
     """
     line = Linear(cycles, orbit)
     n, omega = line.n, angle / orbit.y[0]
-    v = wave(line, omega)
+    v = wave(line, omega) if v is None else line.unit(v)
     u, w = np.ascontiguousarray(v[:, :n]), np.ascontiguousarray(v[:, n:])
     second = line.second
     g = second(u, u) + second(w, w)
