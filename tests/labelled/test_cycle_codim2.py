@@ -108,3 +108,27 @@ def test_doublings_of_a_linear_system_are_no_generalized_ones():
     curve = branch.special("PD")[0].curve("q", (0.6, 1.4))
     assert curve.points.sizes["point"] > 3
     assert {one.kind for one in curve.special_points} == {"end"}
+
+
+def test_two_multipliers_pass_minus_one_together(tmp_path):
+    """(xi, eta)' = ((0, 1), (mu, s)) (xi, eta), turned by t/2: both are -1 at mu = s = 0."""
+    D, S, half = "(-s/2)", "((1 + mu)/2)", "((mu - 1)/2)"
+    same, across = f"({D}*cos(t) - {S}*sin(t))", f"({D}*sin(t) + {S}*cos(t))"
+    system = pk.Problem(
+        [
+            f"(s/2 + {same})*a + ({across} - {half} - 1/2)*b",
+            f"({across} + {half} + 1/2)*a + (s/2 - {same})*b",
+        ],
+        ("a", "b"), {"mu": 0.02, "s": -0.3}, time="t", period="2*pi",
+    )  # fmt: skip
+    orbit = pk.periodic_orbit(system, [0.0, 0.0])
+    branch = pk.continuation(system, "mu", orbit=orbit, span=(-0.02, 0.02))
+    (point,) = branch.special("PD")
+    assert point["mu"] == pytest.approx(0.0, abs=1e-12)
+    curve = point.curve("s", (-0.4, 0.4))
+    np.testing.assert_allclose(curve.points.mu, 0.0, atol=1e-10)
+    (strong,) = [one for one in curve.special_points if one.kind != "end"]
+    assert (strong.kind, strong.label, strong.status) == ("resonance_2", "R2", "converged")
+    assert strong["s"] == pytest.approx(0.0, abs=1e-8)
+    curve.save(tmp_path / "curve.nc")
+    assert pk.Branch.load(tmp_path / "curve.nc").points.identical(curve.points)
