@@ -10,7 +10,6 @@ from phasekit.numerics.compile import Array, kernel
 from phasekit.numerics.differences import jet
 from phasekit.numerics.native import call
 
-ROUNDING = 4.0 * np.finfo(np.float64).eps  # of values along an orbit
 STILL = 1e-3  # part of the largest amplitude that others count as at least
 
 
@@ -177,23 +176,18 @@ def highest(
     """Size of the derivative of order m + 1 on each interval (see `collocation.highest`)."""
     m, n, count = coefficients.size - 1, x.shape[1], mesh.size - 1
     constant = np.zeros((count, n))
-    rounded = np.zeros((count, n))
     jump = np.zeros((count, n))
     for j in range(count):
         h = (mesh[j + 1] - mesh[j]) ** m
         for c in range(n):
             for k in range(m + 1):
-                part = coefficients[k] * x[j * m + k, c] / h
-                constant[j, c] += part
-                rounded[j, c] += ROUNDING * abs(part)
+                constant[j, c] += coefficients[k] * x[j * m + k, c] / h
     for j in range(count):
         before = j - 1 if j > 0 else count - 1
         gap = 0.5 * (mesh[j + 1] - mesh[j] + mesh[before + 1] - mesh[before])
         for c in range(n):
             value = constant[before, c] * (closure[c] if j == 0 else 1.0)
-            # Of what is at rest it is all rounding.
-            left = abs(constant[j, c] - value) - rounded[j, c] - rounded[before, c]
-            jump[j, c] = max(left, 0.0) / gap / scale[c] if left == left else np.nan
+            jump[j, c] = abs(constant[j, c] - value) / gap / scale[c]
     for j in range(count):
         after = j + 1 if j < count - 1 else 0
         out[j] = 0.0

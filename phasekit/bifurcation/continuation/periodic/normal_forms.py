@@ -65,6 +65,8 @@ def at_branching(
     (dx, dy), (ex, ey) = own, other
     p, r = float(dy[1] / cycles.width[0]), float(ey[1] / cycles.width[0])
     steep = abs(p) < VERTICAL
+    if steep and abs(r) < VERTICAL:
+        return {}  # on neither family the parameter moves
     v = p * ex - r * dx
     v = v * np.sign(v.flat[np.argmax(np.abs(v / cycles.scale))])
     # The parameter moves by 1; where the own family does not move it, any other one will do.
