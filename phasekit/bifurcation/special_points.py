@@ -142,37 +142,37 @@ for _kind in (
         "hopf", "torus", crossing=2,
     ),
     PointKind(
-        "resonance_1", "R1", "two multipliers of a map are 1: a fold and a torus curve meet",
+        "resonance_1", "R1", "two multipliers of a map or cycle are 1; fold and torus curve meet",
         "w v of the fold; angle of the pair", "fold, and w v = 0; torus point, and the angle is 0",
         (), "P", 9, "GREEN", None,
     ),
     PointKind(
-        "resonance_2", "R2", "two multipliers of a map are -1: a flip and a torus curve meet",
+        "resonance_2", "R2", "two multipliers of a map or cycle are -1; flip and torus curve meet",
         "w v of the period doubling; angle of the pair",
         "period doubling, and w v = 0; torus point, and the angle is half a turn",
         (), "P", 9, "ORANGE", None,
     ),
     PointKind(
-        "resonance_3", "R3", "a pair of multipliers of a map at a third of a turn",
+        "resonance_3", "R3", "a pair of multipliers of a map or cycle at a third of a turn",
         "angle of the pair", "torus point, and the angle is a third of a turn",
         (), "^", 8, "SKY", None,
     ),
     PointKind(
-        "resonance_4", "R4", "a pair of multipliers of a map at a quarter of a turn",
+        "resonance_4", "R4", "a pair of multipliers of a map or cycle at a quarter of a turn",
         "angle of the pair", "torus point, and the angle is a quarter of a turn",
         (), "s", 8, "SKY", None,
     ),
     PointKind(
-        "fold_flip", "LPPD", "multipliers 1 and -1 of a map together",
+        "fold_flip", "LPPD", "multipliers 1 and -1 of a map or cycle together",
         "product of 1 + mu along folds, of mu - 1 along period doublings",
         "fold and period doubling", (), "X", 9, "ORANGE", None,
     ),
     PointKind(
-        "generalized_flip", "GPD", "the coefficient c of a period doubling of a map is zero",
+        "generalized_flip", "GPD", "c of a period doubling of a map or cycle is zero",
         "c of the period doubling", "period doubling, and c = 0", (), "h", 9, "ORANGE", None,
     ),
     PointKind(
-        "chenciner", "CH", "the coefficient d of a torus point of a map is zero",
+        "chenciner", "CH", "the coefficient d of a torus point of a map or cycle is zero",
         "d of the torus point", "torus point, and d = 0", (), "H", 9, "GREEN", None,
     ),
     PointKind(

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
+import phasekit as pk
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
 
@@ -140,3 +142,24 @@ def test_the_flow_is_parted_from_what_is_across_it():
         np.sort_complex(np.linalg.eigvals(found)), np.sort_complex(np.linalg.eigvals(exact)),
         rtol=1e-7, atol=1e-12 * np.linalg.norm(exact),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("rate", [-9.0, -0.1, 3.0])
+def test_errors_of_small_and_large_multipliers_are_told(monkeypatch, rate):
+    """A multiplier of 1e-25, or 1e8, that is wrong in its fourth digit."""
+    system = pk.Problem(
+        ["x*(1 - x**2 - y**2) - y", "y*(1 - x**2 - y**2) + x", "k*z"], ("x", "y", "z"), {"k": rate}
+    )
+    right = pk.periodic_orbit(system, [1.0, 0.0, 0.0], 6.28)
+    trace = (rate - 2.0) * 2.0 * np.pi
+    assert float(right.liouville_error) < 1e-9
+    assert int(right.n_unstable) == (rate > 0.0)
+    own = Cycles.multipliers
+
+    def wrong(self, W, orbit):
+        values, log, trivial = own(self, W, orbit)
+        return values, log + 1e-4, trivial
+
+    monkeypatch.setattr(Cycles, "multipliers", wrong)
+    found = pk.periodic_orbit(system, [1.0, 0.0, 0.0], 6.28)
+    assert float(found.liouville_error) == pytest.approx(1e-4 / (1.0 + abs(trace)), rel=1e-3)

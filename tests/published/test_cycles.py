@@ -201,10 +201,11 @@ def test_roessler_doubles():
         third = checked(two.switch())
         (three,) = third.special("PD")
         assert 3.4 < (two["c"] - one["c"]) / (three["c"] - two["c"]) < 5.0  # towards 4.669
-        i = int(np.argmin(np.abs(second.points.c.values - 5.7)))
-        at = pk.periodic_orbit(roessler(5.7), second.orbit(i))
-        assert close(at.period, 11.7586260717)
-        assert abs(at.multiplier.values[0] + 3.512006980) < 1e-8
+    # ChaosBook.
+    i = int(np.argmin(np.abs(second.points.c.values - 5.7)))
+    at = pk.periodic_orbit(roessler(5.7), second.orbit(i))
+    assert close(at.period, 11.7586260717)
+    assert abs(at.multiplier.values[0] + 3.512006980) < 1e-8
 
 
 def test_hardening_duffing():

@@ -21,7 +21,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _CHECKS = {
     "trivial_error": "distance from 1 of the multiplier that is 1; 0 of a forced system",
-    "liouville_error": "product of the multipliers beside exp of the integral of the divergence",
+    "liouville_error": "logarithm of the product of the multipliers beside the integral of the "
+    "divergence",
     "mesh_error": "estimated error of the states beside their amplitudes",
     "residual": "largest size of x' - f beside that of f",
 }

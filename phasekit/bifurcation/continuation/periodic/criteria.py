@@ -64,6 +64,13 @@ def torus_test(point: Point, forced: bool) -> float:
     return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
 
 
+def second_doubling(point: Point, forced: bool) -> float:
+    """Derivative of det(M - mu) at -1, where one multiplier is that."""
+    mu = nontrivial(point.multipliers, forced)
+    rest = ([-one for one in mu[:i] + mu[i + 1 :]] for i in range(len(mu)))
+    return sum(_parts(part, 1.0).real for part in rest) if len(mu) > 1 else 1.0
+
+
 def determinant(point: Point, forced: bool) -> float:
     """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
     mu = point.multipliers.tolist()

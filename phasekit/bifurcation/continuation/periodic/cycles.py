@@ -19,6 +19,7 @@ from phasekit.bifurcation.continuation.periodic.multipliers import across, multi
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
+REST = 1e-12  # amplitude, beside the size of a state, that is rounding
 MOST = 20_000  # intervals of a mesh that resolves them
 
 
@@ -307,8 +308,11 @@ class Cycles:
         return half
 
     def mesh_error(self, orbit: Orbit) -> float:
-        """Largest estimated error of a state, beside its amplitude."""
-        return collocation.error(orbit.mesh, orbit.x, self.m, self.amplitudes(orbit), self.closure)
+        """Largest estimated error of a state, beside its amplitude; of what is at rest none."""
+        half = self.amplitudes(orbit)
+        if np.all(half <= REST * self.scale):
+            return 0.0
+        return collocation.error(orbit.mesh, orbit.x, self.m, half, self.closure)
 
     def on(self, mesh: Array, orbit: Orbit, *more: Array) -> tuple[Orbit, tuple[Array, ...]]:
         """The orbit, and directions, on another mesh."""

@@ -44,6 +44,7 @@ from phasekit.bifurcation.special_points import KINDS
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
+NOTHING = 1e-9  # size of a coefficient, as all change by their scales, that is rounding
 JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 
 
@@ -54,7 +55,7 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
     signs = [_signs(cycles, point) if critical else None for point in path.points]
     values = [_values(cycles, point) for point in path.points]
     for test, value in zip(_looked_for(cycles), values[0], strict=True):
-        if isinstance(test, CurveTest) and value == 0.0:  # what the curve ends for
+        if isinstance(test, CurveTest) and test.blurred and value == 0.0:  # what the curve ends for
             p = float(path.points[0].orbit.y[1])
             found.append(Found(test.kind, path.points[0], 0, (p, p), "converged", "", {}))
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
@@ -74,7 +75,12 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
 
 def _values(cycles: Cycles, point: Point) -> list[float]:
     """The numbers whose zeros are events."""
-    return [event.value(cycles, point.orbit) for event in _looked_for(cycles)]
+    return [_value(event, cycles, point) for event in _looked_for(cycles)]
+
+
+def _value(event: Any, cycles: Cycles, point: Point) -> float:
+    """The number whose zero is an event, or a special point of a curve."""
+    return float(event.value(cycles, point if isinstance(event, CurveTest) else point.orbit))
 
 
 def _looked_for(cycles: Cycles) -> tuple[Any, ...]:
@@ -90,9 +96,11 @@ def _events(
     for event, before, after in zip(_looked_for(cycles), left, right, strict=True):
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
+        if isinstance(event, CurveTest) and max(abs(before), abs(after)) < NOTHING:
+            continue  # a coefficient that is zero all along
 
         def value(point: Point, forced: bool, event: Any = event) -> float:
-            return float(event.value(cycles, point.orbit))
+            return _value(event, cycles, point)
 
         point = b if after == 0.0 else root(Stretch(cycles, a, b), value)
         if isinstance(event, CurveTest) and point is not None:

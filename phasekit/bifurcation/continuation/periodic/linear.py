@@ -147,10 +147,12 @@ class Linear:
         if right is not None:
             sides[1:] = right
         dx, dy = np.empty((2, places, wide)), np.empty((2, 1 + q))
-        kernels.solve(
+        sign = kernels.solve(
             W, border, border_y, sides, np.zeros(wide), np.full(wide, sigma), self.m, dx,
             dy,
         )  # fmt: skip
+        if sign == 0.0:  # singular still: there is no such coefficient
+            dx[:], dy[:] = np.nan, np.nan
         return dx[0], dy[0, 1:]
 
     def across(self, v: Array) -> tuple[Array, float]:

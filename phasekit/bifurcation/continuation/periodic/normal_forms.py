@@ -65,6 +65,8 @@ def at_branching(
     (dx, dy), (ex, ey) = own, other
     p, r = float(dy[1] / cycles.width[0]), float(ey[1] / cycles.width[0])
     steep = abs(p) < VERTICAL
+    if steep and abs(r) < VERTICAL:
+        return {}  # on neither family the parameter moves
     v = p * ex - r * dx
     v = v * np.sign(v.flat[np.argmax(np.abs(v / cycles.scale))])
     # The parameter moves by 1; where the own family does not move it, any other one will do.
@@ -108,14 +110,18 @@ def at_doubling(cycles: Cycles, orbit: Orbit, v: Array) -> dict[str, float]:
     return {"c": float(c)}
 
 
-def at_torus(cycles: Cycles, orbit: Orbit, angle: float) -> dict[str, float]:
+def at_torus(
+    cycles: Cycles, orbit: Orbit, angle: float, v: Array | None = None
+) -> dict[str, float]:
     """The coefficient d of a torus bifurcation, of a pair of multipliers with an angle.
+
+    Its critical function, real and imaginary part side by side, is ``v`` where it is known.
 
     The torus is stable beside it if the real part of d is negative.
     """
     line = Linear(cycles, orbit)
     n, omega = line.n, angle / orbit.y[0]
-    v = wave(line, omega)
+    v = wave(line, omega) if v is None else line.unit(v)
     u, w = np.ascontiguousarray(v[:, :n]), np.ascontiguousarray(v[:, n:])
     second = line.second
     g = second(u, u) + second(w, w)

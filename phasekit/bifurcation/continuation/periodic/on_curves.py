@@ -1,8 +1,10 @@
-"""Special points on curves of folds and tori of cycles in two parameters.
+"""Special points on curves of folds, period doublings and tori of cycles in two parameters.
 
 A cusp is where the quadratic coefficient of the fold vanishes; where it is infinite, a second
 multiplier besides that of the fold is 1. A torus has a strong resonance where its multipliers meet
-or are at a third or a quarter of a turn ([Kuznetsov2004] chapters 8 and 9).
+or are at a third or a quarter of a turn. Doublings and tori change from soft to hard where their
+cubic coefficient vanishes; a fold doubles where multipliers are 1 and -1 ([Kuznetsov2004] chapters
+8 and 9).
 """
 
 from __future__ import annotations
@@ -12,11 +14,25 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.periodic.criteria import (
+    determinant,
+    doubling_test,
+    second_doubling,
+)
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.extended import FOLD, TORUS, Extended
-from phasekit.bifurcation.continuation.periodic.normal_forms import at_fold
+from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, TORUS, Extended
+from phasekit.bifurcation.continuation.periodic.normal_forms import (
+    at_doubling,
+    at_fold,
+    at_torus,
+)
+from phasekit.bifurcation.continuation.periodic.point import Point
 
+Array = npt.NDArray[np.float64]
+
+RESONANT = 0.05  # distance of half the angle from resonances 1 and 2 below which d says nothing
 SAME = 2e-5  # half the angle within which multipliers meet, at ends of curves
 
 
@@ -26,25 +42,31 @@ class CurveTest:
 
     kind: str
     of: str
-    function: Callable[[Extended, Orbit], float]
+    function: Callable[[Extended, Point], float]
     name: str = ""
     #: Whether the equations are singular there, so that it is known to `SAME` alone.
     blurred: bool = False
 
-    def value(self, cycles: Cycles, orbit: Orbit) -> float:
+    def value(self, cycles: Cycles, point: Point) -> float:
         """The number of an orbit with its critical function."""
         assert isinstance(cycles, Extended)
-        return self.function(cycles, orbit)
+        return self.function(cycles, point)
 
 
-def _coefficients(cycles: Extended, orbit: Orbit) -> tuple[float, float]:
+def _parted(cycles: Extended, point: Point) -> tuple[Cycles, Orbit, Array]:
+    """The family of the orbit alone, the orbit, and its critical function."""
+    n, orbit = cycles.own, point.orbit
+    alone = Orbit(orbit.mesh, orbit.x[:, :n].copy(), orbit.y[:2].copy())
+    return cycles.plain(orbit.y[2]), alone, orbit.x[:, n:].copy()
+
+
+def _coefficients(cycles: Extended, point: Point) -> tuple[float, float]:
     """Those of a fold, xi' = b + a xi^2, as xi and the parameter change by their scales.
 
     Their signs go with that of the critical function; both are infinite where it resonates.
     """
-    n = cycles.own
-    one, v = cycles.plain(orbit.y[2]), orbit.x[:, n:].copy()
-    alone = Orbit(orbit.mesh, orbit.x[:, :n].copy(), orbit.y[:2].copy())
+    n, orbit = cycles.own, point.orbit
+    one, alone, v = _parted(cycles, point)
     dy = np.zeros(2)
     if not cycles.forced:
         dy[0] = orbit.y[-1] * orbit.y[0]
@@ -58,27 +80,46 @@ def _coefficients(cycles: Extended, orbit: Orbit) -> tuple[float, float]:
     return form["a"] * whole / parts, form["b"] * float(one.width[0])
 
 
-def _bend(cycles: Extended, orbit: Orbit) -> float:
+def _bend(cycles: Extended, point: Point) -> float:
     """The quadratic coefficient beside both."""
-    a, b = _coefficients(cycles, orbit)
+    a, b = _coefficients(cycles, point)
     return a / math.hypot(a, b)
 
 
-def _meet(cycles: Extended, orbit: Orbit) -> float:
+def _meet(cycles: Extended, point: Point) -> float:
     """The product of the left and the right critical function, with the sign of a."""
-    a, b = _coefficients(cycles, orbit)
+    a, b = _coefficients(cycles, point)
     return math.copysign(1.0 / math.hypot(a, b), a)
 
 
-def _half(cycles: Extended, orbit: Orbit) -> float:
-    """Half the angle of the pair of multipliers."""
-    return 0.5 * float(orbit.y[-1] * orbit.y[0])
+def _doubled(cycles: Extended, point: Point) -> float:
+    """The cubic coefficient of a period doubling."""
+    return at_doubling(*_parted(cycles, point))["c"] * _unit(cycles, point)
 
 
-def _at(turn: float) -> Callable[[Extended, Orbit], float]:
+def _unit(cycles: Extended, point: Point) -> float:
+    """By what a cubic coefficient is multiplied as states change by their scales in a period."""
+    return float(np.mean(cycles.scale[: cycles.own] ** 2) * point.orbit.y[0])
+
+
+def _angle(cycles: Extended, point: Point) -> float:
+    """The angle of the pair of multipliers."""
+    return float(point.orbit.y[-1] * point.orbit.y[0])
+
+
+def _torus(cycles: Extended, point: Point) -> float:
+    """The cubic coefficient of a torus; none next to resonances, where it is infinite."""
+    angle = _angle(cycles, point)
+    if min(abs(math.sin(0.5 * angle)), abs(math.cos(0.5 * angle))) < RESONANT:
+        return math.nan
+    one, alone, v = _parted(cycles, point)
+    return at_torus(one, alone, angle, v)["d"] * _unit(cycles, point)
+
+
+def _at(turn: float) -> Callable[[Extended, Point], float]:
     """How far the pair of multipliers is from a part of a turn."""
     cosine = round(math.cos(2.0 * math.pi * turn), 15)
-    return lambda cycles, orbit: math.cos(2.0 * _half(cycles, orbit)) - cosine
+    return lambda cycles, point: math.cos(_angle(cycles, point)) - cosine
 
 
 def _zero(value: float) -> float:
@@ -86,18 +127,30 @@ def _zero(value: float) -> float:
     return 0.0 if abs(value) < SAME else value
 
 
+def _of(test: Callable[[Point, bool], float]) -> Callable[[Extended, Point], float]:
+    """A function of the multipliers alone; none where they are not known."""
+    return lambda cycles, point: test(point, cycles.forced) if point.trusted else math.nan
+
+
 TESTS = (
     CurveTest("cusp", FOLD, _bend),
     CurveTest("resonance_1", FOLD, _meet),
+    CurveTest("fold_flip", FOLD, _of(doubling_test)),
+    CurveTest("generalized_flip", DOUBLING, _doubled),
+    CurveTest("fold_flip", DOUBLING, _of(determinant)),
+    CurveTest("resonance_2", DOUBLING, _of(second_doubling)),
     CurveTest(
-        "resonance_1", TORUS, lambda cycles, o: _zero(math.sin(_half(cycles, o))), blurred=True
+        "resonance_1", TORUS, lambda cycles, p: _zero(math.sin(0.5 * _angle(cycles, p))),
+        blurred=True,
     ),
     CurveTest(
-        "resonance_2", TORUS, lambda cycles, o: _zero(math.cos(_half(cycles, o))), blurred=True
+        "resonance_2", TORUS, lambda cycles, p: _zero(math.cos(0.5 * _angle(cycles, p))),
+        blurred=True,
     ),
     CurveTest("resonance_3", TORUS, _at(1.0 / 3.0)),
     CurveTest("resonance_4", TORUS, _at(0.25)),
-)
+    CurveTest("chenciner", TORUS, _torus),
+)  # fmt: skip
 
 
 def tests_of(cycles: Cycles) -> tuple[CurveTest, ...]:

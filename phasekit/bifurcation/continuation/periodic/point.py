@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cmath
 import math
 from dataclasses import dataclass, replace
 
@@ -15,7 +14,7 @@ from phasekit.bifurcation.continuation.periodic.multipliers import LARGEST
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
-TRUSTED = 1e-5  # error by Liouville's formula above which no tests
+TRUSTED = 1e-5  # error of the product of multipliers, beside 1 or its size, above which no tests
 NEAR = 5e-7  # the same of the trivial multiplier
 UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are not resolved
 SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
@@ -26,7 +25,11 @@ NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is cons
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """A point of a family: the orbit, the unit tangent, multipliers and checks."""
+    """A point of a family: the orbit, the unit tangent, multipliers and checks.
+
+    ``liouville_error`` is how far the logarithm of the product of multipliers is from the integral
+    of the divergence, beside 1 and its size.
+    """
 
     orbit: Orbit
     dx: Array
@@ -48,9 +51,15 @@ class Point:
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
-        if not (self.trivial_error <= NEAR and self.liouville_error <= TRUSTED):
+        if not (self.trivial_error <= NEAR and self.liouville_error <= ALIKE):
             return False
-        return all(map(cmath.isfinite, self.multipliers.tolist()))
+        sizes = [abs(one) for one in self.multipliers.tolist()]
+        if not all(map(math.isfinite, sizes)):
+            return False
+        log = sum(math.log(one) if one > 0.0 else -LARGEST for one in sizes)
+        # What the product itself is wrong by, beside 1 or its size.
+        part = (1.0 + abs(log)) * math.exp(max(min(log, 0.0), -LARGEST)) if log < LARGEST else 1.0
+        return self.liouville_error * part <= TRUSTED
 
 
 def vertical(cycles: Cycles, point: Point) -> bool:
@@ -99,12 +108,8 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
         part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
         # The error of a decay goes with the power 2 m of the length of intervals.
         reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
-    # Where both are beyond all numbers, their logarithms are compared.
-    apart = abs(log - divergence) / (1.0 + abs(divergence))
-    defect = apart
-    if apart <= ALIKE and max(log, divergence) < LARGEST:
-        exact = math.exp(divergence)
-        defect = abs(math.exp(log) - exact) / max(1.0, exact)
+    # In logarithms, as the product may be beyond all numbers.
+    defect = abs(log - divergence) / (1.0 + abs(divergence))
     return Point(
         s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
         defect, error,
