@@ -12,7 +12,14 @@ import xarray as xr
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
-from phasekit.labels.arguments import NumberLike, bad, number, numeric, whole
+from phasekit.labels.arguments import (
+    NumberLike,
+    bad,
+    number,
+    numeric,
+    state_arguments,
+    whole,
+)
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
@@ -37,6 +44,7 @@ def perturbed_of(system: Any) -> Perturbed:
     return found
 
 
+@state_arguments
 def stroboscopic(
     perturbed: Any,
     phi0: NumberLike,
@@ -116,6 +124,7 @@ def _sections(law: PerturbedConservative, *arrays: Any, **options: Any) -> Any:
     return sections(law, *arrays, **options)
 
 
+@state_arguments
 def lyapunov(
     perturbed: Any,
     phi0: NumberLike,

@@ -15,7 +15,13 @@ import xarray as xr
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states, pass_from
 from phasekit.labelled.orbits import noted
-from phasekit.labels.arguments import NumberLike, bad, number, state_arguments
+from phasekit.labels.arguments import (
+    NumberLike,
+    bad,
+    call_checked,
+    number,
+    state_arguments,
+)
 from phasekit.numerics.waits import said
 from phasekit.systems.as_system import as_system
 from phasekit.systems.perturbed import Perturbed
@@ -51,8 +57,10 @@ def flow(
     events : callable or mapping of str to callable, optional
         Of one motion of a `Perturbed` system: functions of (t, phi, dphi) whose zeros are looked
         for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True
-        or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. Two zeros within
-        one step are not seen; a stretch on which one vanishes counts once, with a RuntimeWarning.
+        or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. A function
+        that comes to 1e-8 of its values around and turns back touches zero and counts, unless it
+        has a direction; zeros that lie closer together than a quarter of a step may be missed. A
+        stretch on which one vanishes counts once, with a RuntimeWarning.
 
     Returns
     -------
@@ -136,6 +144,7 @@ def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, floa
     return found
 
 
+@call_checked
 def separatrix_motion(
     system: Any, t: NumberLike, *, saddle: str | int | None = None, side: str = "right"
 ) -> xr.Dataset:

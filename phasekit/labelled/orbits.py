@@ -16,7 +16,15 @@ import xarray as xr
 
 from phasekit.cells.states import SIDES, at_states, pass_from
 from phasekit.errors import OrbitFamily, ParameterError
-from phasekit.labels.arguments import NumberLike, bad, describe, numeric, one_of, state_arguments
+from phasekit.labels.arguments import (
+    NumberLike,
+    bad,
+    call_checked,
+    describe,
+    numeric,
+    one_of,
+    state_arguments,
+)
 from phasekit.systems.as_system import as_system
 from phasekit.table.quantities import select
 
@@ -215,6 +223,7 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     return at_states(system, rows, {"phi": ("state_phi", phi), "dphi": ("state_dphi", dphi)})
 
 
+@call_checked
 def state_of(
     system: Any,
     action: NumberLike,

@@ -299,6 +299,41 @@ def test_events_are_zeros_on_the_motion():
     assert back.event_time.values[0] < 0.0 < back.event_time.values[-1]
 
 
+def test_events_that_touch_zero_and_turn_back():
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.2, 1.0))
+    fine = {"rtol": 1e-12, "atol": 1e-13}
+    turns = pk.flow(system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: v, **fine)
+    times, places = turns.event_time.values, turns.event_phi.values
+    assert times.size > 8
+    ds = pk.flow(system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: v * v, **fine)
+    assert ds.event_time.values == pytest.approx(times, abs=1e-6)
+
+    def rising(t, x, v):
+        return v * v
+
+    rising.direction = 1  # what turns back neither rises nor falls through zero
+    assert pk.flow(system, 0.4, 0.5, [40.0], events=rising, **fine).sizes["event"] == 0
+
+    def third(t, x, v):
+        return -v * v
+
+    third.terminal = 3
+    ended = pk.flow(system, 0.4, 0.5, [40.0], events=third, **fine)
+    assert ended.event_time.values == pytest.approx(times[times > 0.0][:3], abs=1e-6)
+    assert np.isnan(ended.motion_phi).all()
+    # a pair of zeros on both sides of a turn, much closer than a step
+    number = int(np.argmax(places))
+    near = places[number] - 1e-9
+    pair = pk.flow(system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: x - near, **fine)
+    close = pair.event_time.values[abs(pair.event_time.values - times[number]) < 1e-3]
+    assert close.size == 2
+    assert close.mean() == pytest.approx(times[number], abs=1e-6)
+    missed = pk.flow(
+        system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: x - places.max() - 1e-5, **fine
+    )
+    assert missed.sizes["event"] == 0
+
+
 def test_events_of_what_has_none_are_refused():
     system = pk.Perturbed(EIGHT, damping=0.1)
     with pytest.raises(pk.ParameterError, match="wants nothing, or one motion"):
