@@ -153,7 +153,8 @@ def lyapunov(
     xarray.Dataset
         On ``exponent``: ``lyapunov_exponent`` in s^-1, the largest first, and its
         ``lyapunov_error``. ``lyapunov_sum``, which is -damping where there is no quadratic
-        damping, as a check.
+        damping, as a check (of a `FreeGyroRotor` the mean of -damping M22/M, M the inertia at the
+        momentum).
 
     Raises
     ------

@@ -80,7 +80,9 @@ def flow(
     Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones. Damped
     and driven motions are integrated by the Runge-Kutta method DOP853 of order 8
     ([HairerNorsettWanner1993] II.5) in compiled code, eight at a time, on all cores; times within
-    a step come from its interpolation of the seventh order. With quadratic damping, which is not
+    a step come from its interpolation of the seventh order. A few motions that damping holds back
+    for more than 6e6 of its own times are followed by Radau's implicit method of order 5; more of
+    them end after 10,000,000 steps. With quadratic damping, which is not
     smooth where the motion turns, steps end there. Where damping, torque and drive are all zero,
     the motion in the potential of (A, B, C) is the exact one.
 

@@ -89,7 +89,8 @@ def orbits(
         ``phi'^2/2 + V - torque phi`` of the unwrapped angle. Librations are quadratures, with
         estimates of their errors; an orbit that is running turned back once, at its only turning
         point, and gains ``gain_per_turn`` from each turn to the next: it has no period and no
-        action, both are NaN, and its other end is infinite.
+        action, both are NaN, and its other end is infinite. A `Potential` on a circle has such
+        orbits as well; on a line the torque is a part of the potential, and what runs is unbounded.
 
     Raises
     ------

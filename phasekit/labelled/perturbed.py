@@ -59,6 +59,8 @@ def melnikov(perturbed: Any) -> xr.Dataset:
 
     Notes
     -----
+    Of a `FreeGyroRotor` energies are in J and the turnstile in kg m^2/s.
+
     First order in damping and drive ([GuckenheimerHolmes1983] section 4.5). The integrals along
     the separatrices of (A, B, C) are sums of residues; those of a `Potential` are quadratures,
     NaN where they would lose more than six digits. Time is that of `separatrix_motion`. Of a
