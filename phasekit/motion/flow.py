@@ -15,6 +15,7 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.motion import stiff as implicit
 from phasekit.motion.lost import MOST, judged, tell
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import rates_of
@@ -134,8 +135,6 @@ def _integrated(
     threads: int | None,
 ) -> Array:
     """States of motions, those that are stiff by a method of their own."""
-    from phasekit.motion import stiff as implicit
-
     stiff = implicit.stiff_cells(law, values, times, len(states))
     if not stiff.any():
         found = motions(law, values, states, times, rtol, atol, threads)
@@ -149,7 +148,8 @@ def _integrated(
     for cell in np.flatnonzero(stiff):
         one = {name: np.reshape(some(x, cell), ()) for name, x in values.items()}
         own = times[cell if len(times) > 1 else 0]
-        result[cell], status[cell] = implicit.follow(law, one, states[cell], own, rtol, atol)
+        rates = pointwise(law, one, 0.0, float(own.max()))
+        result[cell], status[cell] = implicit.follow(rates, states[cell], own, rtol, atol)
     if not stiff.all():
         rest = {name: some(x, ~stiff) for name, x in values.items()}
         moved = motions(law, rest, states[~stiff], some(times, ~stiff), rtol, atol, threads)

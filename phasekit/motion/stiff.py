@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import solve_ivp
 
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
+from phasekit.motion.steps import Rates
 
 Array = npt.NDArray[np.float64]
 
@@ -46,20 +46,12 @@ def stiff_cells(
     return stiff if few and smooth and forward else np.zeros(count, bool)
 
 
-def follow(
-    law: PerturbedConservative,
-    values: Mapping[str, Array],
-    state: Array,
-    times: Array,
-    rtol: float,
-    atol: float,
-) -> tuple[Array, int]:
-    """States of one motion at times, of shape (times, 2), and whether it came to its end."""
-    from phasekit.motion.flow import pointwise
+def follow(rates: Rates, state: Array, times: Array, rtol: float, atol: float) -> tuple[Array, int]:
+    """States of one motion at times >= 0, of shape (times, 2), and whether it came to its end."""
+    from scipy.integrate import solve_ivp
 
     order = np.argsort(times)
     rising = times[order]
-    rates = pointwise(law, values, 0.0, float(rising[-1]))
     asked = 0
 
     def counted(t: float, x: Any) -> Array:
@@ -67,7 +59,7 @@ def follow(
         asked += 1
         if asked > MOST_RATES:
             raise TooMany
-        return rates(t, x)
+        return np.asarray(rates(t, x))
 
     found = np.full((times.size, 2), np.nan)
     if not np.isfinite(state).all():
