@@ -7,7 +7,7 @@ motion ([HairerNorsettWanner1993]; the implementation is SciPy's).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
-from phasekit.motion.steps import Rates
 
 Array = npt.NDArray[np.float64]
 
