@@ -45,7 +45,9 @@ def stiff_cells(
     return stiff if few and smooth and forward else np.zeros(count, bool)
 
 
-def follow(rates: Rates, state: Array, times: Array, rtol: float, atol: float) -> tuple[Array, int]:
+def follow(
+    rates: Callable[[float, Any], Any], state: Array, times: Array, rtol: float, atol: float
+) -> tuple[Array, int]:
     """States of one motion at times >= 0, of shape (times, 2), and whether it came to its end."""
     from scipy.integrate import solve_ivp
 
