@@ -37,6 +37,20 @@ class ParameterError(PhasekitError, ValueError):
     """
 
 
+class ArgumentError(ParameterError, TypeError):
+    """A call does not fit the function: an argument is unknown, missing or given twice.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> try:
+    ...     pk.melnikov(pk.Perturbed(pk.Pendulum(length=1.0)), side="left")
+    ... except pk.ParameterError as error:
+    ...     print(error)
+    melnikov() got an unexpected keyword argument 'side'; its arguments are perturbed
+    """
+
+
 class InvalidCellsWarning(ParameterError, UserWarning):
     """Cells of an array have parameters that are not legal: they are NaN, and -1 in counts.
 

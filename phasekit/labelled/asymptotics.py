@@ -7,10 +7,14 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.states import at_states
-from phasekit.labels.arguments import NumberLike
+from phasekit.labels.arguments import (
+    NumberLike,
+    call_checked,
+)
 from phasekit.table.quantities import select
 
 
+@call_checked
 def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     """Period and frequency of small oscillations about the centers, to first order in energy.
 
@@ -50,6 +54,7 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     return at_states(system, select("near_center"), {"energy": ("state_excess", energy)})
 
 
+@call_checked
 def near_separatrix(system: Any, gap: NumberLike) -> xr.Dataset:
     """Period next to the separatrices, to leading order in the energy from the saddle.
 

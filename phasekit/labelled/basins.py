@@ -11,7 +11,15 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.labelled.driven import perturbed_of
-from phasekit.labels.arguments import FloatArray, NumberLike, bad, number, numeric, whole
+from phasekit.labels.arguments import (
+    FloatArray,
+    NumberLike,
+    bad,
+    number,
+    numeric,
+    state_arguments,
+    whole,
+)
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.motion import attractors as search
@@ -28,6 +36,7 @@ from phasekit.table.row import Quantity
 STARTS = 16
 
 
+@state_arguments
 def attractors(
     perturbed: Any, *, phi: NumberLike, dphi: NumberLike, period: float | None = None
 ) -> xr.Dataset:
@@ -84,6 +93,7 @@ def attractors(
     return _dataset(system, _attractor_rows(found.result()), {"period": found.leg})
 
 
+@state_arguments
 def basins(
     perturbed: Any,
     *,
@@ -158,7 +168,7 @@ def basins(
             f"of {len(grid[0])} x {len(grid[1])} states is too coarse to show the basins; their "
             "fractions hold as those of a sample",
             RuntimeWarning,
-            stacklevel=2,
+            stacklevel=4,
         )
     return ds
 

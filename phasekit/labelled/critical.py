@@ -13,7 +13,11 @@ import xarray as xr
 from phasekit.bifurcation.exact.critical import critical_reduced
 from phasekit.bifurcation.exact.fold_values import fold_values
 from phasekit.cells.evaluate import evaluate
-from phasekit.labels.arguments import FloatArray, unknown
+from phasekit.labels.arguments import (
+    FloatArray,
+    call_checked,
+    unknown,
+)
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.as_system import as_system
 from phasekit.systems.system import Model
@@ -23,6 +27,7 @@ from phasekit.table.row import Pass
 _CRITICAL = ("critical_fold", "critical_sign_change")
 
 
+@call_checked
 def critical(system: Any, parameter: str) -> xr.Dataset:
     """Values of one parameter at which equilibria merge, or A changes sign.
 

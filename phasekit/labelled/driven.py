@@ -12,7 +12,14 @@ import xarray as xr
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
-from phasekit.labels.arguments import NumberLike, bad, number, numeric, whole
+from phasekit.labels.arguments import (
+    NumberLike,
+    bad,
+    number,
+    numeric,
+    state_arguments,
+    whole,
+)
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
@@ -38,6 +45,7 @@ def perturbed_of(system: Any) -> Perturbed:
     return perturbed
 
 
+@state_arguments
 def stroboscopic(
     perturbed: Any,
     phi0: NumberLike,
@@ -117,6 +125,7 @@ def _sections(law: PerturbedConservative, *arrays: Any, **options: Any) -> Any:
     return sections(law, *arrays, **options)
 
 
+@state_arguments
 def lyapunov(
     perturbed: Any,
     phi0: NumberLike,
@@ -145,7 +154,8 @@ def lyapunov(
     xarray.Dataset
         On ``exponent``: ``lyapunov_exponent`` in s^-1, the largest first, and its
         ``lyapunov_error``. ``lyapunov_sum``, which is -damping where there is no quadratic
-        damping, as a check.
+        damping, as a check (of a `FreeGyroRotor` the mean of -damping M22/M, M the inertia at the
+        momentum).
 
     Raises
     ------

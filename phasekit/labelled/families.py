@@ -12,7 +12,12 @@ import xarray as xr
 from phasekit.cells.states import at_states
 from phasekit.errors import EquilibriumKind, ParameterError, Topology
 from phasekit.labelled.numerical_families import families_of_any
-from phasekit.labels.arguments import FloatArray, number, whole
+from phasekit.labels.arguments import (
+    FloatArray,
+    call_checked,
+    number,
+    whole,
+)
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import TiltedConservative, TiltedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
@@ -38,6 +43,7 @@ class Families(NamedTuple):
     action: FloatArray
 
 
+@call_checked
 def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None) -> xr.Dataset:
     """Periods, frequencies and actions of all orbits, family by family.
 

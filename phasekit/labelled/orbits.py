@@ -16,7 +16,15 @@ import xarray as xr
 
 from phasekit.cells.states import SIDES, at_states, pass_from
 from phasekit.errors import OrbitFamily, ParameterError
-from phasekit.labels.arguments import NumberLike, bad, describe, numeric, one_of, state_arguments
+from phasekit.labels.arguments import (
+    NumberLike,
+    bad,
+    call_checked,
+    describe,
+    numeric,
+    one_of,
+    state_arguments,
+)
 from phasekit.systems.as_system import as_system
 from phasekit.table.quantities import select
 
@@ -81,7 +89,8 @@ def orbits(
         ``phi'^2/2 + V - torque phi`` of the unwrapped angle. Librations are quadratures, with
         estimates of their errors; an orbit that is running turned back once, at its only turning
         point, and gains ``gain_per_turn`` from each turn to the next: it has no period and no
-        action, both are NaN, and its other end is infinite.
+        action, both are NaN, and its other end is infinite. A `Potential` on a circle has such
+        orbits as well; on a line the torque is a part of the potential, and what runs is unbounded.
 
     Raises
     ------
@@ -215,6 +224,7 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     return at_states(system, rows, {"phi": ("state_phi", phi), "dphi": ("state_dphi", dphi)})
 
 
+@call_checked
 def state_of(
     system: Any,
     action: NumberLike,

@@ -15,13 +15,20 @@ from phasekit.cells.evaluate import evaluate
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import CENTERS
 from phasekit.labelled.orbits import FAMILIES, noted
-from phasekit.labels.arguments import bad, named, one_of, whole
+from phasekit.labels.arguments import (
+    bad,
+    call_checked,
+    named,
+    one_of,
+    whole,
+)
 from phasekit.labels.coordinates import LABELS
 from phasekit.systems.as_system import as_system
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
 
 
+@call_checked
 def melnikov(perturbed: Any) -> xr.Dataset:
     """Melnikov's function on the separatrices: when damping and drive make motion irregular.
 
@@ -52,6 +59,8 @@ def melnikov(perturbed: Any) -> xr.Dataset:
 
     Notes
     -----
+    Of a `FreeGyroRotor` energies are in J and the turnstile in kg m^2/s.
+
     First order in damping and drive ([GuckenheimerHolmes1983] section 4.5). The integrals along
     the separatrices of (A, B, C) are sums of residues; those of a `Potential` are quadratures,
     NaN where they would lose more than six digits. Time is that of `separatrix_motion`. Of a
@@ -68,6 +77,7 @@ def melnikov(perturbed: Any) -> xr.Dataset:
     return _of_system("melnikov", perturbed)
 
 
+@call_checked
 def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
     """Frequencies of a torque to which the lobes of a figure-eight do not respond.
 
@@ -118,6 +128,7 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
     return ds.assign(quiet_frequency=listed).assign_coords(order=order)
 
 
+@call_checked
 def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
     """Into which well a motion falls that is slowly led to a separatrix.
 
@@ -166,6 +177,7 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
     return noted(_of_system("capture", perturbed, rotation=rotation), start=start)
 
 
+@call_checked
 def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
     """Rates at which noise leads out of a well, over each saddle at its ends.
 
@@ -215,6 +227,7 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
     return noted(_of_system("escape", perturbed, center=number), center=center)
 
 
+@call_checked
 def critical_torque(system: Any) -> xr.Dataset:
     """Least and greatest constant torque under which an equilibrium exists.
 
@@ -250,6 +263,7 @@ def critical_torque(system: Any) -> xr.Dataset:
     return _of_system("critical_torques", system)
 
 
+@call_checked
 def retrapping_torque(perturbed: Any) -> xr.Dataset:
     """Least constant torque that keeps a rotation going, at small damping.
 
@@ -285,6 +299,7 @@ def retrapping_torque(perturbed: Any) -> xr.Dataset:
     return _of_system("retrapping", perturbed)
 
 
+@call_checked
 def resonances(
     perturbed: Any, *, n: int | Sequence[int], m: int = 1, family: str = "lower_well"
 ) -> xr.Dataset:

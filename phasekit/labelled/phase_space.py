@@ -10,13 +10,17 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
-from phasekit.labels.arguments import bad
+from phasekit.labels.arguments import (
+    bad,
+    call_checked,
+)
 from phasekit.systems.as_system import as_system
 from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import Model
 from phasekit.table.quantities import select
 
 
+@call_checked
 def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     """All equilibria, their kinds, energies and frequencies, as branches.
 
@@ -85,6 +89,7 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     return _of_system("equilibria", system)
 
 
+@call_checked
 def separatrices(system: Any) -> xr.Dataset:
     """Separatrices: their topology, turning points and areas; whether there is a figure-eight.
 

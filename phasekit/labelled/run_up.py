@@ -9,7 +9,11 @@ import xarray as xr
 
 from phasekit.labelled.loads import bearing_forces, is_disk
 from phasekit.labelled.motion import flow
-from phasekit.labels.arguments import NumberLike, bad
+from phasekit.labels.arguments import (
+    NumberLike,
+    bad,
+    call_checked,
+)
 from phasekit.labels.grid import variable
 from phasekit.motion.flow import accelerations
 from phasekit.motion.prescribed import prescribed_at, span, table_of
@@ -17,6 +21,7 @@ from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
 
 
+@call_checked
 def run_up(
     disk: Any,
     *,

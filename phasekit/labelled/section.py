@@ -9,7 +9,13 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
-from phasekit.labels.arguments import FloatArray, bad, number, whole
+from phasekit.labels.arguments import (
+    FloatArray,
+    bad,
+    call_checked,
+    number,
+    whole,
+)
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.laws.ladder import Routhian
@@ -24,6 +30,7 @@ from phasekit.systems.problem import Problem
 from phasekit.table.quantities import ROWS
 
 
+@call_checked
 def poincare_section(
     system: Any,
     phi0: Any,

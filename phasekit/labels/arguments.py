@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from phasekit.errors import ParameterError
+from phasekit.errors import ArgumentError, ParameterError
 from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
 from phasekit.labels.units import factor, si_unit
 
@@ -241,6 +241,32 @@ def brief(value: Value) -> str:
     return f"<{'lazy ' if value.chunks is not None else ''}DataArray ({sizes})>"
 
 
+def call_checked(function: Function) -> Function:
+    """Make a call with an unknown, missing or surplus argument say what the arguments are."""
+    signature = inspect.signature(function)
+    expected = list(signature.parameters)
+    kinds = {parameter.kind for parameter in signature.parameters.values()}
+    takes_all = inspect.Parameter.VAR_KEYWORD in kinds
+
+    @functools.wraps(function)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as error:
+            strange = [name for name in kwargs if name not in expected and not takes_all]
+            text, hint = str(error), ""
+            if strange:  # rather than what is missing in its place
+                text = f"got an unexpected keyword argument {strange[0]!r}"
+                near = difflib.get_close_matches(strange[0], expected, n=1)
+                hint = f" did you mean {near[0]!r}?" if near else ""
+            listed = ", ".join(expected)
+            message = f"{function.__name__}() {text};{hint} its arguments are {listed}"
+            raise ArgumentError(message) from None
+        return function(*args, **kwargs)
+
+    return cast(Function, called)
+
+
 def state_arguments(function: Function) -> Function:
     """Let a function take the parts of a state by any name that they have anywhere.
 
@@ -248,6 +274,7 @@ def state_arguments(function: Function) -> Function:
     the coordinate of results, and has the name of the coordinate in a system that names it; so are
     its rates. The first argument is the system, or an accessor.
     """
+    function = call_checked(function)
     own = {name.rstrip("0"): name for name in inspect.signature(function).parameters}
     own = {stem: name for stem, name in own.items() if stem in ("phi", "dphi", "ddphi")}
     other = {
@@ -262,7 +289,9 @@ def state_arguments(function: Function) -> Function:
         names = dict(other)
         coordinate = getattr(args[0], "coordinate", None) if args else None
         if isinstance(coordinate, str):
-            names |= {stem.replace("phi", coordinate): name for stem, name in own.items()}
+            spelled = {stem.replace("phi", coordinate): name for stem, name in own.items()}
+            for form in ("{}", "{}0", "state_{}"):
+                names |= {form.format(stem): name for stem, name in spelled.items()}
         for name in [name for name in kwargs if name in names and name not in own.values()]:
             if names[name] in kwargs:
                 raise ParameterError(f"{name}: got it besides {names[name]}, wants it once")

@@ -210,6 +210,8 @@ class Search:
         found = self.run(state[None], FILLING, 0).states[0]
         if not np.isfinite(found).all() or self._is_known(found[-1]):
             return
+        if self.apart(found, found[-1]).max() < SAME * self.size:
+            return  # at rest where nothing attracts: on a saddle
         for other in self.others:
             near = [self.apart(other, one).min() < 2.0 * self.size / BOXES for one in found[-50:]]
             if np.mean(near) > 0.9:

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from phasekit.motion.steps import Rates, Step
+
+#: Ends of the pieces in which a step is looked at.
+PIECES = (0.0, 0.25, 0.5, 0.75, 1.0)
+#: A function that comes so near to zero, as part of its values around, touches it.
+TOUCH = 1e-8
 
 
 @dataclass(frozen=True)
 class Event:
     """A function of (t, x) whose zeros are looked for along a motion.
 
-    A pair of zeros within one step is not seen.
+    A step is looked at in pieces, and where the function turns towards zero between them. Zeros
+    that lie more closely, several in a piece, may be missed.
     """
 
     function: Rates
@@ -42,36 +49,85 @@ class Watch:
 
     looked: bool = False
     rest: float | None = None
-    """From where on it first vanished over a whole step."""
+    """From where on it first vanished over a whole piece of a step."""
     resting: float | None = None
     """Up to where it did last."""
+    behind: tuple[float, float, Any] | None = None
+    """Time and value a piece before the end of the last step, and the motion there."""
 
-    def look(self, step: Step) -> float | None:
-        """Time of a zero in the next step; where it vanishes from the start on, the start."""
-        before, self.value = self.value, self.event.function(step.stop, step.after)
-        first, self.looked = not self.looked, True
-        if not self.event.passes(before, self.value):
-            return None
+    def look(self, step: Step) -> list[float]:
+        """Times of zeros in the next step; where it vanishes from the start on, the start."""
+        function, dense = self.event.function, step.dense
+        times = [step.start + part * (step.stop - step.start) for part in PIECES]
+        values = [self.value, *(function(t, dense(t)) for t in times[1:-1])]
+        values.append(function(step.stop, step.after))
+        self.value = values[-1]
+        found = []
+        for k in range(len(times) - 1):
+            found += self._between(times[k : k + 2], values[k : k + 2], dense)
+        if self.behind is not None:  # a turn may lie where two steps meet
+            t, value, before = self.behind
+            times, values = [t, *times], [value, *values]
+        else:
+            before = dense
+
+        def value_at(t: float) -> float:
+            own = before if abs(t - times[0]) < abs(step.start - times[0]) else dense
+            return float(function(t, own(t)))
+
+        for k in range(1, len(times) - 1):
+            found += self._touches(times[k - 1 : k + 2], values[k - 1 : k + 2], value_at)
+        self.behind = (times[-2], values[-2], dense)
+        self.looked = True
+        kept = []
+        for when in sorted(found, key=lambda t: abs(t - times[0])):
+            if not self.ends and not (self.times and self.times[-1] == when):
+                self.times.append(when)
+                kept.append(when)
+        return kept
+
+    def _between(self, times: list[float], values: list[float], dense: Any) -> list[float]:
+        """The zero in a piece at whose ends the signs differ, or vanish."""
+        (start, stop), (before, after) = times, values
+        first = not self.looked and self.behind is None and self.rest is None
+        if not self.event.passes(before, after):
+            return []
         if before == 0.0:
-            middle = 0.5 * (step.start + step.stop)
-            if self.value == 0.0 and self.event.function(middle, step.dense(middle)) == 0.0:
-                self.rest = step.start if self.rest is None else self.rest
-                self.resting = step.stop
-                if first:
-                    self.times.append(step.start)
-                return step.start if first else None
-            if self.resting == step.start and self.value != 0.0:
-                return None
-        when = instant(lambda t: self.event.function(t, step.dense(t)), step.start, step.stop)
-        if self.times and self.times[-1] == when:  # the end of the step before
-            return None
-        self.times.append(when)
-        return when
+            middle = 0.5 * (start + stop)
+            if after == 0.0 and self.event.function(middle, dense(middle)) == 0.0:
+                self.rest = start if self.rest is None else self.rest
+                self.resting = stop
+                return [start] if first else []
+            if self.resting == start and after != 0.0:
+                return []
+        return [instant(lambda t: self.event.function(t, dense(t)), start, stop)]
+
+    def _touches(
+        self, times: list[float], values: list[float], function: Callable[[float], float]
+    ) -> list[float]:
+        """Zeros next to a turn of the function between values of one sign: two, one or none.
+
+        Where it comes to zero within what the motion itself may be wrong by, it touches.
+        """
+        sign = 1.0 if values[1] > 0.0 else -1.0
+        left, middle, right = (sign * value for value in values)
+        if not (0.0 < middle <= min(left, right)) or middle == max(left, right):
+            return []
+        low, high = sorted((times[0], times[2]))
+        turn = minimize_scalar(
+            lambda t: sign * function(t), bounds=(low, high), method="bounded",
+            options={"xatol": 1e-9 * (high - low)},
+        )  # fmt: skip
+        if turn.fun < 0.0:
+            rises = ((times[0], turn.x, values[0]), (turn.x, times[2], -values[0]))
+            return [instant(function, a, b) for a, b, at in rises if self.event.passes(at, -at)]
+        touches = turn.fun <= TOUCH * max(left, right) and self.event.direction == 0
+        return [float(turn.x)] if touches else []
 
     @property
     def ends(self) -> bool:
         """Whether the last zero is the one at which the motion ends."""
-        return len(self.times) == self.event.terminal
+        return len(self.times) == self.event.terminal > 0
 
 
 def instant(function: Callable[[float], float], start: float, stop: float) -> float:

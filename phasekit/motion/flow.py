@@ -15,6 +15,7 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.motion import stiff as implicit
 from phasekit.motion.lost import MOST, judged, tell
 from phasekit.motion.method import limits_of, run
 from phasekit.motion.prescribed import span, table_of
@@ -105,9 +106,7 @@ def _motions(
     """States of motions, by the exact flow where nothing disturbs them."""
     still = _is_still(law, values, len(states))
     if not still.any():
-        found = motions(law, values, states, times, *how)
-        tell("motion_phi", found.status, states)
-        return found.states
+        return _integrated(law, values, states, times, *how)
     from phasekit.phase.exact.flow import flow as exact
 
     result = np.empty((len(states), times.shape[1], 2))
@@ -118,9 +117,40 @@ def _motions(
     result[still] = np.stack(exact(A, B, C, phi, dphi, some(times, still)), axis=-1)
     if not still.all():
         rest = {name: some(value, ~still) for name, value in values.items()}
-        found = motions(law, rest, states[~still], some(times, ~still), *how)
-        tell("motion_phi", found.status, states[~still])
-        result[~still] = found.states
+        result[~still] = _integrated(law, rest, states[~still], some(times, ~still), *how)
+    return result
+
+
+def _integrated(
+    law: PerturbedConservative,
+    values: Mapping[str, Array],
+    states: Array,
+    times: Array,
+    rtol: float,
+    atol: float,
+    threads: int | None,
+) -> Array:
+    """States of motions, those that are stiff by a method of their own."""
+    stiff = implicit.stiff_cells(law, values, times, len(states))
+    if not stiff.any():
+        found = motions(law, values, states, times, rtol, atol, threads)
+        tell("motion_phi", found.status, states)
+        return found.states
+
+    def some(array: Array, which: Any) -> Array:
+        return array[which] if array.ndim and len(array) > 1 else array
+
+    result, status = np.empty((len(states), times.shape[1], 2)), np.zeros(len(states), np.int64)
+    for cell in np.flatnonzero(stiff):
+        one = {name: np.reshape(some(x, cell), ()) for name, x in values.items()}
+        own = times[cell if len(times) > 1 else 0]
+        rates = pointwise(law, one, 0.0, float(own.max()))
+        result[cell], status[cell] = implicit.follow(rates, states[cell], own, rtol, atol)
+    if not stiff.all():
+        rest = {name: some(x, ~stiff) for name, x in values.items()}
+        moved = motions(law, rest, states[~stiff], some(times, ~stiff), rtol, atol, threads)
+        result[~stiff], status[~stiff] = moved.states, moved.status
+    tell("motion_phi", status, states)
     return result
 
 

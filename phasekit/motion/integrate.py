@@ -68,10 +68,14 @@ def integrate(
     for step in steps(problem, stop):
         seen = {name: watch.look(step) for name, watch in watches.items()}
         order = sorted(
-            ((name, when) for name, when in seen.items() if when is not None),
+            ((name, when) for name, times_ in seen.items() for when in times_),
             key=lambda pair: abs(pair[1] - step.start),
         )
-        last = [place for place, (name, _) in enumerate(order) if watches[name].ends]
+        last = [
+            place
+            for place, (name, when) in enumerate(order)
+            if watches[name].ends and when == watches[name].times[-1]
+        ]
         found += order[: last[0] + 1] if last else order
         end = found[-1][1] if last else step.stop
         if end != times[-1] or not segments:

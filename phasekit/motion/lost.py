@@ -9,12 +9,13 @@ import numpy.typing as npt
 
 #: Steps that a motion may take.
 MOST = 10_000_000
-#: States of a motion that did not come to its end: too many steps, steps too short; and one that
-#: never began, because a parameter of it has no value.
-EXHAUSTED, FAILED, INVALID = 3, 4, 5
+#: States of a motion that came to its end, and of those that did not: too many steps, steps too
+#: short; and one that never began, because a parameter of it has no value.
+ARRIVED, EXHAUSTED, FAILED, INVALID = 2, 3, 4, 5
 
 REASONS = {
-    EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol",
+    EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "
+    "damping makes steps short",
     FAILED: "their steps become too short: they run to infinity, or the law has no value there",
     INVALID: "their parameters are invalid",
 }

@@ -43,7 +43,8 @@ class Perturbed(Model):
     Parameters
     ----------
     system : system
-        Any system in a potential: a disk, an analogue, a `Potential`.
+        Any system in a potential: a disk, an analogue, a `Potential`; or a `FreeGyroRotor`, at the
+        momentum that it keeps.
     damping : float, 1-D array_like or xarray.DataArray, default 0.0
         Linear damping in s^-1; negative: it drives the motion.
     quadratic : float or array_like, default 0.0
@@ -75,7 +76,8 @@ class Perturbed(Model):
     Raises
     ------
     ParameterError
-        If the system is none in a potential, or perturbed already, or an argument is unusable.
+        If the system is none in a potential or at a momentum, or perturbed already, or an argument
+        is unusable.
 
     Notes
     -----
@@ -88,6 +90,13 @@ class Perturbed(Model):
     ``-omega1' kappa cos phi``, ``kappa = (r^2 + 4 e^2) sin beta cos beta/N``, which replacing
     omega1 by omega1(t) in [Veljovic2015] (12) would lose; likewise the Euler force of a
     `ParticleOnCircle`.
+
+    Of a `FreeGyroRotor` damping and drive act about the disk's shaft alone, between disk and
+    support, per unit of the inertia M22 about it: nothing turns or brakes the support, so that the
+    momentum p about the vertical stays, and phi moves by itself, exactly, as
+    ``M phi'' + M' phi'^2/2 + V_p' = M22 (-damping phi' - quadratic |phi'| phi' + torque + ...)``
+    with ``M = M22 - M12^2/M11`` and the amended potential ``V_p = V + p^2/(2 M11)``. Energies are
+    in J. Modulation, drift and a prescribed omega1 would change the momentum and are refused.
 
     Examples
     --------

@@ -151,7 +151,9 @@ class RotorMotions(Model):
             Functions of (t, phi1, phi, omega1, dphi), with names of your choice; times are found
             at which they vanish. As in SciPy, an attribute ``terminal = True`` of the function
             ends the motion there, and ``direction`` of 1 or -1 selects where it rises or falls.
-            A pair of zeros within one step is not seen: `max_step` makes steps shorter.
+            One that comes to 1e-8 of its values around and turns back touches zero and counts,
+            unless it has a direction. Zeros closer together than a quarter of a step may be
+            missed: `max_step` makes steps shorter.
         phi0, dphi0, omega1, phi1, torque1, torque2, rtol, atol, max_step
             As `simulate`.
 

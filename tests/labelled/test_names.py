@@ -61,6 +61,46 @@ def test_a_state_is_given_once():
         pk.energy(SYSTEM, phy=0.5, dphi=0.2)
 
 
+def test_the_coordinate_names_the_start_of_a_motion():
+    want = pk.flow(WELL, 0.5, 0.1, 1.0)
+    xr.testing.assert_identical(pk.flow(WELL, x0=0.5, dx0=0.1, t=1.0), want)
+    xr.testing.assert_identical(pk.flow(WELL, state_x=0.5, state_dx=0.1, t=1.0), want)
+    driven = pk.Perturbed(WELL, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
+    found = pk.stroboscopic(driven, x0=0.5, dx0=0.1, n=2)
+    xr.testing.assert_identical(found, pk.stroboscopic(driven, 0.5, 0.1, n=2))
+    with pytest.raises(pk.ParameterError, match="x0: got it besides phi0"):
+        pk.flow(WELL, 0.5, x0=0.5, phi0=0.1, dx0=0.1, t=1.0)
+
+
+DRIVEN = pk.Perturbed(SYSTEM, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: pk.flow(SYSTEM, 0.1, 0.0, times=[1.0]), r"flow\(\) got .* 'times'; its arguments"),
+        (lambda: pk.flow(SYSTEM, 0.1, 0.0), "flow.*missing a required argument: 't'; its arg"),
+        (lambda: pk.flow(SYSTEM, 0.1, 0.0, 1.0, 2.0), "too many positional arguments"),
+        (lambda: pk.orbits(SYSTEM, energi=1.0), "did you mean 'energy'"),
+        (lambda: pk.orbit_families(SYSTEM, energymax=1.0), "did you mean 'energy_max'"),
+        (lambda: pk.escape_rate(DRIVEN, centre="lower_center"), "did you mean 'center'"),
+        (lambda: pk.capture(DRIVEN, "rotation"), "capture.*arguments are perturbed, start"),
+        (lambda: pk.melnikov(DRIVEN, saddle="lower"), "'saddle'; its arguments are perturbed$"),
+        (lambda: pk.resonances(DRIVEN), "resonances.*missing a required argument: 'n'"),
+        (lambda: pk.stroboscopic(DRIVEN, 0.1, 0.0), "stroboscopic.*'n'"),
+        (lambda: pk.lyapunov(DRIVEN, 0.1, 0.0, t=3.0), "lyapunov.*'t'; its arguments"),
+        (lambda: pk.basins(DRIVEN, phis=[0.1], dphi=[0.0]), "did you mean 'phi'"),
+        (lambda: pk.run_up(SYSTEM), "run_up.*missing"),
+        (lambda: pk.equilibria(), "equilibria.*'system'"),
+        (lambda: pk.separatrix_motion(SYSTEM, time=[1.0]), "separatrix_motion.*'time'"),
+    ],
+)
+def test_a_call_that_does_not_fit_says_how(call, message):
+    with pytest.raises(pk.ParameterError, match=message) as caught:
+        call()
+    assert isinstance(caught.value, TypeError)  # as Python's own
+
+
 def test_the_amplitude_is_half_the_way_between_the_turning_points():
     # Released from rest at 0.5 a pendulum swings as far to the other side.
     swing = pk.orbits(pk.Pendulum(length=1.0), [0.5, 3.0, 0.0, 0.0], [0.0, 0.0, 0.0, 9.0])

@@ -269,6 +269,33 @@ def test_a_rate_of_the_support_with_a_kink_is_followed():
     assert pk.flow(ramp, 0.2, 0.0, 3.0).motion_phi.item() == pytest.approx(last.y[0, -1], abs=1e-8)
 
 
+@pytest.mark.parametrize("damping", [1e4, 1e6])
+def test_a_stiff_motion_creeps_to_rest(damping):
+    """By the law of the slow motion, phi' = -V'/damping, to first order in 1/damping^2."""
+    pendulum = pk.Coefficients(0.0, 1.0, 0.0)
+    times = damping * np.array([0.0, 5.0, 0.7])
+    ds = pk.flow(
+        pk.Perturbed(pendulum, damping=damping), 2.5, 0.0, np.append(times, 600.0 * damping)
+    )
+    want = 2.0 * np.arctan(np.tan(1.25) * np.exp(-times / damping))
+    assert ds.motion_phi.values[:3] == pytest.approx(want, abs=3.0 / damping**2 + 1e-8)
+    assert ds.motion_dphi.values[1:3] == pytest.approx(-np.sin(want[1:]) / damping, rel=1e-6)
+    assert abs(ds.motion_phi.values[3]) < 1e-9
+
+
+def test_stiff_motions_end_with_a_reason_where_they_are_too_fast(monkeypatch):
+    from phasekit.motion import stiff
+
+    monkeypatch.setattr(stiff, "MOST_RATES", 2000)
+    driven = pk.Perturbed(EIGHT, damping=1e4, forcing=pk.Harmonic(1.0, 50.0))
+    with pytest.warns(RuntimeWarning, match="1 of 1 motions end .* strong damping"):
+        assert np.isnan(pk.flow(driven, 0.4, 0.5, 1e4).motion_phi)
+    both = pk.Perturbed(EIGHT, damping=[1e4, 1.0])
+    found = pk.flow(both, 0.4, 0.5, 100.0).motion_phi  # a shorter time is no trouble
+    assert found.values[1] == pytest.approx(pk.equilibria(EIGHT).phi.values[0], abs=1e-6)
+    assert np.isfinite(found).all()
+
+
 def test_events_are_zeros_on_the_motion():
     system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.2, 1.0))
 
@@ -297,6 +324,41 @@ def test_events_are_zeros_on_the_motion():
     back = pk.flow(system, 0.4, 0.5, [-5.0, 5.0], events=turns)
     assert (np.diff(back.event_time) > 0).all()
     assert back.event_time.values[0] < 0.0 < back.event_time.values[-1]
+
+
+def test_events_that_touch_zero_and_turn_back():
+    system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.2, 1.0))
+    fine = {"rtol": 1e-12, "atol": 1e-13}
+    turns = pk.flow(system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: v, **fine)
+    times, places = turns.event_time.values, turns.event_phi.values
+    assert times.size > 8
+    ds = pk.flow(system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: v * v, **fine)
+    assert ds.event_time.values == pytest.approx(times, abs=1e-6)
+
+    def rising(t, x, v):
+        return v * v
+
+    rising.direction = 1  # what turns back neither rises nor falls through zero
+    assert pk.flow(system, 0.4, 0.5, [40.0], events=rising, **fine).sizes["event"] == 0
+
+    def third(t, x, v):
+        return -v * v
+
+    third.terminal = 3
+    ended = pk.flow(system, 0.4, 0.5, [40.0], events=third, **fine)
+    assert ended.event_time.values == pytest.approx(times[times > 0.0][:3], abs=1e-6)
+    assert np.isnan(ended.motion_phi).all()
+    # a pair of zeros on both sides of a turn, much closer than a step
+    number = int(np.argmax(places))
+    near = places[number] - 1e-9
+    pair = pk.flow(system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: x - near, **fine)
+    close = pair.event_time.values[abs(pair.event_time.values - times[number]) < 1e-3]
+    assert close.size == 2
+    assert close.mean() == pytest.approx(times[number], abs=1e-6)
+    missed = pk.flow(
+        system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: x - places.max() - 1e-5, **fine
+    )
+    assert missed.sizes["event"] == 0
 
 
 def test_events_of_what_has_none_are_refused():

@@ -198,6 +198,14 @@ def test_a_damped_rotor_comes_to_rest_or_turns_with_its_torque():
     assert rest.motion_phi.item() == pytest.approx(np.arcsin(0.5), abs=1e-7)
 
 
+def test_rest_on_a_saddle_is_no_attractor():
+    damped = pk.Perturbed(WELL, damping=0.3)
+    ds = pk.basins(damped, phi=np.linspace(-1.5, 1.5, 7), dphi=[-0.5, -0.25, 0.0, 0.25, 0.5])
+    assert ds.attractor_phi.values.round(9).ravel().tolist() == [-1.0, 1.0]
+    assert ds.basin.sel(state_phi=0.0, state_dphi=0.0) == -1
+    assert (ds.basin == -1).sum() == 1
+
+
 def test_a_coarse_grid_says_so():
     few = np.linspace(-2.0, 2.0, 4)
     with pytest.warns(RuntimeWarning, match="too coarse to show the basins"):

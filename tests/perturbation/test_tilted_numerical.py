@@ -52,7 +52,7 @@ def turns_of(N, start, until):
 @pytest.mark.parametrize("N", [0.15, -0.4])
 def test_orbits_against_integration(N):
     rng = np.random.default_rng(2)
-    x, v = rng.uniform(-5.0, 5.0, 10), 2.0 * rng.normal(size=10)
+    x, v = rng.uniform(-5.0, 5.0, 12), 2.5 * rng.normal(size=12)
     ds = pk.orbits(waves(N), x, v)
     assert ds.orbit_energy.values == pytest.approx(
         0.5 * v**2 + [height(one, N) for one in x], rel=1e-13
