@@ -361,7 +361,9 @@ def newton(
         # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.
         rounded = residual * min(speed, 1.0) < ROUNDING
         flat = size > 0.25 * before and size < FLAT and rounded
-        if part == 1.0 and (size <= tolerance or flat):
+        # The residual is that before the step: one that is not yet rounding is looked at again.
+        small = size <= tolerance and (rounded or before <= tolerance)
+        if part == 1.0 and (small or flat):
             length = inner(mesh, weights, value, dx[1], dx[1], scale)
             for k in range(1, q):
                 length += (dy[1, k] / width[k - 1]) ** 2
