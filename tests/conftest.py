@@ -54,12 +54,28 @@ FIRST = (
 )
 FAST = "not slow"
 
+#: Folders and files that are slow as a whole, besides what is marked where it stands.
+SLOW = (
+    "published",
+    "properties",
+    "maps/test_store_damage.py",
+    "maps/test_store_failures.py",
+    "phase/test_portrait_kernel.py",
+    "plot/test_layout.py",
+)
+
 
 def pytest_configure(config):
     """Leave out what is slow where neither files nor a selection are asked for."""
     everything = config.args_source is config.ArgsSource.TESTPATHS
     if everything and not (config.option.markexpr or config.option.keyword):
         config.option.markexpr = FAST
+
+
+def pytest_itemcollected(item):
+    """Mark what is slow as a whole."""
+    if any(item.path.is_relative_to(Path(__file__).parent / name) for name in SLOW):
+        item.add_marker(pytest.mark.slow)
 
 
 def pytest_terminal_summary(terminalreporter, config):

@@ -103,7 +103,6 @@ def test_a_tile_that_raises(engine, tmp_path, expected, monkeypatch, request):
     assert content(path) == expected
 
 
-@pytest.mark.slow
 def test_a_tile_that_ends_its_process(tmp_path, expected, monkeypatch):
     path = tmp_path / "map.zarr"
     with monkeypatch.context() as patch:
@@ -118,7 +117,6 @@ def test_a_tile_that_ends_its_process(tmp_path, expected, monkeypatch):
 # ------------------------------------------------------------------------------ disks
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_disk_that_takes_no_more(workers, tmp_path):
     """Files cannot grow beyond a limit: those of codes fit, those of numbers do not."""
@@ -173,7 +171,6 @@ print("went on")
 """
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_full_disk(workers, tmp_path):
     private = ["unshare", "--map-root-user", "--mount"]
@@ -261,7 +258,6 @@ STEPS = {
 }
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("step", STEPS)
 def test_each_write_may_be_the_last_one(step, tmp_path, writes):
     if step in ("more quantities", "longer") and "PHASEKIT_KILLS" not in os.environ:

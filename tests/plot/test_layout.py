@@ -240,13 +240,7 @@ CASES = {
         "all NaN": lambda: P.time_history(without_values(motions()).isel(point=0)),
     },
 }
-#: All of them narrow, where room is short; wide, one of each picture, and the others at leisure.
-EVERY = [
-    pytest.param(name, case, width, marks=[pytest.mark.slow] if width > 4.0 and others else [])
-    for name, cases in CASES.items()
-    for others, case in enumerate(cases)
-    for width in WIDTHS
-]
+EVERY = [(name, case, width) for name, cases in CASES.items() for case in cases for width in WIDTHS]
 
 
 def drawn(name, case, width, style="default"):
