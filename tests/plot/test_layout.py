@@ -240,7 +240,7 @@ CASES = {
         "all NaN": lambda: P.time_history(without_values(motions()).isel(point=0)),
     },
 }
-EVERY = [(name, case, width) for name, cases in CASES.items() for case in cases for width in WIDTHS]
+EVERY = [(name, case) for name, cases in CASES.items() for case in cases]
 
 
 def drawn(name, case, width, style="default"):
@@ -267,7 +267,8 @@ def test_names_under_plot_are_pictures():
             assert "did you mean 'p" in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "case", "width"), EVERY)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(("name", "case"), EVERY)
 def test_texts_are_inside_and_clear_of_each_other(name, case, width):
     figure = drawn(name, case, width)
     with warnings.catch_warnings():
