@@ -100,17 +100,19 @@ def nearer(
         if fixed is not None:
             again[fixed] = u[fixed]
         tried.append(again)
+    tried += [without_rounding(curve, one) for one in tried]
     best, least = u, residual
-    for one in [*tried, *(without_rounding(curve, one) for one in tried)]:
-        value = residual_at(curve, one)
-        if value < least:
-            best, least = one, value
+    for i, one in enumerate(tried):
+        if not any(np.array_equal(one, other) for other in (u, *tried[:i])):
+            value = residual_at(curve, one)
+            if value < least:
+                best, least = one, value
     return best, least
 
 
 def residual_at(curve: Curve, u: Array) -> float:
-    """|f| beside its terms at one point."""
-    return float(curve.residuals(u[None], curve.at(u)[1][None])[0])
+    """|f| beside its terms at one point, whose sizes need few digits."""
+    return float(curve.residuals(u[None], curve.at(u, sharp=False)[1][None])[0])
 
 
 def without_rounding(curve: Curve, u: Array) -> Array:
