@@ -250,9 +250,8 @@ class Curve:
             if isinstance(slopes, np.ndarray):  # what Newton's method takes for zero
                 nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
                 value[value <= nothing] = 0.0
-            return np.asarray(
-                np.max(np.where(value > 0.0, value / terms, 0.0), axis=1, initial=0.0)
-            )
+            ratio = np.where(value > 0.0, value / terms, 0.0)
+            return np.asarray(np.max(ratio, axis=1, initial=0.0))
 
     def linear(self, slopes: Array) -> Array:
         """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
