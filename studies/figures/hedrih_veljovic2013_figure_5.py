@@ -2,7 +2,7 @@
 HedrihVeljovic2013, figure 5: kinetic force of A2 across the shaft, for several e
 =================================================================================
 
-(27) as printed has its peak at another angle: five of its eight terms are wrong.
+As printed, (27) has its peak at another angle: five of its eight terms are wrong.
 
 Left the size of (27) as printed, right phasekit's.
 Parameters: ``hedrih_veljovic.py``, beta = 45 deg, a = 50 mm; e is the family. None is the paper's.
