@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -16,4 +17,4 @@ def argv(gallery_conf: Any, script_vars: Any) -> list[str]:
 
 def named(app: Any, page: str, source: list[str]) -> None:
     """Leave out of a study's words the folder that its picture was written to."""
-    source[0] = source[0].replace(f"{_FOLDER}/", "")
+    source[0] = re.sub(r"\bwrote /\S+/", "wrote ", source[0])
