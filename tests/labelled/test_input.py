@@ -234,7 +234,7 @@ def test_pairs_and_counts():
             pair("span", wrong, "two")
     with pytest.raises(pk.ParameterError, match="^span: got nan, wants a finite number"):
         pair("span", [1, np.nan], "two")
-    for wrong in (2.5, -1, 0, True, "3", np.float64(3), np.timedelta64(3), None, [3]):
+    for wrong in (2.5, -1, 0, True, "3", np.float64(3), np.timedelta64(3, "s"), None, [3]):
         with pytest.raises(pk.ParameterError, match="^n: got .*, wants one"):
             whole("n", wrong, "one")
 

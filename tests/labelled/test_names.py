@@ -86,7 +86,7 @@ DRIVEN = pk.Perturbed(SYSTEM, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
         (lambda: pk.escape_rate(DRIVEN, centre="lower_center"), "did you mean 'center'"),
         (lambda: pk.capture(DRIVEN, "rotation"), "capture.*arguments are perturbed, start"),
         (lambda: pk.melnikov(DRIVEN, saddle="lower"), "'saddle'; its arguments are perturbed$"),
-        (lambda: pk.resonances(DRIVEN), "resonances.*missing a required argument: 'n'"),
+        (lambda: pk.resonances(DRIVEN), "resonances.*missing a required.* argument: 'n'"),
         (lambda: pk.stroboscopic(DRIVEN, 0.1, 0.0), "stroboscopic.*'n'"),
         (lambda: pk.lyapunov(DRIVEN, 0.1, 0.0, t=3.0), "lyapunov.*'t'; its arguments"),
         (lambda: pk.basins(DRIVEN, phis=[0.1], dphi=[0.0]), "did you mean 'phi'"),
