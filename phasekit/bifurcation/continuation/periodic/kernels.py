@@ -293,6 +293,23 @@ def solve(
     return sign
 
 
+@routine
+def made_unit(
+    mesh: Array, weights: Array, value: Array, scale: Array, width: Array, dx: Array, dy: Array
+) -> float:
+    """Divide a tangent by its length, which is returned; that of none is 1."""
+    length = inner(mesh, weights, value, dx, dx, scale)
+    for k in range(1, dy.size):
+        length += (dy[k] / width[k - 1]) ** 2
+    length = np.sqrt(length) if length > 0.0 else 1.0
+    for i in range(dx.shape[0]):
+        for c in range(dx.shape[1]):
+            dx[i, c] /= length
+    for k in range(dy.size):
+        dy[k] /= length
+    return length
+
+
 @kernel
 def newton(
     given: bool, first: Any, mode: int, par: Array, active: Any, forced: bool, clock: Any,
@@ -364,15 +381,7 @@ def newton(
         # The residual is that before the step: one that is not yet rounding is looked at again.
         small = size <= tolerance and (rounded or before <= tolerance)
         if part == 1.0 and (small or flat):
-            length = inner(mesh, weights, value, dx[1], dx[1], scale)
-            for k in range(1, q):
-                length += (dy[1, k] / width[k - 1]) ** 2
-            length = np.sqrt(length) if length > 0.0 else 1.0
-            for i in range(places):
-                for c in range(n):
-                    dx[1, i, c] /= length
-            for k in range(q):
-                dy[1, k] /= length
+            length = made_unit(mesh, weights, value, scale, width, dx[1], dy[1])
             return FOUND, step, sign, residual, divergence, size, length
         if not damped and before < np.inf and size > 2.0 * before:
             return DIVERGED, step, sign, residual, divergence, size, 1.0
