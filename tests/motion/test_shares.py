@@ -109,6 +109,7 @@ def test_motions_that_take_too_many_steps_are_undecided_and_not_away(monkeypatch
     assert found.basin.tolist() == [[basins.UNDECIDED, basins.ESCAPED]]
 
 
+@pytest.mark.slow
 def test_stored_shares_are_the_same_however_they_were_made(tmp_path, monkeypatch):
     """Interrupted and resumed, extended, by processes and by dask: the same bits."""
     pytest.importorskip("zarr")
