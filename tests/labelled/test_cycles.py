@@ -313,3 +313,16 @@ def test_samples():
     assert np.isclose(found.period, exact.period, rtol=1e-11)
     found = pk.periodic_orbit(brusselator(), exact[["x", "y"]])
     assert np.isclose(found.period, exact.period, rtol=1e-11)
+
+
+def test_a_forced_system_without_its_force_rests():
+    driven = pk.Problem(
+        ["0.4 + x**2*y - 2.2*x - x + c*cos(w*t)", "2.2*x - x**2*y"], ("x", "y"),
+        {"c": 0.0, "w": 0.8}, time="t", period="2*pi/w",
+    )  # fmt: skip
+    rest = pk.periodic_orbit(driven, [0.4, 5.4])
+    assert np.allclose([rest.x_max, rest.y_max], [0.4, 5.5], rtol=1e-12)
+    assert float(rest.residual) < 1e-12  # beside the states: nothing moves
+    response = pk.continuation(driven, "c", orbit=rest, span=(0.0, 0.1))
+    assert response.points.sizes["point"] > 3
+    assert np.all(response.points.residual < 1e-11)

@@ -19,6 +19,7 @@ from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
 ROUNDING = 1e-11  # of the residual, relative
+REST = 1e-12  # |T f| beside the states' sizes that is rounding: the orbit is an equilibrium
 
 # How Newton's method ended.
 ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED = range(5)
@@ -77,8 +78,8 @@ def condense(
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
 
-    Returns the sign of the determinants, the largest residual beside the largest |T f|, the latter,
-    both on scaled axes, and the integral of the trace of T f_x.
+    Returns the sign of the determinants, the largest residual beside the largest |T f| (or, at rest,
+    beside the states), the latter, both on scaled axes, and the integral of the trace of T f_x.
     """
     m, n = nodes.size, x.shape[1]
     q = y.size
@@ -127,7 +128,7 @@ def condense(
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
-    residual = worst / speed if speed > 0.0 else worst
+    residual = worst / speed if speed > REST else worst
     return sign, residual, speed, divergence
 
 
