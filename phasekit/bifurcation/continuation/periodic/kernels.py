@@ -78,8 +78,9 @@ def condense(
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
 
-    Returns the sign of the determinants, the largest residual beside the largest |T f| (or, at rest,
-    beside the states), the latter, both on scaled axes, and the integral of the trace of T f_x.
+    Returns the sign of the determinants, the largest residual beside the largest |T f| or, at rest,
+    beside the states, the largest |T f|, both on scaled axes, and the integral of the trace of T
+    f_x.
     """
     m, n = nodes.size, x.shape[1]
     q = y.size
