@@ -7,7 +7,7 @@ left to Runge-Kutta.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,22 @@ def run(
     launch(kernel, arguments, lost.size, parts, threads, WEIGHT)
     for group, part in zip(groups, parts, strict=True):
         group[lost] = part
+
+
+def some(array: Array, which: Any) -> Array:
+    """Entries of cells, of what may be the same in all."""
+    return array[which] if array.ndim and len(array) > 1 else array
+
+
+def cells_of(values: Mapping[str, Array], which: Any) -> dict[str, Array]:
+    """Values of parameters in some cells."""
+    return {name: some(np.asarray(value), which) for name, value in values.items()}
+
+
+def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]]:
+    """Which of so many cells have one machine code: those of quadratic damping, and the others."""
+    kinked = np.broadcast_to(np.asarray(values["quadratic"]) != 0.0, (count,))
+    return [kind for kind in (~kinked, kinked) if kind.any()]
 
 
 def limits_of(

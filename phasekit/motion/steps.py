@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853, DenseOutput
+from scipy.integrate import DOP853, DenseOutput, OdeSolver
 
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad
@@ -51,6 +51,8 @@ class InitialValue:
     """Steps that a motion may take."""
     causes: str = "Rates without bound"
     """What a message supposes where steps become too short to go on."""
+    method: type[OdeSolver] = DOP853
+    """One of SciPy's with an error of its own."""
 
 
 @dataclass
@@ -86,7 +88,7 @@ class Step:
     after: Array
     rates_before: Array
     rates_after: Array
-    _solver: DOP853
+    _solver: OdeSolver
 
     @functools.cached_property
     def dense(self) -> DenseOutput:
@@ -114,7 +116,7 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
 
     Notes
     -----
-    The method is the explicit Runge-Kutta method DOP853 of order 8.
+    The method is the explicit Runge-Kutta method DOP853 of order 8, unless the problem has another.
     """
     with np.errstate(all="ignore"):
         first = np.asarray(problem.rates(problem.start, np.array(problem.state, dtype=float)))
@@ -123,8 +125,9 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     # Where a component is zero, no relative error of it can be allowed.
     atol = max(problem.atol, float(np.finfo(float).tiny))
     options = {"rtol": problem.rtol, "atol": atol, "max_step": problem.max_step}
+    start = problem.start, np.array(problem.state)
     with np.errstate(all="ignore"):
-        solver = DOP853(problem.rates, problem.start, np.array(problem.state), stop, **options)
+        solver = problem.method(problem.rates, *start, stop, **options)
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop), abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
