@@ -40,8 +40,9 @@ class Cells(NamedTuple):
 
     states: Array
     """Of shape (cells, times, 2); NaN where a motion did not come to a time."""
-    status: npt.NDArray[np.int64]
-    steps: npt.NDArray[np.int64]
+    status: Index
+    steps: Index
+    """By the method that followed a motion last."""
 
 
 def flow(
@@ -219,12 +220,12 @@ def motions(
     most : int
         Steps that a motion may take.
     series : bool
-        Take steps by Taylor series where the law has them, and there are no tangent vectors; by
-        Runge-Kutta otherwise, and where series would take too many.
+        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
+        series would take too many.
     """
     from phasekit.motion.kernels.motions import motions as kernel
 
-    degree = order_of(rtol) if series and not tangents else 0
+    degree = order_of(rtol) if series else 0
     code, parameters = rates_of(law, values, tangents, degree)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
@@ -241,7 +242,7 @@ def motions(
         out = np.empty(result.shape)
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
-            limits = limits_of(law, rtol, atol, most, once=True)
+            limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
             shared, cells = (table, limits, 0.0, code.kink), (rising, np.array(states))
             run(kernel, code, shared, cells, parameters, (out, reached, taken), reached, threads)
         back = np.argsort(order, axis=1)[..., None]

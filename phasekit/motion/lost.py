@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 #: Steps that a motion may take.
 MOST = 10_000_000
-#: States of a motion that came to its end, and of those that did not: too many steps, steps too
-#: short; and one that never began, because a parameter of it has no value.
-ARRIVED, EXHAUSTED, FAILED, INVALID = 2, 3, 4, 5
+#: States of a motion: none yet, under way, at its end; and of those that do not come to it: too
+#: many steps, steps too short, a parameter that has no value.
+IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
 
 REASONS = {
     EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "

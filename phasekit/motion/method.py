@@ -27,7 +27,7 @@ def run(
     kernel: Callable[..., None],
     code: Rates,
     shared: tuple[Any, ...],
-    cells: tuple[Array, ...],
+    cells: tuple[npt.NDArray[Any], ...],
     parameters: Array,
     groups: Any,
     status: npt.NDArray[np.int64],
@@ -77,12 +77,18 @@ def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]
 
 
 def limits_of(
-    law: PerturbedConservative, rtol: float, atol: float, most: int = MOST, *, once: bool = False
+    law: PerturbedConservative,
+    rtol: float,
+    atol: float,
+    most: int = MOST,
+    *,
+    alone: bool = False,
+    keep: bool = False,
 ) -> Array:
-    """What bounds the steps of the kernels, in all lanes."""
+    """What bounds the steps of the kernels, in all lanes; whether to take and keep each alone."""
     from phasekit.numerics.lanes import LANES
 
-    rows = rtol, atol, unit_of(law), float(most), float(once)
+    rows = rtol, atol, unit_of(law), float(most), float(alone), float(keep)
     return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
 
 

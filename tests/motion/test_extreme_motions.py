@@ -112,6 +112,21 @@ def test_what_stands_beside_a_motion_does_not_change_it(neighbour):
     assert np.array_equal(pair.motion_phi.values[0], alone.motion_phi.values)
 
 
+def test_sections_and_exponents_are_the_same_alone_and_among_others():
+    """Among motions with quadratic damping, or of another period."""
+    system = pk.Perturbed(EIGHT, damping=0.1, quadratic=[0.2, 0.0], forcing=DRIVE)
+    others = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.3, [2.0, 1.0]))
+    alone = pk.Perturbed(EIGHT, damping=0.1, forcing=DRIVE)
+    want = pk.stroboscopic(alone, 0.3, 0.1, n=20, period=2.0 * np.pi).section_phi.values
+    for several in (system, others):
+        found = pk.stroboscopic(several, 0.3, 0.1, n=20, period=2.0 * np.pi).section_phi.values
+        assert np.array_equal(found[1], want)
+        grown = pk.lyapunov(several, 0.3, 0.1, time=10.0).lyapunov_exponent.values
+        assert np.array_equal(
+            grown[1], pk.lyapunov(alone, 0.3, 0.1, time=10.0).lyapunov_exponent.values
+        )
+
+
 def test_a_run_up_to_a_time_without_value():
     for omega1 in (lambda t: 5.0 * t, ([0.0, 1.0, 2.0], [0.0, 5.0, 10.0])):
         ds = pk.run_up(disk(1.0), omega1=omega1, phi0=0.1, dphi0=0.0, t=[np.nan, 1.0], damping=1.0)

@@ -7,13 +7,10 @@ import numpy as np
 from phasekit.motion.kernels.dop853 import ROWS, densify, rates, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
-    ARRIVED,
     CELL,
     END,
     GONE,
-    IDLE,
     REALS,
-    RUNNING,
     SCALE,
     START,
     STATE,
@@ -28,6 +25,7 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
+from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
 from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 

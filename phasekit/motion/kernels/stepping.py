@@ -18,6 +18,7 @@ from phasekit.motion.kernels.dop853 import (
     next_step,
     rates,
 )
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.lanes import LANES, invoke
 
@@ -35,14 +36,11 @@ CELL, STATE, ACCEPTED, STEPS, REJECTED, AIMS = range(6)
 WHOLES = 6
 
 #: Rows of limits: errors that are allowed, value from which on a coordinate is held as closely as
-#: there, most steps; and, for steps by series, whether to take one alone, and keep its series.
-RTOL, ATOL, UNIT, MOST, ONCE = range(5)
+#: there, most steps; and, for steps by series, whether to take one alone, and to keep its series.
+RTOL, ATOL, UNIT, MOST, ALONE, KEEP = range(6)
 
 #: In place of `ACCEPTED`: its state was changed between steps.
 CHANGED = 2
-
-#: States: nothing to do, under way, at its end, too many steps, steps too short.
-IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED = range(5)
 
 _EPS = float(np.finfo(float).eps)
 _MOST_AIMS = 12

@@ -20,23 +20,21 @@ from llvmlite import ir
 
 from phasekit.motion.kernels.dop853 import CLOSEST, LONGEST
 from phasekit.motion.kernels.stepping import (
-    ARRIVED,
+    ALONE,
     ATOL,
     COUNT,
     END,
-    EXHAUSTED,
-    FAILED,
+    KEEP,
     KEPT,
     MOST,
-    ONCE,
     OUTCOME,
     REFUSED,
     RTOL,
-    RUNNING,
     UNIT,
     H,
     T,
 )
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.lanes import LANES, LaneWriter
 from phasekit.numerics.machine_code import machine_code
 from phasekit.numerics.series import Series
@@ -72,7 +70,7 @@ class Law:
 def compile_steps(law: Law, order: int) -> int:
     """Address of ``void (double *x, double *p, double *real, double *limits)``.
 
-    It takes steps, of all lanes at once, until a lane ends. Or it takes one, and leaves the
+    It takes steps, of all lanes at once, until a lane ends, or one alone; and may leave the
     coefficients of the coordinates in further rows of `real`.
     """
     pointer = ir.DoubleType().as_pointer()
@@ -101,8 +99,7 @@ class StepWriter(LaneWriter):
         t, end, count, state, refused = (
             self.load(real, row) for row in (T, END, COUNT, OUTCOME, REFUSED)
         )
-        first = b.load(super(LaneWriter, self).place(limits, ONCE * LANES))
-        once = b.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
+        alone, keep = self._asked(ALONE), self._asked(KEEP)
         rest, h = b.fsub(end, t), self.load(real, H)
         h = b.select(b.fcmp_unordered("==", h, self.constant(0.0)), rest, h)
         running = b.fcmp_ordered("==", state, self.constant(RUNNING))
@@ -126,7 +123,7 @@ class StepWriter(LaneWriter):
         for i, (old, new) in enumerate(zip(start, ends, strict=True)):
             b.store(b.select(going, new, old), self.place(x, i), align=8)
         self._keep(
-            once, [b.select(going, taken, self.constant(0.0)), t, h, *itertools.chain(*curves)]
+            keep, [b.select(going, taken, self.constant(0.0)), t, h, *itertools.chain(*curves)]
         )
         h = b.select(good, next_, self._mul(self.constant(0.5), taken))
         now = b.select(going, then, t)
@@ -152,11 +149,16 @@ class StepWriter(LaneWriter):
         b.store(new, self.place(real, OUTCOME), align=8)
         ended = b.bitcast(b.fcmp_ordered("!=", new, state), ir.IntType(LANES))
         none = b.icmp_unsigned("==", ended, ir.Constant(ended.type, 0))
-        return b.and_(none, b.not_(once))
+        return b.and_(none, b.not_(alone))
 
-    def _keep(self, once: Any, values: Iterable[Any]) -> None:
-        """Leave a step that is the only one where the caller finds it."""
-        with self.builder.if_then(once):
+    def _asked(self, row: int) -> Any:
+        """Whether a limit is not 0; it is the same in all lanes."""
+        first = self.builder.load(super(LaneWriter, self).place(self.arrays[3], row * LANES))
+        return self.builder.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
+
+    def _keep(self, keep: Any, values: Iterable[Any]) -> None:
+        """Leave a step where the caller finds it."""
+        with self.builder.if_then(keep):
             for row, value in enumerate(values):
                 self.builder.store(value, self.place(self.arrays[2], KEPT + row), align=8)
 
