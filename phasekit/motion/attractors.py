@@ -202,7 +202,9 @@ class Search:
         """State after q legs, and its derivative."""
         start = np.array([[*state, 1.0, 0.0, 0.0, 1.0]])
         times = np.array([[q * self.leg]])
-        end = motions(self.law, self.values, start, times, 1e-12, 1e-13, tangents=2).states[0, 0]
+        # So few maps do not pay for the machine code of series.
+        how = {"rtol": 1e-12, "atol": 1e-13, "tangents": 2, "series": False}
+        end = motions(self.law, self.values, start, times, **how).states[0, 0]
         return end[:2], np.array([[end[2], end[4]], [end[3], end[5]]])
 
     def _take_other(self, state: Array) -> None:
