@@ -12,6 +12,7 @@ from phasekit.labels.arguments import bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.motion.flow import pointwise
 from phasekit.motion.integrate import integrate
+from phasekit.motion.method import unit_of
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import single
 from phasekit.systems.driven_rotor import event_of
@@ -47,7 +48,8 @@ def with_events(
             continue
         rates = pointwise(law, values, min(stop, 0.0), max(stop, 0.0))
         start = (ds.state_phi.item(), ds.state_dphi.item())
-        motion = integrate(InitialValue(rates, start, **tolerances), stop, watched)
+        problem = InitialValue(rates, start, **tolerances, unit=unit_of(law))
+        motion = integrate(problem, stop, watched)
         own = list(zip(*motion.events[:2], *motion.events.state, strict=True))
         found = own[::-1] if stop < 0.0 else found + [e for e in own if e[1] > 0.0 or not found]
         beyond = np.sign(stop) * (ds.time.values - motion.times[-1]) > 0.0

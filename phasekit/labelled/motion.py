@@ -54,7 +54,8 @@ def flow(
     rtol, atol : float, optional
         Of a `Perturbed` system: the error of a step that is allowed, relative (default 1e-10) and
         absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is relative to
-        one radian.
+        one radian. On a line, of motions whose states are below 1 as yet, the absolute error is
+        that part of the greatest: lengths may be in any unit.
     events : callable or mapping of str to callable, optional
         Of one motion of a `Perturbed` system: functions of (t, phi, dphi) whose zeros are looked
         for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True

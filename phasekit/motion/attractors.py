@@ -202,9 +202,9 @@ class Search:
         """State after q legs, and its derivative."""
         start = np.array([[*state, 1.0, 0.0, 0.0, 1.0]])
         times = np.array([[q * self.leg]])
+        cell = self.law, self.values, start, times
         # So few maps do not pay for the machine code of series.
-        how = {"rtol": 1e-12, "atol": 1e-13, "tangents": 2, "series": False}
-        end = motions(self.law, self.values, start, times, **how).states[0, 0]
+        end = motions(*cell, 1e-12, 1e-13, tangents=2, series=False).states[0, 0]
         return end[:2], np.array([[end[2], end[4]], [end[3], end[5]]])
 
     def _take_other(self, state: Array) -> None:
@@ -246,7 +246,8 @@ class Search:
         self.radii.clear()  # they go by place
 
         def first(orbit: Array) -> tuple[float, float]:
-            return round(float(self.wrapped(orbit[0, 0])), 9), round(float(orbit[0, 1]), 9)
+            phi, dphi = self.wrapped(orbit[0, 0]), orbit[0, 1] / self.scale
+            return round(float(phi) / self.size, 9), round(float(dphi) / self.size, 9)
 
         def begun(orbit: Array) -> Array:
             turned = [np.roll(orbit, -i, axis=0) for i in range(len(orbit))]

@@ -16,7 +16,7 @@ from phasekit.laws.perturbed import (
 )
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.motion.lost import ARRIVED, MOST, judged, tell
-from phasekit.motion.method import cells_of, kinds, limits_of, run, some
+from phasekit.motion.method import cells_of, kinds, limits_of, run, some, unit_of
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import order_of, rates_of
 from phasekit.motion.stiff import follow, stiff_cells
@@ -161,7 +161,8 @@ def _stiff_motions(
     for cell, own in enumerate(times):
         one = {name: np.reshape(x, ()) for name, x in cells_of(values, cell).items()}
         rates = pointwise(law, one, *span(own))
-        found[cell] = follow(rates, states[cell], own, rtol, atol)
+        how = {"rtol": rtol, "atol": atol, "unit": unit_of(law)}
+        found[cell] = follow(rates, states[cell], own, **how)
     left = np.isnan(found[..., 0]) & ~np.isnan(times)
     lost = left.any(axis=1)
     if lost.any():

@@ -45,6 +45,9 @@ class InitialValue:
     """Error of a step, relative to the state, that is allowed."""
     atol: float = 1e-12
     """The same, absolute."""
+    unit: float = 1.0
+    """What the absolute error is of, where that is below 1; infinite: the greatest component so
+    far, of states that may be lengths in any unit."""
     max_step: float = np.inf
     """Longest step."""
     most: int = 1_000_000
@@ -122,8 +125,8 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         first = np.asarray(problem.rates(problem.start, np.array(problem.state, dtype=float)))
     if not np.isfinite(first).all():  # the integrator would not come back from NaN
         raise bad("state", tuple(problem.state), f"one with finite rates, not {first.tolist()}")
-    # Where a component is zero, no relative error of it can be allowed.
-    atol = max(problem.atol, float(np.finfo(float).tiny))
+    size = float(np.abs(problem.state).max(initial=0.0))
+    atol = _absolute(problem, size)
     options = {"rtol": problem.rtol, "atol": atol, "max_step": problem.max_step}
     start = problem.start, np.array(problem.state)
     with np.errstate(all="ignore"):
@@ -134,6 +137,8 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     pace = Pace(problem.most, stop)
     while solver.status == "running":
         before, rates_before = solver.y, solver.f
+        size = max(size, float(np.abs(before).max()))
+        solver.atol = _absolute(problem, size)
         with np.errstate(all="ignore"):
             message = solver.step()
         if solver.status == "failed":
@@ -141,6 +146,13 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
         if pace.is_too_slow(solver.t_old, solver.t):
             raise _too_long(problem, solver.t, pace)
+
+
+def _absolute(problem: InitialValue, size: float) -> float:
+    """Absolute error that is allowed to a motion that was as great."""
+    unit = problem.unit if np.isfinite(problem.unit) else size
+    # Where a component is zero, no relative error of it can be allowed.
+    return max(problem.atol * min(unit, 1.0), float(np.finfo(float).tiny))
 
 
 def _stopped(problem: InitialValue, t: float, stop: float, message: str) -> ConvergenceError:

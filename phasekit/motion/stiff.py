@@ -39,9 +39,12 @@ def stiff_cells(
 
 
 def follow(
-    rates: Callable[[float, Any], Any], state: Array, times: Array, rtol: float, atol: float
+    rates: Callable[[float, Any], Any], state: Array, times: Array, **tolerances: Any
 ) -> Array:
-    """States of one motion at times, of shape (times, 2): NaN before 0, and once it is given up."""
+    """States of one motion at times, of shape (times, 2): NaN before 0, and once it is given up.
+
+    Tolerances are those of an `InitialValue`.
+    """
     from scipy.integrate import Radau
 
     from phasekit.motion.steps import InitialValue, steps
@@ -51,10 +54,10 @@ def follow(
     later = np.flatnonzero((times > 0.0) & np.isfinite(times))
     later = later[np.argsort(times[later])]
     rising = times[later]
-    how = {"rtol": max(rtol, LEAST), "atol": atol, "most": MOST_STEPS, "method": Radau}
+    tolerances |= {"rtol": max(tolerances["rtol"], LEAST), "most": MOST_STEPS, "method": Radau}
     done = 0
     try:
-        for step in steps(InitialValue(rates, list(state), **how), float(rising[-1])):
+        for step in steps(InitialValue(rates, list(state), **tolerances), float(rising[-1])):
             upto = int(np.searchsorted(rising, step.stop, side="right"))
             if upto > done:
                 found[later[done:upto]] = step.dense(rising[done:upto]).T

@@ -39,6 +39,49 @@ def test_a_disk_at_any_speed_moves_as_scipy_says(omega1, damping):
     assert np.abs(ds.motion_dphi.values - expected[1]).max() < 2e-10 * unit
 
 
+@pytest.mark.parametrize(("length", "time"), [(1e-15, 1.0), (1e-9, 1e-3), (1e12, 1e6)])
+def test_any_unit_of_length_and_of_time(length, time):
+    """A motion and the same in other units; by SciPy in units of its own."""
+
+    def rates(t, x):
+        return [x[1], x[0] - x[0] ** 3 - 0.1 * x[1] + 0.3 * np.cos(1.1 * t + 0.2)]
+
+    t = np.array([1.0, 7.0, 12.0])
+    passes = solve_ivp(rates, (0.0, 12.0), [0.3, 0.1], "DOP853", t, rtol=1e-12, atol=1e-14,
+                       events=lambda t, x: x[0] - 0.5)  # fmt: skip
+    law = pk.Potential("x^4/(4*l^2*u^2) - x^2/(2*u^2)", "x", {"l": length, "u": time})
+    drive = pk.Harmonic(0.3 * length / time**2, 1.1 / time, 0.2)
+    system = pk.Perturbed(law, damping=0.1 / time, forcing=drive)
+    start, speed = (0.3 * length, 0.1 * length / time), length / time
+    for one in (system, system.replace(quadratic=1e-30 / length)):
+        ds = pk.flow(one, *start, t * time)
+        assert np.abs(ds.motion_phi.values / length - passes.y[0]).max() < 1e-7
+        assert np.abs(ds.motion_dphi.values / speed - passes.y[1]).max() < 1e-7
+    ds = pk.flow(system, *start, 12.0 * time, events=lambda t, x, v: x / length - 0.5)
+    assert ds.event_time.values / time == pytest.approx(passes.t_events[0], abs=1e-8)
+    ds = pk.poincare_section(
+        system, *start, duration=12.0 * time, section=0.5 * length, direction=0
+    )
+    assert ds.section_time.values / time == pytest.approx(passes.t_events[0], abs=1e-8)
+    plain = pk.Perturbed(
+        pk.Potential("x^4/4 - x^2/2", "x"), damping=0.1, forcing=pk.Harmonic(0.3, 1.1, 0.2)
+    )
+    grid = np.linspace(-2.0, 2.0, 7), np.linspace(-1.0, 1.0, 5)
+    want = pk.attractors(plain, phi=grid[0], dphi=grid[1])
+    ds = pk.attractors(system, phi=grid[0] * length, dphi=grid[1] * speed)
+    assert want.attractor_period.values.tolist() == ds.attractor_period.values.tolist() == [1, 2]
+    for name, scale in (("phi", length), ("dphi", speed), ("multiplier", 1.0)):
+        found, wanted = (x[f"attractor_{name}"].values for x in (ds, want))
+        assert found / scale == pytest.approx(wanted, rel=1e-6, nan_ok=True)
+
+
+def test_a_problem_in_any_unit():
+    oscillator = pk.Problem(["y", "-x/u"], ("x", "y"), {"u": 1.0})
+    found = pk.poincare_section(oscillator, [1e-13, 0.0], duration=20.0, section=("x", 0.0))
+    assert found.section_time.values == pytest.approx(np.pi * np.array([1.5, 3.5, 5.5]))
+    assert found.section_y.values == pytest.approx([1e-13] * 3, rel=1e-7)
+
+
 @pytest.mark.parametrize("frequency", [1e-3, 1e3])
 def test_a_drive_of_any_frequency(frequency):
     system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.3, frequency, 0.2))

@@ -18,7 +18,7 @@ import numpy as np
 import sympy as sp
 from llvmlite import ir
 
-from phasekit.motion.kernels.dop853 import CLOSEST, LONGEST
+from phasekit.motion.kernels.dop853 import CLOSEST, LEAST, LONGEST
 from phasekit.motion.kernels.stepping import (
     ALONE,
     ATOL,
@@ -30,6 +30,7 @@ from phasekit.motion.kernels.stepping import (
     OUTCOME,
     REFUSED,
     RTOL,
+    SIZE,
     UNIT,
     H,
     T,
@@ -105,10 +106,11 @@ class StepWriter(LaneWriter):
         running = b.fcmp_ordered("==", state, self.constant(RUNNING))
         per = b.fdiv(self.constant(1.0), h)
         curves = self._curves(law, order, t, start, h, per)
-        allowed = [
-            self._allowed(i, curve, h, per, [self.load(limits, i) for i in (RTOL, ATOL, UNIT)])
-            for i, curve in enumerate(curves)
-        ]
+        rtol, atol, unit = (self.load(limits, row) for row in (RTOL, ATOL, UNIT))
+        size = self._larger(self.load(real, SIZE), self._larger(*map(self._size, start[:2])))
+        b.store(size, self.place(real, SIZE), align=8)
+        allowed = [self._allowed(curves[0], per, size, rtol, atol, unit)]
+        allowed += [self._allowed_beside(curve, h, per, rtol, atol) for curve in curves[1:]]
         next_ = self._mul(self._part(order, curves, allowed, per, refused), h)
         far, long = self._size(rest), self._size(next_)
         last = b.fcmp_ordered(">=", long, far)
@@ -188,22 +190,32 @@ class StepWriter(LaneWriter):
         return curves
 
     def _allowed(
-        self, i: int, curve: Sequence[Any], h: Any, per: Any, limits: Sequence[Any]
+        self, curve: Sequence[Any], per: Any, size: Any, rtol: Any, atol: Any, unit: Any
     ) -> tuple[Any, Any]:
-        """Errors of a pair that are allowed, as of Runge-Kutta steps.
+        """Errors of the coordinate and its rate that are allowed, as of Runge-Kutta steps.
 
         What a step adds counts as the size of what is zero at its start. The rounding of a far
         coordinate is no error of the rate.
         """
-        rtol, atol, unit = limits
+        b, x, v = self.builder, curve[0], self._mul(curve[1], per)
+        bend = self._size(curve[2])
+        change = self._size(self._mul(self._mul(self.constant(2.0), curve[2]), per))
+        far = self._larger(self._size(x), self._size(curve[1]))
+        fast = self._larger(self._size(v), change)
+        size = self._larger(size, self._larger(self._larger(far, bend), fast))
+        line = b.fcmp_ordered("==", unit, self.constant(float("inf")))
+        own = self._smaller(b.select(line, size, unit), self.constant(1.0))
+        least = self._larger(self._mul(atol, own), self.constant(LEAST))
+        a = self._sum(self._mul(rtol, self._smaller(far, unit)), least)
+        c = self._sum(self._mul(rtol, fast), least)
+        noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
+        return a, self._larger(c, noise)
+
+    def _allowed_beside(
+        self, curve: Sequence[Any], h: Any, per: Any, rtol: Any, atol: Any
+    ) -> tuple[Any, Any]:
+        """Those of a tangent vector: by its length."""
         x, v = curve[0], self._mul(curve[1], per)
-        if i == 0:
-            size = self._larger(self._size(x), self._size(curve[1]))
-            change = self._size(self._mul(self._mul(self.constant(2.0), curve[2]), per))
-            sizes = self._smaller(size, unit), self._larger(self._size(v), change)
-            a, c = (self._sum(self._mul(rtol, size), atol) for size in sizes)
-            noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
-            return a, self._larger(c, noise)
         length = self._intrinsic("sqrt", self._sum(self._mul(x, x), self._mul(v, v)))
         second = self._smaller(self._size(h), self.constant(1.0))
         part = self._mul(self._sum(self._mul(rtol, length), atol), second)
