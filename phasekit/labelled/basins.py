@@ -24,7 +24,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
-from phasekit.motion.lost import tell_unsettled
+from phasekit.motion.lost import tell_open
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import said
 from phasekit.systems.as_system import single
@@ -68,7 +68,7 @@ def attractors(
     Warns
     -----
     RuntimeWarning
-        If damping is too weak to see where motions end.
+        If damping is too weak to see where motions end, or they take too many steps.
 
     Notes
     -----
@@ -90,6 +90,7 @@ def attractors(
     [-0.779055, 1.210091]
     """
     system, found, _ = _searched(perturbed, phi, dphi, period)
+    tell_open("attractor_phi", found.open)
     return _dataset(system, _attractor_rows(found.result()), {"period": found.leg})
 
 
@@ -132,8 +133,8 @@ def basins(
     Warns
     -----
     RuntimeWarning
-        If more than half of the cells lie beside another basin: the grid is too coarse to show
-        the basins.
+        If it is not seen where some motions end, as of `attractors`; and if more than half of the
+        cells lie beside another basin: the grid is too coarse to show the basins.
 
     Notes
     -----
@@ -155,6 +156,7 @@ def basins(
     system, found, grid = _searched(perturbed, phi, dphi, period)
     with said(f"following {grid[0].size * grid[1].size:,} motions to their attractors"):
         result = shares.basins(found, *grid, legs=periods)
+    tell_open("attractor_phi", found.open)
     data = _attractor_rows(found.result())
     dims = ("state_phi", "state_dphi")
     for name, values in result._asdict().items():
@@ -204,7 +206,6 @@ def _searched(
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
     with said(f"looking for attractors from {len(states)} states"):
         found = search.find(law, values, leg, states)
-    tell_unsettled("attractor_phi", found.unsettled, search.PATIENCE)
     return system, found, grid
 
 

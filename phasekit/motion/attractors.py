@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -11,6 +12,7 @@ import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import motions
+from phasekit.motion.lost import EXHAUSTED, MOST
 from phasekit.motion.method import circle
 from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
 
@@ -34,6 +36,9 @@ BOXES, FILLING, VISITS = 100, 4000, 40
 RING = 32
 #: Legs for which they are followed.
 LONGEST_RING = 20_000
+#: Why it is not seen where a motion ends.
+TOO_WEAK = f"are damped so weakly that they did not settle within {PATIENCE} periods or less"
+TOO_LONG = f"take more than {MOST} steps"
 
 
 class Attractors(NamedTuple):
@@ -70,8 +75,8 @@ class Search:
     drifts: list[float] = field(default_factory=list)
     radii: dict[int, float] = field(default_factory=dict)
     """How far around periodic ones states were seen to come to them, by place."""
-    unsettled: int = 0
-    """Motions that are damped too weakly to show where they end."""
+    open: Counter[str] = field(default_factory=Counter)
+    """Motions of which it was not seen where they end, by the reason."""
 
     @property
     def period(self) -> float:
@@ -88,7 +93,9 @@ class Search:
 
     def run(self, states: Array, kept: int, skip: int) -> Strobed:
         """Follow motions."""
-        return strobe(self.law, self.values, states, self.leg, kept, skip)
+        found = strobe(self.law, self.values, states, self.leg, kept, skip)
+        self.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
+        return found
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
@@ -114,7 +121,7 @@ class Search:
         legs = SETTLED / strength if strength > 0.0 else np.inf
         slow = [orbit[-1] for orbit in found if not self._is_sorted(orbit, legs)]
         if legs > PATIENCE:
-            self.unsettled += len(slow)
+            self.open[TOO_WEAK] += len(slow)
         elif slow and legs > ROUNDS[-1]:
             found = self.run(np.array(slow), kept, int(legs)).states
             slow = [orbit[-1] for orbit in found if not self._is_sorted(orbit, legs)]

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.motion.attractors import Search
-from phasekit.motion.lost import FAILED
+from phasekit.motion.attractors import TOO_LONG, Search
+from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.strobe import strobe
 
 Array = npt.NDArray[np.float64]
@@ -60,6 +60,7 @@ def basins(
         targets=search.targets(), most_legs=legs, threads=threads,
     )  # fmt: skip
     code = found.code.astype(np.int16)
+    search.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
     lost = (code < 0) & (found.status == FAILED)
     code[lost] = ESCAPED
     time = np.where(code >= 0, found.taken * search.leg, np.nan)

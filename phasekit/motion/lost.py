@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -40,13 +41,13 @@ def tell(quantity: str, status: npt.NDArray[np.int64], states: npt.NDArray[np.fl
             )
 
 
-def tell_unsettled(quantity: str, number: int, patience: int) -> None:
-    """Say that damping was too weak to see where some motions end."""
-    if number:
-        warnings.warn(
-            f"{quantity}: {number} of the motions that were followed are damped so weakly that "
-            f"they did not settle within {patience} periods or less: there may be attractors that "
-            "are not found, and states are undecided",
-            RuntimeWarning,
-            stacklevel=4,
-        )
+def tell_open(quantity: str, numbers: Mapping[str, int]) -> None:
+    """Say of how many motions, by the reason, it was not seen where they end."""
+    for reason, number in numbers.items():
+        if number:
+            warnings.warn(
+                f"{quantity}: {number} of the motions that were followed {reason}: there may be "
+                "attractors that are not found, and states are undecided",
+                RuntimeWarning,
+                stacklevel=4,
+            )

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.motion import method
 
 EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
 WELL = pk.Potential("x^4/4 - x^2/2", "x")
@@ -69,7 +72,7 @@ def test_any_unit_of_length_and_of_time(length, time):
     grid = np.linspace(-2.0, 2.0, 7), np.linspace(-1.0, 1.0, 5)
     want = pk.attractors(plain, phi=grid[0], dphi=grid[1])
     ds = pk.attractors(system, phi=grid[0] * length, dphi=grid[1] * speed)
-    assert want.attractor_period.values.tolist() == ds.attractor_period.values.tolist() == [1, 2]
+    assert want.attractor_period.values.tolist() == ds.attractor_period.values.tolist() == [1, 3]
     for name, scale in (("phi", length), ("dphi", speed), ("multiplier", 1.0)):
         found, wanted = (x[f"attractor_{name}"].values for x in (ds, want))
         assert found / scale == pytest.approx(wanted, rel=1e-6, nan_ok=True)
@@ -204,3 +207,14 @@ def test_damping_too_weak_to_settle_is_announced():
     with pytest.warns(RuntimeWarning, match="damped so weakly that they did not settle"):
         ds = pk.attractors(pk.Perturbed(EIGHT, damping=1e-7), phi=[0.5, 1.0], dphi=[0.4])
     assert (ds.attractor_period > 0).all()
+
+
+def test_attractors_to_which_motions_are_too_slow_are_not_passed_over(monkeypatch):
+    few = functools.partial(method.limits_of, most=2000)
+    monkeypatch.setattr("phasekit.motion.strobe.limits_of", few)
+    strong = pk.Perturbed(EIGHT, damping=1e3, forcing=DRIVE)
+    said = "attractor_phi: .* take more than 10000000 steps: there may be attractors .* not found"
+    with pytest.warns(RuntimeWarning, match=said):
+        assert pk.attractors(strong, phi=[0.5, 1.0], dphi=[0.4]).sizes["attractor"] == 0
+    with pytest.warns(RuntimeWarning, match=said):
+        assert (pk.basins(strong, phi=[0.5, 1.0], dphi=[0.4]).basin == -1).all()
