@@ -25,6 +25,7 @@ from phasekit.labels.grid import variable
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
 from phasekit.motion.lost import tell_open
+from phasekit.motion.shares import damping_time
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import said
 from phasekit.systems.as_system import single
@@ -50,7 +51,7 @@ def attractors(
         Angles in rad and angular velocities in s^-1 of the grid; of a large one a part is used.
     period : float, optional
         Time from state to state in s; default: the common period of all that varies, of a system
-        without such a quarter of the period of small oscillations.
+        without such a quarter of the period of small oscillations, without these 1/damping.
 
     Returns
     -------
@@ -198,7 +199,7 @@ def _searched(
         if not leg > 0.0:
             raise bad("period", period, "a time in s, > 0")
     elif own is None:
-        leg = _quarter(system)
+        leg = _quarter(system, values)
     else:
         leg = float(check_period("period", own))
     every = [axis[np.linspace(0, len(axis) - 1, min(len(axis), STARTS)).round().astype(int)]
@@ -209,13 +210,16 @@ def _searched(
     return system, found, grid
 
 
-def _quarter(system: Perturbed) -> float:
-    """A quarter of the period of small oscillations about the center of greatest curvature."""
+def _quarter(system: Perturbed, values: Mapping[str, Any]) -> float:
+    """A quarter of the period of small oscillations about the center of greatest curvature.
+
+    Without one the time in which damping acts.
+    """
     from phasekit.labelled.phase_space import equilibria
 
     frequency = equilibria(system.system).natural_frequency.values
     if not np.isfinite(frequency).any():
-        return 1.0
+        return damping_time(values)
     return float(0.5 * np.pi / np.nanmax(frequency))
 
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import motions
 from phasekit.motion.lost import EXHAUSTED, MOST
-from phasekit.motion.method import circle
+from phasekit.motion.method import circle, unit_of
 from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]
@@ -348,10 +348,25 @@ def find(
     states : array, shape (n, 2)
         Where motions start; they also say how coordinates and rates are measured.
     """
-    width = float(np.ptp(states[:, 0])) or 1.0
-    fastest = float(np.abs(states[:, 1]).max(initial=0.0))
-    scale = 2.0 * fastest / width if fastest > 0.0 else 1.0
-    search = Search(law, values, leg, scale, width)
+    width, fastest = _extent(law, values, leg, states)
+    search = Search(law, values, leg, 2.0 * fastest / width, width)
     search.look(states)
     search.order()
     return search
+
+
+def _extent(
+    law: PerturbedConservative, values: Mapping[str, Array], leg: float, states: Array
+) -> tuple[float, float]:
+    """Width in the coordinate and greatest rate of states, or of the motions from them."""
+    width, fastest = float(np.ptp(states[:, 0])), float(np.abs(states[:, 1]).max())
+    if width and fastest:
+        return width, fastest
+    seen = strobe(law, values, states, leg / 8.0, 17).states.reshape(-1, 2)
+    seen = seen[np.isfinite(seen).all(axis=1)]
+    if not width and circle(law):
+        width = unit_of(law)
+    elif not width:
+        far = float(np.abs(seen[:, 0]).max(initial=0.0))
+        width = max(float(np.ptp(seen[:, 0])) if seen.size else 0.0, 1e-3 * far) or 1.0
+    return width, fastest or max(float(np.abs(seen[:, 1]).max(initial=0.0)), width / leg)

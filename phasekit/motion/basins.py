@@ -77,7 +77,8 @@ def basins(
 
 def _covers_turn(phi: Array, period: float) -> bool:
     """Whether the last cell has the first as its neighbour."""
-    return len(phi) > 2 and abs(abs(phi[-1] - phi[0]) * len(phi) / (len(phi) - 1) - period) < 1e-6
+    turn = abs(phi[-1] - phi[0]) * len(phi) / max(len(phi) - 1, 1)
+    return len(phi) > 2 and bool(abs(turn / period - 1.0) < 1e-6)
 
 
 def _boundary(grid: npt.NDArray[np.int16], wraps: bool) -> float:

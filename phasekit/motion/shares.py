@@ -80,7 +80,7 @@ def fractions(law: PerturbedConservative, *arrays: npt.ArrayLike) -> Fractions:
 def leg_of(law: PerturbedConservative, values: Mapping[str, Array], reach: float) -> float:
     """Time from state to state: the period of what varies, else of the order of an oscillation.
 
-    NaN without a common period.
+    NaN without a common period. Where nothing oscillates, the time in which damping acts.
     """
     period = common_period(law, values)
     if period is not None:
@@ -88,4 +88,9 @@ def leg_of(law: PerturbedConservative, values: Mapping[str, Array], reach: float
     phi = np.linspace(-reach, reach, 129)
     change = np.gradient(accelerations(law, values, 0.0, phi, 0.0), phi)
     stiffest = float(np.max(np.abs(change)))
-    return float(0.5 * np.pi / np.sqrt(stiffest)) if stiffest > 0.0 else 1.0
+    return float(0.5 * np.pi / np.sqrt(stiffest)) if stiffest > 0.0 else damping_time(values)
+
+
+def damping_time(values: Mapping[str, Array]) -> float:
+    """Time in which linear damping acts; 1 s without."""
+    return float(1.0 / values["damping"]) if values["damping"] > 0.0 else 1.0
