@@ -136,7 +136,9 @@ def _integrated(
     found, status = np.empty((count, times.shape[1], 2)), np.empty(count, np.int64)
     for kind in kinds(values, count):
         which = kind & ~stiff
-        if which.any():
+        if which.all():
+            found, status, _ = motions(law, values, states, times, *how)
+        elif which.any():
             cells = cells_of(values, which), states[which], some(times, which)
             found[which], status[which], _ = motions(law, *cells, *how)
     if stiff.any():

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import phasekit as pk
 from phasekit.motion import method
+from phasekit.motion.basins import _covers_turn
 
 EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
 WELL = pk.Potential("x^4/4 - x^2/2", "x")
@@ -76,6 +77,46 @@ def test_any_unit_of_length_and_of_time(length, time):
     for name, scale in (("phi", length), ("dphi", speed), ("multiplier", 1.0)):
         found, wanted = (x[f"attractor_{name}"].values for x in (ds, want))
         assert found / scale == pytest.approx(wanted, rel=1e-6, nan_ok=True)
+
+
+@pytest.mark.parametrize("quadratic", [0.0, 0.2])
+@pytest.mark.parametrize("time", [1e-9, 1e3, 1e12])
+def test_any_unit_of_time_is_as_good(quadratic, time):
+    def moved(unit):
+        law = pk.Coefficients(*(x / unit**2 for x in (1.0, 0.35, 0.12)))
+        drive = pk.Harmonic(0.3 / unit**2, 1.1 / unit, 0.2)
+        system = pk.Perturbed(law, damping=0.1 / unit, quadratic=quadratic, forcing=drive)
+        ds = pk.flow(system, 0.3, 0.1 / unit, np.array([1.0, 7.0, 20.0]) * unit)
+        return ds.motion_phi.values, ds.motion_dphi.values * unit
+
+    assert np.abs(np.subtract(moved(time), moved(1.0))).max() < 1e-10
+
+
+@pytest.mark.parametrize("time", [1e-9, 1.0, 1e6])
+def test_attractors_of_few_states_in_any_unit_of_time(time):
+    system = pk.Perturbed(pk.Coefficients(*(x / time**2 for x in (1.0, 0.35, 0.12))),
+                          damping=0.1 / time)  # fmt: skip
+    for phi in ([-1.0, 1.0], [1.0]):
+        ds = pk.attractors(system, phi=phi, dphi=[0.0])
+        assert ds.attractor_period.values.tolist() == [1] * len(phi)
+        assert ds.attractor_phi.values[:, 0] == pytest.approx(rests()[-len(phi) :], abs=1e-9)
+
+
+def test_a_rotor_that_nothing_holds_is_seen_in_the_time_of_its_damping():
+    for time in (1.0, 1e-6):
+        rotor = pk.Perturbed(
+            pk.Coefficients(0.0, 0.0, 0.0), damping=0.1 / time, torque=0.3 / time**2
+        )
+        ds = pk.attractors(rotor, phi=[-1.0, 1.0], dphi=[0.0, 1.0 / time])
+        assert float(ds.attrs["period"]) == pytest.approx(10.0 * time)
+        assert ds.attractor_rotation.values == pytest.approx([30.0 / (2.0 * np.pi)], rel=1e-6)
+
+
+@pytest.mark.parametrize("period", [2e-9 * np.pi, 2.0 * np.pi, 360.0])
+def test_a_grid_closes_a_circle_of_any_length_or_not(period):
+    assert _covers_turn(period * (np.arange(8) / 8.0 - 0.5), period)
+    assert not _covers_turn(period * np.arange(8) / 16.0, period)
+    assert not _covers_turn(period * np.linspace(-0.5, 0.5, 8), period)
 
 
 def test_a_problem_in_any_unit():

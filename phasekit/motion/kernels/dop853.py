@@ -143,7 +143,8 @@ def errors(
 
     A coordinate beyond `unit` counts as `unit`, so that an angle which runs on is held as closely
     as at first. The absolute error is of a unit, on a line of the motion's size so far, where that
-    is below 1: coordinates may be lengths in any unit. A tangent vector is held against its length,
+    is below 1: coordinates may be lengths in any unit; of a rate it is what adds up to that in the
+    step, if that is longer than a second. A tangent vector is held against its length,
     the more closely the shorter the step is: the logs of lengths add up, so that what counts is the
     error in a second.
     """
@@ -166,9 +167,13 @@ def errors(
             else:
                 other = m + LANES if c % 2 == 0 else m - LANES
                 scale = max(math.hypot(x[m], x[other]), math.hypot(y[m], y[other]))
-            allowed = (least if c < 2 else atol) + rtol * scale
-            if c >= 2:
-                allowed = max(allowed * min(1.0, abs(h[lane])), CLOSEST * scale)
+            allowed = rtol * scale
+            if c == 0:
+                allowed += least
+            elif c == 1:
+                allowed += least / max(1.0, abs(h[lane]))
+            else:
+                allowed = max((allowed + atol) * min(1.0, abs(h[lane])), CLOSEST * scale)
             scale = 1.0 / allowed
             e3 += (third[m] * scale) ** 2
             e5 += (fifth[m] * scale) ** 2

@@ -207,7 +207,9 @@ class StepWriter(LaneWriter):
         own = self._smaller(b.select(line, size, unit), self.constant(1.0))
         least = self._larger(self._mul(atol, own), self.constant(LEAST))
         a = self._sum(self._mul(rtol, self._smaller(far, unit)), least)
-        c = self._sum(self._mul(rtol, fast), least)
+        # Of a rate, what adds up to that in a step, if that is longer than a second.
+        part = self._mul(least, self._smaller(self._size(per), self.constant(1.0)))
+        c = self._sum(self._mul(rtol, fast), part)
         noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
         return a, self._larger(c, noise)
 
