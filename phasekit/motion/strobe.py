@@ -46,12 +46,12 @@ def common_period(law: PerturbedConservative, values: Mapping[str, Array]) -> Ar
 def _period(frequencies: Array) -> float:
     if not (np.isfinite(frequencies).all() and (frequencies > 0.0).all()):
         return float("nan")
-    base = float(frequencies[0])
+    base = float(frequencies.min())
     turns = 1
-    for frequency in frequencies[1:]:
+    for frequency in frequencies:
         ratio = float(frequency) / base
         near = Fraction(ratio).limit_denominator(DENOMINATOR)
-        if near == 0 or abs(ratio - near) > 1e-12 * ratio:
+        if abs(ratio - near) > min(1e-12 * ratio, 1e-9):  # of great ones some come near by chance
             return float("nan")
         turns = int(np.lcm(turns, near.denominator))
     return 2.0 * np.pi * turns / base

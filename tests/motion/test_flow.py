@@ -421,6 +421,27 @@ def test_events_that_touch_zero_and_turn_back():
     assert missed.sizes["event"] == 0
 
 
+def test_events_of_any_size_at_any_time():
+    system = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), forcing=pk.Harmonic(1e-3, 1.0))
+    for factor in (1e-200, 1e200):
+        for power in (1, 2, 3):
+
+            def event(t, x, v, factor=factor, power=power):
+                return factor * (t - 7.3) ** power
+
+            found = pk.flow(system, 0.3, 0.1, [20.0], events=event).event_time.values
+            assert found == pytest.approx([7.3], abs=1e-4 if power == 3 else 1e-8)
+    late = pk.flow(system, 0.3, 0.1, [0.0, 400.0], events={
+        "corner": lambda t, x, v: abs(t - 399.7), "touch": lambda t, x, v: (t - 399.6) ** 2,
+    })  # fmt: skip
+    assert late.event_name.values.tolist() == ["touch", "corner"]
+    assert late.event_time.values == pytest.approx([399.6, 399.7], abs=1e-7)
+    # a time without value is none at which a motion could end
+    found = pk.flow(system, 0.3, 0.1, [np.nan, 8.0], events=lambda t, x, v: t - 7.3)
+    assert found.event_time.values == pytest.approx([7.3])
+    assert np.isnan(found.motion_phi.values).tolist() == [True, False]
+
+
 def test_events_of_what_has_none_are_refused():
     system = pk.Perturbed(EIGHT, damping=0.1)
     with pytest.raises(pk.ParameterError, match="wants nothing, or one motion"):
