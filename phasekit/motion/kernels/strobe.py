@@ -140,13 +140,11 @@ def strobe(
                 if skip <= done[lane] < skip + out.shape[1]:
                     out[own, done[lane] - skip, 0] = phi
                     out[own, done[lane] - skip, 1] = dphi
-                near = nearest_of(phi, dphi, points, period, scale)
                 inside = box_of(phi, dphi, period, box, boxes)
-                if stays(lane, inside, visits, last, same) and near < 0:
-                    near = inside
-                if near >= 0:
-                    code[own] = near
-                ended = near >= 0 or done[lane] >= many
+                code[own] = nearest_of(phi, dphi, points, period, scale)
+                if stays(lane, inside, visits, last, same) and code[own] < 0:
+                    code[own] = inside
+                ended = code[own] >= 0 or done[lane] >= many
                 if not ended:
                     resume(lane, done[lane], legs[own], again[own], real, whole)
                     fresh = fresh or again[own]
