@@ -89,10 +89,10 @@ def flow(
     is used ([HairerNorsettWanner1993] II.5), whose steps are interpolated to the seventh order.
     Quadratic damping is not smooth where the motion turns: steps end there. Motions that linear
     damping holds back for more than 6e7 of its own times are followed by Radau's implicit method
-    of order 5, with an rtol of at least 1e-13, and by DOP853 where that gives up. A motion ends
-    after 10,000,000 steps. Events are looked for along steps of DOP853, of which there may be
-    1,000,000. Where damping, torque and drive are all zero, the motion in the potential of
-    (A, B, C) is the exact one.
+    of order 5 ([HairerWanner1996] IV.8), with an rtol of at least 1e-13, and by DOP853 where that
+    gives up. A motion ends after 10,000,000 steps. Events are looked for along steps of DOP853, of
+    which there may be 1,000,000. Where damping, torque and drive are all zero, the motion in the
+    potential of (A, B, C) is the exact one.
 
     Examples
     --------

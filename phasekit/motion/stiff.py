@@ -2,7 +2,7 @@
 
 An explicit method takes steps of the order of the time in which damping acts, however slowly the
 motion goes on. Where these would be too many, Radau's method of order 5 takes its place, motion by
-motion ([HairerNorsettWanner1993]; the implementation is SciPy's).
+motion ([HairerWanner1996] IV.8; the implementation is SciPy's).
 """
 
 from __future__ import annotations
