@@ -337,3 +337,68 @@ def kappa(disk):
     """Euler's torque of omega1' is -kappa cos phi."""
     s, c, r, e = np.sin(disk.beta), np.cos(disk.beta), disk.r, disk.e
     return (r * r + 4 * e * e) * s * c / (4 * e * e * s * s + r * r * (1 + s * s))
+
+
+@pytest.mark.parametrize("k", [1.0, 1e-9, 1e9])
+def test_a_constant_in_the_potential_does_not_matter(k):
+    """Both saddles stand at V = 0, or at the constant; the wells between them differ in size."""
+    x = np.linspace(0.0, np.pi, 4001)
+    areas = [
+        2.0 * np.trapezoid(np.sqrt(2.0 * k * np.sin(x) ** 2 * (1.0 + s * np.sin(x))), x)
+        for s in (-0.3, 0.3)
+    ]
+    damping, torque = 0.01 * k**0.5, 0.02 * k
+    values = {"k": k, "c": k * np.array([0.0, 1.0, -3.0, 1e3])}
+    text = "-k*sin(x)^2*(1 + 0.3*sin(x)) + c"
+    slope = pk.Perturbed(
+        pk.Potential(text, "x", values, period="2*pi"), damping=damping, torque=torque
+    )
+    inside = damping * sum(areas)
+    arriving = 0.5 * inside + 2.0 * np.pi * torque
+    assert inside < arriving
+    for start in ("outside", "rotation"):
+        ds = pk.capture(slope, start=start)
+        assert ds.capture_flux.shape == (4, 3)
+        flux = ds.capture_flux.values
+        assert flux[:, :2].sum(axis=1) == pytest.approx(np.full(4, inside), rel=1e-5)
+        share = ds.capture_probability.values
+        caught = 1.0 if start == "outside" else inside / arriving
+        want = [caught * areas[0] / sum(areas), caught * areas[1] / sum(areas), 1.0 - caught]
+        assert share == pytest.approx(np.tile(want, (4, 1)), abs=1e-5)
+
+
+@pytest.mark.parametrize("start", ["outside", "rotation"])
+def test_two_wells_on_one_level_share_alike_by_formula_and_by_coefficients(start):
+    perturbed = [
+        pk.Perturbed(one, damping=0.002, torque=0.004)
+        for one in (
+            pk.Coefficients(1.0, 0.0, 0.4),
+            pk.Potential("cos(phi)^2/2 - 0.4*sin(phi)", "phi", period="2*pi"),
+        )
+    ]
+    closed, numerical = (odds(one, start=start) for one in perturbed)
+    assert abs(closed[0] - closed[1]) > 0.1
+    assert sorted(numerical[:2]) == pytest.approx(sorted(closed[:2]), rel=1e-9)
+    assert numerical[2] == pytest.approx(closed[2], rel=1e-9, abs=1e-12)
+
+
+def test_of_three_wells_left_and_right_are_not_all():
+    """From rotation it may fall into the third one, which two shares would hide."""
+    text = "cos(x) + 0.5*cos(2*x) + 0.7*cos(3*x) + 0.1*sin(x)"
+    three = pk.Potential(text, "x", period="2*pi")
+    assert int((pk.equilibria(three).kind == pk.EquilibriumKind.CENTER).sum()) == 3
+    found = pk.capture(pk.Perturbed(three, damping=0.01), start="rotation")
+    assert np.isnan(found.capture_probability).all()
+    assert np.isnan(found.capture_flux).all()
+    outside = pk.capture(pk.Perturbed(three, damping=0.01)).capture_probability.values
+    assert outside.sum() == pytest.approx(1.0)
+
+
+def test_on_a_line_nothing_rotates():
+    """Saddles on one level: the arcs on both sides of the middle one make no turn."""
+    line = pk.Potential("cos(3*x)", "x", interval=(-2.4, 2.4))
+    assert (pk.separatrices(line).loop == pk.Loop.HETEROCLINIC).sum() == 3
+    found = pk.capture(pk.Perturbed(line, damping=0.01), start="rotation")
+    assert found.capture_flux.size == 3
+    assert np.isnan(found.capture_flux).all()
+    assert np.isnan(found.capture_probability).all()
