@@ -76,6 +76,8 @@ class PerturbedConservative(Law):
         That angular velocity as a function or a table of time.
     unit : str
         Unit of the amplitude of the first harmonic, of the forcing or else of a modulation.
+    torqued : bool
+        Whether there is a constant torque, of which equations then tell.
     """
 
     called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
@@ -89,6 +91,7 @@ class PerturbedConservative(Law):
     rate: Rate | None = None
     prescribed: Any = field(default=None, compare=False)
     unit: str = "s-2"
+    torqued: bool = field(default=True, compare=False)
 
     @property
     def may_be_incomplete(self) -> bool:
@@ -102,7 +105,7 @@ class PerturbedConservative(Law):
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity: as of the potential, but that the torque has a part in it."""
         words = dict(self.base.words(name, units, long_name))
-        if name in _STANDING:
+        if self.torqued and name in _STANDING:
             words["equation"] = _STANDING[name]
         if name == "chaos_threshold" and self.unit != units:
             words["units"] = self.unit
@@ -173,7 +176,7 @@ class PerturbedRouthian(PerturbedConservative):
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity: energies are no longer per unit of inertia."""
         words = dict(self.base.words(name, units, long_name))
-        if name in _STEADY:
+        if self.torqued and name in _STEADY:
             words["equation"] = _STEADY[name]
         if name in _MOTION:
             words["equation"] = (

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import EquilibriumKind, Loop
+from phasekit.errors import Loop
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
@@ -33,18 +33,10 @@ class Capture(NamedTuple):
     capture_probability: Array
 
 
-class Landscape(NamedTuple):
-    """What of the potentials, one a cell, tells levels from rounding and wells from others."""
-
-    wells: Any
-    energy_size: Any
+def energy_size(points: Any) -> Array:
     """Greatest energy of an equilibrium without its sign, a constant in V included."""
-
-    @classmethod
-    def of(cls, points: Any) -> Landscape:
-        """From the equilibria."""
-        size = np.abs(np.where(points.kind > 0, points.energy, 0.0)).max(axis=-1, initial=0.0)
-        return cls((points.kind == EquilibriumKind.CENTER).sum(axis=-1), size)
+    energies = np.abs(np.where(points.kind > 0, points.energy, 0.0))
+    return np.asarray(energies.max(axis=-1, initial=0.0))
 
 
 def capture(
@@ -71,38 +63,48 @@ def capture_numerical(
     points, loops = functions.phase_space(formula, *(values[name] for name in formula.names))
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
     circle = formula.period is not None
-    return of_loops(loops, loss, Landscape.of(points), rotation=rotation, circle=circle)
+    return of_loops(loops, loss, energy_size(points), rotation=rotation, circle=circle)
 
 
 def of_loops(
-    loops: Any, loss: Array, ground: Landscape, *, rotation: bool, circle: bool = True
+    loops: Any, loss: Array, size: Array, *, rotation: bool, circle: bool = True
 ) -> Capture:
-    """Capture by the separatrices of numbered saddles, and what they lose on each side."""
+    """Capture by the separatrices of numbered saddles, and what they lose on each side.
+
+    Energies are of a size that rounding is measured by.
+    """
     if not loss.shape[-2]:
         nothing = np.full((*loss.shape[:-2], 2), np.nan)
         return regions(nothing, nothing, np.zeros(loss.shape[:-2], bool), rotation)
     height, loop = (np.broadcast_to(x, loss.shape[:-1]) for x in (loops.saddle_energy, loops.loop))
-    wells, size = (np.broadcast_to(x, loss.shape[:-2]) for x in ground)
-    lowest = np.where(loop == Loop.LOBES, height, np.inf)
-    at = lowest.argmin(-1)[..., None]
-    found = np.isfinite(np.take_along_axis(lowest, at, -1))
-    lobes = np.where(found, np.take_along_axis(loss, at[..., None], -2)[..., 0, :], np.nan)
+    wells = (loop != Loop.ABSENT).sum(axis=-1)  # on a circle as many as saddles
+    near = LEVEL * np.broadcast_to(size, loss.shape[:-2])[..., None]
+    eights = loop == Loop.LOBES
+    lowest = np.where(eights, height, np.inf).min(-1, keepdims=True)
+    eights = eights & (height <= lowest + near)
+    first = np.take_along_axis(loss, eights.argmax(-1)[..., None, None], -2)[..., 0, :]
+    lobes = np.where(eights.any(-1, keepdims=True), first, np.nan)
     winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC)) & circle
-    highest = np.where(winds, height, -np.inf)
-    top = highest.max(-1, keepdims=True)
+    top = np.where(winds, height, -np.inf).max(-1, keepdims=True)
     # A turn on a level of several saddles is an arc of each.
-    arcs = winds & (top - highest <= LEVEL * size[..., None])
-    winding = np.where(arcs[..., None], loss, 0.0).sum(axis=-2)
-    winding = np.where(arcs.any(-1, keepdims=True), winding, np.nan)
+    arcs = winds & (height >= top - near)
     number = arcs.sum(axis=-1)
-    if loss.shape[-2] > 1:  # two wells end in an arc of both their saddles, there and back
-        pair = np.argsort(~arcs, axis=-1, kind="stable")[..., :2, None]
-        one, other = np.moveaxis(np.take_along_axis(loss, pair, -2), -2, 0)
-        two = ((number == 2) & (wells == 2))[..., None]
-        lobes = np.where(two, one + other[..., ::-1], lobes)
-    if rotation:  # of three wells or more two would be no answer
-        winding = np.where((wells <= 2)[..., None], winding, np.nan)
-    return regions(lobes, winding, wells == 1, rotation)
+    winding = np.where(number[..., None] > 0, _total(loss, arcs), np.nan)
+    if rotation:  # left and right are all that is there if each arc holds an eight
+        each = (wells == 2 * number) & (eights.sum(axis=-1) == number)
+        each &= (loop == Loop.LOBES).sum(axis=-1) == number
+        lobes = np.where(each[..., None], _total(loss, eights), np.nan)
+    pair = (number == 2) & (wells == 2)
+    if pair.any():  # both wells end in an arc of each saddle, there and back
+        two = np.argsort(~arcs, axis=-1, kind="stable")[..., :2, None]
+        one, other = np.moveaxis(np.take_along_axis(loss, two, -2), -2, 0)
+        lobes = np.where(pair[..., None], one + other[..., ::-1], lobes)
+    return regions(lobes, winding, (wells == number) & ~pair, rotation)
+
+
+def _total(loss: Array, saddles: Any) -> Array:
+    """What is lost at some saddles together."""
+    return np.asarray(np.where(saddles[..., None], loss, 0.0).sum(axis=-2))
 
 
 def regions(lobes: Array, winding: Array, single: Any, rotation: bool) -> Capture:

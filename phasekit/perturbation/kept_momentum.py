@@ -21,7 +21,7 @@ from phasekit.laws.perturbed import PerturbedRouthian
 from phasekit.mechanics.at_momentum import AtMomentum, Machines
 from phasekit.mechanics.steady import Steady, steady_at
 from phasekit.mechanics.two_degrees import TwoDegrees
-from phasekit.perturbation.capture import Capture, Landscape, of_loops
+from phasekit.perturbation.capture import Capture, energy_size, of_loops
 from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
 from phasekit.perturbation.quadrature import CELLS, POINTS, Paths, along, closed, times_of
 from phasekit.phase.numerical import motion
@@ -66,8 +66,8 @@ def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
 
 def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
-    loops, levels, found = _along_separatrices(law, parameters)
-    return of_loops(loops, -found.melnikov_mean, levels, rotation=rotation)
+    loops, size, found = _along_separatrices(law, parameters)
+    return of_loops(loops, -found.melnikov_mean, size, rotation=rotation)
 
 
 # ------------------------------------------------------------------------- energies
@@ -125,10 +125,8 @@ def _machines(law: PerturbedRouthian) -> Machines:
 # ------------------------------------------------------------------------- separatrices
 
 
-def _along_separatrices(
-    law: PerturbedRouthian, parameters: Any
-) -> tuple[Loops, Landscape, Melnikov]:
-    """Separatrices of the cells, what their levels are measured by, and Melnikov's function."""
+def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops, Array, Melnikov]:
+    """Separatrices of the cells, the size of their energies, and Melnikov's function."""
     refuse_prescribed(law, "melnikov")
     values = law.values(*parameters)
     shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
@@ -138,7 +136,7 @@ def _along_separatrices(
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
     order = np.argsort(which.reshape(-1), kind="stable")
-    parts: list[tuple[Any, ...]] = []
+    parts: list[tuple[Loops, Array, Melnikov]] = []
     for start in range(0, order.size, CELLS):
         rows = order[start : start + CELLS]
         machines, own = np.unique(which.reshape(-1)[rows], return_inverse=True)
@@ -147,27 +145,25 @@ def _along_separatrices(
         weight = np.asarray(one.machine.Jn).reshape(-1)[rows, None, None]
         parts.append(_part(law, followed, own.reshape(-1), own_values, weight))
     width = max((part[0].loop.shape[1] for part in parts), default=0)
-    found: list[Any] = []
-    for kind in (Loops, Landscape, Melnikov):
-        fields = zip(*(part[len(found)] for part in parts), strict=True)
-        whole = [np.concatenate([_wide(x, width, 1) for x in field]) for field in fields]
-        found.append(kind(*(x[np.argsort(order)].reshape(shape + x.shape[1:]) for x in whole)))
-    return tuple(found)
+    fields = zip(*((*loops, size, *found) for loops, size, found in parts), strict=True)
+    back = np.argsort(order)
+    whole = [np.concatenate([_wide(x, width, 1) for x in field])[back] for field in fields]
+    shaped = [x.reshape(shape + x.shape[1:]) for x in whole]
+    number = len(Loops._fields)
+    return Loops(*shaped[:number]), shaped[number], Melnikov(*shaped[number + 1 :])
 
 
 def _part(
     law: PerturbedRouthian, followed: Sequence[Followed], which: Any, values: dict[str, Array],
     weight: Array,
-) -> tuple[Loops, Landscape, Melnikov]:  # fmt: skip
+) -> tuple[Loops, Array, Melnikov]:  # fmt: skip
     """The same of some cells in a row, each the machine of a number."""
     width = max((len(each.loops.loop) for each in followed), default=0)
     loops = Loops(
         *(np.stack([_wide(getattr(each.loops, name), width) for each in followed])[which]
           for name in Loops._fields)
     )  # fmt: skip
-    levels = Landscape(
-        *(np.stack(x)[which] for x in zip(*(f.levels for f in followed), strict=True))
-    )
+    size = np.array([each.size for each in followed])[which]
     found: Melnikov | None = None
     for points in POINTS:
         moved = [motions_of(each, points) for each in followed]
@@ -184,7 +180,7 @@ def _part(
         if not rows.size:
             break
     assert found is not None
-    return loops, levels, found
+    return loops, size, found
 
 
 def _wide(values: Any, width: int, axis: int = 0) -> Any:
@@ -201,7 +197,8 @@ class Followed:
     """The separatrices of one machine at a momentum, along arc length."""
 
     loops: Loops
-    levels: Landscape
+    size: float
+    """Of the energies of its equilibria."""
     path: ArcLength | None
     ground: Any
     columns: npt.NDArray[np.intp]
@@ -210,7 +207,7 @@ class Followed:
 
 NOTHING = Followed(
     Loops(np.empty(0), np.empty(0), np.empty(0, np.int8)),
-    Landscape(0, np.nan),
+    np.nan,
     None,
     None,
     np.empty(0, np.intp),
@@ -244,8 +241,7 @@ def separatrices_of(*constants: float) -> Followed:
     fields = (found.saddle_energy, found.saddle_exponent, found.loop)
     columns = saddles_of(ground)[1][order]
     loops = Loops(*(field[0][order] for field in fields))
-    levels = Landscape(*(x[0] for x in Landscape.of(ground.points)))
-    return Followed(loops, levels, path, ground, columns)
+    return Followed(loops, float(energy_size(ground.points)[0]), path, ground, columns)
 
 
 @functools.lru_cache(maxsize=64)

@@ -204,6 +204,7 @@ class Perturbed(Model):
             rate=self.system.frame_rate,
             prescribed=self.omega1,
             unit=self._driven_unit(),
+            torqued=not (isinstance(self.torque, float) and self.torque == 0.0),
         )
         return law
 

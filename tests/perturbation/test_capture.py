@@ -394,6 +394,26 @@ def test_of_three_wells_left_and_right_are_not_all():
     assert outside.sum() == pytest.approx(1.0)
 
 
+def test_a_circle_that_is_gone_round_several_times():
+    """Its cells are alike: the shares are those of one, and all cells together turn."""
+    eight = "cos(x)^2/2 - 0.35*cos(x) - 0.12*sin(x)"
+    for text in (eight, "-cos(x) + 0.2*sin(2*x)"):
+        single = text != eight
+        found = []
+        for turns in (1, 3):
+            circle = pk.Potential(text, "x", period=f"{2 * turns}*pi")
+            damped = pk.Perturbed(circle, damping=0.01, torque=0.02)
+            ds = pk.capture(damped, start="rotation")
+            assert ds.capture_probability.sum() == pytest.approx(1.0)
+            found.append((ds.capture_probability.values, ds.capture_flux.values / turns))
+            outside = pk.capture(damped).capture_probability.values
+            assert np.isnan(outside).all() == single
+        for one, other in zip(*found, strict=True):
+            assert one == pytest.approx(other, rel=1e-9)
+        assert 0.1 < found[0][0][2] < 0.9
+        assert (found[0][0][1] == 0.0) == single
+
+
 def test_on_a_line_nothing_rotates():
     """Saddles on one level: the arcs on both sides of the middle one make no turn."""
     line = pk.Potential("cos(3*x)", "x", interval=(-2.4, 2.4))
