@@ -51,7 +51,9 @@ def capture(
     joined = loops.loop[..., :1] == Loop.HETEROCLINIC
     lobes = loss[..., 0, :] + np.where(joined, loss[..., 1, ::-1], 0.0)
     winding = loss[..., 1, :] + np.where(joined, loss[..., 0, :], 0.0)  # a turn is both arcs
-    return regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), rotation)
+    push = winding[..., 0] - winding[..., 1]
+    push = np.where(np.abs(push) > LEVEL * np.abs(winding).max(axis=-1), push, 0.0)
+    return regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), push if rotation else None)
 
 
 def capture_numerical(
@@ -63,19 +65,20 @@ def capture_numerical(
     points, loops = functions.phase_space(formula, *(values[name] for name in formula.names))
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
     circle = formula.period is not None
-    return of_loops(loops, loss, energy_size(points), rotation=rotation, circle=circle)
+    push = values["torque"] if rotation else None
+    return of_loops(loops, loss, energy_size(points), push, circle=circle)
 
 
 def of_loops(
-    loops: Any, loss: Array, size: Array, *, rotation: bool, circle: bool = True
+    loops: Any, loss: Array, size: Array, push: Array | None, *, circle: bool = True
 ) -> Capture:
     """Capture by the separatrices of numbered saddles, and what they lose on each side.
 
-    Energies are of a size that rounding is measured by.
+    Energies are of a size that rounding is measured by; of a push see `regions`.
     """
     if not loss.shape[-2]:
         nothing = np.full((*loss.shape[:-2], 2), np.nan)
-        return regions(nothing, nothing, np.zeros(loss.shape[:-2], bool), rotation)
+        return regions(nothing, nothing, np.zeros(loss.shape[:-2], bool), push)
     height, loop = (np.broadcast_to(x, loss.shape[:-1]) for x in (loops.saddle_energy, loops.loop))
     wells = (loop != Loop.ABSENT).sum(axis=-1)  # on a circle as many as saddles
     near = LEVEL * np.broadcast_to(size, loss.shape[:-2])[..., None]
@@ -90,7 +93,7 @@ def of_loops(
     arcs = winds & (height >= top - near)
     number = arcs.sum(axis=-1)
     winding = np.where(number[..., None] > 0, _total(loss, arcs), np.nan)
-    if rotation:  # left and right are all that is there if each arc holds an eight
+    if push is not None:  # left and right are all that is there if each arc holds an eight
         each = (wells == 2 * number) & (eights.sum(axis=-1) == number)
         each &= (loop == Loop.LOBES).sum(axis=-1) == number
         lobes = np.where(each[..., None], _total(loss, eights), np.nan)
@@ -99,7 +102,7 @@ def of_loops(
         two = np.argsort(~arcs, axis=-1, kind="stable")[..., :2, None]
         one, other = np.moveaxis(np.take_along_axis(loss, two, -2), -2, 0)
         lobes = np.where(pair[..., None], one + other[..., ::-1], lobes)
-    return regions(lobes, winding, (wells == number) & ~pair, rotation)
+    return regions(lobes, winding, (wells == number) & ~pair, push)
 
 
 def _total(loss: Array, saddles: Any) -> Array:
@@ -107,19 +110,19 @@ def _total(loss: Array, saddles: Any) -> Array:
     return np.asarray(np.where(saddles[..., None], loss, 0.0).sum(axis=-2))
 
 
-def regions(lobes: Array, winding: Array, single: Any, rotation: bool) -> Capture:
+def regions(lobes: Array, winding: Array, single: Any, push: Array | None) -> Capture:
     """Fluxes and probabilities from the losses of the lobes and of both winding branches.
 
-    Where a single well is, there are no lobes.
+    A push forward brakes what comes from rotation backward; without any it comes forward. None: it
+    comes from outside the lobes. Where a single well is, there are no lobes.
     """
-    if not rotation:
+    if push is None:
         flux = np.concatenate([lobes, np.zeros((*lobes.shape[:-1], 1))], axis=-1)
         flux[np.isnan(lobes).any(axis=-1)] = np.nan
         flux[..., 2] -= np.minimum(lobes.sum(axis=-1), 0.0)
         return Capture(flux, _shares(lobes))
     with np.errstate(all="ignore"):
-        # What is braked loses more; forward where nothing tells, within rounding.
-        forward = ~(winding[..., 0] - winding[..., 1] > 1e-9 * np.abs(winding).max(axis=-1))
+        forward = np.broadcast_to(~(push > 0.0), winding.shape[:-1])
         arriving = np.where(forward, winding[..., 1], winding[..., 0])
         inside = winding.sum(axis=-1)
         share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)

@@ -67,7 +67,8 @@ def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
 def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
     loops, size, found = _along_separatrices(law, parameters)
-    return of_loops(loops, -found.melnikov_mean, size, rotation=rotation)
+    push = law.values(*parameters)["torque"] if rotation else None
+    return of_loops(loops, -found.melnikov_mean, size, push)
 
 
 # ------------------------------------------------------------------------- energies

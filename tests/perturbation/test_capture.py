@@ -422,3 +422,13 @@ def test_on_a_line_nothing_rotates():
     assert found.capture_flux.size == 3
     assert np.isnan(found.capture_flux).all()
     assert np.isnan(found.capture_probability).all()
+
+
+@pytest.mark.parametrize("torque", [1e-12, -1e-12, 1e-3, -1e-3, 0.0])
+def test_however_small_the_torque_its_sense_tells_what_it_brakes(torque):
+    formula = pk.Potential("-cos(phi) + 0.2*sin(phi)", "phi", period="2*pi")
+    for one in (pk.Coefficients(0.0, 1.0, -0.2), formula):
+        found = odds(pk.Perturbed(one, damping=0.01, torque=torque), start="rotation")
+        left, right = (found[0], found[1]) if torque > 0.0 else (found[1], found[0])
+        assert left > 0.9
+        assert right == 0.0
