@@ -33,7 +33,8 @@ def end_of(
     cycles: Cycles, before: State, made: Point, start: Point
 ) -> tuple[Point | None, Stop] | None:
     """The last point and the reason, if the family ends between two points."""
-    small = np.mean(cycles.amplitudes(made.orbit) / cycles.scale) < 4.0 * made.step
+    sizes = (cycles.amplitudes(made.orbit) / cycles.scale).tolist()
+    small = sum(sizes) < 4.0 * made.step * len(sizes)
     if small and not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
         return _at_hopf(cycles, before, made)
     if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit):
@@ -241,8 +242,8 @@ def _near_doubling(cycles: Cycles, made: Point) -> bool:
     """Whether the orbit can be a doubled one near its birth, with a multiplier near 1."""
     if cycles.forced and cycles.multiple % 2:
         return False
-    near = np.sum(np.abs(made.multipliers - 1.0) < 0.7)
-    return bool(near > (0 if cycles.forced else 1))
+    near = sum(abs(mu - 1.0) < 0.7 for mu in made.multipliers.tolist())
+    return near > (0 if cycles.forced else 1)
 
 
 def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:

@@ -19,9 +19,10 @@ from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
 ROUNDING = 1e-11  # of the residual, relative
+STALE = 10.0  # times the tolerance: the last step, if the residual after it is only looked at
 
 # How Newton's method ended.
-ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED = range(5)
+ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED, CHECKED = range(6)
 
 
 @routine
@@ -129,6 +130,28 @@ def condense(
                 W[j, r, k] = M[r, size + k]
     residual = worst / speed if speed > 0.0 else worst
     return sign, residual, speed, divergence
+
+
+@routine
+def residual_of(
+    jet_: Array, mesh: Array, slope: Array, scale: Array, x: Array, y: Array
+) -> tuple[float, float]:
+    """The largest residual beside the largest |T f|, and the latter (see `condense`)."""
+    m, n = slope.shape[0], x.shape[1]
+    speed, worst = 0.0, 0.0
+    for j in range(mesh.size - 1):
+        h = mesh[j + 1] - mesh[j]
+        for i in range(m):
+            for c in range(n):
+                f = y[0] * jet_[j * m + i, c]
+                total = -h * f
+                for k in range(m + 1):
+                    total += slope[i, k] * x[j * m + k, c]
+                if not np.isfinite(total):
+                    return np.inf, np.inf
+                speed = max(speed, abs(f) / scale[c])
+                worst = max(worst, abs(total / h) / scale[c])
+    return (worst / speed if speed > 0.0 else worst), speed
 
 
 @kernel
@@ -321,7 +344,8 @@ def newton(
     """Newton's method for an orbit, in its place, with the derivatives of f given or taken here.
 
     Returns how it ended, steps, sign of the determinant, residual, integral of the trace, the size
-    of the last step and the length of the tangent before it is made 1.
+    of the last step and the length of the tangent before it is made 1. Where it ended as checked,
+    W and the tangent are those of the last step; what was given to that is not known here.
     """
     m, n, q = nodes.size, x.shape[1], y.size
     places = x.shape[0]
@@ -329,6 +353,7 @@ def newton(
     border = rows_y.copy()
     w = np.zeros(2 * q + 2)
     sign, residual, divergence, size = 0.0, np.inf, np.nan, before
+    whole = before < np.inf and not damped
     for step in range(1, iterations + 1):
         for r in range(q):
             right[r] = target[r]
@@ -349,6 +374,12 @@ def newton(
             right[0] = multiple * w[own] - y[0]
         if not given:
             jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
+        if size <= STALE * tolerance and whole:
+            # Steps get shorter by squares: another one would be rounding, if nothing else is off.
+            left, speed = residual_of(jet_, mesh, slope, scale, x, y)
+            if left * min(speed, 1.0) < ROUNDING:
+                length = made_unit(mesh, weights, value, scale, width, dx[1], dy[1])
+                return CHECKED, step - 1, sign, left, divergence, size, length
         sign, residual, speed, divergence = condense(
             jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
         )
@@ -385,5 +416,5 @@ def newton(
             return FOUND, step, sign, residual, divergence, size, length
         if not damped and before < np.inf and size > 2.0 * before:
             return DIVERGED, step, sign, residual, divergence, size, 1.0
-        before = size
+        before, whole = size, part == 1.0
     return ON_ITS_WAY, iterations, sign, residual, divergence, size, 1.0

@@ -80,6 +80,7 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
         after = State(
             solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step),
             state.arclength + step, state.since + 1, state.since_start + 1,
+            (state.orbit, state.dx, state.dy),
         )  # fmt: skip
         return point, _meshed(cycles, after)
     where = ", ".join(f"{name} = {v:.9g}" for name, v in _named(cycles, state.orbit).items())
@@ -96,7 +97,7 @@ def _named(cycles: Cycles, orbit: Orbit) -> dict[str, float]:
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
     """Newton's method a step ahead, and the cosine of the turn; or why there is no point."""
     orbit, dx, dy = state.orbit, state.dx, state.dy
-    guess = Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+    guess = state.ahead(cycles, step)
     if not guess.y[0] > 0.0:
         return "the period vanished"
     for _ in range(4):
@@ -135,11 +136,22 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
 def _meshed(cycles: Cycles, state: State) -> State:
     """The state with a mesh that follows the orbit, every few points."""
     if state.since < REMESH:
-        return state
-    mesh = fitted(cycles, state.orbit)
-    orbit, (dx,) = cycles.on(mesh, state.orbit, state.dx)
+        return _moved(cycles, state, state.orbit.mesh)
+    moved = _moved(cycles, state, fitted(cycles, state.orbit))
     before = max(cycles.mesh_error(state.orbit), cycles.options.mesh_tolerance)
-    if not cycles.mesh_error(orbit) <= WORSE * before:
-        return replace(state, since=0)
-    length = np.sqrt(cycles.inner(mesh, dx, dx, state.dy, state.dy))
-    return replace(state, orbit=orbit, dx=dx / length, dy=state.dy / length, since=0)
+    if not cycles.mesh_error(moved.orbit) <= WORSE * before:
+        return replace(_moved(cycles, state, state.orbit.mesh), since=0)
+    dx, dy = moved.dx, moved.dy
+    length = np.sqrt(cycles.inner(moved.orbit.mesh, dx, dx, dy, dy))
+    return replace(moved, dx=dx / length, dy=dy / length, since=0)
+
+
+def _moved(cycles: Cycles, state: State, mesh: Array) -> State:
+    """The state on a mesh, with the point behind it."""
+    orbit, dx, behind = state.orbit, state.dx, state.behind
+    if orbit.mesh is not mesh:
+        orbit, (dx,) = cycles.on(mesh, orbit, dx)
+    if behind is not None and behind[0].mesh is not mesh:
+        last, (ex,) = cycles.on(mesh, *behind[:2])
+        behind = last, ex, behind[2]
+    return replace(state, orbit=orbit, dx=dx, behind=behind)
