@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, ends
+from phasekit.bifurcation.continuation.periodic import collocation, ends, homoclinic
 from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
@@ -43,7 +43,9 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
         made, state_or_stop = advance(cycles, state)
         if made is None:
             assert isinstance(state_or_stop, Stop)
-            return Track(tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop))
+            return Track(
+                tuple(found), state, homoclinic.when_stuck(cycles, state, start, state_or_stop)
+            )
         assert isinstance(state_or_stop, State)
         end = ends.end_of(cycles, state, made, start)
         if end is not None:
