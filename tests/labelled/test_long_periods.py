@@ -53,7 +53,7 @@ def test_a_family_goes_on_to_the_bound_of_its_period(name):
 @pytest.mark.parametrize("name", CASES)
 def test_a_family_goes_on_to_an_event_of_its_period(name):
     problem, parameter, _, span, period, at = CASES[name]
-    orbit = nearest(name).orbit(-1)
+    orbit = nearest(name).orbit(nearest(name).points.sizes["point"] // 2)
     there = problem.replace(**{parameter: float(orbit[parameter])})
     family = pk.continuation(
         there, parameter, orbit=orbit, span=span, events={"long": f"period - {period}"}, stop="long"

@@ -270,6 +270,8 @@ def jets(
     w = np.zeros(spare + n + a + 7 * n)
     for i in range(n + a):
         w[sizes + i] = scale[i]
+    if forced:
+        w[sizes + n] = y[0]
     t = 1 if forced else 0
     for i in range(t, a):
         w[u + n + i] = y[1 + i - t]
