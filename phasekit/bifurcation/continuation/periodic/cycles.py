@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
+from phasekit.bifurcation.continuation.periodic import along, collocation, kernels, newton
 from phasekit.bifurcation.continuation.periodic.jets import Jets
 from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
@@ -223,7 +223,7 @@ class Cycles:
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, self.sizes)
-            end, steps, side, residual, trace, size, length = kernels.newton(
+            end, steps, side, residual, trace, size, length = newton.newton(
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale,
                 self.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
@@ -232,15 +232,15 @@ class Cycles:
             step += steps
             if steps:  # else the last ones stand
                 sign, divergence = side, trace
-            if end != kernels.ON_ITS_WAY or step >= most:
+            if end != newton.ON_ITS_WAY or step >= most:
                 break
         orbit = Orbit(mesh, x, y)
-        if end in (kernels.FOUND, kernels.CHECKED):
+        if end in (newton.FOUND, newton.CHECKED):
             found = (step, residual, sign, divergence, W)
             return Solution(orbit, dx[1], dy[1], *found, length=length)
         message = {
-            kernels.NOT_FINITE: "f or its derivatives are not finite",
-            kernels.SINGULAR: "the equations are singular",
+            newton.NOT_FINITE: "f or its derivatives are not finite",
+            newton.SINGULAR: "the equations are singular",
         }.get(end, "Newton's method did not converge")
         return Solution(orbit, dx[1], dy[1], 0, residual, sign, divergence, W, message)
 
