@@ -6,6 +6,7 @@ import functools
 
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
 import phasekit as pk
 
@@ -74,12 +75,25 @@ def test_a_forced_function_in_other_units_of_time(t):
     assert np.allclose(sorted(folds), [1.043913708797, 1.049262399236], rtol=1e-8, atol=0.0)
 
 
-@pytest.mark.parametrize("t", [1e-6, 1e6])
+@pytest.mark.parametrize("t", [1e-12, 1e9])
 def test_a_conservative_family_in_other_units_of_time(t):
-    well = pk.Problem([f"v/{t!r}", f"-sin(x)/{t!r}"], ("x", "v"), {"g": 1.0}, conservative=True)
+    well = pk.Problem([f"v/{t!r}", f"-g*sin(x)/{t!r}"], ("x", "v"), {"g": 1.0}, conservative=True)
     first = pk.periodic_orbit(well, [1.0, 0.0], 6.7 * t)
     exact = 6.699975664370451  # 4 K(sin^2(1/2))
     assert float(first.period) / t == pytest.approx(exact, rel=1e-10)
     family = pk.continuation(well, "period", orbit=first, span=(1.0 * t, 9.0 * t))
     assert [stop.reason for stop in family.stops] == ["hopf", "bound"]
     assert float(family.points.period[0]) / t == pytest.approx(2 * np.pi, rel=1e-3)
+    alike = pk.continuation(well, "g", orbit=first, span=(0.9, 1.1), fix="period")
+    assert [stop.reason for stop in alike.stops] == ["bound", "bound"]
+    top, g = alike.points.x_max.values, alike.points.g.values
+    assert np.allclose(4.0 * ellipk(np.sin(top / 2) ** 2), exact * np.sqrt(g), rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize("t", [1.0, 1e9])
+def test_energy_that_is_lost_is_noticed_in_any_units_of_time(t):
+    damped = pk.Problem(
+        [f"v/{t!r}", f"-(sin(x) + g*v)/{t!r}"], ("x", "v"), {"g": 1e-4}, conservative=True
+    )
+    with pytest.raises(pk.ConvergenceError, match="not conserved"):
+        pk.periodic_orbit(damped, [1.0, 0.0], 6.7 * t)

@@ -215,6 +215,8 @@ def _spans(problem: Problem, free: list[str], span: Any) -> list[tuple[float, fl
             raise bad(
                 "span", (low, high), f"a span that holds the problem's own {name} = {value:.9g}"
             )
+    if len(spans) < len(free) and free[1] == UNFOLDING:
+        spans.append((-np.inf, np.inf))  # it stays zero: steps are not measured by it
     if len(spans) < len(free):
         value = problem.parameters[free[1]]
         reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])

@@ -29,10 +29,10 @@ from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
 
+UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservative system closes
 TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
 LONGEST = 2000  # steps of the slowest time scale that a search for a return may take
 SAMPLES = 2001
-UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservative system closes
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 

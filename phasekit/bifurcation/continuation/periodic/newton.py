@@ -13,7 +13,8 @@ from phasekit.numerics.native import call
 
 FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
 ROUNDING = 1e-11  # of the residual, relative
-STALE = 10.0  # times the tolerance: the last step, if the residual after it is only looked at
+# The longest last step after which the residual is only looked at, beside the tolerance and at all.
+LONGER, LONGEST = 10.0, 1e-10
 
 # How Newton's method ended.
 ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED, CHECKED = range(6)
@@ -99,7 +100,7 @@ def newton(
             right[0] = multiple * w[own] - y[0]
         if not given:
             jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
-        if size <= STALE * tolerance and whole:
+        if size <= min(LONGER * tolerance, LONGEST) and whole:
             # Steps get shorter by squares: another one would be rounding, if nothing else is off.
             left, speed = residual_of(jet_, mesh, slope, scale, x, y)
             if left * min(speed, 1.0) < ROUNDING:
