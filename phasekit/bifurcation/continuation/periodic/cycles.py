@@ -158,6 +158,7 @@ class Cycles:
     def sizes(self) -> Array:
         """Sizes of states and active parameters, for differences; that of time is the period."""
         time = np.ones(1) if self.forced else np.ones(0)
+        # F is linear in what has no span: any size will do.
         width = np.where(np.isfinite(self.width), self.width, 1.0)
         return np.concatenate([self.scale, time, width])
 
