@@ -75,6 +75,9 @@ class Jets:
             return out
         f = out[:, :n] = self._values(x, given)
         slopes = np.empty((len(x), n, n + a))
+        sizes = scale.tolist()
+        if self.forced:
+            sizes[n] = float(y[0])
         begin = 0
         if field.jacobian is not None:
             slopes[:, :, :n] = [
@@ -82,12 +85,8 @@ class Jets:
             ]
             begin = n
         for j in range(begin, n + a):
-            size = (
-                float(np.max(np.abs(x[:, j])))
-                if j < n
-                else float(np.max(np.abs(self._p(given, j - n))))
-            )
-            h = STEP * 2.0 ** np.floor(np.log2(max(size, scale[j])))
+            size = float(np.max(np.abs(x[:, j] if j < n else self._p(given, j - n))))
+            h = STEP * 2.0 ** np.floor(np.log2(max(size, sizes[j])))
 
             def at(k: float, j: int = j, h: float = h) -> Array:
                 if j >= n:
