@@ -9,14 +9,14 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.fields import Field
-from phasekit.bifurcation.continuation.periodic import along
+from phasekit.bifurcation.continuation.periodic import along, lines
 from phasekit.bifurcation.continuation.periodic.collocation import at_gauss, scheme
 from phasekit.errors import PhasekitError
 from phasekit.numerics import differences
 
 Array = npt.NDArray[np.float64]
 
-STEP = 2.0**-10  # of differences of fourth order
+STEP = 2.0**-10  # of differences of fourth order, at first
 SAME = 1e-13  # by which f of many states at once may differ from f of each
 
 
@@ -81,6 +81,8 @@ class Jets:
                 field.slopes(one.copy(), self._at(given, i)) for i, one in enumerate(x)
             ]
             begin = n
+        columns = []
+        noise = lines.EPSILON * np.max(np.abs(f), axis=0)
         for j in range(begin, n + a):
             size = (
                 float(np.max(np.abs(x[:, j])))
@@ -89,16 +91,19 @@ class Jets:
             )
             h = STEP * 2.0 ** np.floor(np.log2(max(size, scale[j])))
 
-            def at(k: float, j: int = j, h: float = h) -> Array:
+            def at(k: float, j: int = j) -> Array:
                 if j >= n:
                     name = names[j - n]
-                    return self._values(x, given | {name: given[name] + k * h})
+                    return self._values(x, given | {name: given[name] + k})
                 shifted = x.copy()
-                shifted[:, j] += k * h
+                shifted[:, j] += k
                 return self._values(shifted, given)
 
-            near, far = at(1.0) - at(-1.0), at(2.0) - at(-2.0)
-            slopes[:, :, j] = (8.0 * near - far) / (12.0 * h)
+            near, wide = ((at(k) - at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
+            columns.append((j, at, h, wide, near))
+            noise += lines.EPSILON * h / STEP * np.max(np.abs(near), axis=0)
+        for j, *found in columns:
+            slopes[:, :, j] = lines.slope_along(*found, noise)
         out[:, n:] = slopes.reshape(len(x), -1)
         out[~np.isfinite(f).all(axis=1), :] = np.nan
         return out

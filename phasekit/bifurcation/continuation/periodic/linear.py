@@ -7,10 +7,11 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.lines import Derivatives, along_line
 
 Array = npt.NDArray[np.float64]
 
-REACH = 2.0**-8  # of differences along a function, beside the sizes of the states
+REACH = 2.0**-8  # of the first differences along a function, beside the sizes of the states
 CLOSE = 2.0**-10  # the same of a parameter, beside its span
 
 
@@ -18,13 +19,15 @@ class Linear:
     """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g."""
 
     def __init__(self, cycles: Cycles, orbit: Orbit) -> None:
+        #: Whether derivatives of f_x are those of other steps, which tell of their errors.
+        self.other = False
         self.cycles, self.orbit, self.m = cycles, orbit, cycles.m
         n = self.n = cycles.n
         whole = self._jets(orbit.x)
         self.f = whole[:, :n]
         self.slopes = whole[:, n:].reshape(len(whole), n, -1)
         self.A = self.slopes[:, :, :n]
-        self._along: dict[bytes, tuple[Array, Array]] = {}
+        self._along: dict[bytes, Derivatives] = {}
 
     def _jets(self, x: Array, y: Array | None = None) -> Array:
         o = self.orbit
@@ -48,37 +51,31 @@ class Linear:
 
     def bends(self, v: Array) -> tuple[Array, Array]:
         """First and second derivatives of the matrices f_x along a function."""
-        key = v.tobytes()
-        if key not in self._along:
-            length = float(np.max(np.abs(v) / self.cycles.scale))
-            h = REACH / length if length > 0.0 else 1.0
-            n = self.n
-
-            def matrix(k: float) -> Array:
-                whole = self._jets(self.orbit.x + k * h * v)
-                return whole[:, n:].reshape(len(whole), n, -1)[:, :, :n]
-
-            (a, b), (c, d) = ((matrix(k), matrix(-k)) for k in (1.0, 2.0))
-            first = (8.0 * (a - b) - (c - d)) / (12.0 * h)
-            second = (16.0 * (a + b) - (c + d) - 30.0 * self.A) / (12.0 * h * h)
-            self._along[key] = first, second
-        return self._along[key]
+        length = float(np.max(np.abs(v) / self.cycles.scale))
+        found = self._derived(v, np.zeros_like(self.orbit.y), length / REACH)
+        return (found.other_first, found.other_second) if self.other else (found.first, found.second)
 
     def bends_along(self, dx: Array, dy: Array) -> Array:
         """Derivative of the matrices f_x along a family, as period and parameter change, too."""
-        o = self.orbit
         length = max(
             float(np.max(np.abs(dx) / self.cycles.scale)) / REACH,
             float(np.max(np.abs(dy[1:]) / self.cycles.width)) / CLOSE,
         )
-        h = 1.0 / length
+        found = self._derived(dx, dy, length)
+        return found.other_first if self.other else found.first
 
-        def matrix(k: float) -> Array:
-            whole = self._jets(o.x + k * h * dx, o.y + k * h * dy)
-            return whole[:, self.n :].reshape(len(whole), self.n, -1)[:, :, : self.n]
+    def _derived(self, dx: Array, dy: Array, length: float) -> Derivatives:
+        """Derivatives of the matrices f_x along a direction, from steps of 1 over its length on."""
+        key = dx.tobytes() + dy.tobytes()
+        if key not in self._along:
 
-        near, far = matrix(1.0) - matrix(-1.0), matrix(2.0) - matrix(-2.0)
-        return np.asarray((8.0 * near - far) / (12.0 * h))
+            def matrix(k: float) -> Array:
+                whole = self._jets(self.orbit.x + k * dx, self.orbit.y + k * dy)
+                return whole[:, self.n :].reshape(len(whole), self.n, -1)[:, :, : self.n]
+
+            step = 1.0 / length if length > 0.0 else 1.0
+            self._along[key] = along_line(matrix, self.A, step, self.cycles.scale)
+        return self._along[key]
 
     def second(self, v: Array, u: Array) -> Array:
         """B(v, u) at all Gauss points."""
