@@ -47,6 +47,24 @@ class Jets:
         )  # fmt: skip
         return out
 
+    @property
+    def exact(self) -> bool:
+        """Whether derivatives by states are known without differences of f."""
+        if isinstance(self.field, PythonField):
+            return self.field.jacobian is not None
+        return self.mode == differences.DERIVED
+
+    def values(self, u: Array) -> Array:
+        """F at points, the rows of u: states and active parameters."""
+        if not isinstance(self.field, PythonField):
+            return self.field.values(np.ascontiguousarray(u), self.par.copy(), self.active)
+        n = len(self.field.states)
+        given: dict[str, Any] = dict(zip(self.field.parameters, self.par.tolist(), strict=True))
+        for column, place in zip(u[:, n:].T, self.active, strict=True):
+            same = np.all(column == column[0])
+            given[self.field.parameters[place]] = float(column[0]) if same else column
+        return self._values(np.ascontiguousarray(u[:, :n]), given)
+
     def at_mesh(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
         """F at the beginning of each interval."""
         n = x.shape[1]
@@ -99,11 +117,11 @@ class Jets:
                 shifted[:, j] += k
                 return self._values(shifted, given)
 
-            near, wide = ((at(k) - at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
-            columns.append((j, at, h, wide, near))
+            wide, near = ((at(k) - at(-k)) / (2.0 * k) for k in (2.0 * h, h))
+            columns.append((j, at, h, (wide, near)))
             noise += lines.EPSILON * h / STEP * np.max(np.abs(near), axis=0)
-        for j, *found in columns:
-            slopes[:, :, j] = lines.slope_along(*found, noise)
+        for j, at, h, sides in columns:
+            slopes[:, :, j] = lines.slope_along(at, h, noise, sides=sides)
         out[:, n:] = slopes.reshape(len(x), -1)
         out[~np.isfinite(f).all(axis=1), :] = np.nan
         return out

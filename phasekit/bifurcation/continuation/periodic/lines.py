@@ -15,6 +15,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 EPSILON = 2.0**-52
+REACH = 2.0**-8  # of the first differences along a direction, beside the sizes of the states
 ENOUGH = 1e-9  # part of a derivative that may be left out
 SMOOTH = 3e-6  # part by which slopes over two steps differ, whose square is left out
 LEVELS = 24  # halvings of a step
@@ -56,20 +57,23 @@ def along_line(
 
 
 def slope_along(
-    at: Callable[[float], Array], step: float, wide: Array, near: Array, noise: Array
-) -> Array:
-    """Slopes at 0 of functions (columns) at many points, from those over two steps and over one.
+    at: Callable[[float], Array], step: float, noise: Array, weights: Array | None = None,
+    sides: tuple[Array, Array] | None = None,
+) -> Array:  # fmt: skip
+    """Slopes at 0 of functions (rows) at many points, weighed as in `along_line`.
 
-    ``noise`` is the rounding of each function.
+    ``noise`` is the rounding of each function, ``sides`` the slopes over two steps and over one
+    where they are known.
     """
-    gap = _size(near - wide)
-    if np.all(gap <= np.maximum(SMOOTH * _size(near), 4.0 * noise / step)):
-        return near + (near - wide) / 3.0
 
-    def sides(h: float) -> tuple[Array, ...]:
-        return ((at(h) - at(-h)) / (2.0 * h),)
+    def side(h: float) -> Array:
+        return np.asarray((at(h) - at(-h)) / (2.0 * h))
 
-    return _halved(sides, step, (wide,), (near,), noise)[0][0]
+    wide, near = sides or (side(2.0 * step), side(step))
+    gap = _size(near - wide, weights)
+    if np.all(gap <= np.maximum(SMOOTH * _size(near, weights), 4.0 * noise / step)):
+        return np.asarray(near + (near - wide) / 3.0)
+    return _halved(lambda h: (side(h),), step, (wide,), (near,), noise, weights)[0][0]
 
 
 def _halved(

@@ -23,6 +23,7 @@ from phasekit.bifurcation.continuation.periodic.criteria import (
 )
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, TORUS, Extended
+from phasekit.bifurcation.continuation.periodic.linear import Linear
 from phasekit.bifurcation.continuation.periodic.normal_forms import (
     at_doubling,
     at_fold,
@@ -73,7 +74,7 @@ def _coefficients(cycles: Extended, point: Point) -> tuple[float, float]:
     stretch = 0.0
     if cycles.forced:
         stretch = float(cycles.own_period(orbit.y)[1][0]) / float(orbit.y[0])
-    form = at_fold(one, alone, v, dy, stretch)
+    form = at_fold(Linear(one, alone), v, dy, stretch)
     nothing = np.zeros(2)
     parts = one.inner(orbit.mesh, v, v, nothing, nothing)
     whole = one.replace(scale=np.ones(n)).inner(orbit.mesh, v, v, nothing, nothing)
@@ -94,7 +95,8 @@ def _meet(cycles: Extended, point: Point) -> float:
 
 def _doubled(cycles: Extended, point: Point) -> float:
     """The cubic coefficient of a period doubling."""
-    return at_doubling(*_parted(cycles, point))["c"] * _unit(cycles, point)
+    one, alone, v = _parted(cycles, point)
+    return at_doubling(Linear(one, alone), v)["c"] * _unit(cycles, point)
 
 
 def _unit(cycles: Extended, point: Point) -> float:
@@ -113,7 +115,7 @@ def _torus(cycles: Extended, point: Point) -> float:
     if min(abs(math.sin(0.5 * angle)), abs(math.cos(0.5 * angle))) < RESONANT:
         return math.nan
     one, alone, v = _parted(cycles, point)
-    return at_torus(one, alone, angle, v)["d"] * _unit(cycles, point)
+    return at_torus(Linear(one, alone), angle, v)["d"] * _unit(cycles, point)
 
 
 def _at(turn: float) -> Callable[[Extended, Point], float]:
