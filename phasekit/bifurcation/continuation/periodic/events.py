@@ -46,7 +46,6 @@ from phasekit.bifurcation.special_points import KINDS
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
-NOTHING = 1e-9  # size of a coefficient, as all change by their scales, that is rounding
 JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 
 
@@ -98,7 +97,9 @@ def _events(
     for event, before, after in zip(_looked_for(cycles), left, right, strict=True):
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
-        if isinstance(event, CurveTest) and max(abs(before), abs(after)) < NOTHING:
+        if isinstance(event, CurveTest) and not (
+            event.signed(cycles, a, before) or event.signed(cycles, b, after)
+        ):
             continue  # a coefficient that is zero all along
 
         def value(point: Point, forced: bool, event: Any = event) -> float:

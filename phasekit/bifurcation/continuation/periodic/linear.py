@@ -15,10 +15,13 @@ Array = npt.NDArray[np.float64]
 
 
 class Linear:
-    """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g."""
+    """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g.
 
-    def __init__(self, cycles: Cycles, orbit: Orbit) -> None:
-        self.variant = 0
+    A ``variant`` of the second and third derivatives is off by about their errors.
+    """
+
+    def __init__(self, cycles: Cycles, orbit: Orbit, variant: int = 0) -> None:
+        self.variant = variant
         self.cycles, self.orbit, self.m = cycles, orbit, cycles.m
         n = self.n = cycles.n
         whole = self._jets(orbit.x)
@@ -69,11 +72,6 @@ class Linear:
             return whole[:, self.n :].reshape(self.slopes.shape)[:, :, : self.n]
 
         return OfMatrices(matrices, self.at, cycles.scale, cycles.width)
-
-    @property
-    def variants(self) -> int:
-        """Number of values of `variant`, whose second and third derivatives differ by errors."""
-        return self._forms.variants
 
     def _wide(self, v: Array, y: Array) -> Array:
         """States and active parameters at all Gauss points; of a forced system with its time."""

@@ -19,6 +19,8 @@ REACH = 2.0**-8  # of the first differences along a direction, beside the sizes 
 ENOUGH = 1e-9  # part of a derivative that may be left out
 SMOOTH = 3e-6  # part by which slopes over two steps differ, whose square is left out
 LEVELS = 24  # halvings of a step
+WIDER = 8  # first steps, each 16 times the one before, where f is linear over the shorter ones
+SEEN = 1e3  # a derivative beside its error, where there is one
 PATIENCE = 3  # halvings without a better row after which no more are tried
 
 
@@ -52,7 +54,14 @@ def along_line(
         return (ahead - behind) / (2.0 * h), ((ahead - middle) + (behind - middle)) / h**2
 
     noise = EPSILON * _size(middle, weights)
-    best, other = _halved(sides, step, sides(2.0 * step), sides(step), noise, weights)
+    for _ in range(WIDER):
+        best, other, least = _halved(sides, step, sides(2.0 * step), sides(step), noise, weights)
+        sizes = (_size(one, weights) for one in best)
+        seen = [size > SEEN * left for size, left in zip(sizes, least, strict=True)]
+        if np.any(seen) or not np.any(noise > 0.0):
+            break
+        # Over such a step it is linear but for rounding: of a state at rest the size is not known.
+        step *= 16.0
     return Derivatives(*best, *other)
 
 
@@ -79,8 +88,8 @@ def slope_along(
 def _halved(
     sides: Callable[[float], tuple[Array, ...]], h: float, wide: tuple[Array, ...],
     near: tuple[Array, ...], noise: Array, weights: Array | None = None,
-) -> tuple[list[Array], list[Array]]:  # fmt: skip
-    """Derivatives row by row over the best of steps that are halved, and over that before it."""
+) -> tuple[list[Array], list[Array], list[Array]]:  # fmt: skip
+    """Derivatives row by row over the best of halved steps, over the step before it; errors."""
     orders = range(len(wide))
     best, other = ([np.full_like(one, np.nan) for one in wide] for _ in range(2))
     least = [np.full(len(noise), np.inf) for _ in orders]
@@ -107,7 +116,7 @@ def _halved(
                 break
         h *= 0.5
         before, wide, near = found, near, sides(h)
-    return best, other
+    return best, other, least
 
 
 def _size(values: Array, weights: Array | None = None) -> Array:

@@ -19,14 +19,15 @@ from phasekit.bifurcation.continuation.periodic import lines
 
 Array = npt.NDArray[np.float64]
 
+VARIANTS = 4  # of derivatives: the best, and others that differ by the errors
 CLOSER = 0.25  # first steps along parameters, beside their spans and those along states
 
 
 class OfMatrices:
-    """Of the matrices f_x beside an orbit, as functions of what is added to it: (dx, dy)."""
+    """Of the matrices f_x beside an orbit, as functions of what is added to it: (dx, dy).
 
-    #: What may be asked for: the best, and what the steps before that say.
-    variants = 2
+    Variants but the first are what the steps before the best say.
+    """
 
     def __init__(
         self, matrices: Callable[[Array, Array], Array], at: Callable[[Array], Array],
@@ -62,10 +63,10 @@ class OfMatrices:
 
 
 class OfValues:
-    """Of f alone, as a function of the unknowns of all points (rows)."""
+    """Of f alone, as a function of the unknowns of all points (rows).
 
-    #: The best, and three that are off by their errors, to one side or the other.
-    variants = 4
+    Variants but the first are off by the errors, to one side or the other.
+    """
 
     def __init__(
         self, values: Callable[[Array], Array], wide: Callable[[Array, Array], Array], u: Array,
@@ -74,7 +75,7 @@ class OfValues:
         self.wide, self.shape = wide, slopes.shape[:2]
         whole: Any = _Whole(values, u, sizes, slopes)
         self.derivatives = Derivatives(whole, u.ravel())
-        self.sides = np.random.default_rng(5).choice([-1.0, 1.0], (self.variants, *self.shape))
+        self.sides = np.random.default_rng(5).choice([-1.0, 1.0], (VARIANTS, *self.shape))
 
     def second(self, v: Array, dy: Array, u: Array, variant: int) -> Array:
         """The second derivative of f along (v, dy) and along u."""

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, unknown
 from phasekit.bifurcation.continuation.periodic.linear import Linear, wave
+from phasekit.bifurcation.continuation.periodic.multilinear import VARIANTS
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def known(
     """
     found = form(line)
     errors = dict.fromkeys(found, 0.0)
-    for variant in range(1, line.variants):
+    for variant in range(1, VARIANTS):
         line.variant = variant
         other = form(line)
         for name in found:
