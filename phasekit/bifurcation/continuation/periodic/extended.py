@@ -152,7 +152,7 @@ class _Both:
         slopes = out[:, wide:].reshape(count, wide, wide + a + more)
         out[:, :n] = f
         # Bends of what is itself differences need no more digits than those have.
-        rounding = lines.EPSILON if self.jets.exact else c.field.accuracy
+        rounding = lines.EPSILON if self.jets.exact else lines.DIFFERENCED
         noise = rounding * np.max(np.max(np.abs(J), axis=0) * own, axis=1)
         slopes[:, :n, :n], slopes[:, :n, wide : wide + a] = A, J[:, :, n:]
         for part in range(1, parts + 1):

@@ -15,6 +15,7 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 
 EPSILON = 2.0**-52
+DIFFERENCED = 1e-10  # relative error of slopes that are differences
 REACH = 2.0**-8  # of the first differences along a direction, beside the sizes of the states
 ENOUGH = 1e-9  # part of a derivative that may be left out
 SMOOTH = 3e-6  # part by which slopes over two steps differ, whose square is left out

@@ -20,6 +20,8 @@ from phasekit.bifurcation.continuation.periodic import lines
 Array = npt.NDArray[np.float64]
 
 VARIANTS = 4  # of derivatives: the best, and others that differ by the errors
+BESIDE = 2.0**-6  # of the sizes of the unknowns, where rounding is looked at
+STILL = 1e-9  # motion beside the sizes of the states that is none
 CLOSER = 0.25  # first steps along parameters, beside their spans and those along states
 
 
@@ -75,6 +77,14 @@ class OfValues:
         self.wide, self.shape = wide, slopes.shape[:2]
         whole: Any = _Whole(values, u, sizes, slopes)
         self.derivatives = Derivatives(whole, u.ravel())
+        # Beside the orbit as well: where terms vanish, as at rest, so does what they are rounded by.
+        beside = u + BESIDE * sizes * np.random.default_rng(6).choice([-1.0, 1.0], u.shape)
+        noise = Derivatives(whole, beside.ravel()).noise().reshape(self.shape)
+        self.derivatives.doubt(np.tile(np.max(noise, axis=0), len(u)))
+        n = slopes.shape[1]
+        if np.any(np.ptp(u[:, :n], axis=0) > STILL * sizes[:n]):
+            # It has sizes, unlike a state at rest, for which wider steps are tried.
+            self.derivatives.widest = 1
         self.sides = np.random.default_rng(5).choice([-1.0, 1.0], (VARIANTS, *self.shape))
 
     def second(self, v: Array, dy: Array, u: Array, variant: int) -> Array:
