@@ -12,7 +12,7 @@ import sympy
 import phasekit as pk
 
 #: Few points, each as sharp as by default.
-FEW = pk.ContinuationOptions(degree=7, intervals=12, initial_step=0.1)
+FEW = pk.ContinuationOptions(degree=7, intervals=8, initial_step=0.2, max_step=0.5)
 FORMS = ("formula", "function", "compiled", "jac")
 
 
@@ -40,7 +40,7 @@ def problem(form, equations, state, parameters, **more):
 
 
 def twisted(rate, cos, sin):
-    """Formulas of xi' = xi rate(xi^2) and eta' = -0.4 eta, with (a, b) = (xi, eta) turned by t/2."""
+    """Formulas of xi' = xi rate(xi^2), eta' = -0.4 eta; (a, b) is (xi, eta) turned by t/2."""
     square = f"(a**2*(1 + {cos})/2 + b**2*(1 - {cos})/2 + a*b*{sin})"
     xx, xy, yy = f"(1 + {cos})/2", f"{sin}/2", f"(1 - {cos})/2"
     grow = f"({rate.replace('SQUARE', square)})"
@@ -152,10 +152,10 @@ def test_tori_in_other_units():
     (point,) = special(branch)
     assert point.normal_form["d"] == pytest.approx(-0.2e12, rel=1e-8)
     assert point.normal_form["d_imag"] == pytest.approx(2e12, rel=1e-8)
-    (hard,) = special(point.curve("p", (0.19, 0.31)))
+    (hard,) = special(point.curve("p", (0.2, 0.31)))
     assert (hard.kind, hard.status) == ("chenciner", "converged")
     assert hard["p"] == pytest.approx(0.3, abs=1e-8)
-    steep = pk.ContinuationOptions(degree=7, intervals=12, turn=1e-9, max_turn=1e-9)
+    steep = pk.ContinuationOptions(degree=7, intervals=8, turn=1e-9, max_turn=1e-9)
     stuck = point.curve("p", (0.1, 0.4), options=steep)
     assert [stop.reason for stop in stuck.stops] == ["stuck", "stuck"]
     assert "period = 6.28318531, mu = 0.0" in stuck.stops[0].message

@@ -77,14 +77,15 @@ class OfValues:
         self.wide, self.shape = wide, slopes.shape[:2]
         whole: Any = _Whole(values, u, sizes, slopes)
         self.derivatives = Derivatives(whole, u.ravel())
-        # Beside the orbit as well: where terms vanish, as at rest, so does what they are rounded by.
-        beside = u + BESIDE * sizes * np.random.default_rng(6).choice([-1.0, 1.0], u.shape)
-        noise = Derivatives(whole, beside.ravel()).noise().reshape(self.shape)
-        self.derivatives.doubt(np.tile(np.max(noise, axis=0), len(u)))
         n = slopes.shape[1]
         if np.any(np.ptp(u[:, :n], axis=0) > STILL * sizes[:n]):
             # It has sizes, unlike a state at rest, for which wider steps are tried.
             self.derivatives.widest = 1
+        else:
+            # At rest terms may vanish, and with them their rounding: it is looked at beside it.
+            beside = u + BESIDE * sizes * np.random.default_rng(6).choice([-1.0, 1.0], u.shape)
+            noise = Derivatives(whole, beside.ravel()).noise().reshape(self.shape)
+            self.derivatives.doubt(np.tile(np.max(noise, axis=0), len(u)))
         self.sides = np.random.default_rng(5).choice([-1.0, 1.0], (VARIANTS, *self.shape))
 
     def second(self, v: Array, dy: Array, u: Array, variant: int) -> Array:
