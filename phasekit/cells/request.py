@@ -197,7 +197,13 @@ def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
     own = getattr(system, "system", system).rung  # that of what is perturbed
     near = {one for one in plain if issubclass(own, one)}
     tilted = TiltedTrigonometric if issubclass(own, Trigonometric) else TiltedConservative
-    stands_on(system, max(near or plain or rungs, key=depth), what, tilted=tilted in rungs)
+
+    def order(one: type[Law]) -> tuple[int, str]:
+        return depth(one), one.__name__
+
+    # The nearest one below its own, else the most general, which asks for the least.
+    rung = max(near, key=order) if near else min(plain or rungs, key=order)
+    stands_on(system, rung, what, tilted=tilted in rungs)
 
 
 def inputs_of(system: Model, rows: Iterable[Quantity]) -> tuple[Quantity, ...]:

@@ -24,7 +24,8 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
-from phasekit.motion.lost import tell_unsettled
+from phasekit.motion.lost import tell_open
+from phasekit.motion.shares import damping_time
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import said
 from phasekit.systems.as_system import single
@@ -50,7 +51,7 @@ def attractors(
         Angles in rad and angular velocities in s^-1 of the grid; of a large one a part is used.
     period : float, optional
         Time from state to state in s; default: the common period of all that varies, of a system
-        without such a quarter of the period of small oscillations.
+        without such a quarter of the period of small oscillations, without these 1/damping.
 
     Returns
     -------
@@ -68,7 +69,7 @@ def attractors(
     Warns
     -----
     RuntimeWarning
-        If damping is too weak to see where motions end.
+        If damping is too weak to see where motions end, or they take too many steps.
 
     Notes
     -----
@@ -90,6 +91,7 @@ def attractors(
     [-0.779055, 1.210091]
     """
     system, found, _ = _searched(perturbed, phi, dphi, period)
+    tell_open("attractor_phi", found.open)
     return _dataset(system, _attractor_rows(found.result()), {"period": found.leg})
 
 
@@ -132,8 +134,8 @@ def basins(
     Warns
     -----
     RuntimeWarning
-        If more than half of the cells lie beside another basin: the grid is too coarse to show
-        the basins.
+        If it is not seen where some motions end, as of `attractors`; and if more than half of the
+        cells lie beside another basin: the grid is too coarse to show the basins.
 
     Notes
     -----
@@ -155,6 +157,7 @@ def basins(
     system, found, grid = _searched(perturbed, phi, dphi, period)
     with said(f"following {grid[0].size * grid[1].size:,} motions to their attractors"):
         result = shares.basins(found, *grid, legs=periods)
+    tell_open("attractor_phi", found.open)
     data = _attractor_rows(found.result())
     dims = ("state_phi", "state_dphi")
     for name, values in result._asdict().items():
@@ -196,7 +199,7 @@ def _searched(
         if not leg > 0.0:
             raise bad("period", period, "a time in s, > 0")
     elif own is None:
-        leg = _quarter(system)
+        leg = _quarter(system, values)
     else:
         leg = float(check_period("period", own))
     every = [axis[np.linspace(0, len(axis) - 1, min(len(axis), STARTS)).round().astype(int)]
@@ -204,17 +207,19 @@ def _searched(
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
     with said(f"looking for attractors from {len(states)} states"):
         found = search.find(law, values, leg, states)
-    tell_unsettled("attractor_phi", found.unsettled, search.PATIENCE)
     return system, found, grid
 
 
-def _quarter(system: Perturbed) -> float:
-    """A quarter of the period of small oscillations about the center of greatest curvature."""
+def _quarter(system: Perturbed, values: Mapping[str, Any]) -> float:
+    """A quarter of the period of small oscillations about the center of greatest curvature.
+
+    Without one the time in which damping acts.
+    """
     from phasekit.labelled.phase_space import equilibria
 
     frequency = equilibria(system.system).natural_frequency.values
     if not np.isfinite(frequency).any():
-        return 1.0
+        return damping_time(values)
     return float(0.5 * np.pi / np.nanmax(frequency))
 
 

@@ -12,6 +12,8 @@ from phasekit.labels.arguments import bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.motion.flow import pointwise
 from phasekit.motion.integrate import integrate
+from phasekit.motion.method import unit_of
+from phasekit.motion.prescribed import span
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import single
 from phasekit.systems.driven_rotor import event_of
@@ -38,16 +40,16 @@ def with_events(
     law, parameters = single(system)
     if ds.state_phi.ndim or ds.state_dphi.ndim:
         raise bad("events", list(named), "nothing, or one motion: a single state")
-    times = np.atleast_1d(ds.time.values)
     values = law.values(*parameters.values())
     found: list[tuple[str, float, float, float]] = []
     phi, dphi = ds.motion_phi.values.copy(), ds.motion_dphi.values.copy()
-    for stop in (float(times.min(initial=0.0)), float(times.max(initial=0.0))):
+    for stop in span(ds.time.values):
         if stop == 0.0:
             continue
         rates = pointwise(law, values, min(stop, 0.0), max(stop, 0.0))
         start = (ds.state_phi.item(), ds.state_dphi.item())
-        motion = integrate(InitialValue(rates, start, **tolerances), stop, watched)
+        problem = InitialValue(rates, start, **tolerances, unit=unit_of(law))
+        motion = integrate(problem, stop, watched)
         own = list(zip(*motion.events[:2], *motion.events.state, strict=True))
         found = own[::-1] if stop < 0.0 else found + [e for e in own if e[1] > 0.0 or not found]
         beyond = np.sign(stop) * (ds.time.values - motion.times[-1]) > 0.0

@@ -54,7 +54,8 @@ def flow(
     rtol, atol : float, optional
         Of a `Perturbed` system: the error of a step that is allowed, relative (default 1e-10) and
         absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is relative to
-        one radian.
+        one radian. On a line, of motions whose states are below 1 as yet, the absolute error is
+        that part of the greatest: lengths may be in any unit.
     events : callable or mapping of str to callable, optional
         Of one motion of a `Perturbed` system: functions of (t, phi, dphi) whose zeros are looked
         for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True
@@ -75,19 +76,23 @@ def flow(
     ------
     ParameterError
         If an argument is unusable, or bare arrays of states differ in length.
+    ConvergenceError
+        If events are looked for on a motion that takes too many steps, or steps too short.
 
     Notes
     -----
     Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones. Damped
     and driven motions are integrated in compiled code, eight at a time, on all cores: by their
     Taylor series, of an order from 6 to 20 by rtol [JorbaZou2005], where the law is made of sums,
-    products, whole powers up to 16, sin, cos, exp, sinh, cosh and tanh. Otherwise, and with
-    quadratic damping, the Runge-Kutta method DOP853 of order 8 is used ([HairerNorsettWanner1993]
-    II.5), whose steps are interpolated to the seventh order. Quadratic damping is not smooth where
-    the motion turns: steps end there. A few motions that damping holds back for more than 6e6 of
-    its own times are followed by Radau's implicit method of order 5; more of them end after
-    10,000,000 steps. Where damping, torque and drive are all zero,
-    the motion in the potential of (A, B, C) is the exact one.
+    products, whole powers up to 16, sin, cos, exp, sinh, cosh and tanh. Otherwise, with quadratic
+    damping, and where series would take too many steps, the Runge-Kutta method DOP853 of order 8
+    is used ([HairerNorsettWanner1993] II.5), whose steps are interpolated to the seventh order.
+    Quadratic damping is not smooth where the motion turns: steps end there. Motions that linear
+    damping holds back for more than 6e7 of its own times are followed by Radau's implicit method
+    of order 5 ([HairerWanner1996] IV.8), with an rtol of at least 1e-13, and by DOP853 where that
+    gives up. A motion ends after 10,000,000 steps. Events are looked for along steps of DOP853, of
+    which there may be 1,000,000. Where damping, torque and drive are all zero, the motion in the
+    potential of (A, B, C) is the exact one.
 
     Examples
     --------

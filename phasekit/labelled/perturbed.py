@@ -148,7 +148,8 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
         which sums to 1. Left and right are the lobes of the lower saddle; in a system with one
         well it is the side from which the rotation came that stays empty. "none": it is not
         captured, never comes to the separatrix, or stays round both wells because they shrink too
-        fast. NaN where there is no such separatrix.
+        fast. NaN where there is no such separatrix, and from rotation over wells of which left
+        and right are not all: three or more that saddles of several energies part.
 
     Raises
     ------

@@ -21,7 +21,7 @@ from phasekit.labels.grid import variable
 from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import pointwise
-from phasekit.motion.method import circle
+from phasekit.motion.method import circle, unit_of
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.as_system import as_system, single
@@ -148,7 +148,7 @@ def _of_system(
     rates = pointwise(law, law.values(*perturbed.parameters.values()), 0.0, duration)
     turn = circle(law)
     found = passages(
-        InitialValue(rates, state, **tolerances),
+        InitialValue(rates, state, **tolerances, unit=unit_of(law)),
         duration, 0, level, period=turn or None, direction=direction,
     )  # fmt: skip
     if turn:
@@ -186,7 +186,7 @@ def _of_problem(
     if start.shape != (len(problem.state),) or not np.isfinite(start).all():
         raise bad("phi0", x0, f"a finite number for each of {', '.join(problem.state)}")
     found = passages(
-        InitialValue(lambda t, x: problem(x), list(start), **tolerances),
+        InitialValue(lambda t, x: problem(x), list(start), **tolerances, unit=np.inf),
         duration, problem.state.index(section[0]), level,
         period=problem.periods.get(section[0]), direction=direction,
     )  # fmt: skip

@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
 from phasekit.laws.trigonometric import Trigonometric
 
 #: What every perturbed law has beside the parameters of its potential.
@@ -76,6 +76,8 @@ class PerturbedConservative(Law):
         That angular velocity as a function or a table of time.
     unit : str
         Unit of the amplitude of the first harmonic, of the forcing or else of a modulation.
+    torqued : bool
+        Whether there is a constant torque, of which equations then tell.
     """
 
     called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
@@ -89,6 +91,7 @@ class PerturbedConservative(Law):
     rate: Rate | None = None
     prescribed: Any = field(default=None, compare=False)
     unit: str = "s-2"
+    torqued: bool = field(default=True, compare=False)
 
     @property
     def may_be_incomplete(self) -> bool:
@@ -100,8 +103,10 @@ class PerturbedConservative(Law):
         self.base.check_searchable()
 
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
-        """What is said of a quantity: as of the potential."""
+        """What is said of a quantity: as of the potential, but that the torque has a part in it."""
         words = dict(self.base.words(name, units, long_name))
+        if self.torqued and name in _STANDING:
+            words["equation"] = _STANDING[name]
         if name == "chaos_threshold" and self.unit != units:
             words["units"] = self.unit
         if name in _MOTION:
@@ -151,8 +156,9 @@ class TiltedConservative(PerturbedConservative):
             "potential_gradient": "V' - torque",
             "energy_integral": f"h = {x}'^2/2 + V - torque {x}",
             "phase_velocity": f"{x}' = sqrt(2 (h - V + torque {x}))",
+            **_turns(self.base.period),
         }
-        return words | ({"equation": tilted[name]} if name in tilted else {})
+        return words | _tilted_words(name, words.get("long_name", long_name), tilted)
 
 
 @dataclass(frozen=True)
@@ -170,6 +176,8 @@ class PerturbedRouthian(PerturbedConservative):
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity: energies are no longer per unit of inertia."""
         words = dict(self.base.words(name, units, long_name))
+        if self.torqued and name in _STEADY:
+            words["equation"] = _STEADY[name]
         if name in _MOTION:
             words["equation"] = (
                 "M phi'' + M' phi'^2/2 + V_p' = M22 (-d phi' - q |phi'| phi' + N + F(t))"
@@ -184,6 +192,61 @@ class TiltedRouthian(PerturbedRouthian):
     """The same under a constant torque alone, which keeps an energy."""
 
     called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
+
+    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
+        """What is said of a quantity: the torque has a part in the energy."""
+        words = dict(super().words(name, units, long_name))
+        return words | ({"equation": _ROUTH[name]} if name in _ROUTH else {})
+
+
+#: Equations of the equilibria under a torque, of a potential and at a constant momentum.
+_STANDING = {
+    "phi": "V'(phi) = torque",
+    "energy": "V(phi) - torque phi",
+    "n_equilibria": "changes of sign of V' - torque between the zeros of V''",
+}
+_AMENDED = "V + p^2/(2 M11) - M22 torque phi"
+_STEADY = {
+    "phi": "V' = p^2 M11'/(2 M11^2) + M22 torque",
+    "energy": _AMENDED,
+    "n_equilibria": "zeros of M11^2 (V' - M22 torque) - p^2 M11'/2",
+}
+#: Equations of what has a part of the torque in its energy.
+_ROUTH = {
+    "potential": _AMENDED,
+    "potential_gradient": "V' - p^2 M11'/(2 M11^2) - M22 torque",
+    "energy_integral": f"h = (M22 - M12^2/M11) phi'^2/2 + {_AMENDED}",
+    "phase_velocity": f"phi' = sqrt(2 (h - ({_AMENDED}))/(M22 - M12^2/M11))",
+}
+_LEVELS = {
+    "topology": "by what the separatrices of all saddles do",
+    "figure_eight": "V - torque phi = h_s on both sides of a saddle, before a saddle as high",
+    "saddle_phi": "V'(phi_s) = torque, V''(phi_s) < 0",
+    "saddle_energy": "h_s = V(phi_s) - torque phi_s",
+    "loop": "where V - torque phi = h_s again on either side of the saddle",
+    "turning_phi": "V(phi_t) - torque phi_t = h_s",
+    "orbit_kind": "sign of h - h_s; equilibrium: phi' = 0 and V'(phi) = torque",
+    "orbit_energy": "h = phi'^2/2 + V(phi) - torque phi",
+    "phi_min": "V(phi_min) - torque phi_min = h",
+    "phi_max": "V(phi_max) - torque phi_max = h",
+}
+
+
+def _turns(period: float | None) -> dict[str, str]:
+    """Equations of what a turn gains."""
+    if period is None:
+        return {"energy_per_turn": "no turn on a line", "gain_per_turn": "no turn on a line"}
+    turn = "2 pi" if is_turn(period) else f"{period:g}"
+    return {"energy_per_turn": f"{turn} torque", "gain_per_turn": f"{turn} |torque|"}
+
+
+def _tilted_words(name: str, long_name: str, own: Mapping[str, str]) -> dict[str, str]:
+    """Equation and long name of a quantity under a torque alone, beside what a law says itself."""
+    equations = {**_LEVELS, **own}
+    words = {"equation": equations[name]} if name in equations else {}
+    if "NaN for a rotation" in long_name:
+        words["long_name"] = f"{long_name}, infinite where it runs"
+    return words
 
 
 _MOTION = ("motion_phi", "motion_dphi")
@@ -231,7 +294,7 @@ class TiltedTrigonometric(PerturbedTrigonometric):
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity: the torque has a part in the energy."""
         words = dict(super().words(name, units, long_name))
-        return words | ({"equation": TILTED[name]} if name in TILTED else {})
+        return words | _tilted_words(name, words.get("long_name", long_name), TILTED)
 
 
 _V = "-B cos(phi) + (A/2) cos(phi)^2 - C sin(phi) - torque phi"
@@ -239,8 +302,8 @@ _V = "-B cos(phi) + (A/2) cos(phi)^2 - C sin(phi) - torque phi"
 TILTED = {
     "potential": f"V = {_V}",
     "potential_gradient": "V' = B sin(phi) - A sin(phi) cos(phi) - C cos(phi) - torque",
-    "energy_integral": f"h = phi'^2/2 {_V}",
-    "orbit_energy": f"h = phi'^2/2 {_V}",
+    "energy_integral": f"h = phi'^2/2 + ({_V})",
+    "orbit_energy": f"h = phi'^2/2 + ({_V})",
     "phase_velocity": "phi' = sqrt(2 (h - V(phi) + torque phi))",
     "motion_phi": "phi'' = -V'(phi) + torque",
     "motion_dphi": "phi'' = -V'(phi) + torque",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -11,7 +12,8 @@ import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import motions
-from phasekit.motion.method import circle
+from phasekit.motion.lost import EXHAUSTED, MOST
+from phasekit.motion.method import circle, unit_of
 from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +36,9 @@ BOXES, FILLING, VISITS = 100, 4000, 40
 RING = 32
 #: Legs for which they are followed.
 LONGEST_RING = 20_000
+#: Why it is not seen where a motion ends.
+TOO_WEAK = f"are damped so weakly that they did not settle within {PATIENCE} periods or less"
+TOO_LONG = f"take more than {MOST} steps"
 
 
 class Attractors(NamedTuple):
@@ -70,8 +75,8 @@ class Search:
     drifts: list[float] = field(default_factory=list)
     radii: dict[int, float] = field(default_factory=dict)
     """How far around periodic ones states were seen to come to them, by place."""
-    unsettled: int = 0
-    """Motions that are damped too weakly to show where they end."""
+    open: Counter[str] = field(default_factory=Counter)
+    """Motions of which it was not seen where they end, by the reason."""
 
     @property
     def period(self) -> float:
@@ -88,7 +93,9 @@ class Search:
 
     def run(self, states: Array, kept: int, skip: int) -> Strobed:
         """Follow motions."""
-        return strobe(self.law, self.values, states, self.leg, kept, skip)
+        found = strobe(self.law, self.values, states, self.leg, kept, skip)
+        self.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
+        return found
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
@@ -114,7 +121,7 @@ class Search:
         legs = SETTLED / strength if strength > 0.0 else np.inf
         slow = [orbit[-1] for orbit in found if not self._is_sorted(orbit, legs)]
         if legs > PATIENCE:
-            self.unsettled += len(slow)
+            self.open[TOO_WEAK] += len(slow)
         elif slow and legs > ROUNDS[-1]:
             found = self.run(np.array(slow), kept, int(legs)).states
             slow = [orbit[-1] for orbit in found if not self._is_sorted(orbit, legs)]
@@ -202,7 +209,9 @@ class Search:
         """State after q legs, and its derivative."""
         start = np.array([[*state, 1.0, 0.0, 0.0, 1.0]])
         times = np.array([[q * self.leg]])
-        end = motions(self.law, self.values, start, times, 1e-12, 1e-13, tangents=2).states[0, 0]
+        cell = self.law, self.values, start, times
+        # So few maps do not pay for the machine code of series.
+        end = motions(*cell, 1e-12, 1e-13, tangents=2, series=False).states[0, 0]
         return end[:2], np.array([[end[2], end[4]], [end[3], end[5]]])
 
     def _take_other(self, state: Array) -> None:
@@ -244,7 +253,8 @@ class Search:
         self.radii.clear()  # they go by place
 
         def first(orbit: Array) -> tuple[float, float]:
-            return round(float(self.wrapped(orbit[0, 0])), 9), round(float(orbit[0, 1]), 9)
+            phi, dphi = self.wrapped(orbit[0, 0]), orbit[0, 1] / self.scale
+            return round(float(phi) / self.size, 9), round(float(dphi) / self.size, 9)
 
         def begun(orbit: Array) -> Array:
             turned = [np.roll(orbit, -i, axis=0) for i in range(len(orbit))]
@@ -338,10 +348,25 @@ def find(
     states : array, shape (n, 2)
         Where motions start; they also say how coordinates and rates are measured.
     """
-    width = float(np.ptp(states[:, 0])) or 1.0
-    fastest = float(np.abs(states[:, 1]).max(initial=0.0))
-    scale = 2.0 * fastest / width if fastest > 0.0 else 1.0
-    search = Search(law, values, leg, scale, width)
+    width, fastest = _extent(law, values, leg, states)
+    search = Search(law, values, leg, 2.0 * fastest / width, width)
     search.look(states)
     search.order()
     return search
+
+
+def _extent(
+    law: PerturbedConservative, values: Mapping[str, Array], leg: float, states: Array
+) -> tuple[float, float]:
+    """Width in the coordinate and greatest rate of states, or of the motions from them."""
+    width, fastest = float(np.ptp(states[:, 0])), float(np.abs(states[:, 1]).max())
+    if width and fastest:
+        return width, fastest
+    seen = strobe(law, values, states, leg / 8.0, 17).states.reshape(-1, 2)
+    seen = seen[np.isfinite(seen).all(axis=1)]
+    if not width and circle(law):
+        width = unit_of(law)
+    elif not width:
+        far = float(np.abs(seen[:, 0]).max(initial=0.0))
+        width = max(float(np.ptp(seen[:, 0])) if seen.size else 0.0, 1e-3 * far) or 1.0
+    return width, fastest or max(float(np.abs(seen[:, 1]).max(initial=0.0)), width / leg)

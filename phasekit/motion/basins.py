@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.motion.attractors import Search
-from phasekit.motion.lost import FAILED
+from phasekit.motion.attractors import TOO_LONG, Search
+from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.strobe import strobe
 
 Array = npt.NDArray[np.float64]
@@ -60,6 +60,7 @@ def basins(
         targets=search.targets(), most_legs=legs, threads=threads,
     )  # fmt: skip
     code = found.code.astype(np.int16)
+    search.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
     lost = (code < 0) & (found.status == FAILED)
     code[lost] = ESCAPED
     time = np.where(code >= 0, found.taken * search.leg, np.nan)
@@ -76,7 +77,8 @@ def basins(
 
 def _covers_turn(phi: Array, period: float) -> bool:
     """Whether the last cell has the first as its neighbour."""
-    return len(phi) > 2 and abs(abs(phi[-1] - phi[0]) * len(phi) / (len(phi) - 1) - period) < 1e-6
+    turn = abs(phi[-1] - phi[0]) * len(phi) / max(len(phi) - 1, 1)
+    return len(phi) > 2 and bool(abs(turn / period - 1.0) < 1e-6)
 
 
 def _boundary(grid: npt.NDArray[np.int16], wraps: bool) -> float:

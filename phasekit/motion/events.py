@@ -114,15 +114,21 @@ class Watch:
         if not (0.0 < middle <= min(left, right)) or middle == max(left, right):
             return []
         low, high = sorted((times[0], times[2]))
-        turn = minimize_scalar(
-            lambda t: sign * function(t), bounds=(low, high), method="bounded",
-            options={"xatol": 1e-9 * (high - low)},
-        )  # fmt: skip
-        if turn.fun < 0.0:
-            rises = ((times[0], turn.x, values[0]), (turn.x, times[2], -values[0]))
+        turn, least, part = times[1], middle, high - low
+        for _ in range(2):  # then nearby, where a corner shows
+            ends = max(low, turn - part) - turn, min(high, turn + part) - turn
+            near = minimize_scalar(
+                lambda s, turn=turn: sign * function(turn + s), bounds=ends, method="bounded",
+                options={"xatol": 1e-9 * part},
+            )  # fmt: skip
+            if near.fun < least:
+                turn, least = turn + float(near.x), near.fun
+            part *= 1e-6
+        if least < 0.0:
+            rises = ((times[0], turn, values[0]), (turn, times[2], -values[0]))
             return [instant(function, a, b) for a, b, at in rises if self.event.passes(at, -at)]
-        touches = turn.fun <= TOUCH * max(left, right) and self.event.direction == 0
-        return [float(turn.x)] if touches else []
+        touches = least <= TOUCH * max(left, right) and self.event.direction == 0
+        return [turn] if touches else []
 
     @property
     def ends(self) -> bool:
@@ -136,7 +142,7 @@ def instant(function: Callable[[float], float], start: float, stop: float) -> fl
     One of them, if rounding leaves the zero just outside.
     """
     left, right = function(start), function(stop)
-    if not left * right < 0.0:
+    if not min(left, right) < 0.0 < max(left, right):
         return start if abs(left) < abs(right) else stop
     eps = float(np.finfo(float).eps)
     nearest = max(4 * eps * abs(stop - start), float(np.finfo(float).smallest_subnormal))

@@ -15,13 +15,14 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.motion import stiff as implicit
-from phasekit.motion.lost import MOST, judged, tell
-from phasekit.motion.method import limits_of, run
+from phasekit.motion.lost import ARRIVED, MOST, judged, tell
+from phasekit.motion.method import cells_of, kinds, limits_of, run, some, unit_of
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import order_of, rates_of
+from phasekit.motion.stiff import follow, stiff_cells
 
 Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
 
 #: Error of a step that is allowed, relative and absolute.
 RTOL, ATOL = 1e-10, 1e-12
@@ -39,8 +40,9 @@ class Cells(NamedTuple):
 
     states: Array
     """Of shape (cells, times, 2); NaN where a motion did not come to a time."""
-    status: npt.NDArray[np.int64]
-    steps: npt.NDArray[np.int64]
+    status: Index
+    steps: Index
+    """By the method that followed a motion last."""
 
 
 def flow(
@@ -110,14 +112,14 @@ def _motions(
     from phasekit.phase.exact.flow import flow as exact
 
     result = np.empty((len(states), times.shape[1], 2))
-    own = {name: some(value, still) for name, value in values.items()}
+    own = cells_of(values, still)
     assert isinstance(law.base, Trigonometric)
     A, B, C = (np.reshape(x, (-1, 1)) for x in law.base.coefficients(own))
     phi, dphi = states[still].T[..., None]
     result[still] = np.stack(exact(A, B, C, phi, dphi, some(times, still)), axis=-1)
     if not still.all():
-        rest = {name: some(value, ~still) for name, value in values.items()}
-        result[~still] = _integrated(law, rest, states[~still], some(times, ~still), *how)
+        rest = cells_of(values, ~still), states[~still], some(times, ~still)
+        result[~still] = _integrated(law, *rest, *how)
     return result
 
 
@@ -126,37 +128,51 @@ def _integrated(
     values: Mapping[str, Array],
     states: Array,
     times: Array,
+    *how: Any,
+) -> Array:
+    """States of motions, each by the method that suits it, whatever the others are."""
+    count = len(states)
+    stiff = stiff_cells(law, values, times, count)
+    found, status = np.empty((count, times.shape[1], 2)), np.empty(count, np.int64)
+    for kind in kinds(values, count):
+        which = kind & ~stiff
+        if which.all():
+            found, status, _ = motions(law, values, states, times, *how)
+        elif which.any():
+            cells = cells_of(values, which), states[which], some(times, which)
+            found[which], status[which], _ = motions(law, *cells, *how)
+    if stiff.any():
+        cells = cells_of(values, stiff), states[stiff], some(times, stiff)
+        found[stiff], status[stiff] = _stiff_motions(law, *cells, *how)
+    tell("motion_phi", status, states)
+    return found
+
+
+def _stiff_motions(
+    law: PerturbedConservative,
+    values: Mapping[str, Array],
+    states: Array,
+    times: Array,
     rtol: float,
     atol: float,
     threads: int | None,
-) -> Array:
-    """States of motions, those that are stiff by a method of their own."""
-    stiff = implicit.stiff_cells(law, values, times, len(states))
-    if not stiff.any():
-        found = motions(law, values, states, times, rtol, atol, threads)
-        tell("motion_phi", found.status, states)
-        return found.states
-
-    def some(array: Array, which: Any) -> Array:
-        return array[which] if array.ndim and len(array) > 1 else array
-
-    result, status = np.empty((len(states), times.shape[1], 2)), np.zeros(len(states), np.int64)
-    for cell in np.flatnonzero(stiff):
-        one = {name: np.reshape(some(x, cell), ()) for name, x in values.items()}
-        own = times[cell if len(times) > 1 else 0]
-        rates = pointwise(law, one, 0.0, float(own.max()))
-        result[cell], status[cell] = implicit.follow(rates, states[cell], own, rtol, atol)
-    if not stiff.all():
-        rest = {name: some(x, ~stiff) for name, x in values.items()}
-        moved = motions(law, rest, states[~stiff], some(times, ~stiff), rtol, atol, threads)
-        result[~stiff], status[~stiff] = moved.states, moved.status
-    tell("motion_phi", status, states)
-    return result
-
-
-def some(array: Array, which: Any) -> Array:
-    """Entries of cells, of what may be the same in all."""
-    return array[which] if array.ndim and len(array) > 1 else array
+) -> tuple[Array, Index]:
+    """States of stiff motions, and what the implicit method leaves by the explicit one."""
+    times = np.broadcast_to(times, (len(states), times.shape[1]))
+    found, status = np.empty((*times.shape, 2)), np.full(len(states), ARRIVED)
+    for cell, own in enumerate(times):
+        one = {name: np.reshape(x, ()) for name, x in cells_of(values, cell).items()}
+        rates = pointwise(law, one, *span(own))
+        how = {"rtol": rtol, "atol": atol, "unit": unit_of(law)}
+        found[cell] = follow(rates, states[cell], own, **how)
+    left = np.isnan(found[..., 0]) & ~np.isnan(times)
+    lost = left.any(axis=1)
+    if lost.any():
+        cells = cells_of(values, lost), states[lost], np.where(left, times, 0.0)[lost]
+        moved = motions(law, *cells, rtol, atol, threads)
+        found[lost] = np.where(left[lost, :, None], moved.states, found[lost])
+        status[lost] = moved.status
+    return found, status
 
 
 def _is_still(law: PerturbedConservative, values: Mapping[str, Array], count: int) -> Any:
@@ -207,12 +223,12 @@ def motions(
     most : int
         Steps that a motion may take.
     series : bool
-        Take steps by Taylor series where the law has them, and there are no tangent vectors; by
-        Runge-Kutta otherwise, and where series would take too many.
+        Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
+        series would take too many.
     """
     from phasekit.motion.kernels.motions import motions as kernel
 
-    degree = order_of(rtol) if series and not tangents else 0
+    degree = order_of(rtol) if series else 0
     code, parameters = rates_of(law, values, tangents, degree)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
@@ -229,7 +245,7 @@ def motions(
         out = np.empty(result.shape)
         reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
         if count and times.shape[1]:
-            limits = limits_of(law, rtol, atol, most, once=True)
+            limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
             shared, cells = (table, limits, 0.0, code.kink), (rising, np.array(states))
             run(kernel, code, shared, cells, parameters, (out, reached, taken), reached, threads)
         back = np.argsort(order, axis=1)[..., None]

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 #: Steps that a motion may take.
 MOST = 10_000_000
-#: States of a motion that came to its end, and of those that did not: too many steps, steps too
-#: short; and one that never began, because a parameter of it has no value.
-ARRIVED, EXHAUSTED, FAILED, INVALID = 2, 3, 4, 5
+#: States of a motion: none yet, under way, at its end; and of those that do not come to it: too
+#: many steps, steps too short, a parameter that has no value.
+IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
 
 REASONS = {
     EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "
@@ -40,13 +41,13 @@ def tell(quantity: str, status: npt.NDArray[np.int64], states: npt.NDArray[np.fl
             )
 
 
-def tell_unsettled(quantity: str, number: int, patience: int) -> None:
-    """Say that damping was too weak to see where some motions end."""
-    if number:
-        warnings.warn(
-            f"{quantity}: {number} of the motions that were followed are damped so weakly that "
-            f"they did not settle within {patience} periods or less: there may be attractors that "
-            "are not found, and states are undecided",
-            RuntimeWarning,
-            stacklevel=4,
-        )
+def tell_open(quantity: str, numbers: Mapping[str, int]) -> None:
+    """Say of how many motions, by the reason, it was not seen where they end."""
+    for reason, number in numbers.items():
+        if number:
+            warnings.warn(
+                f"{quantity}: {number} of the motions that were followed {reason}: there may be "
+                "attractors that are not found, and states are undecided",
+                RuntimeWarning,
+                stacklevel=4,
+            )

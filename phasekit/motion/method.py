@@ -7,7 +7,7 @@ left to Runge-Kutta.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -27,7 +27,7 @@ def run(
     kernel: Callable[..., None],
     code: Rates,
     shared: tuple[Any, ...],
-    cells: tuple[Array, ...],
+    cells: tuple[npt.NDArray[Any], ...],
     parameters: Array,
     groups: Any,
     status: npt.NDArray[np.int64],
@@ -60,13 +60,35 @@ def run(
         group[lost] = part
 
 
+def some(array: Array, which: Any) -> Array:
+    """Entries of cells, of what may be the same in all."""
+    return array[which] if array.ndim and len(array) > 1 else array
+
+
+def cells_of(values: Mapping[str, Array], which: Any) -> dict[str, Array]:
+    """Values of parameters in some cells."""
+    return {name: some(np.asarray(value), which) for name, value in values.items()}
+
+
+def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]]:
+    """Which of so many cells have one machine code: those of quadratic damping, and the others."""
+    kinked = np.broadcast_to(np.asarray(values["quadratic"]) != 0.0, (count,))
+    return [kind for kind in (~kinked, kinked) if kind.any()]
+
+
 def limits_of(
-    law: PerturbedConservative, rtol: float, atol: float, most: int = MOST, *, once: bool = False
+    law: PerturbedConservative,
+    rtol: float,
+    atol: float,
+    most: int = MOST,
+    *,
+    alone: bool = False,
+    keep: bool = False,
 ) -> Array:
-    """What bounds the steps of the kernels, in all lanes."""
+    """What bounds the steps of the kernels, in all lanes; whether to take and keep each alone."""
     from phasekit.numerics.lanes import LANES
 
-    rows = rtol, atol, unit_of(law), float(most), float(once)
+    rows = rtol, atol, unit_of(law), float(most), float(alone), float(keep)
     return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
 
 

@@ -92,8 +92,6 @@ def rates_of(
         known.update(zip(_EULER, euler, strict=True))
     elif isinstance(law.base, Machines):
         known.update(law.base.constants_of(values))
-    elif isinstance(law.base, Machines):
-        known.update(law.base.constants_of(values))
     known["sign"] = 0.0
     columns = [np.atleast_1d(np.asarray(known[name], float)) for name in code.names]
     return code, np.stack(np.broadcast_arrays(*columns))

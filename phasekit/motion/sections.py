@@ -130,7 +130,8 @@ def _between_turns(
     ends = [
         (t, float(x[coordinate])) for t, x in ((step.start, step.before), (step.stop, step.after))
     ]
-    if step.rates_before[coordinate] * step.rates_after[coordinate] < 0.0:
+    rates = step.rates_before[coordinate], step.rates_after[coordinate]
+    if min(rates) < 0.0 < max(rates):
         turn = instant(
             lambda t: float(problem.rates(t, step.dense(t))[coordinate]), step.start, step.stop
         )

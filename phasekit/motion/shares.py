@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -9,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.attractors import PATIENCE, find
+from phasekit.motion.attractors import find
 from phasekit.motion.basins import basins
 from phasekit.motion.flow import accelerations
-from phasekit.motion.lost import tell_unsettled
+from phasekit.motion.lost import tell_open
 from phasekit.motion.strobe import common_period
 
 Array = npt.NDArray[np.float64]
@@ -53,7 +54,7 @@ def fractions(law: PerturbedConservative, *arrays: npt.ArrayLike) -> Fractions:
     cells = np.stack([array.reshape(-1) for array in given], axis=-1)
     slots = [np.full((len(cells), SLOTS), np.nan) for _ in range(3)]
     remaining, number = np.full(len(cells), np.nan), np.full(len(cells), -1, np.int64)
-    unsettled = 0
+    unseen: Counter[str] = Counter()
     for row, cell in enumerate(cells):
         values = law.values(*cell[:-2])
         leg = leg_of(law, values, cell[-2])
@@ -64,14 +65,14 @@ def fractions(law: PerturbedConservative, *arrays: npt.ArrayLike) -> Fractions:
         phi, dphi = cell[-2] * middle, cell[-1] * middle
         some = np.stack(np.meshgrid(phi[::EVERY], dphi[::EVERY], indexing="ij"), axis=-1)
         search = find(law, values, leg, some.reshape(-1, 2))
-        unsettled += search.unsettled
         found, places = basins(search, phi, dphi), search.result().attractor_phi
+        unseen += search.open
         columns = found.basin_fraction, found.basin_fraction_error, places[:, 0]
         for slot, column in zip(slots, columns, strict=True):
             slot[row, : len(column)] = column[:SLOTS]
         number[row] = len(places)
         remaining[row] = 1.0 - found.basin_fraction[:SLOTS].sum()
-    tell_unsettled("n_attractors", unsettled, PATIENCE)
+    tell_open("n_attractors", unseen)
     share, error, angle = (slot.reshape(*shape, SLOTS) for slot in slots)
     return Fractions(share, error, angle, remaining.reshape(shape), number.reshape(shape))
 
@@ -79,7 +80,7 @@ def fractions(law: PerturbedConservative, *arrays: npt.ArrayLike) -> Fractions:
 def leg_of(law: PerturbedConservative, values: Mapping[str, Array], reach: float) -> float:
     """Time from state to state: the period of what varies, else of the order of an oscillation.
 
-    NaN without a common period.
+    NaN without a common period. Where nothing oscillates, the time in which damping acts.
     """
     period = common_period(law, values)
     if period is not None:
@@ -87,4 +88,9 @@ def leg_of(law: PerturbedConservative, values: Mapping[str, Array], reach: float
     phi = np.linspace(-reach, reach, 129)
     change = np.gradient(accelerations(law, values, 0.0, phi, 0.0), phi)
     stiffest = float(np.max(np.abs(change)))
-    return float(0.5 * np.pi / np.sqrt(stiffest)) if stiffest > 0.0 else 1.0
+    return float(0.5 * np.pi / np.sqrt(stiffest)) if stiffest > 0.0 else damping_time(values)
+
+
+def damping_time(values: Mapping[str, Array]) -> float:
+    """Time in which linear damping acts; 1 s without."""
+    return float(1.0 / values["damping"]) if values["damping"] > 0.0 else 1.0

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853, DenseOutput
+from scipy.integrate import DOP853, DenseOutput, OdeSolver
 
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad
@@ -45,12 +45,17 @@ class InitialValue:
     """Error of a step, relative to the state, that is allowed."""
     atol: float = 1e-12
     """The same, absolute."""
+    unit: float = 1.0
+    """What the absolute error is of, where that is below 1; infinite: the greatest component so
+    far, of states that may be lengths in any unit."""
     max_step: float = np.inf
     """Longest step."""
     most: int = 1_000_000
     """Steps that a motion may take."""
     causes: str = "Rates without bound"
     """What a message supposes where steps become too short to go on."""
+    method: type[OdeSolver] = DOP853
+    """One of SciPy's with an error of its own."""
 
 
 @dataclass
@@ -86,7 +91,7 @@ class Step:
     after: Array
     rates_before: Array
     rates_after: Array
-    _solver: DOP853
+    _solver: OdeSolver
 
     @functools.cached_property
     def dense(self) -> DenseOutput:
@@ -114,23 +119,26 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
 
     Notes
     -----
-    The method is the explicit Runge-Kutta method DOP853 of order 8.
+    The method is the explicit Runge-Kutta method DOP853 of order 8, unless the problem has another.
     """
     with np.errstate(all="ignore"):
         first = np.asarray(problem.rates(problem.start, np.array(problem.state, dtype=float)))
     if not np.isfinite(first).all():  # the integrator would not come back from NaN
         raise bad("state", tuple(problem.state), f"one with finite rates, not {first.tolist()}")
-    # Where a component is zero, no relative error of it can be allowed.
-    atol = max(problem.atol, float(np.finfo(float).tiny))
+    size = float(np.abs(problem.state).max(initial=0.0))
+    atol = _absolute(problem, size)
     options = {"rtol": problem.rtol, "atol": atol, "max_step": problem.max_step}
+    start = problem.start, np.array(problem.state)
     with np.errstate(all="ignore"):
-        solver = DOP853(problem.rates, problem.start, np.array(problem.state), stop, **options)
+        solver = problem.method(problem.rates, *start, stop, **options)
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
     ulp = np.finfo(float).eps * max(abs(stop), abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
     pace = Pace(problem.most, stop)
     while solver.status == "running":
         before, rates_before = solver.y, solver.f
+        size = max(size, float(np.abs(before).max()))
+        solver.atol = _absolute(problem, size)
         with np.errstate(all="ignore"):
             message = solver.step()
         if solver.status == "failed":
@@ -138,6 +146,13 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
         if pace.is_too_slow(solver.t_old, solver.t):
             raise _too_long(problem, solver.t, pace)
+
+
+def _absolute(problem: InitialValue, size: float) -> float:
+    """Absolute error that is allowed to a motion that was as great."""
+    unit = problem.unit if np.isfinite(problem.unit) else size
+    # Where a component is zero, no relative error of it can be allowed.
+    return max(problem.atol * min(unit, 1.0), float(np.finfo(float).tiny))
 
 
 def _stopped(problem: InitialValue, t: float, stop: float, message: str) -> ConvergenceError:

@@ -2,7 +2,7 @@
 
 An explicit method takes steps of the order of the time in which damping acts, however slowly the
 motion goes on. Where these would be too many, Radau's method of order 5 takes its place, motion by
-motion ([HairerNorsettWanner1993]; the implementation is SciPy's).
+motion ([HairerWanner1996] IV.8; the implementation is SciPy's).
 """
 
 from __future__ import annotations
@@ -13,67 +13,55 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import ConvergenceError
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
 
 Array = npt.NDArray[np.float64]
 
-#: Damping times duration from which on a motion is stiff: DOP853 would take a sixth as many steps.
-STIFF = 6e6
-#: Motions that are followed so at once: each takes seconds.
-MOST_MOTIONS = 16
-#: Evaluations of the law after which one is given up.
-MOST_RATES = 300_000
+#: Damping times duration from which on a motion is stiff: DOP853 would take about the most steps
+#: that a motion may take.
+STIFF = 6e7
+#: Steps after which one is given up: of some ten rates each, or seconds in all.
+MOST_STEPS = 30_000
 #: Least relative tolerance that SciPy takes.
 LEAST = 1e-13
-
-
-class TooMany(Exception):
-    """The law was evaluated too often."""
 
 
 def stiff_cells(
     law: PerturbedConservative, values: Mapping[str, Array], times: Array, count: int
 ) -> Any:
-    """Which of so many cells are stiff; none if they are too many, or the law has a kink."""
-    reach = np.max(times, axis=1, initial=0.0)
+    """Which of so many cells are stiff at times > 0; none of those whose law has a kink."""
+    reach = np.max(times, axis=1, initial=0.0, where=np.isfinite(times))
     with np.errstate(all="ignore"):
-        stiff = np.broadcast_to(values["damping"] * reach > STIFF, (count,))
-    few = 0 < np.count_nonzero(stiff) <= MOST_MOTIONS
-    smooth = not np.any(np.asarray(values["quadratic"]) != 0.0) and law.prescribed is None
-    forward = not np.any(times < 0.0)
-    return stiff if few and smooth and forward else np.zeros(count, bool)
+        stiff = values["damping"] * reach > STIFF
+    smooth = (np.asarray(values["quadratic"]) == 0.0) & (law.prescribed is None)
+    return np.broadcast_to(stiff & smooth, (count,))
 
 
 def follow(
-    rates: Callable[[float, Any], Any], state: Array, times: Array, rtol: float, atol: float
-) -> tuple[Array, int]:
-    """States of one motion at times >= 0, of shape (times, 2), and whether it came to its end."""
-    from scipy.integrate import solve_ivp
+    rates: Callable[[float, Any], Any], state: Array, times: Array, **tolerances: Any
+) -> Array:
+    """States of one motion at times, of shape (times, 2): NaN before 0, and once it is given up.
 
-    order = np.argsort(times)
-    rising = times[order]
-    asked = 0
+    Tolerances are those of an `InitialValue`.
+    """
+    from scipy.integrate import Radau
 
-    def counted(t: float, x: Any) -> Array:
-        nonlocal asked
-        asked += 1
-        if asked > MOST_RATES:
-            raise TooMany
-        return np.asarray(rates(t, x))
+    from phasekit.motion.steps import InitialValue, steps
 
     found = np.full((times.size, 2), np.nan)
-    if not np.isfinite(state).all():
-        return found, ARRIVED
+    found[times == 0.0] = state
+    later = np.flatnonzero((times > 0.0) & np.isfinite(times))
+    later = later[np.argsort(times[later])]
+    rising = times[later]
+    tolerances |= {"rtol": max(tolerances["rtol"], LEAST), "most": MOST_STEPS, "method": Radau}
+    done = 0
     try:
-        run = solve_ivp(
-            counted, (0.0, rising[-1]), state, "Radau", rising, rtol=max(rtol, LEAST), atol=atol
-        )
-    except TooMany:
-        return found, EXHAUSTED
-    except ValueError:  # rates that are not finite
-        return found, FAILED
-    if not run.success:
-        return found, FAILED
-    found[order] = run.y.T
-    return found, ARRIVED
+        for step in steps(InitialValue(rates, list(state), **tolerances), float(rising[-1])):
+            upto = int(np.searchsorted(rising, step.stop, side="right"))
+            if upto > done:
+                found[later[done:upto]] = step.dense(rising[done:upto]).T
+                done = upto
+    except (ConvergenceError, ValueError):  # a ValueError: of rates that are not finite
+        pass
+    return found

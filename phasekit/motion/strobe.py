@@ -14,7 +14,7 @@ from phasekit.inputs import bad
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import judged, tell
-from phasekit.motion.method import circle, limits_of, run
+from phasekit.motion.method import cells_of, circle, kinds, limits_of, run, some
 from phasekit.motion.prescribed import table_of
 from phasekit.motion.rates import order_of, rates_of
 
@@ -46,12 +46,12 @@ def common_period(law: PerturbedConservative, values: Mapping[str, Array]) -> Ar
 def _period(frequencies: Array) -> float:
     if not (np.isfinite(frequencies).all() and (frequencies > 0.0).all()):
         return float("nan")
-    base = float(frequencies[0])
+    base = float(frequencies.min())
     turns = 1
-    for frequency in frequencies[1:]:
+    for frequency in frequencies:
         ratio = float(frequency) / base
         near = Fraction(ratio).limit_denominator(DENOMINATOR)
-        if near == 0 or abs(ratio - near) > 1e-12 * ratio:
+        if abs(ratio - near) > min(1e-12 * ratio, 1e-9):  # of great ones some come near by chance
             return float("nan")
         turns = int(np.lcm(turns, near.denominator))
     return 2.0 * np.pi * turns / base
@@ -134,7 +134,7 @@ def strobe(
     many = max(skip + kept - 1, 0) if most_legs is None else most_legs
     period = common_period(law, values)
     never = ~np.isfinite(legs)
-    again = period is None or bool(np.all((np.abs(legs - period) <= 1e-14 * legs) | never))
+    again = np.full(count, True) if period is None else np.abs(legs - period) <= 1e-14 * legs
     states, legs = np.where(never[:, None], np.nan, states), np.where(never, 1.0, legs)
     end = float(np.max(legs, initial=0.0)) * many
     table = table_of(law.prescribed, 0.0, end)
@@ -144,9 +144,9 @@ def strobe(
     found = np.full(count, -1, np.int64)
     taken, status = np.zeros(count, np.int64), np.zeros(count, np.int64)
     if count and many:
-        shared: Any = (table, limits_of(law, rtol, atol), again, code.kink, skip, many, circle(law))
+        shared: Any = (table, limits_of(law, rtol, atol), code.kink, skip, many, circle(law))
         shared += targets.scale, targets.points, targets.box, targets.boxes, targets.visits
-        cells, groups = (legs, np.array(states)), (out, found, taken, status)
+        cells, groups = (legs, again, np.array(states)), (out, found, taken, status)
         run(kernel, code, shared, cells, parameters, groups, status, threads)
         judged(status, parameters)
     return Strobed(out, found, taken, status)
@@ -211,21 +211,25 @@ def _exponents(
         x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).reshape(-1) for x in given
     )
     values = law.values(*flat)
-    code, parameters = rates_of(law, values, 2, order_of(rtol) if series else 0)
     count = int(np.prod(shape, dtype=int))
     states = np.zeros((count, 6))
     states[:, 0], states[:, 1], states[:, 2], states[:, 5] = phi, dphi, 1.0, 1.0
-    parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     valid = np.isfinite(time) & (time > 0.0)
     states[~np.broadcast_to(valid, (count,))] = np.nan
     legs = np.array(np.broadcast_to(np.where(valid, time, 1.0) / PARTS, (count,)))
     table = table_of(law.prescribed, 0.0, float(np.max(np.where(valid, time, 0.0), initial=0.0)))
     out, status = np.full((count, PARTS, 2), np.nan), np.zeros(count, np.int64)
-    if count:
-        shared = table, limits_of(law, rtol, atol, once=True), code.kink
-        run(growth, code, shared, (legs, states), parameters, (out, status), status, threads)
-        judged(status, parameters)
-        tell("lyapunov_exponent", status, states)
+    for which in kinds(values, count):
+        code, parameters = rates_of(
+            law, cells_of(values, which), 2, order_of(rtol) if series else 0
+        )
+        parameters = np.array(np.broadcast_to(parameters, (len(parameters), which.sum())))
+        shared = table, limits_of(law, rtol, atol, alone=True), code.kink
+        own = out[which], status[which]
+        run(growth, code, shared, (legs[which], states[which]), parameters, own, own[1], threads)
+        judged(own[1], parameters)
+        out[which], status[which] = own
+    tell("lyapunov_exponent", status, states)
     means = np.diff(out[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
     exponents = means.mean(axis=1)
     number = PARTS - SKIPPED
@@ -301,9 +305,12 @@ def sections(
             stacklevel=2,
         )
     states = np.stack([np.broadcast_to(x, (count,)) for x in (phi, dphi)], axis=-1)
-    run = strobe(law, values, states, legs, n, skip, rtol=rtol, atol=atol)
-    tell("section_phi", run.status, np.where(np.isfinite(legs).reshape(-1, 1), states, np.nan))
-    found = run.states
+    found, status = np.empty((count, n, 2)), np.empty(count, np.int64)
+    for which in kinds(values, count):
+        cells = cells_of(values, which), states[which], some(legs, which)
+        own_run = strobe(law, *cells, n, skip, rtol=rtol, atol=atol)
+        found[which], status[which] = own_run.states, own_run.status
+    tell("section_phi", status, np.where(np.isfinite(legs).reshape(-1, 1), states, np.nan))
     times = np.broadcast_to(np.reshape(legs, (-1, 1)) * (skip + np.arange(n)), (count, n))
     turn = circle(law)
     angles = found[..., 0]

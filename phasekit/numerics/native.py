@@ -16,11 +16,24 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
+from numba.np.linalg import F_INT_nbtype, F_INT_nptype
 
-from phasekit.numerics.compile import OPTIONS, Array, Function
+from phasekit.numerics.compile import OPTIONS, Array, Function, routine
 from phasekit.numerics.linked import link
 
 OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
+
+#: LAPACK's elimination, as numba finds it. What `numpy.linalg.solve` puts round it for the compiler
+#: keeps no factors, whose sign is wanted too, and took a third of a kernel's time to compile.
+_pointers: Any = [types.CPointer(kind) for kind in (types.float64, F_INT_nbtype)]  # type: ignore[no-untyped-call]
+_gesv: Any = types.ExternalFunction(
+    "numba_xgesv",
+    types.intc(
+        types.char, types.intp, types.intp, _pointers[0], types.intp,
+        _pointers[1], _pointers[0], types.intp,
+    ),
+)  # fmt: skip
+_DOUBLE = ord("d")
 
 
 def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
@@ -63,17 +76,34 @@ def call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
     function(w[x:], p, w[z:], w[out:])
 
 
+@routine
+def _eliminate(w: Array, a: int, b: int, n: int) -> float:
+    for i in range(n * n):
+        if not np.isfinite(w[a + i]):
+            return 0.0
+    for i in range(n):  # LAPACK holds matrices by columns
+        for j in range(i):
+            value = w[a + i * n + j]
+            w[a + i * n + j] = w[a + j * n + i]
+            w[a + j * n + i] = value
+    matrix, right, swapped = w[a : a + n * n], np.empty(2 * n), np.empty(n, F_INT_nptype)
+    for i in range(n):
+        right[i] = w[b + 2 * i]
+        right[n + i] = w[b + 2 * i + 1]
+    if _gesv(_DOUBLE, n, 2, matrix.ctypes, n, swapped.ctypes, right.ctypes, n) != 0:
+        return 0.0
+    sign = 1.0
+    for i in range(n):
+        w[b + 2 * i] = right[i]
+        w[b + 2 * i + 1] = right[n + i]
+        if (swapped[i] != i + 1) != (w[a + i * n + i] < 0.0):
+            sign = -sign
+    return sign
+
+
 def _solve(w: Array, a: int, b: int, n: int) -> float:
     if n > OWN:
-        matrix, right = w[a : a + n * n].reshape(n, n), w[b : b + 2 * n].reshape(n, 2)
-        for i in range(n * n):
-            if not np.isfinite(w[a + i]):
-                return 0.0
-        try:
-            right[:] = np.linalg.solve(matrix, right)
-        except Exception:  # noqa: BLE001 (all that numba knows)
-            return 0.0
-        return 1.0
+        return _eliminate(w, a, b, n)
     sign = 1.0
     for j in range(n):
         pivot = j
@@ -118,10 +148,7 @@ def _solve(w: Array, a: int, b: int, n: int) -> float:
 
 @twin(_solve)
 def solve(w: Array, a: int, b: int, n: int) -> float:
-    """Solve for two right sides, in their place; the determinant's sign, 0 if it is singular.
-
-    Of many unknowns that are compiled the sign is left to `orientation`.
-    """
+    """Solve for two right sides, in their place; the determinant's sign, 0 if it is singular."""
     right = w[b : b + 2 * n].reshape(n, 2)
     factors, swapped, solved, singular = _lapack()(w[a : a + n * n].reshape(n, n), right)
     if singular:
@@ -142,18 +169,6 @@ def _lapack() -> Callable[..., Any]:
 @functools.lru_cache(maxsize=16)
 def _places(n: int) -> Any:
     return np.arange(n)
-
-
-def _orientation(w: Array, a: int, n: int, sign: float) -> float:
-    if n > OWN:
-        return float(np.linalg.slogdet(w[a : a + n * n].reshape(n, n))[0])
-    return sign
-
-
-@twin(_orientation)
-def orientation(w: Array, a: int, n: int, sign: float) -> float:
-    """Sign of the determinant of the matrix that was solved last."""
-    return sign
 
 
 def _inner(w: Array, weight: int, x: int, y: int, n: int) -> float:
@@ -178,6 +193,28 @@ def _copy(w: Array, source: int, target: int, n: int) -> None:
 def copy(w: Array, source: int, target: int, n: int) -> None:
     """Copy n entries."""
     w[target : target + n] = w[source : source + n]
+
+
+def _keep(row: Array, w: Array, source: int, n: int) -> None:
+    for i in range(n):
+        row[i] = w[source + i]
+
+
+@twin(_keep)
+def keep(row: Array, w: Array, source: int, n: int) -> None:
+    """Copy n entries to the beginning of another array."""
+    row[:n] = w[source : source + n]
+
+
+def _divide(w: Array, x: int, by: float, n: int) -> None:
+    for i in range(n):
+        w[x + i] /= by
+
+
+@twin(_divide)
+def divide(w: Array, x: int, by: float, n: int) -> None:
+    """Divide n entries by a number."""
+    w[x : x + n] /= by
 
 
 def _dot(w: Array, x: int, y: int, n: int) -> float:

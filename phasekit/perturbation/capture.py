@@ -22,7 +22,7 @@ from phasekit.phase.numerical import functions
 Array = npt.NDArray[np.float64]
 
 
-#: Energies of saddles that differ by less, relative to their size, are one.
+#: Energies of saddles that differ by less, relative to those of all equilibria, are one.
 LEVEL = 16.0 * 2.0**-52
 
 
@@ -31,6 +31,12 @@ class Capture(NamedTuple):
 
     capture_flux: Array
     capture_probability: Array
+
+
+def energy_size(points: Any) -> Array:
+    """Greatest energy of an equilibrium without its sign, a constant in V included."""
+    energies = np.abs(np.where(points.kind > 0, points.energy, 0.0))
+    return np.asarray(energies.max(axis=-1, initial=0.0))
 
 
 def capture(
@@ -45,7 +51,9 @@ def capture(
     joined = loops.loop[..., :1] == Loop.HETEROCLINIC
     lobes = loss[..., 0, :] + np.where(joined, loss[..., 1, ::-1], 0.0)
     winding = loss[..., 1, :] + np.where(joined, loss[..., 0, :], 0.0)  # a turn is both arcs
-    return regions(lobes, winding, rotation)
+    push = winding[..., 0] - winding[..., 1]
+    push = np.where(np.abs(push) > LEVEL * np.abs(winding).max(axis=-1), push, 0.0)
+    return regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), push if rotation else None)
 
 
 def capture_numerical(
@@ -54,52 +62,76 @@ def capture_numerical(
     """Capture in any potential: lobes of the lowest saddle that has two, loops of the highest."""
     values = law.values(*parameters)
     formula: Any = law.base
-    loops = functions.separatrices(formula, *(values[name] for name in formula.names))
+    points, loops = functions.phase_space(formula, *(values[name] for name in formula.names))
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
-    return of_loops(loops, loss, rotation)
+    circle = formula.period is not None
+    push = values["torque"] if rotation else None
+    return of_loops(loops, loss, energy_size(points), push, circle=circle)
 
 
-def of_loops(loops: Any, loss: Array, rotation: bool) -> Capture:
-    """Capture by the separatrices of numbered saddles, and what they lose on each side."""
+def of_loops(
+    loops: Any, loss: Array, size: Array, push: Array | None, *, circle: bool = True
+) -> Capture:
+    """Capture by the separatrices of numbered saddles, and what they lose on each side.
+
+    Energies are of a size that rounding is measured by; of a push see `regions`.
+    """
     if not loss.shape[-2]:
         nothing = np.full((*loss.shape[:-2], 2), np.nan)
-        return regions(nothing, nothing, rotation)
-    winds = np.isin(loops.loop, (Loop.WINDING, Loop.HETEROCLINIC))
-    height = np.broadcast_to(loops.saddle_energy, loss.shape[:-1])
-    both = np.isfinite(loss).all(axis=-1)
-    winds = both & np.broadcast_to(winds, both.shape)
-    lowest = np.where(both & ~winds, height, np.inf)
-    highest = np.where(winds, height, -np.inf)
-    at = lowest.argmin(-1)[..., None]
-    found = np.isfinite(np.take_along_axis(lowest, at, -1))
-    lobes = np.where(found, np.take_along_axis(loss, at[..., None], -2)[..., 0, :], np.nan)
-    top = highest.max(-1, keepdims=True)
+        return regions(nothing, nothing, np.zeros(loss.shape[:-2], bool), push)
+    height, loop = (np.broadcast_to(x, loss.shape[:-1]) for x in (loops.saddle_energy, loops.loop))
+    wells = (loop != Loop.ABSENT).sum(axis=-1)  # on a circle as many as saddles
+    near = LEVEL * np.broadcast_to(size, loss.shape[:-2])[..., None]
+    eights = loop == Loop.LOBES
+    lowest = np.where(eights, height, np.inf).min(-1, keepdims=True)
+    eights = eights & (height <= lowest + near)
+    first = np.take_along_axis(loss, eights.argmax(-1)[..., None, None], -2)[..., 0, :]
+    lobes = np.where(eights.any(-1, keepdims=True), first, np.nan)
+    winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC)) & circle
+    top = np.where(winds, height, -np.inf).max(-1, keepdims=True)
     # A turn on a level of several saddles is an arc of each.
-    arcs = winds & (top - highest <= LEVEL * np.abs(height).max(-1, keepdims=True, initial=0.0))
-    winding = np.where(arcs[..., None], loss, 0.0).sum(axis=-2)
-    winding = np.where(arcs.any(-1, keepdims=True), winding, np.nan)
-    return regions(lobes, winding, rotation)
+    arcs = winds & (height >= top - near)
+    number = arcs.sum(axis=-1)
+    winding = np.where(number[..., None] > 0, _total(loss, arcs), np.nan)
+    if push is not None:  # left and right are all that is there if each arc holds an eight
+        each = (wells == 2 * number) & (eights.sum(axis=-1) == number)
+        each &= (loop == Loop.LOBES).sum(axis=-1) == number
+        lobes = np.where(each[..., None], _total(loss, eights), np.nan)
+    pair = (number == 2) & (wells == 2)
+    if pair.any():  # both wells end in an arc of each saddle, there and back
+        two = np.argsort(~arcs, axis=-1, kind="stable")[..., :2, None]
+        one, other = np.moveaxis(np.take_along_axis(loss, two, -2), -2, 0)
+        lobes = np.where(pair[..., None], one + other[..., ::-1], lobes)
+    return regions(lobes, winding, (wells == number) & ~pair, push)
 
 
-def regions(lobes: Array, winding: Array, rotation: bool) -> Capture:
-    """Fluxes and probabilities from the losses of the lobes and of both winding branches."""
-    if not rotation:
+def _total(loss: Array, saddles: Any) -> Array:
+    """What is lost at some saddles together."""
+    return np.asarray(np.where(saddles[..., None], loss, 0.0).sum(axis=-2))
+
+
+def regions(lobes: Array, winding: Array, single: Any, push: Array | None) -> Capture:
+    """Fluxes and probabilities from the losses of the lobes and of both winding branches.
+
+    A push forward brakes what comes from rotation backward; without any it comes forward. None: it
+    comes from outside the lobes. Where a single well is, there are no lobes.
+    """
+    if push is None:
         flux = np.concatenate([lobes, np.zeros((*lobes.shape[:-1], 1))], axis=-1)
         flux[np.isnan(lobes).any(axis=-1)] = np.nan
         flux[..., 2] -= np.minimum(lobes.sum(axis=-1), 0.0)
         return Capture(flux, _shares(lobes))
     with np.errstate(all="ignore"):
-        # What is braked loses more; forward where nothing tells, within rounding.
-        forward = ~(winding[..., 0] - winding[..., 1] > 1e-9 * np.abs(winding).max(axis=-1))
+        forward = np.broadcast_to(~(push > 0.0), winding.shape[:-1])
         arriving = np.where(forward, winding[..., 1], winding[..., 0])
         inside = winding.sum(axis=-1)
         share = np.where(arriving > 0.0, np.clip(inside / arriving, 0.0, 1.0), 0.0)
     share = np.where(np.isnan(arriving), np.nan, share)
-    wells = np.asarray(np.isfinite(lobes).all(axis=-1))
-    single = np.stack([np.where(forward, 0.0, 1.0), np.where(forward, 1.0, 0.0)], axis=-1)
+    side = np.stack([np.where(forward, 0.0, 1.0), np.where(forward, 1.0, 0.0)], axis=-1)
     shares = _shares(lobes)
-    parts = np.where(wells[..., None], shares[..., :2], single)
-    held = np.where(wells, 1.0 - shares[..., 2], 1.0)
+    single = np.broadcast_to(single, share.shape)
+    parts = np.where(single[..., None], side, shares[..., :2])
+    held = np.where(single, 1.0, 1.0 - shares[..., 2])
     none = 1.0 - share * held
     probability = np.concatenate([parts * share[..., None], none[..., None]], axis=-1)
     flux = probability * np.maximum(arriving, 0.0)[..., None]

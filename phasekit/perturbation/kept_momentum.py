@@ -9,20 +9,21 @@ machine.
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import Loop, ParameterError
+from phasekit.errors import EquilibriumKind, Loop, ParameterError
 from phasekit.laws.perturbed import PerturbedRouthian
 from phasekit.mechanics.at_momentum import AtMomentum, Machines
 from phasekit.mechanics.steady import Steady, steady_at
 from phasekit.mechanics.two_degrees import TwoDegrees
-from phasekit.perturbation.capture import Capture, of_loops
+from phasekit.perturbation.capture import Capture, energy_size, of_loops
 from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
-from phasekit.perturbation.quadrature import POINTS, Paths, along, closed, times_of
+from phasekit.perturbation.quadrature import CELLS, POINTS, Paths, along, closed, times_of
 from phasekit.phase.numerical import motion
 from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.separatrices import SIDES, branch_of, saddles_of, separatrices
@@ -53,20 +54,21 @@ def most(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> tuple[int, int, 
     values = law.values(*parameters)
     one = _machines(law).at(values)
     free = steady_at(one.machine, one.p, np.zeros(()))
-    saddles = int((np.isfinite(free.exponent)).sum(axis=-1).max(initial=0))
+    own = np.isin(free.kind, (EquilibriumKind.SADDLE, EquilibriumKind.DEGENERATE)).sum(axis=-1)
     number = int(equilibria(law, *parameters).n_equilibria.max(initial=0))
-    return max(number, 0), saddles, np.empty((0, 2))
+    return max(number, 0), int(own.max(initial=0)), np.empty((0, 2))
 
 
 def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
     """Melnikov's function along the separatrices of the amended potential, in J."""
-    return _along_separatrices(law, parameters)[1]
+    return _along_separatrices(law, parameters)[2]
 
 
 def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
-    loops, found = _along_separatrices(law, parameters)
-    return of_loops(loops, -found.melnikov_mean, rotation)
+    loops, size, found = _along_separatrices(law, parameters)
+    push = law.values(*parameters)["torque"] if rotation else None
+    return of_loops(loops, -found.melnikov_mean, size, push)
 
 
 # ------------------------------------------------------------------------- energies
@@ -124,8 +126,8 @@ def _machines(law: PerturbedRouthian) -> Machines:
 # ------------------------------------------------------------------------- separatrices
 
 
-def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops, Melnikov]:
-    """Separatrices of the cells, and Melnikov's function along them."""
+def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops, Array, Melnikov]:
+    """Separatrices of the cells, the size of their energies, and Melnikov's function."""
     refuse_prescribed(law, "melnikov")
     values = law.values(*parameters)
     shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
@@ -134,14 +136,35 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
     columns = np.stack(np.broadcast_arrays(*one.machine, one.p, np.zeros(flat["torque"].shape)))
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
-    which = which.reshape(-1)
-    followed = [_followed(column, cells.shape[1] == 1) for column in cells.T]
+    order = np.argsort(which.reshape(-1), kind="stable")
+    parts: list[tuple[Loops, Array, Melnikov]] = []
+    for start in range(0, order.size, CELLS):
+        rows = order[start : start + CELLS]
+        machines, own = np.unique(which.reshape(-1)[rows], return_inverse=True)
+        followed = [_followed(cells[:, i], cells.shape[1] == 1) for i in machines]
+        own_values = {name: x[rows] for name, x in flat.items()}
+        weight = np.asarray(one.machine.Jn).reshape(-1)[rows, None, None]
+        parts.append(_part(law, followed, own.reshape(-1), own_values, weight))
+    width = max((part[0].loop.shape[1] for part in parts), default=0)
+    fields = zip(*((*loops, size, *found) for loops, size, found in parts), strict=True)
+    back = np.argsort(order)
+    whole = [np.concatenate([_wide(x, width, 1) for x in field])[back] for field in fields]
+    shaped = [x.reshape(shape + x.shape[1:]) for x in whole]
+    number = len(Loops._fields)
+    return Loops(*shaped[:number]), shaped[number], Melnikov(*shaped[number + 1 :])
+
+
+def _part(
+    law: PerturbedRouthian, followed: Sequence[Followed], which: Any, values: dict[str, Array],
+    weight: Array,
+) -> tuple[Loops, Array, Melnikov]:  # fmt: skip
+    """The same of some cells in a row, each the machine of a number."""
     width = max((len(each.loops.loop) for each in followed), default=0)
     loops = Loops(
         *(np.stack([_wide(getattr(each.loops, name), width) for each in followed])[which]
           for name in Loops._fields)
     )  # fmt: skip
-    weight = np.asarray(one.machine.Jn).reshape(-1, 1, 1)
+    size = np.array([each.size for each in followed])[which]
     found: Melnikov | None = None
     for points in POINTS:
         moved = [motions_of(each, points) for each in followed]
@@ -149,7 +172,7 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
             np.stack([_wide(part, width) for part in parts])[which]
             for parts in zip(*moved, strict=True)
         )
-        better, lost = along(law, Paths(time, phi, dphi, []), flat, weight)
+        better, lost = along(law, Paths(time, phi, dphi, []), values, weight)
         if found is None:
             found, rows = better, np.flatnonzero(lost)
         else:
@@ -158,16 +181,15 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
         if not rows.size:
             break
     assert found is not None
-    return (
-        Loops._make(x.reshape(*shape, width) for x in loops),
-        Melnikov._make(x.reshape(shape + x.shape[1:]) for x in found),
-    )
+    return loops, size, found
 
 
-def _wide(values: Any, width: int) -> Any:
+def _wide(values: Any, width: int, axis: int = 0) -> Any:
     """Values of the saddles, and nothing for those that other machines have more."""
+    if values.ndim <= axis:
+        return values
     empty: Any = Loop.ABSENT if values.dtype == np.int8 else np.nan
-    more = [(0, width - len(values)), *[(0, 0)] * (values.ndim - 1)]
+    more = [(0, width - values.shape[i] if i == axis else 0) for i in range(values.ndim)]
     return np.pad(values, more, constant_values=empty)
 
 
@@ -176,6 +198,8 @@ class Followed:
     """The separatrices of one machine at a momentum, along arc length."""
 
     loops: Loops
+    size: float
+    """Of the energies of its equilibria."""
     path: ArcLength | None
     ground: Any
     columns: npt.NDArray[np.intp]
@@ -183,7 +207,11 @@ class Followed:
 
 
 NOTHING = Followed(
-    Loops(np.empty(0), np.empty(0), np.empty(0, np.int8)), None, None, np.empty(0, np.intp)
+    Loops(np.empty(0), np.empty(0), np.empty(0, np.int8)),
+    np.nan,
+    None,
+    None,
+    np.empty(0, np.intp),
 )
 
 
@@ -213,7 +241,8 @@ def separatrices_of(*constants: float) -> Followed:
     order = np.argsort(phi)
     fields = (found.saddle_energy, found.saddle_exponent, found.loop)
     columns = saddles_of(ground)[1][order]
-    return Followed(Loops(*(field[0][order] for field in fields)), path, ground, columns)
+    loops = Loops(*(field[0][order] for field in fields))
+    return Followed(loops, float(energy_size(ground.points)[0]), path, ground, columns)
 
 
 @functools.lru_cache(maxsize=64)

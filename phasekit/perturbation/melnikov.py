@@ -188,6 +188,8 @@ def assembled(mean: Array, parts: Sequence[Part], unmoved: Any) -> Melnikov:
     mean = np.broadcast_to(mean, shape)
     amplitude, area = reach(Z, nu, np.where(mean > 0.0, -1.0, 1.0))
     same = (nu == nu[..., :1]).all(axis=-1)
+    # Of several frequencies the sense of the mean tells which peak counts.
+    amplitude = np.where(same | ~np.isnan(mean), amplitude, np.nan)
     total = Z.sum(axis=-1)
     phase = np.where(same & (total != 0.0), np.angle(total), np.nan)
     size = np.abs(mean)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,9 +29,8 @@ REACH = 36.0
 POINTS = (3 << 7, 1 << 11)
 #: Cells at a time, for the memory of their motions.
 CELLS = 256
-#: Greatest rounding of what is said, and difference from twice the step, relative: half the step
-#: squares the error.
-WORST, APART = 1e-6, 1e-4
+#: Greatest error of what is said, relative, and that of motions and sums relative to their size.
+WORST, ROUNDING = 1e-6, 1e-13
 
 
 @functools.lru_cache(maxsize=32)
@@ -74,23 +73,46 @@ class Paths:
                 phi[there, saddle, side], dphi[there, saddle, side] = moved
         return cls(times[which], phi[which], dphi[which], parameters)
 
-    def integral(self, values: Any) -> Any:
-        """Integral over time, NaN where it has lost too many digits."""
-        fine = values.sum(axis=-1)
-        coarse = 2.0 * values[..., ::2].sum(axis=-1)
-        rounding = 1e-13 * np.abs(values).sum(axis=-1)
-        good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
-        # What vanishes by symmetry, within rounding, vanishes.
-        nothing = np.abs(fine) <= 0.1 * rounding
-        return np.where(good, fine * self.step, np.where(nothing, 0.0, np.nan))
+    def integral(self, values: Any, corner: Any = False) -> Sum:
+        """Integral over time of what is analytic, or has a corner as that of abs(t)^3 at t = 0."""
+        size = np.abs(values).sum(axis=-1)
+        fine, coarse = values.sum(axis=-1), 2.0 * values[..., ::2].sum(axis=-1)
+        # Half the step squares the error; with a corner it is of the fourth order.
+        fourth = (fine - coarse) / 15.0
+        with np.errstate(all="ignore"):
+            square = np.where(size > 0.0, np.abs(fine - coarse) ** 2 / size, 0.0 * size)
+        error = np.where(corner, np.abs(fourth), square) + ROUNDING * size
+        return Sum(np.where(corner, fine + fourth, fine), error, size).times(self.step)
 
-    def transform(self, values: Any, nu: Array) -> Any:
+    def transform(self, values: Any, nu: Array) -> Sum:
         """Integral of phi' g e^{i nu t}, its real and imaginary part."""
-        at = np.exp(1j * nu[:, None, None, None] * self.time) * self.dphi * values
-        rounding = 1e-13 * np.abs(at).sum(axis=-1)
-        fine, coarse = at.sum(axis=-1), 2.0 * at[..., ::2].sum(axis=-1)
-        good = (np.abs(fine - coarse) <= APART * np.abs(fine)) & (rounding <= WORST * np.abs(fine))
-        return np.where(good, fine * self.step, np.nan)
+        return self.integral(np.exp(1j * nu[:, None, None, None] * self.time) * self.dphi * values)
+
+
+class Sum(NamedTuple):
+    """An integral, or several together: its error, and the size of what was added."""
+
+    value: Any
+    error: Any
+    size: Any
+
+    def times(self, factor: Any) -> Sum:
+        """It times a factor."""
+        size = np.abs(factor)
+        return Sum(factor * self.value, size * self.error, size * self.size)
+
+    def plus(self, other: Sum) -> Sum:
+        """Both together."""
+        return Sum(*(one + more for one, more in zip(self, other, strict=True)))
+
+    def known(self) -> Any:
+        """Whether it has not lost too many digits."""
+        return self.error <= WORST * np.abs(self.value)
+
+    def settled(self) -> Any:
+        """The value, NaN where it has lost too many digits; 0 where it is but rounding of 0."""
+        nothing = (np.abs(self.value) <= self.error) & (self.error <= 2.0 * ROUNDING * self.size)
+        return np.where(self.known(), self.value, np.where(nothing, 0.0, np.nan))
 
 
 def times_of(k: Array, points: int) -> Array:
@@ -159,38 +181,50 @@ def along(
     formula: Any = law.base
     each = {name: x[:, None, None] for name, x in values.items()}
     square = paths.dphi**2
-    mean = -each["damping"] * paths.integral(square)
+    total = paths.integral(square).times(-each["damping"])
     net = paths.phi[..., -1] - paths.phi[..., 0]
     lobe = np.abs(net) < 1e-6 * np.abs(paths.phi - paths.phi[..., :1]).max(axis=-1)
-    net = np.where(lobe, 0.0, net)
-    mean = mean + np.where(each["torque"] == 0.0, 0.0 * net, each["torque"] * net)
+    gain = each["torque"] * np.where(lobe, 0.0, net)
+    total = total.plus(Sum(gain, 0.0 * gain, np.abs(gain)))
     if np.any(values["quadratic"] != 0.0):
-        mean = mean - each["quadratic"] * paths.integral(square * np.abs(paths.dphi))
+        cubes = paths.integral(square * np.abs(paths.dphi), corner=lobe)
+        total = total.plus(cubes.times(-each["quadratic"]))
     for parameter in law.drifting:
-        rate = values[drift_name(parameter)]
-        mean = mean + np.where(
-            each[drift_name(parameter)] == 0.0,
-            0.0,
-            rate[:, None, None] * _area_loss(paths, formula, parameter),
-        )
-    parts: list[Part] = [
-        (weight * paths.transform(1.0, nu), amplitude, nu, phase)
+        rate = each[drift_name(parameter)]
+        loss = _area_loss(paths, formula, parameter).times(rate)
+        total = total.plus(Sum(*(np.where(rate == 0.0, 0.0, x) for x in loss)))
+    mean = total.settled()
+    drives: list[tuple[Sum, Any, Any, Any]] = [
+        (paths.transform(1.0, nu), amplitude, nu, phase)
         for amplitude, nu, phase in law.forcing(values)
     ]
     for parameter in law.modulated:
         amplitude, nu, phase = law.harmonic(values, modulation_names(parameter))
         slope = -derivative(formula, parameter).slopes(paths.phi, *paths.parameters)
-        parts.append((weight * paths.transform(slope, nu), amplitude, nu, phase))
+        drives.append((paths.transform(slope, nu), amplitude, nu, phase))
+    sizes = [np.abs(a)[:, None, None] for _, a, _, _ in drives]
+    responses = [
+        np.where(Z.known(), size * np.abs(Z.value), 0.0)
+        for (Z, *_), size in zip(drives, sizes, strict=True)
+    ]
+    parts: list[Part] = []
+    for i, (Z, amplitude, nu, phase) in enumerate(drives):
+        # What is small beside the others need not have digits of its own.
+        others = [one for j, one in enumerate(responses) if j != i]
+        good = Z.known()
+        if others:
+            good |= sizes[i] * Z.error <= WORST * np.max(others, axis=0)
+        parts.append((weight * np.where(good, Z.value, np.nan), amplitude, nu, phase))
     found = assembled(weight * mean, parts, undamped(law, values))
     closed = np.isfinite(paths.phi[..., 0])
     lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
     return found, lost.any(axis=(1, 2))
 
 
-def _area_loss(paths: Paths, formula: Formula, parameter: str) -> Any:
+def _area_loss(paths: Paths, formula: Formula, parameter: str) -> Sum:
     """Integral of V_p(phi) - V_p(phi_s): minus the derivative of the area."""
     level = derivative(formula, parameter).values(paths.phi, *paths.parameters)
     rise = level - level[..., :1]
     size = np.abs(rise).max(axis=-1)
-    found = paths.integral(rise)
-    return np.where(np.abs(rise[..., -1]) <= 1e-9 * size, found, np.nan)
+    returns = np.abs(rise[..., -1]) <= 1e-9 * size
+    return Sum(*(np.where(returns, x, np.nan) for x in paths.integral(rise)))

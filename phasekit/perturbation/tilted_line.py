@@ -13,13 +13,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import EquilibriumKind
 from phasekit.laws.perturbed import TiltedConservative
-from phasekit.perturbation.tilted_orbits import CELLS, SPAN, followed
+from phasekit.perturbation.tilted_orbits import CELLS, SPAN, followed, repeated
 from phasekit.perturbation.tilted_potential import equilibria_of_cells, tilted
 from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical.differences import Ground, survey
-from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import saddles_of
 from phasekit.phase.numerical.systems import Systems
@@ -115,7 +113,7 @@ class Slope:
         count = np.isfinite(points.phi).sum(axis=1)
         first = np.zeros(systems.size, np.intp)
         if cells.formula.period is not None:
-            points, first = _repeated(points, torque, cells.formula.period), count
+            points, first = repeated(points, torque, cells.formula.period), count
         line = Systems(unrolled(cells.formula), (*own, torque), systems.size)
         return cls(survey(line, points), torque, first, count, cells.period)
 
@@ -159,26 +157,3 @@ class Slope:
         if np.isinf(self.period):
             return rounds.orbits_of(self.ground, states, v)
         return followed(self.ground, states, v, self.torque, self.period)
-
-
-def _repeated(points: Equilibria, torque: Array, period: float) -> Equilibria:
-    """Equilibria of a circle on the line, over as many turns as `SPAN` has."""
-    turns = period * np.array(SPAN, float)[:, None]
-    if not points.phi.shape[1]:  # nothing stands: one place, which stays empty
-        empty = np.full((len(points.phi), 1), np.nan)
-        kinds = np.full(empty.shape, EquilibriumKind.ABSENT, np.int8)
-        points = Equilibria._make([empty, kinds, *[empty] * 4, *list(points)[6:]])
-    rows, width = points.phi.shape
-
-    def spread(field: Any, shift: Any = 0.0) -> Any:
-        return (field[:, None, :] + shift).reshape(rows, len(SPAN) * width)
-
-    phi = spread(points.phi, turns)
-    order = np.argsort(phi, axis=1)
-    fields: list[Any] = [phi, spread(points.kind, np.zeros(turns.shape, np.int8))]
-    fields.append(spread(points.energy, -torque[:, None, None] * turns))
-    others = (points.curvature, points.natural_frequency, points.exponent)
-    fields += [spread(field, np.zeros(turns.shape)) for field in others]
-    listed = [np.take_along_axis(field, order, axis=1) for field in fields]
-    proofs: list[Any] = list(points)[6:]
-    return Equilibria._make([*listed, *proofs])

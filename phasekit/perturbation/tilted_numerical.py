@@ -5,47 +5,34 @@ On a line that is another potential. On a circle what runs on gains N times the 
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
 from phasekit.laws.perturbed import TiltedConservative
+from phasekit.perturbation.tilted import Tilted
 from phasekit.perturbation.tilted_line import Cells, Index, Slope
-from phasekit.perturbation.tilted_orbits import SPAN, TiltedOrbits, enter, enter_level, home, room
+from phasekit.perturbation.tilted_orbits import (
+    SPAN,
+    TiltedOrbits,
+    enter,
+    enter_level,
+    enter_motion,
+    home,
+    room,
+)
 from phasekit.perturbation.tilted_potential import equilibria
 from phasekit.perturbation.tilted_potential import most as most_equilibria
-from phasekit.phase.numerical import functions, motion
+from phasekit.phase.numerical import functions
 from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical.angles import AnglesWithErrors, angles
 from phasekit.phase.numerical.functions import states_at_energy, states_at_gap
 from phasekit.phase.numerical.motion import MotionWithErrors
-from phasekit.phase.numerical.separatrices import (
-    branch_of,
-    saddles_of,
-)
 from phasekit.phase.numerical.separatrices import separatrices as find_separatrices
 
 Array = npt.NDArray[np.float64]
-
-
-class TiltedSeparatrices(NamedTuple):
-    """Separatrices under a torque, their saddles by the coordinate; as of a potential."""
-
-    topology: npt.NDArray[np.int8]
-    figure_eight: npt.NDArray[np.bool_]
-    saddle_phi: Array
-    saddle_energy: Array
-    saddle_exponent: Array
-    loop: npt.NDArray[np.int8]
-    winding_area: Array
-    turning_offset: Array
-    turning_phi: Array
-    lobe_area: Array
-    winding_area_error: Array
-    lobe_area_error: Array
-    energy_per_turn: Array
 
 
 def orbits(law: TiltedConservative, *inputs: npt.ArrayLike) -> TiltedOrbits:
@@ -152,17 +139,11 @@ def separatrix_motion(
             field[flat] = values
     for slope, some in cells.parts():
         column, there = slope.saddle(saddle)
-        rows = np.flatnonzero(there)
-        if rows.size:
-            ground = slope.ground.take(rows)
-            branch = branch_of(ground, column[rows], 1.0 if side else -1.0)
-            found = motion.separatrix_motion(branch, np.arange(rows.size), time[some[rows]])
-            for field, values in zip(out, found, strict=True):
-                field[some[rows]] = values
+        enter_motion(out, some, slope.ground, column, there, side, time[some])
     return MotionWithErrors._make(cells.shaped(out))
 
 
-def separatrices(law: TiltedConservative, *parameters: npt.ArrayLike) -> TiltedSeparatrices:
+def separatrices(law: TiltedConservative, *parameters: npt.ArrayLike) -> Tilted:
     """Separatrices of the potential that a constant torque tilts."""
     cells = Cells.of(law, parameters, ())
     parts = []
@@ -175,7 +156,7 @@ def separatrices(law: TiltedConservative, *parameters: npt.ArrayLike) -> TiltedS
     parts += [(some, _of_turn(slope)) for slope, some in cells.parts()]
     width = max((fields[2].shape[1] for _, fields in parts), default=0)
     out = []
-    for i, name in enumerate(TiltedSeparatrices._fields[:-1]):
+    for i, name in enumerate(Tilted._fields[:-1]):
         first = parts[0][1][i]
         tail = (width, *first.shape[2:]) if first.ndim > 1 else ()
         empty: Any = Loop.ABSENT if name == "loop" else np.nan if tail else 0
@@ -183,10 +164,9 @@ def separatrices(law: TiltedConservative, *parameters: npt.ArrayLike) -> TiltedS
         for some, fields in parts:
             field[(some, slice(fields[i].shape[1])) if tail else some] = fields[i]
         out.append(field)
-    torque = cells.torque[cells.number]
     turn = cells.period if np.isfinite(cells.period) else np.nan
-    out.append(np.where(torque == 0.0, 0.0, turn * torque))
-    return TiltedSeparatrices._make(x.reshape(cells.shape + x.shape[1:]) for x in out)
+    out.append(turn * cells.torque[cells.number])
+    return Tilted._make(x.reshape(cells.shape + x.shape[1:]) for x in out)
 
 
 def most(law: TiltedConservative, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
@@ -203,7 +183,6 @@ def most(law: TiltedConservative, *parameters: npt.ArrayLike) -> tuple[int, int,
 def _of_turn(slope: Slope) -> list[Any]:
     """Separatrices of the saddles of the turn of the states."""
     found = find_separatrices(slope.ground)
-    _, columns = saddles_of(slope.ground)
     width = found.loop.shape[1]
     number = (found.loop > Loop.ABSENT).sum(axis=1)
     turns = 1 if np.isinf(slope.period) else len(SPAN)

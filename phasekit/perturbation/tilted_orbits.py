@@ -130,26 +130,35 @@ class Cells:
 def ground_of(cells: Cells, systems: Index) -> Ground:
     """The potential of some systems with its equilibria, over the span of turns."""
     A, B, C, N = (x[systems] for x in (cells.A, cells.B, cells.C, cells.N))
-    points = type(cells.points)._make(field[systems] for field in cells.points)
-    turns = TURN * np.array(SPAN, float)[:, None]
+    points = [field[systems] for field in cells.points]
+    count = points[6]
+    nothing = np.full((len(N), 2), np.nan)
+    proofs = [count.astype(np.int16), count >= 0, nothing, np.zeros(len(N), np.int64)]
+    found = repeated(Equilibria._make([*points[:6], *proofs]), N)
+    return survey(Systems(TILTED, (A, B, C, N), len(N)), found)
+
+
+def repeated(points: Equilibria, torque: Array, period: float = TURN) -> Equilibria:
+    """Equilibria of a circle on the line, over as many turns as `SPAN` has."""
+    turns = period * np.array(SPAN, float)[:, None]
+    if not points.phi.shape[1]:  # nothing stands: one place, which stays empty
+        empty = np.full((len(points.phi), 1), np.nan)
+        kinds = np.full(empty.shape, EquilibriumKind.ABSENT, np.int8)
+        points = Equilibria._make([empty, kinds, *[empty] * 4, *list(points)[6:]])
+    rows, width = points.phi.shape
 
     def spread(field: Any, shift: Any = 0.0) -> Any:
-        return (field[:, None, :] + shift).reshape(len(field), len(SPAN) * field.shape[-1])
+        return (field[:, None, :] + shift).reshape(rows, len(SPAN) * width)
 
     phi = spread(points.phi, turns)
     order = np.argsort(phi, axis=1)
-    energy = spread(points.energy, -N[:, None, None] * turns)
-    kind = spread(points.kind, np.zeros(turns.shape, np.int8))
-    fields: list[Any] = [phi, kind, energy] + [
-        spread(field, np.zeros(turns.shape))
-        for field in (points.curvature, points.natural_frequency, points.exponent)
-    ]
-    nothing = np.full((len(N), 2), np.nan)
-    fields = [np.take_along_axis(field, order, axis=1) for field in fields]
-    valid = points.n_equilibria >= 0
-    proofs = [points.n_equilibria.astype(np.int16), valid, nothing, np.zeros(len(N), np.int64)]
-    found = Equilibria._make([*fields, *proofs])
-    return survey(Systems(TILTED, (A, B, C, N), len(N)), found)
+    fields: list[Any] = [phi, spread(points.kind, np.zeros(turns.shape, np.int8))]
+    fields.append(spread(points.energy, -torque[:, None, None] * turns))
+    others = (points.curvature, points.natural_frequency, points.exponent)
+    fields += [spread(field, np.zeros(turns.shape)) for field in others]
+    listed = [np.take_along_axis(field, order, axis=1) for field in fields]
+    proofs: list[Any] = list(points)[6:]
+    return Equilibria._make([*listed, *proofs])
 
 
 def home(phi: Array, period: float = TURN) -> tuple[Array, Array]:
@@ -252,12 +261,7 @@ def separatrix_motion(
         out[2][flat], out[3][flat] = (np.where(np.isnan(x), np.nan, 0.0) for x in moved)
     for ground, some, system in parts:
         column, there = _saddle(cells, ground, system, saddle)
-        rows = np.flatnonzero(there)
-        if rows.size:
-            branch = separatrices.branch_of(ground.take(rows), column[rows], 1.0 if side else -1.0)
-            found = motion.separatrix_motion(branch, np.arange(rows.size), time[some[rows]])
-            for field, values in zip(out, found, strict=True):
-                field[some[rows]] = values
+        enter_motion(out, some, ground, column, there, side, time[some])
     return MotionWithErrors._make(cells.shaped(out))
 
 
@@ -329,6 +333,18 @@ def enter(
     values = (found.orbit_kind, np.where(found.orbit_kind >= 0, energy, np.nan), *found[2:], gain)
     for field, one in zip(out, values, strict=True):
         field[cells] = one
+
+
+def enter_motion(
+    out: list[Any], cells: Index, ground: Ground, column: Index, there: Any, side: int, time: Array
+) -> None:
+    """Write down the motions on the separatrices of saddles where these are there."""
+    rows = np.flatnonzero(there)
+    if rows.size:
+        branch = separatrices.branch_of(ground.take(rows), column[rows], 1.0 if side else -1.0)
+        found = motion.separatrix_motion(branch, np.arange(rows.size), time[rows])
+        for field, values in zip(out, found, strict=True):
+            field[cells[rows]] = values
 
 
 def _column(cells: Cells, ground: Ground, system: Index, label: int) -> tuple[Index, Any]:

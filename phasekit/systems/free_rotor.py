@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
@@ -99,6 +100,7 @@ class FreeGyroRotor(RotorStates):
         ),
     )
     rung: ClassVar[type[Law]] = Routhian
+    own_units: ClassVar[Mapping[str, str]] = {"state_energy": "J"}
 
     def __post_init__(self) -> None:
         """Check that it is one machine, with all of its masses."""
@@ -133,20 +135,6 @@ class FreeGyroRotor(RotorStates):
         """The law of the disk's angle as a function of the parameters."""
         domains = ((p.name, p.least, p.high) for p in self.declared)
         return machines(tuple(self.parameters), tuple(domains))
-
-    def unit_of(self, name: str) -> str | None:
-        """Unit of a parameter or state; None where it may be any.
-
-        Parameters
-        ----------
-        name : str
-            The parameter or state.
-
-        Returns
-        -------
-        str or None
-        """
-        return "J" if name == "state_energy" else super().unit_of(name)
 
     @property
     def parameters(self) -> dict[str, Value]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of
-from phasekit.laws.ladder import Routhian
+from phasekit.laws.ladder import Routhian, is_turn
 
 #: The formulas of a system: right-hand sides, states, values of its parameters, keywords.
 Formulas = tuple[list[Any], tuple[str, str], dict[str, float], dict[str, Any]]
@@ -27,7 +26,8 @@ def moving_formulas(system: Any) -> Formulas:
     law = system.law
     states = (law.coordinate, f"d{law.coordinate}")
     of = symbols_of([*states, *values])
-    force = _at_momentum(of) if free else -law.gradient_formula(of)
+    own = system.law_of_parameters if free else law
+    force = own.acceleration_formula(of, of[states[1]], 0)
     periods = {} if law.period is None else {law.coordinate: law.period}
     return [of[states[1]], force], states, values, {"periods": periods, "conservative": True}
 
@@ -58,32 +58,11 @@ def at_momentum(machine: Any) -> dict[str, float]:
     return {**values, "momentum": kept}
 
 
-def _at_momentum(of: dict[str, Any]) -> Any:
-    """Phi'' of the disk on a free support: M phi'' + M' phi'^2/2 + V_p' = 0.
-
-    M = M22 - M12^2/M11 and the amended potential V_p = V + p^2/(2 M11), as in
-    `phasekit.mechanics.two_degrees`.
-    """
-    import sympy
-
-    beta, m, a, e, r, phi, v = (of[n] for n in ("beta", "m", "a", "e", "r", "phi", "dphi"))
-    sine, cosine, s, c = sympy.sin(beta), sympy.cos(beta), sympy.sin(phi), sympy.cos(phi)
-    own = m * r**2 / 4
-    across = own + m * e**2
-    along, deviation = own + across * sine**2, across * sine * cosine
-    m11 = of["carrier_inertia"] + own + m * (e * cosine) ** 2 + own * cosine**2 * c**2
-    m11 += m * (a + e * sine * s) ** 2
-    inertia = along - (deviation * c) ** 2 / m11
-    slope = sympy.diff(m11, phi)
-    torque = of["momentum"] ** 2 * slope / (2 * m11**2) - m * of["g"] * e * sine * s
-    return (torque - sympy.diff(inertia, phi) * v**2 / 2) / inertia
-
-
 def moving_words(system: Any, states: Sequence[str], names: Sequence[str]) -> dict[str, Any]:
     """Long names and units of the states and parameters."""
     declared = {p.name: {"long_name": p.long_name, "units": p.units} for p in system.declared}
     words = {name: declared[name] for name in names if name in declared}
-    if system.law.period is not None and math.isclose(system.law.period, 2.0 * math.pi):
+    if is_turn(system.law.period):
         words[states[0]] = {"long_name": "angle", "units": "rad"}
         words[states[1]] = {"long_name": "angular velocity", "units": "s-1"}
     return words

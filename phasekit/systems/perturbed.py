@@ -92,8 +92,8 @@ class Perturbed(Model):
     `ParticleOnCircle`.
 
     Of a `FreeGyroRotor` damping and drive act about the disk's shaft alone, between disk and
-    support, per unit of the inertia M22 about it: nothing turns or brakes the support, so that the
-    momentum p about the vertical stays, and phi moves by itself, exactly, as
+    support, per unit of the inertia M22 about it: the momentum p about the vertical stays, while
+    the support's speed ``(p - M12 phi')/M11`` changes, and phi moves by itself, exactly, as
     ``M phi'' + M' phi'^2/2 + V_p' = M22 (-damping phi' - quadratic |phi'| phi' + torque + ...)``
     with ``M = M22 - M12^2/M11`` and the amended potential ``V_p = V + p^2/(2 M11)``. Energies are
     in J. Modulation, drift and a prescribed omega1 would change the momentum and are refused.
@@ -204,6 +204,7 @@ class Perturbed(Model):
             rate=self.system.frame_rate,
             prescribed=self.omega1,
             unit=self._driven_unit(),
+            torqued=not (isinstance(self.torque, float) and self.torque == 0.0),
         )
         return law
 

@@ -9,9 +9,8 @@ from typing import Any
 
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of
-from phasekit.laws.ladder import Routhian
+from phasekit.laws.ladder import is_turn
 from phasekit.laws.perturbed import forcing_names
-from phasekit.laws.trigonometric import Trigonometric
 
 #: What is added to the potential; kT is noise, of which a periodic orbit knows nothing.
 ADDED = ("damping", "quadratic", "torque")
@@ -60,7 +59,7 @@ def words_of(system: Any, states: Sequence[str], names: Iterable[str]) -> dict[s
     """Long names and units of the states and parameters of the `Problem` of a system."""
     declared = {p.name: {"long_name": p.long_name, "units": p.units} for p in system.declared}
     words = {name: declared[name] for name in names}
-    if isinstance(system.law.base, (Trigonometric, Routhian)):
+    if is_turn(system.law.base.period):
         words[states[0]] = {"long_name": "angle", "units": "rad"}
         words[states[1]] = {"long_name": "angular velocity", "units": "s-1"}
     return words

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -23,6 +24,8 @@ class ModelValue(Lawful):
     __slots__ = ()
 
     declared: ClassVar[tuple[Parameter, ...]]
+    #: Units of states where they are not those of a system per unit of inertia.
+    own_units: ClassVar[Mapping[str, str]] = {}
 
     def unit_of(self, name: str) -> str | None:
         """Unit of a parameter or state; None where it may be any.
@@ -37,7 +40,7 @@ class ModelValue(Lawful):
         str or None
         """
         units = {p.name: p.units for p in self.declared}
-        return units.get(name) or STATES.get(name, (None,))[0]
+        return units.get(name) or self.own_units.get(name) or STATES.get(name, (None,))[0]
 
     @property
     def definition(self) -> dict[str, str]:

@@ -14,6 +14,7 @@ def as_potential(A, B, C):
     return pk.Potential(TEXT, "q", {"A": A, "B": B, "C": C}, period=2 * np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [(2.0, 1.0, 0.3), (-1.5, 0.4, 0.2)])
 def test_action_and_angle_are_those_of_the_closed_form(system):
     rng = np.random.default_rng(3)
@@ -29,6 +30,7 @@ def test_action_and_angle_are_those_of_the_closed_form(system):
     assert not {"twist", "orbit_family"} & set(found)
 
 
+@pytest.mark.slow
 def test_the_angle_grows_evenly():
     """The angle of where an integrator goes, after a time."""
     start = pk.action_angle(WELL, 0.9, [0.4, -1.2])
@@ -41,6 +43,7 @@ def test_the_angle_grows_evenly():
         assert abs(np.angle(np.exp(1j * grown.item()))) < 1e-8
 
 
+@pytest.mark.slow
 def test_angles_at_the_ends():
     right = pk.orbits(WELL, 0.9, 0.4).phi_max.item()
     left = pk.orbits(WELL, 0.9, 0.4).phi_min.item()

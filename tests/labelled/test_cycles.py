@@ -125,6 +125,23 @@ def test_extended_branches_are_those_never_interrupted(tmp_path):
         whole.extend()
 
 
+def test_branches_that_say_nothing_of_the_point_behind_go_on(cycles, tmp_path):
+    """Those saved by earlier versions: the next step goes along the tangent alone."""
+    options = pk.ContinuationOptions(max_points=6, directions="forward")
+    short = pk.continuation(
+        brusselator(2.2), "b", orbit=pk.periodic_orbit(brusselator(2.2), [1.0, 2.0], 6.4),
+        span=(1.5, 3.0), options=options,
+    )  # fmt: skip
+    one = short.extend()
+    (state,) = (track.state for track in short.tracks if track is not None)
+    assert state.behind is not None
+    object.__setattr__(state, "behind", None)
+    short.save(tmp_path / "short.nc")
+    two = pk.Branch.load(tmp_path / "short.nc").extend()
+    assert one.points.sizes == two.points.sizes
+    assert np.allclose(one.points.period, two.points.period, rtol=1e-10)
+
+
 def test_branch_points_and_switching():
     system = pk.Problem(WOBBLE, ("x", "y", "z"), {"l": -0.5})
     orbit = pk.periodic_orbit(system, [1.0, 0.0, 0.0])
@@ -313,3 +330,16 @@ def test_samples():
     assert np.isclose(found.period, exact.period, rtol=1e-11)
     found = pk.periodic_orbit(brusselator(), exact[["x", "y"]])
     assert np.isclose(found.period, exact.period, rtol=1e-11)
+
+
+def test_a_forced_system_without_its_force_rests():
+    driven = pk.Problem(
+        ["0.4 + x**2*y - 2.2*x - x + c*cos(w*t)", "2.2*x - x**2*y"], ("x", "y"),
+        {"c": 0.0, "w": 0.8}, time="t", period="2*pi/w",
+    )  # fmt: skip
+    rest = pk.periodic_orbit(driven, [0.4, 5.4])
+    assert np.allclose([rest.x_max, rest.y_max], [0.4, 5.5], rtol=1e-12)
+    assert float(rest.residual) < 1e-12  # beside the states: nothing moves
+    response = pk.continuation(driven, "c", orbit=rest, span=(0.0, 0.1))
+    assert response.points.sizes["point"] > 3
+    assert np.all(response.points.residual < 1e-11)

@@ -1,11 +1,14 @@
 """Damped and driven motions against SciPy's integrator and what is known exactly."""
 
+import functools
+
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.motion import flow, stiff
 
 DISK = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.05, r=0.1, omega1=6.0)
 EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
@@ -283,17 +286,74 @@ def test_a_stiff_motion_creeps_to_rest(damping):
     assert abs(ds.motion_phi.values[3]) < 1e-9
 
 
-def test_stiff_motions_end_with_a_reason_where_they_are_too_fast(monkeypatch):
-    from phasekit.motion import stiff
+def test_a_motion_is_not_called_stiff_too_soon():
+    """Damping has acted six million times, but the drive makes short steps anyhow."""
+    system = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=10.0, forcing=pk.Harmonic(0.3, 1))
 
-    monkeypatch.setattr(stiff, "MOST_RATES", 2000)
+    def rates(t, x):
+        return [x[1], -np.sin(x[0]) - 10.0 * x[1] + 0.3 * np.cos(t)]
+
+    end = 6.5e5  # what was before the last 300 s is forgotten
+    late = solve_ivp(rates, (end - 300.0, end), [0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-13)
+    soon = solve_ivp(rates, (0.0, 1.0), [0.3, 0.1], "DOP853", rtol=1e-12, atol=1e-13)
+    found = pk.flow(system, 0.3, 0.1, [1.0, end])
+    for i, want in enumerate((soon, late)):
+        assert found.motion_phi.values[i] == pytest.approx(want.y[0, -1], abs=1e-9)
+        assert found.motion_dphi.values[i] == pytest.approx(want.y[1, -1], abs=1e-9)
+
+
+def test_what_the_implicit_method_gives_up_is_left_to_the_explicit_one(monkeypatch):
+    system = pk.Perturbed(EIGHT, damping=20.0, forcing=pk.Harmonic(0.3, 5.0))
+    times = np.array([300.0, np.nan, 0.0, 1.0, -0.2, 1.0])
+    want = pk.flow(system, 0.4, 0.5, times)
+    assert np.isnan(want.motion_phi.values).tolist() == [False, True] + [False] * 4
+    monkeypatch.setattr(stiff, "STIFF", 1e3)
+    followed = pk.flow(system, 0.4, 0.5, times[3:])
+    monkeypatch.setattr(stiff, "MOST_STEPS", 1000)
+    found = pk.flow(system, 0.4, 0.5, times)
+    for name in ("motion_phi", "motion_dphi"):
+        assert found[name].values == pytest.approx(want[name].values, abs=1e-8, nan_ok=True)
+    assert followed.motion_phi.values == pytest.approx(want.motion_phi.values[3:], abs=1e-8)
+
+
+def test_stiff_motions_end_with_a_reason_where_they_are_too_fast(monkeypatch):
+    monkeypatch.setattr(stiff, "MOST_STEPS", 200)
+    monkeypatch.setattr(flow, "motions", functools.partial(flow.motions, most=300_000))
     driven = pk.Perturbed(EIGHT, damping=1e4, forcing=pk.Harmonic(1.0, 50.0))
     with pytest.warns(RuntimeWarning, match="1 of 1 motions end .* strong damping"):
-        assert np.isnan(pk.flow(driven, 0.4, 0.5, 1e4).motion_phi)
+        found = pk.flow(driven, 0.4, 0.5, [1e-3, 1e4]).motion_phi
+    assert np.isnan(found).values.tolist() == [False, True]  # what it came to, it keeps
     both = pk.Perturbed(EIGHT, damping=[1e4, 1.0])
     found = pk.flow(both, 0.4, 0.5, 100.0).motion_phi  # a shorter time is no trouble
     assert found.values[1] == pytest.approx(pk.equilibria(EIGHT).phi.values[0], abs=1e-6)
     assert np.isfinite(found).all()
+
+
+def test_other_motions_do_not_change_a_bit():
+    """Whether they are stiff, have a kink, are at rest, go backwards, are lost, or are many."""
+    count = 30
+    damping, quadratic = np.full(count, 0.1), np.zeros(count)
+    damping[1:20], damping[20:23], quadratic[23:26] = 1e8, 0.0, 0.3
+    phi, dphi = np.linspace(0.3, 1.2, count), np.linspace(0.1, 0.4, count)
+    phi[29] = np.nan
+    times = np.array([1.0, 7.0, 30.0])
+
+    def system(which):
+        names = {"damping": damping, "quadratic": quadratic}
+        return pk.Perturbed(EIGHT, **{name: xr.DataArray(x[which], dims="point")
+                                      for name, x in names.items()})  # fmt: skip
+
+    every = pk.flow(system(slice(None)), phi, dphi, times, rtol=1e-5)
+    back = np.tile(times, (count, 1))
+    back[[2, 3, 24], 0] = -1e-9
+    back = xr.DataArray(back, dims=("point", "moment"))
+    mixed = pk.flow(system(slice(None)), phi, dphi, back, rtol=1e-5)
+    assert np.isnan(every.motion_phi.values).any(axis=1).tolist() == [False] * 29 + [True]
+    for i in (0, 1, 2, 19, 21, 24, 28):
+        alone = pk.flow(system([i]), phi[[i]], dphi[[i]], times, rtol=1e-5)
+        for name in ("motion_phi", "motion_dphi"):
+            assert np.array_equal(alone[name].values[0], every[name].values[i])
+            assert np.array_equal(mixed[name].values[i, 1:], alone[name].values[0, 1:])
 
 
 def test_events_are_zeros_on_the_motion():
@@ -359,6 +419,27 @@ def test_events_that_touch_zero_and_turn_back():
         system, 0.4, 0.5, [40.0, -4.0], events=lambda t, x, v: x - places.max() - 1e-5, **fine
     )
     assert missed.sizes["event"] == 0
+
+
+def test_events_of_any_size_at_any_time():
+    system = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), forcing=pk.Harmonic(1e-3, 1.0))
+    for factor in (1e-200, 1e200):
+        for power in (1, 2, 3):
+
+            def event(t, x, v, factor=factor, power=power):
+                return factor * (t - 7.3) ** power
+
+            found = pk.flow(system, 0.3, 0.1, [20.0], events=event).event_time.values
+            assert found == pytest.approx([7.3], abs=1e-4 if power == 3 else 1e-8)
+    late = pk.flow(system, 0.3, 0.1, [0.0, 400.0], events={
+        "corner": lambda t, x, v: abs(t - 399.7), "touch": lambda t, x, v: (t - 399.6) ** 2,
+    })  # fmt: skip
+    assert late.event_name.values.tolist() == ["touch", "corner"]
+    assert late.event_time.values == pytest.approx([399.6, 399.7], abs=1e-7)
+    # a time without value is none at which a motion could end
+    found = pk.flow(system, 0.3, 0.1, [np.nan, 8.0], events=lambda t, x, v: t - 7.3)
+    assert found.event_time.values == pytest.approx([7.3])
+    assert np.isnan(found.motion_phi.values).tolist() == [True, False]
 
 
 def test_events_of_what_has_none_are_refused():

@@ -1,11 +1,14 @@
 """Steps by Taylor series: against other integrators, beside Runge-Kutta steps, where they end."""
 
+import functools
+
 import mpmath as mp
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.motion import method
 from phasekit.motion.flow import motions
 from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.rates import order_of, rates_of
@@ -93,6 +96,12 @@ def test_both_ways_agree(name):
     ]
     assert np.abs(ways[0].states - ways[1].states).max() < 1e-9
     assert (3 * ways[0].steps < 2 * ways[1].steps).all()
+    beside = np.hstack([states[:3], np.tile([1.0, 0.0, 0.0, 1.0], (3, 1))])
+    how = {"rtol": 1e-12, "atol": 1e-13, "tangents": 2}
+    ways = [moved(system, beside, times, **how, series=one) for one in (True, False)]
+    assert ways[0].states.shape == (3, 6, 6)
+    assert np.abs(ways[0].states - ways[1].states).max() < 1e-9
+    assert (3 * ways[0].steps < 2 * ways[1].steps).all()
     law, parameters = system.law, list(system.parameters.values())
     arrays = (*parameters, states[:2, 0], states[:2, 1], 8.0)
     ways = [_exponents(law, arrays, 1e-11, 1e-12, None, series=how) for how in (True, False)]
@@ -147,6 +156,20 @@ def test_turns_that_do_not_matter_are_left_to_runge_kutta():
     assert np.array_equal(alone.states[0], found.states[0])
     lost = moved(system, [[0.3, 0.1]], [[-0.02]], **{**how, "most": 3})
     assert lost.status.tolist() == [EXHAUSTED]
+
+
+def test_what_series_leave_is_followed_anew(monkeypatch):
+    """Series come further in as many steps; of what they saw nothing is left."""
+    few = functools.partial(method.limits_of, most=400)
+    monkeypatch.setattr("phasekit.motion.strobe.limits_of", few)
+    ways = [
+        followed(SYSTEMS["duffing"], [[0.3, 0.1]], 2.0 * np.pi, 60, series=how)
+        for how in (True, False)
+    ]
+    for way in ways:
+        assert way.status.tolist() == [EXHAUSTED]
+        assert way.taken[0] == np.isfinite(way.states[0, 1:, 0]).sum() < 20
+    assert np.array_equal(ways[0].states, ways[1].states, equal_nan=True)
 
 
 def test_a_motion_is_the_same_in_any_lane():

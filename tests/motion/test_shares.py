@@ -7,7 +7,7 @@ import pytest
 
 import phasekit as pk
 from phasekit.cells import tiling
-from phasekit.motion.attractors import find
+from phasekit.motion.attractors import TOO_WEAK, find
 from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.shares import SIDE, SLOTS
 
@@ -55,7 +55,7 @@ def test_cells_without_attractors():
 def test_motions_that_do_not_settle_are_told(monkeypatch):
     def without_patience(*arguments):
         search = find(*arguments)
-        search.unsettled = 3
+        search.open[TOO_WEAK] = 3
         return search
 
     monkeypatch.setattr("phasekit.motion.shares.find", without_patience)
@@ -109,6 +109,7 @@ def test_motions_that_take_too_many_steps_are_undecided_and_not_away(monkeypatch
     assert found.basin.tolist() == [[basins.UNDECIDED, basins.ESCAPED]]
 
 
+@pytest.mark.slow
 def test_stored_shares_are_the_same_however_they_were_made(tmp_path, monkeypatch):
     """Interrupted and resumed, extended, by processes and by dask: the same bits."""
     pytest.importorskip("zarr")

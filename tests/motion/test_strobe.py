@@ -8,6 +8,7 @@ import pytest
 from scipy.special import mathieu_a, mathieu_b
 
 import phasekit as pk
+from phasekit.motion.strobe import common_period
 from tests.witnesses.mersenne_twister import uniform
 
 WELL = pk.Potential("x^4/4 - x^2/2", "x")
@@ -127,6 +128,20 @@ def test_commensurate_frequencies_have_a_common_period():
     with pytest.raises(pk.ParameterError, match="nothing varies in time"):
         pk.stroboscopic(still, 0.1, 0.0, n=2)
     assert pk.stroboscopic(still, 0.1, 0.0, n=3, period=0.5).section_time[-1].item() == 1.0
+
+
+def test_a_common_period_does_not_depend_on_the_order():
+    law = pk.Perturbed(EIGHT, forcing=[pk.Harmonic(0.1, 1.0)] * 2).law
+
+    def period(*frequencies):
+        names = zip(("forcing_frequency", "forcing2_frequency"), frequencies, strict=True)
+        return float(common_period(law, {name: np.array(x) for name, x in names}))
+
+    for low, high, turns in ((1e-3, 1.0, 1), (1.2, 1.8, 2), (1.0, 64 / 63, 63), (1.0, 1e6, 1)):
+        for pair in ((low, high), (high, low)):
+            assert period(*pair) == pytest.approx(2.0 * np.pi * turns / low, rel=1e-12)
+    for number in range(1, 40):  # irrational, however great
+        assert np.isnan(period(1.0, 1e8 * number**0.5 * np.pi))
 
 
 def test_duffings_attractors_and_basins():

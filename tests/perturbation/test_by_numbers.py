@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.perturbation.melnikov import assembled
 
 H = pk.Harmonic
 DISKS = [
@@ -139,3 +140,48 @@ def test_any_potential():
     p = pk.Perturbed(QUARTIC, damping=0.1, modulation={"b": H(0.1, 1.2, 0.3)}, drift={"b": -0.1})
     assert compare(p) == 2
     assert compare(pk.Perturbed(QUARTIC, forcing=H(0.1, 0.7, 2.0))) == 2
+
+
+def test_what_symmetry_cancels_costs_no_digits():
+    """The drift of C takes nothing here; second harmonics are small beside the first."""
+    A, B = -0.12671154648393168, 0.6318057260154758
+    closed = pk.Coefficients(A, B, 0.0)
+    values = {"A": A, "B": B, "C": 0.0}
+    text = "-B*cos(x) + A*cos(x)^2/2 - C*sin(x)"
+    numerical = pk.Potential(text, "x", values, period="2*pi")
+    for nu in (0.3, 5.0):
+        drive = {
+            "forcing": [pk.Harmonic(0.1, nu, 0.3), pk.Harmonic(0.05, 2.0 * nu)],
+            "drift": {"C": 0.01},
+        }
+        for torque in (0.0, -0.2):
+            kept = {**drive, "damping": 0.02, "quadratic": 0.05, "torque": torque}
+            want, found = (pk.melnikov(pk.Perturbed(one, **kept)) for one in (closed, numerical))
+            for name in ("melnikov_mean", "melnikov_amplitude", "turnstile_area"):
+                one, other = want[name].sel(saddle="upper").values, found[name].values[0]
+                assert np.isfinite(one).all()
+                assert other == pytest.approx(one, rel=1e-6)
+
+
+def test_a_mean_that_is_not_known_has_no_amplitude_against_it():
+    """With two frequencies the greatest response is another one against the other sense."""
+    mean = np.array([np.nan, 1.0, -1.0])
+    parts = [
+        (np.ones(3), np.ones(3), np.full(3, nu), np.zeros(3)) for nu in (1.0, 2.0)
+    ]  # cos t + cos 2 t
+    shaped = [(Z[:, None, None], *rest) for Z, *rest in parts]
+    found = assembled(mean[:, None, None], shaped, np.zeros(3, bool))
+    assert found.melnikov_amplitude[:, 0, 0] == pytest.approx([np.nan, 1.125, 2.0], nan_ok=True)
+
+
+@pytest.mark.parametrize("B", [0.5, 0.35])
+def test_quadratic_damping_has_a_corner_where_lobes_turn(B):
+    formula = pk.Potential(f"-{B}*cos(x) + cos(x)^2/2", "x", period="2*pi")
+    want, found = (
+        pk.melnikov(pk.Perturbed(one, quadratic=0.05)).melnikov_mean
+        for one in (pk.Coefficients(1.0, B, 0.0), formula)
+    )
+    assert found.shape == (2, 2)
+    for saddle, phi in (("lower", 0.0), ("upper", np.pi)):
+        at = int(np.argmin(np.abs(pk.separatrices(formula).saddle_phi.values - phi)))
+        assert found.values[at] == pytest.approx(want.sel(saddle=saddle).values, rel=1e-9)

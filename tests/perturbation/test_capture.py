@@ -337,3 +337,98 @@ def kappa(disk):
     """Euler's torque of omega1' is -kappa cos phi."""
     s, c, r, e = np.sin(disk.beta), np.cos(disk.beta), disk.r, disk.e
     return (r * r + 4 * e * e) * s * c / (4 * e * e * s * s + r * r * (1 + s * s))
+
+
+@pytest.mark.parametrize("k", [1.0, 1e-9, 1e9])
+def test_a_constant_in_the_potential_does_not_matter(k):
+    """Both saddles stand at V = 0, or at the constant; the wells between them differ in size."""
+    x = np.linspace(0.0, np.pi, 4001)
+    areas = [
+        2.0 * np.trapezoid(np.sqrt(2.0 * k * np.sin(x) ** 2 * (1.0 + s * np.sin(x))), x)
+        for s in (-0.3, 0.3)
+    ]
+    damping, torque = 0.01 * k**0.5, 0.02 * k
+    values = {"k": k, "c": k * np.array([0.0, 1.0, -3.0, 1e3])}
+    text = "-k*sin(x)^2*(1 + 0.3*sin(x)) + c"
+    slope = pk.Perturbed(
+        pk.Potential(text, "x", values, period="2*pi"), damping=damping, torque=torque
+    )
+    inside = damping * sum(areas)
+    arriving = 0.5 * inside + 2.0 * np.pi * torque
+    assert inside < arriving
+    for start in ("outside", "rotation"):
+        ds = pk.capture(slope, start=start)
+        assert ds.capture_flux.shape == (4, 3)
+        flux = ds.capture_flux.values
+        assert flux[:, :2].sum(axis=1) == pytest.approx(np.full(4, inside), rel=1e-5)
+        share = ds.capture_probability.values
+        caught = 1.0 if start == "outside" else inside / arriving
+        want = [caught * areas[0] / sum(areas), caught * areas[1] / sum(areas), 1.0 - caught]
+        assert share == pytest.approx(np.tile(want, (4, 1)), abs=1e-5)
+
+
+@pytest.mark.parametrize("start", ["outside", "rotation"])
+def test_two_wells_on_one_level_share_alike_by_formula_and_by_coefficients(start):
+    perturbed = [
+        pk.Perturbed(one, damping=0.002, torque=0.004)
+        for one in (
+            pk.Coefficients(1.0, 0.0, 0.4),
+            pk.Potential("cos(phi)^2/2 - 0.4*sin(phi)", "phi", period="2*pi"),
+        )
+    ]
+    closed, numerical = (odds(one, start=start) for one in perturbed)
+    assert abs(closed[0] - closed[1]) > 0.1
+    assert sorted(numerical[:2]) == pytest.approx(sorted(closed[:2]), rel=1e-9)
+    assert numerical[2] == pytest.approx(closed[2], rel=1e-9, abs=1e-12)
+
+
+def test_of_three_wells_left_and_right_are_not_all():
+    """From rotation it may fall into the third one, which two shares would hide."""
+    text = "cos(x) + 0.5*cos(2*x) + 0.7*cos(3*x) + 0.1*sin(x)"
+    three = pk.Potential(text, "x", period="2*pi")
+    assert int((pk.equilibria(three).kind == pk.EquilibriumKind.CENTER).sum()) == 3
+    found = pk.capture(pk.Perturbed(three, damping=0.01), start="rotation")
+    assert np.isnan(found.capture_probability).all()
+    assert np.isnan(found.capture_flux).all()
+    outside = pk.capture(pk.Perturbed(three, damping=0.01)).capture_probability.values
+    assert outside.sum() == pytest.approx(1.0)
+
+
+def test_a_circle_that_is_gone_round_several_times():
+    """Its cells are alike: the shares are those of one, and all cells together turn."""
+    eight = "cos(x)^2/2 - 0.35*cos(x) - 0.12*sin(x)"
+    for text in (eight, "-cos(x) + 0.2*sin(2*x)"):
+        single = text != eight
+        found = []
+        for turns in (1, 3):
+            circle = pk.Potential(text, "x", period=f"{2 * turns}*pi")
+            damped = pk.Perturbed(circle, damping=0.01, torque=0.02)
+            ds = pk.capture(damped, start="rotation")
+            assert ds.capture_probability.sum() == pytest.approx(1.0)
+            found.append((ds.capture_probability.values, ds.capture_flux.values / turns))
+            outside = pk.capture(damped).capture_probability.values
+            assert np.isnan(outside).all() == single
+        for one, other in zip(*found, strict=True):
+            assert one == pytest.approx(other, rel=1e-9)
+        assert 0.1 < found[0][0][2] < 0.9
+        assert (found[0][0][1] == 0.0) == single
+
+
+def test_on_a_line_nothing_rotates():
+    """Saddles on one level: the arcs on both sides of the middle one make no turn."""
+    line = pk.Potential("cos(3*x)", "x", interval=(-2.4, 2.4))
+    assert (pk.separatrices(line).loop == pk.Loop.HETEROCLINIC).sum() == 3
+    found = pk.capture(pk.Perturbed(line, damping=0.01), start="rotation")
+    assert found.capture_flux.size == 3
+    assert np.isnan(found.capture_flux).all()
+    assert np.isnan(found.capture_probability).all()
+
+
+@pytest.mark.parametrize("torque", [1e-12, -1e-12, 1e-3, -1e-3, 0.0])
+def test_however_small_the_torque_its_sense_tells_what_it_brakes(torque):
+    formula = pk.Potential("-cos(phi) + 0.2*sin(phi)", "phi", period="2*pi")
+    for one in (pk.Coefficients(0.0, 1.0, -0.2), formula):
+        found = odds(pk.Perturbed(one, damping=0.01, torque=torque), start="rotation")
+        left, right = (found[0], found[1]) if torque > 0.0 else (found[1], found[0])
+        assert left > 0.9
+        assert right == 0.0

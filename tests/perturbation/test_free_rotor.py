@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from witnesses import free_support
 
 import phasekit as pk
+from phasekit.perturbation import kept_momentum
 from phasekit.systems.perturbed_problem import formulas_of
 
 ORBITS = int(os.environ.get("PHASEKIT_ENSEMBLES", "0"))
@@ -339,3 +340,46 @@ def test_what_is_not_known_of_it_says_so():
     for function in (pk.separatrices, pk.retrapping_torque, pk.escape_rate, pk.critical_torque):
         with pytest.raises(pk.ParameterError, match="system: got Perturbed"):
             function(driven)
+
+
+def test_a_degenerate_equilibrium_does_not_stop_a_map():
+    """Above pi the amended potential has its maximum until the momentum bends it into a well."""
+    disk = pk.GyroRotorDisk(beta=0.5, e=0.01, a=0.0, r=0.3, omega1=1.0, m=2.0)
+    rotor = pk.FreeGyroRotor(disk, carrier_inertia=0.5)
+    offset = disk.e * np.sin(disk.beta)
+    bend = disk.m * offset**2 - 0.25 * disk.m * disk.r**2 * np.cos(disk.beta) ** 2
+    support = rotor.mass_matrix(np.pi)[0, 0]
+    merged = support * np.sqrt(disk.m * disk.g * offset / -bend)
+    kinds = pk.equilibria(rotor.replace(momentum=merged)).kind.values
+    assert kinds.tolist() == [KIND.CENTER, KIND.DEGENERATE]
+    driven = pk.Perturbed(rotor, damping=0.1, forcing=pk.Harmonic(1.0, 2.0))
+    one = pk.melnikov(driven.replace(momentum=merged))
+    assert one.melnikov_mean.shape == (1, 2)
+    assert np.isnan(one.melnikov_mean).all()  # the motion there is slower than any exponential
+    assert np.isnan(pk.capture(driven.replace(momentum=merged)).capture_probability).all()
+    momenta = np.array([0.9, 1.0, 1.1]) * merged
+    ds = pk.sweep(driven, momentum=momenta, of="melnikov")
+    known = np.isfinite(ds.melnikov_mean).any(dim="side").sum(dim="saddle")
+    assert known.values.tolist() == [1, 0, 2]
+
+
+def test_cells_are_computed_in_parts(monkeypatch):
+    """Whatever the order of their machines, which most parts share."""
+    rotor = ROTOR.replace(momentum=0.4)
+    driven = pk.Perturbed(rotor, damping=0.3, forcing=pk.Harmonic(1.5, 6.0))
+    values = driven.parameters | {
+        "momentum": np.array([0.7, 0.2, 0.7, 0.2, 0.7]),
+        "damping": np.array([[0.1], [0.3]]),
+    }
+    inputs = [values[name] for name in driven.law.names]
+    whole = [*kept_momentum.melnikov(driven.law, *inputs)]
+    whole += kept_momentum.capture(driven.law, *inputs)
+    monkeypatch.setattr(kept_momentum, "CELLS", 3)
+    parts = [*kept_momentum.melnikov(driven.law, *inputs)]
+    parts += kept_momentum.capture(driven.law, *inputs)
+    assert len(parts) == 7
+    for one, other in zip(whole, parts, strict=True):
+        assert one.shape[:2] == (2, 5)
+        assert np.array_equal(one, other, equal_nan=True)
+    assert whole[0][1, :, 0] == pytest.approx(3.0 * whole[0][0, :, 0], nan_ok=True)
+    assert np.isfinite(whole[0][:, :, 0]).all()

@@ -86,6 +86,7 @@ def motion(abc, start, times, drive=None):
     return found.y.reshape(2, -1, len(times))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("abc", "family", "center", "n", "nu", "varies", "amplitude"), CASES)
 def test_width_and_action(abc, family, center, n, nu, varies, amplitude):
     base = pk.Coefficients(*abc)

@@ -82,6 +82,7 @@ def test_orbits_against_integration(N):
     assert min(counts.values()) > 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("abcn", [(1.0, 0.35, 0.12, 0.05), (1.0, 0.35, 0.12, -0.05),
                                   (0.0, 1.0, 0.0, 0.3), (1.0, 0.35, 0.12, 2.0),
                                   (-0.7, -1.27, -0.62, 0.0)])  # fmt: skip

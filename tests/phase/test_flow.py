@@ -72,6 +72,7 @@ def test_recorded_values(case):
     check(*args)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_random_motions(family):
     rng = np.random.default_rng(65)
@@ -139,6 +140,7 @@ def after_periods(system, phi0, v0, n, parts):
     return times, flow_at(*system, phi0, v0, rest, dps=50)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", SYSTEMS)
 @pytest.mark.parametrize("n", [1000, -1000])
 def test_a_thousand_periods(system, n):
@@ -156,6 +158,7 @@ def test_a_thousand_periods(system, n):
         assert abs(mpf(float(got.motion_dphi[i])) - v) <= 2e-14, parts[i]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [*SYSTEMS[:2], SYSTEMS[3], *SYSTEMS[6:]])
 def test_a_thousand_periods_next_to_the_separatrix(system):
     """At 1e-6 of the energy from it: 1e-12 away from the passages, half-way between them.
@@ -217,6 +220,7 @@ def test_pendulum_on_its_separatrix():
     assert np.allclose(got.motion_phi, 6 * np.pi + np.array(phi), rtol=2e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", SYSTEMS)
 @pytest.mark.parametrize("name", ["lower_saddle", "upper_saddle"])
 def test_states_on_separatrices(system, name):

@@ -149,6 +149,7 @@ def lobe_states(rng, A, B, C):
     yield float(rng.uniform(-4, 4)), 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_random_orbits(family):
     rng = np.random.default_rng(64)
@@ -164,6 +165,7 @@ def test_random_orbits(family):
     raise AssertionError("too few systems")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", WELLS + SINGLE)
 def test_amplitudes_from_small_to_the_separatrix(system):
     """Parts 1e-8 to 1 - 1e-12 of the lobe, in every well; at rest and in the middle."""
@@ -181,6 +183,7 @@ def test_amplitudes_from_small_to_the_separatrix(system):
                     check(*system, float(end), 0.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", WELLS + SINGLE)
 def test_rotations_from_the_separatrix_to_the_fastest(system):
     """Up to a million times the energy of the separatrix."""
@@ -426,6 +429,7 @@ def test_heteroclinic_systems(system):
     assert orbits(*system, center, 0.1).orbit_kind == OrbitKind.LIBRATION
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1, -1])
 @pytest.mark.parametrize(
     ("A", "B", "C"),
@@ -576,6 +580,7 @@ def at_gap(A, B, C, gap, saddle, side, dps=30):
         return orbit(A, B, C, near.phi, v0, dps=dps), mp.sqrt(-s.curvature)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", [WELLS[0], WELLS[4], SINGLE[0]])
 @pytest.mark.parametrize("saddle", [0, 1])
 @pytest.mark.parametrize("sense", [-1, 1])
@@ -603,6 +608,7 @@ def test_gaps(system, saddle, sense):
             assert abs(mpf(float(got.action)) / want.action - 1) <= 4e-15, (gap, side)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("system", WELLS + SINGLE)
 def test_energies_are_those_of_states(system):
     """`orbits_at_energy` is the orbit through the center with that energy."""

@@ -100,6 +100,7 @@ def test_recorded_values(case):
     check(A, B, C)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_random_systems(family):
     rng = np.random.default_rng(31)

@@ -72,6 +72,7 @@ def test_a_run_up_shows_forces_and_speed(ax):
         pk.plot.run_up(many)
 
 
+@pytest.mark.slow
 def test_speeds_without_end_are_drawn_as_far_as_they_are_seen(ax):
     # Backwards in time a damped motion speeds up: it would turn round 10^5 times.
     for damping in (0.3, -0.3):

@@ -24,7 +24,7 @@ _CHECKS = {
     "liouville_error": "logarithm of the product of the multipliers beside the integral of the "
     "divergence",
     "mesh_error": "estimated error of the states beside their amplitudes",
-    "residual": "largest size of x' - f beside that of f",
+    "residual": "largest size of x' - f beside that of f, or of the states at rest",
 }
 _WHICH = {"min": "least", "max": "largest", "mean": "mean"}
 ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points

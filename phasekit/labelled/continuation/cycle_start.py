@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -14,6 +15,7 @@ from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.ending import run
 from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
@@ -36,6 +38,8 @@ from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
+
+SAME = 1e-9  # part of its span by which a parameter that is free has moved by rounding
 
 
 def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float) -> FloatArray:
@@ -103,14 +107,11 @@ def continue_orbit(
     value = problem.parameters[free[0]]
     given = given_orbit(problem, orbit, value, options.degree)
     if fix is not None and free[1] == UNFOLDING:
-        cycles, start = _at_period(problem, free, spans, given, options)
+        cycles, start = _at_period(problem, free, spans, given, options, held=1)
+    elif fix is not None:
+        cycles, start = _of_long_period(problem, free, spans, given, options)
     else:
         cycles, start = _first(problem, free[:1], spans[:1], given, options, family)
-        if fix is not None:
-            cycles = _family(problem, free, spans, given, options, fixed=True)
-            y = np.append(start.orbit.y, problem.parameters[free[1]])
-            found = starts.settled(cycles, Orbit(start.orbit.mesh, start.orbit.x, y), held=2)
-            start = first_point(cycles, found, f"with the period {y[0]:.9g}")
     lead = start.dy[0] if cycles.vertical(start.dy) else start.dy[1]
     if lead < 0.0:
         start = start.flipped()
@@ -138,21 +139,49 @@ def _first(
     if family or not found.converged:
         # In a conservative family the parameter is no coordinate; it stays when it is free.
         other = starts.kept(cycles, guess)
-        stays = abs(other.orbit.y[1] - value) <= 1e-9 * max(1.0, abs(value))
-        found = other if other.converged and stays else found
+        stays = other.converged and _stays(cycles, other.orbit, value)
+        found = other if stays else found
     where = f"from the orbit given at {free[0]} = {value:.9g}"
     return cycles, first_point(cycles, found, where)
 
 
-def _at_period(
+def _stays(cycles: Cycles, orbit: Orbit, value: float) -> bool:
+    """Whether the first parameter keeps its value, beside its span.
+
+    What unfolds a conservative family, which has no span, is a rate.
+    """
+    width = float(cycles.width[0])
+    width = width if np.isfinite(width) else 1.0 / float(orbit.y[0])
+    return bool(abs(orbit.y[1] - value) <= SAME * width)
+
+
+def _of_long_period(
     problem: Problem, free: list[str], spans: list[Any], given: Given, options: Any
 ) -> tuple[Cycles, Point]:
-    """The conservative orbits of one period over a parameter, and the one given."""
+    """The orbits of one period over two parameters, and the first one.
+
+    A parameter next to a homoclinic orbit says nothing of the period: that is the one given. If the
+    orbit given belongs to other parameters, it is the period at those of the problem.
+    """
+    value = problem.parameters[free[0]]
+    with contextlib.suppress(ConvergenceError):
+        cycles, start = _at_period(problem, free, spans, given, options, held=2)
+        if _stays(cycles, start.orbit, value):
+            return cycles, start
+    _, start = _first(problem, free[:1], spans[:1], given, options, family=False)
+    moved = (start.orbit, *given[1:])
+    return _at_period(problem, free, spans, moved, options, held=2)
+
+
+def _at_period(
+    problem: Problem, free: list[str], spans: list[Any], given: Given, options: Any, held: int
+) -> tuple[Cycles, Point]:
+    """The orbits of one period over two parameters, and the one given, at its value of one."""
     guess = given[0]
     cycles = _family(problem, free, spans, given, options, fixed=True)
     y = np.append(guess.y, problem.parameters[free[1]])
-    found = starts.settled(cycles, Orbit(guess.mesh, guess.x, y), held=1)
-    where = f"with the period {y[0]:.9g} at {free[0]} = {y[1]:.9g}"
+    found = starts.settled(cycles, Orbit(guess.mesh, guess.x, y), held=held)
+    where = f"with the period {y[0]:.9g} at {free[held - 1]} = {y[held]:.9g}"
     return cycles, first_point(cycles, found, where)
 
 
@@ -186,6 +215,8 @@ def _spans(problem: Problem, free: list[str], span: Any) -> list[tuple[float, fl
             raise bad(
                 "span", (low, high), f"a span that holds the problem's own {name} = {value:.9g}"
             )
+    if len(spans) < len(free) and free[1] == UNFOLDING:
+        spans.append((-np.inf, np.inf))  # it stays zero: steps are not measured by it
     if len(spans) < len(free):
         value = problem.parameters[free[1]]
         reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])

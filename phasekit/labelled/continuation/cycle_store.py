@@ -167,7 +167,7 @@ def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
 
 
 def _packed_state(name: str, state: State) -> dict[str, FloatArray]:
-    return {
+    made = {
         f"{name}_mesh": state.orbit.mesh,
         f"{name}_x": state.orbit.x,
         f"{name}_dx": state.dx,
@@ -176,6 +176,14 @@ def _packed_state(name: str, state: State) -> dict[str, FloatArray]:
             [state.step, state.arclength, float(state.since), float(state.since_start)]
         ),
     }
+    if state.behind is not None:
+        last, dx, dy = state.behind
+        made |= {
+            f"{name}_behind_x": last.x,
+            f"{name}_behind_dx": dx,
+            f"{name}_behind_y": np.stack([last.y, dy]),
+        }
+    return made
 
 
 def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
@@ -214,10 +222,14 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
 
 def _unpacked_state(stored: Stored, name: str, cycles: Cycles) -> State:
     mesh = stored.array(f"{name}_mesh", (None,))
-    places = (len(mesh) - 1) * cycles.m + 1
-    x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
-    y = stored.array(f"{name}_y", (2, cycles.q))
+
+    def orbit_of(name: str) -> tuple[Orbit, FloatArray, FloatArray]:
+        places = (len(mesh) - 1) * cycles.m + 1
+        x, dx = (stored.array(f"{name}_{one}", (places, cycles.n)) for one in ("x", "dx"))
+        y = stored.array(f"{name}_y", (2, cycles.q))
+        return Orbit(mesh, x, y[0].copy()), dx, y[1].copy()
+
     step, arclength, since, count = stored.array(f"{name}_numbers", (4,)).tolist()
-    return State(
-        Orbit(mesh, x, y[0].copy()), dx, y[1].copy(), step, arclength, int(since), int(count)
-    )
+    # Branches that were saved by earlier versions say nothing of the point behind.
+    behind = orbit_of(f"{name}_behind") if f"raw_{name}_behind_x" in stored.ds else None
+    return State(*orbit_of(name), step, arclength, int(since), int(count), behind)

@@ -20,6 +20,8 @@ from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 
+RESTS = 1e-6  # size beside the largest state
+
 #: A guess, its turns, and of a forced system how many periods of the forcing it takes.
 Given = tuple[Orbit, FloatArray, int]
 
@@ -52,10 +54,14 @@ def cycles_of(
 
 
 def scale_of(x: FloatArray) -> FloatArray:
-    """Sizes of the states along an orbit."""
+    """Sizes of the states along an orbit; `ContinuationOptions.scales` knows better.
+
+    A state beside which another one is a million times as large may be one that rests at 0 but for
+    the errors of a simulation: of the same unit as that.
+    """
     size = np.max(np.abs(x), axis=0)
     top = float(np.max(size))
-    return np.asarray(np.where(size > 1e-6 * top, size, top if top > 0.0 else 1.0))
+    return np.asarray(np.where(size > RESTS * top, size, top if top > 0.0 else 1.0))
 
 
 def given_orbit(problem: Problem, orbit: Any, value: float, m: int) -> Given:

@@ -29,6 +29,7 @@ from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]
 
+UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservative system closes
 TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
 LONGEST = 2000  # steps of the slowest time scale that a search for a return may take
 SAMPLES = 2001
@@ -186,9 +187,10 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
     free = UNFOLDING in problem.parameters
     name = UNFOLDING if free else next(iter(problem.parameters))
     value = problem.parameters[name]
-    width = max(abs(value), 1.0)
     said = ""
     for guess, turns, multiple in guesses:
+        # What unfolds a conservative family is a rate.
+        width = 1.0 / float(guess.y[0]) if free else abs(value) or 1.0
         cycles = cycles_of(
             problem, [name], [(value - width, value + width)], scale_of(guess.x), turns, options,
             multiple,
@@ -206,7 +208,7 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
             continue
         if not free:
             found.orbit.y[1] = value
-        elif abs(found.orbit.y[1]) > 1e-8:
+        elif abs(found.orbit.y[1]) * found.orbit.y[0] > UNCONSERVED:
             said = f"energy is not conserved along it: it needs a damping of {found.orbit.y[1]:.2g}"
             continue
         return orbit_of(cycles, problem, found, where)

@@ -39,6 +39,8 @@ _, MORE, THIRD, FIFTH = 11, 12, 15, 16
 
 #: Error of a tangent vector, of its length, below which rounding hides it.
 CLOSEST = 1e-14
+#: Error of a motion that does not move, so that it is not divided by 0.
+LEAST = 1e-150
 #: Least and greatest change of the step, and what of the step that just fits is taken.
 SHORTEST, LONGEST, SAFETY = 0.2, 10.0, 0.9
 
@@ -134,13 +136,17 @@ def errors(
     rtol: float,
     atol: float,
     spare: Array,
+    error: Array,
     size: Array,
 ) -> None:
     """Error of each lane's step over what is allowed.
 
     A coordinate beyond `unit` counts as `unit`, so that an angle which runs on is held as closely
-    as at first. A tangent vector is held against its length, the more closely the shorter the step
-    is: the logs of lengths add up, so that what counts is the error in a second.
+    as at first. The absolute error is of a unit, on a line of the motion's size so far, where that
+    is below 1: coordinates may be lengths in any unit; of a rate it is what adds up to that in the
+    step, if that is longer than a second. A tangent vector is held against its length,
+    the more closely the shorter the step is: the logs of lengths add up, so that what counts is the
+    error in a second.
     """
     third, fifth = spare[0], spare[1]
     add_up(THIRD, k, third)
@@ -148,6 +154,10 @@ def errors(
     n = x.size // LANES
     for lane in range(LANES):
         e3 = e5 = 0.0
+        rate = LANES + lane
+        size[lane] = max(size[lane], max(abs(x[lane]), abs(x[rate])))
+        own = unit if unit < np.inf else max(size[lane], max(abs(y[lane]), abs(y[rate])))
+        least = max(atol * min(own, 1.0), LEAST)
         for c in range(n):
             m = c * LANES + lane
             if c < 2:
@@ -157,14 +167,18 @@ def errors(
             else:
                 other = m + LANES if c % 2 == 0 else m - LANES
                 scale = max(math.hypot(x[m], x[other]), math.hypot(y[m], y[other]))
-            allowed = atol + rtol * scale
-            if c >= 2:
-                allowed = max(allowed * min(1.0, abs(h[lane])), CLOSEST * scale)
+            allowed = rtol * scale
+            if c == 0:
+                allowed += least
+            elif c == 1:
+                allowed += least / max(1.0, abs(h[lane]))
+            else:
+                allowed = max((allowed + atol) * min(1.0, abs(h[lane])), CLOSEST * scale)
             scale = 1.0 / allowed
             e3 += (third[m] * scale) ** 2
             e5 += (fifth[m] * scale) ** 2
         below = e5 + 0.01 * e3
-        size[lane] = abs(h[lane]) * e5 / math.sqrt(below * n) if below > 0.0 else below
+        error[lane] = abs(h[lane]) * e5 / math.sqrt(below * n) if below > 0.0 else below
 
 
 @inline

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from phasekit.motion.kernels.dop853 import ROWS, densify, rates, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
-    ARRIVED,
     CELL,
     END,
     GONE,
-    IDLE,
     REALS,
-    RUNNING,
     SCALE,
     START,
     STATE,
@@ -22,14 +20,45 @@ from phasekit.motion.kernels.stepping import (
     TRY,
     WHOLES,
     T,
+    Whole,
     advance,
     by_series,
     commit,
     load,
     renew,
 )
+from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
 from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
+
+Index = npt.NDArray[np.int64]
+
+
+@routine
+def enter(
+    lane: int, start: float, times: Array, x: Array, real: Array, whole: Whole, out: Array
+) -> int:
+    """Begin the motion of a lane; write its states at the start, and return how many."""
+    real[T, lane], real[END, lane] = start, times[-1]
+    done = 0
+    while done < times.size and times[done] == start:
+        for c in range(out.shape[1]):
+            out[done, c] = x[c * LANES + lane]
+        done += 1
+    if done == times.size:
+        whole[STATE, lane] = ARRIVED
+    return done
+
+
+@routine
+def is_passed(times: Array, written: Index, real: Array, whole: Whole) -> bool:
+    """Whether a time lies within the accepted step of a lane."""
+    for lane in range(LANES):
+        if whole[ACCEPTED, lane] == 1 and written[lane] < times.shape[1]:
+            row = whole[CELL, lane] if times.shape[0] > 1 else 0
+            if abs(times[row, written[lane]] - real[T, lane]) < abs(real[TRY, lane]):
+                return True
+    return False
 
 
 @routine
@@ -128,17 +157,9 @@ def motions(
                         out[old, i, c] = np.nan
                 whole[STATE, lane] = IDLE
             if cell < stop:
-                load(lane, cell, states, parameters, x, p, kink, real, whole)
-                real[T, lane] = start
                 own_times = times[cell if times.shape[0] > 1 else 0]
-                real[END, lane] = own_times[-1]
-                written[lane] = 0
-                while written[lane] < own_times.size and own_times[written[lane]] == start:
-                    for c in range(out.shape[2]):
-                        out[cell, written[lane], c] = states[cell, c]
-                    written[lane] += 1
-                if written[lane] == own_times.size:
-                    whole[STATE, lane] = ARRIVED
+                load(lane, cell, states, parameters, x, p, kink, real, whole)
+                written[lane] = enter(lane, start, own_times, x, real, whole, out[cell])
                 fresh += 1
                 cell += 1
         if address is not None and fresh > 0:
@@ -161,13 +182,7 @@ def motions(
         for lane in range(LANES if kink >= 0 else 0):
             signs[lane] = p[kink * LANES + lane]
         advance(address, table, limits, x, k, y, p, z, kink, h, real, whole)
-        dense = False
-        for lane in range(LANES):
-            if whole[ACCEPTED, lane] == 1 and written[lane] < times.shape[1]:
-                row = whole[CELL, lane] if times.shape[0] > 1 else 0
-                passed = abs(times[row, written[lane]] - real[T, lane]) < abs(real[TRY, lane])
-                dense = dense or passed
-        if dense:
+        if is_passed(times, written, real, whole):
             swap(p, kink, signs)
             densify(address, table, real[T], h, x, k, spare, p, z)
             swap(p, kink, signs)

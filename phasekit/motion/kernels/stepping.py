@@ -18,6 +18,7 @@ from phasekit.motion.kernels.dop853 import (
     next_step,
     rates,
 )
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.compile import Array, inline, routine
 from phasekit.numerics.lanes import LANES, invoke
 
@@ -25,9 +26,10 @@ Whole = npt.NDArray[np.int64]
 
 #: Rows of `real`: time, next step, the step that is tried, where the lane stops, error of the
 #: step over what is allowed, step that is tried to end at a turn. Of steps by series their number,
-#: the state, and whether the last was rejected; of one alone what was gone, 0 where it was
-#: rejected, when it began, the unit of its time, and further rows with its coefficients.
-T, H, TRY, END, ERROR, AIM, COUNT, OUTCOME, REFUSED, GONE, START, SCALE, TERMS = range(13)
+#: the state, and whether the last was rejected; the greatest coordinate or rate so far; of one
+#: step alone what was gone, 0 where it was rejected, when it began, the unit of its time, and
+#: further rows with its coefficients.
+T, H, TRY, END, ERROR, AIM, COUNT, OUTCOME, REFUSED, SIZE, GONE, START, SCALE, TERMS = range(14)
 REALS, KEPT = TERMS, GONE
 #: Rows of `whole`: cell, state, whether the step was accepted, steps so far, whether the last was
 #: rejected, tries to end at a turn.
@@ -35,14 +37,11 @@ CELL, STATE, ACCEPTED, STEPS, REJECTED, AIMS = range(6)
 WHOLES = 6
 
 #: Rows of limits: errors that are allowed, value from which on a coordinate is held as closely as
-#: there, most steps; and, for steps by series, whether to take one alone, and keep its series.
-RTOL, ATOL, UNIT, MOST, ONCE = range(5)
+#: there, most steps; and, for steps by series, whether to take one alone, and to keep its series.
+RTOL, ATOL, UNIT, MOST, ALONE, KEEP = range(6)
 
 #: In place of `ACCEPTED`: its state was changed between steps.
 CHANGED = 2
-
-#: States: nothing to do, under way, at its end, too many steps, steps too short.
-IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED = range(5)
 
 _EPS = float(np.finfo(float).eps)
 _MOST_AIMS = 12
@@ -71,7 +70,7 @@ def load(
     if kink >= 0:
         p[kink * LANES + lane] = np.sign(states[cell, 1])
     real[T, lane] = real[H, lane] = real[AIM, lane] = 0.0
-    real[COUNT, lane] = real[REFUSED, lane] = 0.0
+    real[COUNT, lane] = real[REFUSED, lane] = real[SIZE, lane] = 0.0
     whole[ACCEPTED, lane] = CHANGED
 
 
@@ -208,7 +207,7 @@ def advance(
         h[m] = real[TRY, m % LANES]
     attempt(address, table, real[T], h, x, k, y, p, z)
     rtol, atol, unit, most = limits[RTOL, 0], limits[ATOL, 0], limits[UNIT, 0], limits[MOST, 0]
-    errors(h, x, y, k, unit, rtol, atol, k[13:], real[ERROR])
+    errors(h, x, y, k, unit, rtol, atol, k[13:], real[ERROR], real[SIZE])
     for lane in range(LANES):
         if whole[STATE, lane] == RUNNING:
             judge(lane, int(most), x, k, y, p, kink, real, whole)

@@ -10,13 +10,10 @@ import numpy.typing as npt
 from phasekit.motion.kernels.dop853 import ROWS
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
-    ARRIVED,
     CELL,
     CHANGED,
     END,
-    IDLE,
     REALS,
-    RUNNING,
     STATE,
     WHOLES,
     T,
@@ -26,11 +23,13 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
+from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
 from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 
 Codes = npt.NDArray[np.int16]
 Index = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 
 @inline
@@ -88,7 +87,6 @@ def strobe(
     address: int | None,
     table: Array,
     limits: Array,
-    again: bool,
     kink: int,
     skip: int,
     many: int,
@@ -99,6 +97,7 @@ def strobe(
     boxes: Codes,
     visits: int,
     legs: Array,
+    again: Bools,
     states: Array,
     parameters: Array,
     first: int,
@@ -110,7 +109,8 @@ def strobe(
 ) -> None:
     """States after a leg, two legs, ... of each cell: from the one after `skip` on in `out`.
 
-    `out` is of shape (cells, kept, 2); the state after no leg is not written.
+    `out` is of shape (cells, kept, 2), NaN once a motion has ended; the state after no leg is not
+    written.
 
     Where the law repeats itself after each leg (`again`), time begins anew. A motion ends early
     near a point of an attractor, in whose number `code` is then, or after so many visits in
@@ -140,19 +140,19 @@ def strobe(
                 if skip <= done[lane] < skip + out.shape[1]:
                     out[own, done[lane] - skip, 0] = phi
                     out[own, done[lane] - skip, 1] = dphi
-                near = nearest_of(phi, dphi, points, period, scale)
                 inside = box_of(phi, dphi, period, box, boxes)
-                if stays(lane, inside, visits, last, same) and near < 0:
-                    near = inside
-                if near >= 0:
-                    code[own] = near
-                ended = near >= 0 or done[lane] >= many
+                code[own] = nearest_of(phi, dphi, points, period, scale)
+                if stays(lane, inside, visits, last, same) and code[own] < 0:
+                    code[own] = inside
+                ended = code[own] >= 0 or done[lane] >= many
                 if not ended:
-                    resume(lane, done[lane], legs[own], again, real, whole)
-                    fresh = fresh or again
+                    resume(lane, done[lane], legs[own], again[own], real, whole)
+                    fresh = fresh or again[own]
             if ended:
                 taken[own] = done[lane]
                 status[own] = state
+                for i in range(max(done[lane] + 1 - skip, 0), out.shape[1]):
+                    out[own, i, 0] = out[own, i, 1] = np.nan
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:

@@ -10,13 +10,10 @@ import numpy.typing as npt
 from phasekit.motion.kernels.dop853 import ROWS
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
-    ARRIVED,
     CELL,
     CHANGED,
     END,
-    IDLE,
     REALS,
-    RUNNING,
     STATE,
     WHOLES,
     advance,
@@ -25,6 +22,7 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
+from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
 from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 

@@ -18,25 +18,24 @@ import numpy as np
 import sympy as sp
 from llvmlite import ir
 
-from phasekit.motion.kernels.dop853 import CLOSEST, LONGEST
+from phasekit.motion.kernels.dop853 import CLOSEST, LEAST, LONGEST
 from phasekit.motion.kernels.stepping import (
-    ARRIVED,
+    ALONE,
     ATOL,
     COUNT,
     END,
-    EXHAUSTED,
-    FAILED,
+    KEEP,
     KEPT,
     MOST,
-    ONCE,
     OUTCOME,
     REFUSED,
     RTOL,
-    RUNNING,
+    SIZE,
     UNIT,
     H,
     T,
 )
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.lanes import LANES, LaneWriter
 from phasekit.numerics.machine_code import machine_code
 from phasekit.numerics.series import Series
@@ -72,7 +71,7 @@ class Law:
 def compile_steps(law: Law, order: int) -> int:
     """Address of ``void (double *x, double *p, double *real, double *limits)``.
 
-    It takes steps, of all lanes at once, until a lane ends. Or it takes one, and leaves the
+    It takes steps, of all lanes at once, until a lane ends, or one alone; and may leave the
     coefficients of the coordinates in further rows of `real`.
     """
     pointer = ir.DoubleType().as_pointer()
@@ -101,17 +100,17 @@ class StepWriter(LaneWriter):
         t, end, count, state, refused = (
             self.load(real, row) for row in (T, END, COUNT, OUTCOME, REFUSED)
         )
-        first = b.load(super(LaneWriter, self).place(limits, ONCE * LANES))
-        once = b.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
+        alone, keep = self._asked(ALONE), self._asked(KEEP)
         rest, h = b.fsub(end, t), self.load(real, H)
         h = b.select(b.fcmp_unordered("==", h, self.constant(0.0)), rest, h)
         running = b.fcmp_ordered("==", state, self.constant(RUNNING))
         per = b.fdiv(self.constant(1.0), h)
         curves = self._curves(law, order, t, start, h, per)
-        allowed = [
-            self._allowed(i, curve, h, per, [self.load(limits, i) for i in (RTOL, ATOL, UNIT)])
-            for i, curve in enumerate(curves)
-        ]
+        rtol, atol, unit = (self.load(limits, row) for row in (RTOL, ATOL, UNIT))
+        size = self._larger(self.load(real, SIZE), self._larger(*map(self._size, start[:2])))
+        b.store(size, self.place(real, SIZE), align=8)
+        allowed = [self._allowed(curves[0], per, size, rtol, atol, unit)]
+        allowed += [self._allowed_beside(curve, h, per, rtol, atol) for curve in curves[1:]]
         next_ = self._mul(self._part(order, curves, allowed, per, refused), h)
         far, long = self._size(rest), self._size(next_)
         last = b.fcmp_ordered(">=", long, far)
@@ -126,7 +125,7 @@ class StepWriter(LaneWriter):
         for i, (old, new) in enumerate(zip(start, ends, strict=True)):
             b.store(b.select(going, new, old), self.place(x, i), align=8)
         self._keep(
-            once, [b.select(going, taken, self.constant(0.0)), t, h, *itertools.chain(*curves)]
+            keep, [b.select(going, taken, self.constant(0.0)), t, h, *itertools.chain(*curves)]
         )
         h = b.select(good, next_, self._mul(self.constant(0.5), taken))
         now = b.select(going, then, t)
@@ -152,11 +151,16 @@ class StepWriter(LaneWriter):
         b.store(new, self.place(real, OUTCOME), align=8)
         ended = b.bitcast(b.fcmp_ordered("!=", new, state), ir.IntType(LANES))
         none = b.icmp_unsigned("==", ended, ir.Constant(ended.type, 0))
-        return b.and_(none, b.not_(once))
+        return b.and_(none, b.not_(alone))
 
-    def _keep(self, once: Any, values: Iterable[Any]) -> None:
-        """Leave a step that is the only one where the caller finds it."""
-        with self.builder.if_then(once):
+    def _asked(self, row: int) -> Any:
+        """Whether a limit is not 0; it is the same in all lanes."""
+        first = self.builder.load(super(LaneWriter, self).place(self.arrays[3], row * LANES))
+        return self.builder.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
+
+    def _keep(self, keep: Any, values: Iterable[Any]) -> None:
+        """Leave a step where the caller finds it."""
+        with self.builder.if_then(keep):
             for row, value in enumerate(values):
                 self.builder.store(value, self.place(self.arrays[2], KEPT + row), align=8)
 
@@ -186,22 +190,34 @@ class StepWriter(LaneWriter):
         return curves
 
     def _allowed(
-        self, i: int, curve: Sequence[Any], h: Any, per: Any, limits: Sequence[Any]
+        self, curve: Sequence[Any], per: Any, size: Any, rtol: Any, atol: Any, unit: Any
     ) -> tuple[Any, Any]:
-        """Errors of a pair that are allowed, as of Runge-Kutta steps.
+        """Errors of the coordinate and its rate that are allowed, as of Runge-Kutta steps.
 
         What a step adds counts as the size of what is zero at its start. The rounding of a far
         coordinate is no error of the rate.
         """
-        rtol, atol, unit = limits
+        b, x, v = self.builder, curve[0], self._mul(curve[1], per)
+        bend = self._size(curve[2])
+        change = self._size(self._mul(self._mul(self.constant(2.0), curve[2]), per))
+        far = self._larger(self._size(x), self._size(curve[1]))
+        fast = self._larger(self._size(v), change)
+        size = self._larger(size, self._larger(self._larger(far, bend), fast))
+        line = b.fcmp_ordered("==", unit, self.constant(float("inf")))
+        own = self._smaller(b.select(line, size, unit), self.constant(1.0))
+        least = self._larger(self._mul(atol, own), self.constant(LEAST))
+        a = self._sum(self._mul(rtol, self._smaller(far, unit)), least)
+        # Of a rate, what adds up to that in a step, if that is longer than a second.
+        part = self._mul(least, self._smaller(self._size(per), self.constant(1.0)))
+        c = self._sum(self._mul(rtol, fast), part)
+        noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
+        return a, self._larger(c, noise)
+
+    def _allowed_beside(
+        self, curve: Sequence[Any], h: Any, per: Any, rtol: Any, atol: Any
+    ) -> tuple[Any, Any]:
+        """Those of a tangent vector: by its length."""
         x, v = curve[0], self._mul(curve[1], per)
-        if i == 0:
-            size = self._larger(self._size(x), self._size(curve[1]))
-            change = self._size(self._mul(self._mul(self.constant(2.0), curve[2]), per))
-            sizes = self._smaller(size, unit), self._larger(self._size(v), change)
-            a, c = (self._sum(self._mul(rtol, size), atol) for size in sizes)
-            noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
-            return a, self._larger(c, noise)
         length = self._intrinsic("sqrt", self._sum(self._mul(x, x), self._mul(v, v)))
         second = self._smaller(self._size(h), self.constant(1.0))
         part = self._mul(self._sum(self._mul(rtol, length), atol), second)

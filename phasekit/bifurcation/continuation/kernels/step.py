@@ -16,7 +16,7 @@ from phasekit.bifurcation.continuation.kernels.defining import evaluate, places
 from phasekit.bifurcation.continuation.kernels.newton import correct
 from phasekit.bifurcation.continuation.kernels.state import DONE, LAST, LENGTH, NEXT, SIDE, SIGN
 from phasekit.numerics.compile import Array, routine
-from phasekit.numerics.native import copy, dot, inner, orientation, twin
+from phasekit.numerics.native import copy, divide, dot, inner, twin
 
 # Settings, by place; then come period, lower and upper bound of each unknown.
 LONGEST, SHORTEST, TOLERANCE, ITERATIONS, TURN, LARGEST_TURN, SETTINGS = range(7)
@@ -40,7 +40,7 @@ def attempt(
     Returns why it is refused, or STANDS; Newton's steps, the angle by which the tangent turned, the
     sign of the determinant, and whether the curve is smooth there.
     """
-    size, _, _, v, a, b, _, _, _, _, _, _, _ = places(kind, n, active.size)
+    size, _, _, v, _, b, _, _, _, _, _, _, _ = places(kind, n, active.size)
     t, old, scale, weight, number = size, 2 * size, 3 * size, 4 * size, 7 * size
     row, guess = v + ROW * size, v + GUESS * size
     chord, new = v + CHORD * size, v + NEW * size
@@ -52,7 +52,7 @@ def attempt(
     if steps < 0:
         return steps, 0, 0.0, 0.0, False
     gather(w, scale, b, new, 0, v, chord, guess, size)
-    w[new : new + size] /= np.sqrt(inner(w, weight, new, new, size))
+    divide(w, new, np.sqrt(inner(w, weight, new, new, size)), size)
     angle = np.arccos(min(1.0, max(-1.0, inner(w, weight, new, t, size))))
     drift = np.sqrt(inner(w, weight, guess, guess, size)) / h
     smooth = angle <= fixed[LARGEST_TURN] and drift <= 0.25
@@ -60,7 +60,7 @@ def attempt(
     sharp = not smooth and 0.5 * h < fixed[SHORTEST] and drift <= 2.0
     if not (smooth or sharp):
         return TURNS, steps, angle, 0.0, smooth
-    side = orientation(w, a, size, w[number + SIGN])
+    side = w[number + SIGN]
     if sharp and side * w[number + SIDE] < 0.0:
         return TURNS, steps, angle, side, smooth
     if side * w[number + SIDE] < 0.0 and h > max(CAREFUL, 4.0 * fixed[SHORTEST]):
@@ -112,7 +112,7 @@ def land(
         for j in range(size):
             w[new + j] = w[scale + j] * w[b + 2 * j + 1]
         length = np.sqrt(inner(w, weight, new, new, size))
-        w[new : new + size] /= -length if inner(w, weight, new, t, size) < 0.0 else length
+        divide(w, new, -length if inner(w, weight, new, t, size) < 0.0 else length, size)
     elif which < 0:
         copy(w, guess, v, size)
         evaluate(first, second, mode, kind, n, par, active, w, v)

@@ -23,7 +23,7 @@ from phasekit.bifurcation.continuation.kernels.step import (
     take,
 )
 from phasekit.numerics.compile import Array, kernel, routine
-from phasekit.numerics.native import copy, inner
+from phasekit.numerics.native import copy, inner, keep
 
 # Reasons to stop, beside those of a step.
 FULL, BOUND, CLOSED, STUCK, NOT_FINITE = range(5)
@@ -83,8 +83,8 @@ def trace(
                 continue
             break
         length = take(w, size, n, v, fixed, h, steps, angle, side, smooth, reason >= 0)
-        record[k, : 2 * size] = w[: 2 * size]
-        slopes[k] = w[base + n : base + n + n * m]
+        keep(record[k], w, 0, 2 * size)
+        keep(slopes[k], w, base + n, n * m)
         j = 2 * size
         record[k, j + STEP_LENGTH] = length
         record[k, j + NEWTON_STEPS] = steps

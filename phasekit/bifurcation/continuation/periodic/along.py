@@ -196,15 +196,64 @@ def highest(
 
 
 @kernel
-def error(mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Array) -> float:
-    """Largest part of the derivative of order m + 1 that an interval sees."""
+def error(
+    mesh: Array, x: Array, turns: Array, scale: Array, coefficients: Array, closure: Array,
+    rest: float,
+) -> float:  # fmt: skip
+    """Largest part of the derivative of order m + 1 that an interval sees, beside amplitudes.
+
+    0 where all of them are rest.
+    """
+    half = np.empty(scale.size)
+    amplitudes(mesh, x, turns, scale, coefficients.size - 1, half)
+    still = True
+    for c in range(scale.size):
+        still = still and half[c] <= rest * scale[c]
+    if still:
+        return 0.0
     sizes = np.empty(mesh.size - 1)
-    highest(mesh, x, coefficients, scale, closure, sizes)
+    highest(mesh, x, coefficients, half, closure, sizes)
     worst = 0.0
     for j in range(sizes.size):
         size = sizes[j] * (mesh[j + 1] - mesh[j]) ** coefficients.size
         worst = size if not size <= worst else worst
     return worst
+
+
+@kernel
+def even(
+    mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Array, new: Array
+) -> None:
+    """Fill a mesh over whose intervals the error is spread evenly (see `collocation.even`)."""
+    count, last = mesh.size - 1, new.size - 1
+    density = np.empty(count)
+    highest(mesh, x, coefficients, scale, closure, density)
+    whole = 0.0
+    for j in range(count):
+        density[j] **= 1.0 / coefficients.size
+        whole += density[j] * (mesh[j + 1] - mesh[j])
+    for k in range(last + 1):
+        new[k] = k / last
+    if not whole > 0.0 or not np.isfinite(whole):
+        return
+    # A part of it everywhere, so that no interval grows where nothing seems to happen.
+    reached, j, step = 0.0, 0, 1.2 * whole / last
+    part = (density[0] + 0.2 * whole) * (mesh[1] - mesh[0])
+    for k in range(1, last):
+        while j < count - 1 and reached + part < k * step:
+            reached += part
+            j += 1
+            part = (density[j] + 0.2 * whole) * (mesh[j + 1] - mesh[j])
+        new[k] = mesh[j] + (mesh[j + 1] - mesh[j]) * min((k * step - reached) / part, 1.0)
+
+
+@kernel
+def times(mesh: Array, m: int, out: Array) -> None:
+    """The times of all places of a mesh."""
+    for j in range(mesh.size - 1):
+        for k in range(m):
+            out[j * m + k] = mesh[j] + (mesh[j + 1] - mesh[j]) * (k / m)
+    out[out.size - 1] = mesh[mesh.size - 1]
 
 
 @kernel
@@ -221,6 +270,8 @@ def jets(
     w = np.zeros(spare + spare_size(n, n + a))
     for i in range(n + a):
         w[sizes + i] = scale[i]
+    if forced:
+        w[sizes + n] = y[0]
     t = 1 if forced else 0
     for i in range(t, a):
         w[u + n + i] = y[1 + i - t]

@@ -37,6 +37,8 @@ class Scheme:
         From the values at even places to the m-th derivative, which is constant.
     side : float
         Sign of the determinant of the slopes by all places but the first.
+    places : ndarray, shape (m + 1,)
+        The even places, on [0, 1].
     fine : ndarray, shape (FINE, m + 1)
         From the values at even places to those on a fine grid of the interval.
     """
@@ -48,6 +50,7 @@ class Scheme:
     slope: Array
     high: Array
     side: float
+    places: Array
     fine: Array
 
 
@@ -62,7 +65,7 @@ def scheme(m: int) -> Scheme:
     high *= float(np.prod(np.arange(1.0, m + 1.0)))
     side = float(np.sign(np.linalg.det(slope[:, 1:])))
     fine, _ = basis(m, np.linspace(0.0, 1.0, FINE))
-    return Scheme(m, nodes, 0.5 * weights, value, slope, high, side, fine)
+    return Scheme(m, nodes, 0.5 * weights, value, slope, high, side, places / m, fine)
 
 
 def basis(m: int, at: Array) -> tuple[Array, Array]:
@@ -85,8 +88,9 @@ def basis(m: int, at: Array) -> tuple[Array, Array]:
 
 def times(mesh: Array, m: int) -> Array:
     """The times of all places of a mesh."""
-    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * (np.arange(m) / m)
-    return np.append(inner.ravel(), mesh[-1])
+    out = np.empty((len(mesh) - 1) * m + 1)
+    along.times(mesh, m, out)
+    return out
 
 
 def pieces(x: Array, m: int) -> Array:
@@ -107,7 +111,7 @@ def gathered(parts: Array, m: int) -> Array:
 def interpolate(mesh: Array, x: Array, m: int, at: Array) -> Array:
     """Values of a piecewise polynomial at times in [0, 1], in ascending order."""
     out = np.empty((len(at), x.shape[1]))
-    along.interpolate(mesh, np.ascontiguousarray(x), np.arange(m + 1.0) / m, at, out)
+    along.interpolate(mesh, np.ascontiguousarray(x), scheme(m).places, at, out)
     return out
 
 
@@ -153,11 +157,6 @@ def highest(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> Arra
     return out
 
 
-def error(mesh: Array, x: Array, m: int, scale: Array, closure: Array) -> float:
-    """Largest estimated error of the polynomials between the ends of intervals, on scaled axes."""
-    return float(along.error(mesh, x, scheme(m).high, scale, closure)) * factor(m)
-
-
 @functools.cache
 def factor(m: int) -> float:
     """Largest of the polynomials whose error it is: x^(m+1) h^(m+1) times this is the error.
@@ -173,13 +172,6 @@ def factor(m: int) -> float:
 
 def even(mesh: Array, x: Array, m: int, scale: Array, count: int, closure: Array) -> Array:
     """A mesh of so many intervals over which the error is spread evenly."""
-    density = highest(mesh, x, m, scale, closure) ** (1.0 / (m + 1))
-    # A part of it everywhere, so that no interval grows where nothing seems to happen.
-    whole = float(np.sum(density * np.diff(mesh)))
-    if not whole > 0.0 or not np.isfinite(whole):
-        return np.linspace(0.0, 1.0, count + 1)
-    density = density + 0.2 * whole
-    reached = np.concatenate([[0.0], np.cumsum(density * np.diff(mesh))])
-    new = np.interp(np.linspace(0.0, reached[-1], count + 1), reached, mesh)
-    new[0], new[-1] = 0.0, 1.0
-    return np.asarray(new)
+    new = np.empty(count + 1)
+    along.even(mesh, x, scheme(m).high, scale, closure, new)
+    return new

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
+from phasekit.bifurcation.continuation.periodic import along, collocation, kernels, newton
 from phasekit.bifurcation.continuation.periodic.jets import Jets
 from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
 
@@ -156,8 +156,9 @@ class Cycles:
 
     @cached_property
     def sizes(self) -> Array:
-        """Sizes of states and active parameters, for differences."""
+        """Sizes of states and active parameters, for differences; that of time is the period."""
         time = np.ones(1) if self.forced else np.ones(0)
+        # F is linear in what has no span: any size will do.
         width = np.where(np.isfinite(self.width), self.width, 1.0)
         return np.concatenate([self.scale, time, width])
 
@@ -216,28 +217,31 @@ class Cycles:
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         most = iterations or self.options.max_iterations
+        sign, divergence = 0.0, np.nan
         values, size, step = np.empty((0, 0)), np.inf, 0
         if not jets.given:
             values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, self.sizes)
-            end, steps, sign, residual, divergence, size, length = kernels.newton(
+            end, steps, side, residual, trace, size, length = newton.newton(
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale,
                 self.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
                 dx, dy, values, self.options.tolerance, 1 if jets.given else most, damped, size,
             )  # fmt: skip
             step += steps
-            if end != kernels.ON_ITS_WAY or step >= most:
+            if steps:  # else the last ones stand
+                sign, divergence = side, trace
+            if end != newton.ON_ITS_WAY or step >= most:
                 break
         orbit = Orbit(mesh, x, y)
-        if end == kernels.FOUND:
+        if end in (newton.FOUND, newton.CHECKED):
             found = (step, residual, sign, divergence, W)
             return Solution(orbit, dx[1], dy[1], *found, length=length)
         message = {
-            kernels.NOT_FINITE: "f or its derivatives are not finite",
-            kernels.SINGULAR: "the equations are singular",
+            newton.NOT_FINITE: "f or its derivatives are not finite",
+            newton.SINGULAR: "the equations are singular",
         }.get(end, "Newton's method did not converge")
         return Solution(orbit, dx[1], dy[1], 0, residual, sign, divergence, W, message)
 
@@ -263,9 +267,9 @@ class Cycles:
         G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
         if not self.forced and n > 1:
             f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-            if np.isfinite(f).all() and f.any(axis=1).all():
-                A = np.empty((len(f), n - 1, n - 1))
-                trivial, off = across(G, f, self.scale, A)
+            A = np.empty((len(f), n - 1, n - 1))
+            trivial, off = across(G, f, self.scale, A)
+            if not math.isnan(trivial):
                 others, log = multipliers(A)
                 whole = sorted([*others.tolist(), complex(trivial)], key=abs, reverse=True)
                 log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
@@ -309,10 +313,9 @@ class Cycles:
 
     def mesh_error(self, orbit: Orbit) -> float:
         """Largest estimated error of a state, beside its amplitude; of what is at rest none."""
-        half = self.amplitudes(orbit)
-        if np.all(half <= REST * self.scale):
-            return 0.0
-        return collocation.error(orbit.mesh, orbit.x, self.m, half, self.closure)
+        high = collocation.scheme(self.m).high
+        found = along.error(orbit.mesh, orbit.x, self.turns, self.scale, high, self.closure, REST)
+        return float(found) * collocation.factor(self.m)
 
     def on(self, mesh: Array, orbit: Orbit, *more: Array) -> tuple[Orbit, tuple[Array, ...]]:
         """The orbit, and directions, on another mesh."""

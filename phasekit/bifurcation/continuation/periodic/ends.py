@@ -8,32 +8,25 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, starts
+from phasekit.bifurcation.continuation.periodic import collocation, homoclinic, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import TORUS, Extended
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
 
-STILL = 1e-10  # how far a parameter moves, in units of its span, while the period grows e-fold
-SLOW = 1e-4  # the same, where no step succeeds
-GROWS = 0.02  # part of its range by which no state grows beside a homoclinic orbit, a time e-fold
-REACH = 1e-3  # length along the family, on scaled axes, over which ranges are compared
-STEADY = 1e-6  # range, beside its scale, of a state that rests
 MEETING = 1e-5  # half turns between multipliers that are said to meet, and where they do
 FEW = 5  # points before which a family is not asked whether it closes
 NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
-INFINITE = "stands still: an orbit that takes infinite time is near"
-FAR = 30.0  # times the period of the start, where the parameter stands still throughout
-LONG = 3.0  # times the period of the start, from where on it can be that of a homoclinic orbit
 
 
 def end_of(
     cycles: Cycles, before: State, made: Point, start: Point
 ) -> tuple[Point | None, Stop] | None:
     """The last point and the reason, if the family ends between two points."""
-    small = np.mean(cycles.amplitudes(made.orbit) / cycles.scale) < 4.0 * made.step
+    sizes = (cycles.amplitudes(made.orbit) / cycles.scale).tolist()
+    small = sum(sizes) < 4.0 * made.step * len(sizes)
     if small and not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
         return _at_hopf(cycles, before, made)
     if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit):
@@ -61,13 +54,8 @@ def end_of(
             stays = before.orbit.y[0] == value
             last = None if stays else at_value(cycles, before, made, -1, value)
             return last, Stop("bound", f"period met its {side} bound {value:.9g}")
-    if not cycles.forced and len(cycles.active) == 1 and _homoclinic(cycles, made, start):
-        name = cycles.field.parameters[cycles.active[0]]
-        return made, Stop(
-            "homoclinic",
-            f"the period grows beyond {made.orbit.y[0]:.6g} while {name} = {made.orbit.y[1]:.12g} "
-            f"{INFINITE}",
-        )
+    if homoclinic.near(cycles, made, start) and not homoclinic.awaited(cycles, made.orbit):
+        return made, homoclinic.stop(cycles, made.orbit)
     if _closes(cycles, before, made, start):
         last = replace(start, arclength=made.arclength, step=made.step)
         return last, Stop("closed", "the family closed on its start")
@@ -102,53 +90,6 @@ def _period_bounds(cycles: Cycles, period: float) -> list[tuple[float, str, bool
     """Bounds of the period: their values, their sides, and whether it is out of them."""
     low, high = cycles.options.bounds.get("period", (-np.inf, np.inf))
     return [(low, "lower", period <= low), (high, "upper", period >= high)]
-
-
-def _homoclinic(cycles: Cycles, made: Point, start: Point) -> bool:
-    """Whether the period grows and the parameter stands still."""
-    rate = made.dy[0] / made.orbit.y[0]
-    if not rate > 0.0:
-        return False
-    still = abs(made.dy[1]) / cycles.width[0] / rate
-    if cycles.vertical(start.dy) and cycles.vertical(made.dy):
-        # A conservative family: the parameter always stands still.
-        return bool(made.orbit.y[0] > FAR * start.orbit.y[0])
-    if not (still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0]):
-        return False
-    return _rests(cycles, made.orbit, made.dx, rate)
-
-
-def _rests(cycles: Cycles, orbit: Orbit, dx: Array, rate: float) -> bool:
-    """Whether the ranges of the states stand still while the period grows.
-
-    Where cycles explode along canards the parameter stands still as well, but their ranges grow.
-    """
-    step = REACH / float(np.max(np.abs(dx) / cycles.scale))
-    flat = orbit.x - np.outer(collocation.times(orbit.mesh, cycles.m), cycles.turns)
-    before, after = (
-        np.ptp(collocation.extremes(flat + s * step * dx, cycles.m), axis=0) for s in (-1.0, 1.0)
-    )
-    sizes = np.maximum(before + after, STEADY * cycles.scale)
-    growth = np.abs(after - before) / sizes / (step * rate)
-    return bool(np.max(growth[: cycles.own]) < GROWS)
-
-
-def when_stuck(cycles: Cycles, state: State, start: Point, stop: Stop) -> Stop:
-    """Why no step succeeds: a homoclinic orbit, where the period has grown and grows on."""
-    orbit, rate = state.orbit, state.dy[0] / state.orbit.y[0]
-    if cycles.forced or len(cycles.active) > 1 or not rate > 0.0:
-        return stop
-    still = abs(state.dy[1]) / cycles.width[0] / rate
-    if still > SLOW or orbit.y[0] < LONG * start.orbit.y[0]:
-        return stop
-    if not _rests(cycles, orbit, state.dx, rate):
-        return stop
-    name = cycles.field.parameters[cycles.active[0]]
-    return Stop(
-        "homoclinic",
-        f"the period grows beyond {orbit.y[0]:.6g} while {name} = {orbit.y[1]:.12g} {INFINITE}; "
-        f"{stop.message}",
-    )
 
 
 def shape(cycles: Cycles, orbit: Orbit) -> Array:
@@ -241,7 +182,7 @@ def _near_doubling(cycles: Cycles, made: Point) -> bool:
     """Whether the orbit can be a doubled one near its birth, with a multiplier near 1."""
     if cycles.forced and cycles.multiple % 2:
         return False
-    near = np.sum(np.abs(made.multipliers - 1.0) < 0.7)
+    near = sum(abs(mu - 1.0) < 0.7 for mu in made.multipliers.tolist())
     return bool(near > (0 if cycles.forced else 1))
 
 
@@ -274,13 +215,19 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
     a, (dx,) = cycles.on(mesh, a, before.dx)
     part = (value - a.y[1 + k]) / (b.y[1 + k] - a.y[1 + k])
     guess = Orbit(mesh, a.x + part * (b.x - a.x), a.y + part * (b.y - a.y))
-    rows, rows_y, target = cycles.rows(guess, np.zeros_like(dx), np.zeros(cycles.q))
-    rows_y[-1, 1 + k], target[-1] = 1.0, value
-    found = cycles.correct(guess, rows, rows_y, target, iterations=12)
-    if not found.converged:
-        return None
+    for _ in range(4):
+        rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
+        rows_y[-1, 1 + k], target[-1] = 1.0, value
+        found = cycles.correct(guess, rows, rows_y, target, iterations=12)
+        if not found.converged:
+            return None
+        finer = starts.finer(cycles, found.orbit)
+        if finer is None:
+            break
+        # The mesh of the other orbit, on which one between them need not be as good.
+        guess, (dx,) = cycles.on(finer, found.orbit, dx)
     found.orbit.y[1 + k] = value
-    side = np.sign(cycles.inner(mesh, dx, found.dx, before.dy, found.dy)) or 1.0
+    side = np.sign(cycles.inner(found.orbit.mesh, dx, found.dx, before.dy, found.dy)) or 1.0
     point = point_of(cycles, found, before.arclength + part * made.step, part * made.step)
     # Its determinant has the parameter's row, which goes the way of the tangent that it gave.
     return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)

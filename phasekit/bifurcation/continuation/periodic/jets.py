@@ -93,6 +93,9 @@ class Jets:
             return out
         f = out[:, :n] = self._values(x, given)
         slopes = np.empty((len(x), n, n + a))
+        sizes = scale.tolist()
+        if self.forced:
+            sizes[n] = float(y[0])
         begin = 0
         if field.jacobian is not None:
             slopes[:, :, :n] = [
@@ -102,12 +105,8 @@ class Jets:
         columns = []
         noise = lines.EPSILON * np.max(np.abs(f), axis=0)
         for j in range(begin, n + a):
-            size = (
-                float(np.max(np.abs(x[:, j])))
-                if j < n
-                else float(np.max(np.abs(self._p(given, j - n))))
-            )
-            h = STEP * 2.0 ** np.floor(np.log2(max(size, scale[j])))
+            size = float(np.max(np.abs(x[:, j] if j < n else self._p(given, j - n))))
+            h = STEP * 2.0 ** np.floor(np.log2(max(size, sizes[j])))
 
             def at(k: float, j: int = j) -> Array:
                 if j >= n:

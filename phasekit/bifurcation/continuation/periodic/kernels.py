@@ -1,4 +1,4 @@
-"""Compiled parts of Newton's method for collocation: derivatives, condensation, elimination.
+"""Compiled linear algebra of collocation: condensation, and elimination of what it leaves.
 
 The unknowns are the values x at all places of the mesh and y = (T, free parameters). The places
 inside an interval are eliminated first (condensation): x_jk = W_jk x_j + V_jk y + v_jk. What is
@@ -9,31 +9,23 @@ forwards would be single shooting, which overflows where orbits are unstable.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from phasekit.bifurcation.continuation.periodic.along import inner, jets
-from phasekit.numerics.compile import Array, kernel, routine
-from phasekit.numerics.native import call
+from phasekit.numerics.compile import Array, inline, kernel, routine
 
-FLAT = 1e-7  # a step that no longer shrinks counts below this, where the residual is rounding
-ROUNDING = 1e-11  # of the residual, relative
-
-# How Newton's method ended.
-ON_ITS_WAY, FOUND, NOT_FINITE, SINGULAR, DIVERGED = range(5)
+REST = 1e-12  # |T f| beside the states' sizes that is rounding: the orbit is an equilibrium
 
 
 @routine
-def eliminate(a: Array, rows: int, pivots: int, width: int) -> float:
+def eliminate(a: Array, free: int, rows: int, pivots: int, width: int) -> float:
     """Gaussian elimination of the first columns with partial pivoting; the determinant's sign.
 
-    0 if it is singular.
+    Pivots are taken from the first ``free`` rows. 0 if it is singular.
     """
     sign = 1.0
     for j in range(pivots):
         pivot, size = j, abs(a[j, j])
-        for i in range(j + 1, rows):
+        for i in range(j + 1, free):
             if abs(a[i, j]) > size:
                 pivot, size = i, abs(a[i, j])
         if not size > 0.0 or not np.isfinite(size):
@@ -77,8 +69,9 @@ def condense(
 ) -> tuple[float, float, float, float]:  # fmt: skip
     """Fill W, shape (intervals, m n, n + y + 1): places inside intervals by their first one.
 
-    Returns the sign of the determinants, the largest residual beside the largest |T f|, the latter,
-    both on scaled axes, and the integral of the trace of T f_x.
+    Returns the sign of the determinants, the largest residual beside the largest |T f| or, at rest,
+    beside the states, the largest |T f|, both on scaled axes, and the integral of the trace of T
+    f_x.
     """
     m, n = nodes.size, x.shape[1]
     q = y.size
@@ -119,7 +112,7 @@ def condense(
                 if not np.isfinite(total):
                     return 0.0, np.inf, 0.0, np.nan
                 divergence += h * weights[i] * y[0] * jet_[at, base + c]
-        found = eliminate(M, size, size, width) * side**n
+        found = eliminate(M, size, size, size, width) * side**n
         if found == 0.0:
             return 0.0, np.inf, 0.0, np.nan
         sign *= found
@@ -127,7 +120,7 @@ def condense(
         for r in range(size):
             for k in range(n + q + 1):
                 W[j, r, k] = M[r, size + k]
-    residual = worst / speed if speed > 0.0 else worst
+    residual = worst / speed if speed > REST else worst
     return sign, residual, speed, divergence
 
 
@@ -148,242 +141,140 @@ def solve(
         The solution, shape (2, places, n) and (2, y): that of the right sides given, and the one
         of a 1 in the last row alone.
     """
-    count, n = W.shape[0], W.shape[2] - dy.shape[1] - 1
-    q = dy.shape[1]
-    last = n + q
-    wide = 3 * n + q + 1
-    # Border: coefficients of x_0, of the current x_j, of y, and the right side.
-    at_first, at_next = np.zeros((q, n)), np.zeros((q, n))
-    current = np.zeros((q, n))
-    edge = np.zeros((q, q + 1))
-    store = np.zeros((count, n, wide))
-    block = np.zeros((2 * n, wide))
-    C, A, E = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, q + 1))
-    top = (m - 1) * n
+    count, n, q = W.shape[0], sigma.size, right.size
+    # Columns: x_j, x_0, x_(j+1), y, right side. Rows: what is known of x_j and x_0, at first that
+    # both are one; the next interval; the border.
+    block = np.zeros((2 * n + q, 3 * n + q + 1))
+    store = np.empty((count, n, block.shape[1]))
+    for c in range(n):
+        block[c, c], block[c, n + c] = 1.0, -1.0
     for r in range(q):
-        for k in range(q):
-            edge[r, k] = rows_y[r, k]
-        edge[r, q] = right[r]
         for c in range(n):
-            current[r, c] = rows[r, 0, c]
+            block[2 * n + r, c] = rows[r, 0, c]
+        for k in range(q):
+            block[2 * n + r, 3 * n + k] = rows_y[r, k]
+        block[2 * n + r, 3 * n + q] = right[r]
     sign = 1.0
     for j in range(count):
-        for r in range(q):
-            for c in range(n):
-                at_next[r, c] = rows[r, (j + 1) * m, c]
-            for k in range(m - 1):
-                for c in range(n):
-                    part = rows[r, j * m + 1 + k, c]
-                    if part != 0.0:
-                        at = k * n + c
-                        for d in range(n):
-                            current[r, d] += part * W[j, at, d]
-                        for d in range(q):
-                            edge[r, d] += part * W[j, at, n + d]
-                        edge[r, q] -= part * W[j, at, last]
-        if j == 0:
-            for i in range(n):
-                for k in range(n):
-                    C[i, k] = 1.0 if i == k else 0.0
-                    A[i, k] = -W[0, top + i, k]
-                for k in range(q):
-                    E[i, k] = -W[0, top + i, n + k]
-                E[i, q] = W[0, top + i, last]
-            for r in range(q):
-                for c in range(n):
-                    at_first[r, c] = current[r, c]
-                    current[r, c] = at_next[r, c]
-            continue
-        for i in range(n):
-            for k in range(n):
-                block[i, k] = C[i, k]
-                block[i, n + k] = A[i, k]
-                block[i, 2 * n + k] = 0.0
-                block[n + i, k] = -W[j, top + i, k]
-                block[n + i, n + k] = 0.0
-                block[n + i, 2 * n + k] = 1.0 if i == k else 0.0
-            for k in range(q):
-                block[i, 3 * n + k] = E[i, k]
-                block[n + i, 3 * n + k] = -W[j, top + i, n + k]
-            block[i, 3 * n + q] = E[i, q]
-            block[n + i, 3 * n + q] = W[j, top + i, last]
-        found = eliminate(block, 2 * n, n, wide)
+        append(W, rows, j, m, n, block)
+        found = eliminate(block, 2 * n, 2 * n + q, n, block.shape[1])
         if found == 0.0:
             return 0.0
         sign *= found
-        for i in range(n):
-            for k in range(wide):
-                store[j, i, k] = block[i, k]
-            for k in range(n):
-                A[i, k] = block[n + i, n + k]
-                C[i, k] = block[n + i, 2 * n + k]
-            for k in range(q + 1):
-                E[i, k] = block[n + i, 3 * n + k]
-        for r in range(q):
-            for i in range(n):
-                part = current[r, i] / block[i, i]
-                for k in range(i + 1, n):
-                    current[r, k] -= part * block[i, k]
-                for k in range(n):
-                    at_first[r, k] -= part * block[i, n + k]
-                    at_next[r, k] -= part * block[i, 2 * n + k]
-                for k in range(q + 1):
-                    edge[r, k] -= part * block[i, 3 * n + k]
-            for c in range(n):
-                current[r, c] = at_next[r, c]
-    end = n + q
-    D = np.zeros((end, end + 2))
+        step_on(block, n, store[j])
+    D = np.zeros((n + q, n + q + 2))
+    sign *= close(block, gap, sigma, D)
+    if sign != 0.0:
+        for which in range(2):
+            carry_back(
+                store, W, D[:, n + q + which], gap, sigma, m, which == 0, dx[which], dy[which]
+            )
+    return sign
+
+
+@inline
+def append(W: Array, rows: Array, j: int, m: int, n: int, block: Array) -> None:
+    """Write an interval into the block: its equation, and the border's part of its places."""
+    top, y, q = (m - 1) * n, 3 * n, rows.shape[0]
     for i in range(n):
         for k in range(n):
-            D[i, k] = sigma[k] * C[i, k] + A[i, k]
-            E[i, q] -= C[i, k] * gap[k]
+            block[n + i, k] = -W[j, top + i, k]
+            block[n + i, n + k] = 0.0
+            block[n + i, 2 * n + k] = 1.0 if i == k else 0.0
         for k in range(q):
-            D[i, n + k] = E[i, k]
-        D[i, end] = E[i, q]
+            block[n + i, y + k] = -W[j, top + i, n + k]
+        block[n + i, y + q] = W[j, top + i, n + q]
     for r in range(q):
+        row = 2 * n + r
+        for c in range(n):
+            block[row, 2 * n + c] = rows[r, (j + 1) * m, c]
+        for at in range(top):
+            part = rows[r, j * m + 1 + at // n, at % n]
+            if part != 0.0:
+                for d in range(n):
+                    block[row, d] += part * W[j, at, d]
+                for d in range(q):
+                    block[row, y + d] += part * W[j, at, n + d]
+                block[row, y + q] -= part * W[j, at, n + q]
+
+
+@inline
+def step_on(block: Array, n: int, store: Array) -> None:
+    """Keep the rows that x_j was eliminated with; x_(j+1) takes its place in the others."""
+    width = block.shape[1]
+    for i in range(n):
+        for k in range(width):
+            store[i, k] = block[i, k]
+    for i in range(n, block.shape[0]):
+        to = i - n if i < 2 * n else i
         for k in range(n):
-            D[n + r, k] = sigma[k] * current[r, k] + at_first[r, k]
-            edge[r, q] -= current[r, k] * gap[k]
-        for k in range(q):
-            D[n + r, n + k] = edge[r, k]
-        D[n + r, end] = edge[r, q]
-    D[end - 1, end + 1] = 1.0
+            block[to, k] = block[i, 2 * n + k]
+            block[to, 2 * n + k] = 0.0
+        for k in range(n, 2 * n):
+            block[to, k] = block[i, k]
+        for k in range(3 * n, width):
+            block[to, k] = block[i, k]
+
+
+@inline
+def close(block: Array, gap: Array, sigma: Array, D: Array) -> float:
+    """Solve for x_0 and y with x_N = sigma x_0 + gap; the sign of the determinant, or 0.
+
+    The last columns of D become the solution, and that of a 1 in the last row alone.
+    """
+    n, end = gap.size, D.shape[0]
     for i in range(end):
+        row = i if i < n else n + i
+        total = block[row, block.shape[1] - 1]
         size = 0.0
-        for k in range(end):
+        for k in range(n):
+            D[i, k] = sigma[k] * block[row, k] + block[row, n + k]
+            total -= block[row, k] * gap[k]
             size = max(size, abs(D[i, k]))
+        for k in range(n, end):
+            D[i, k] = block[row, 2 * n + k]
+            size = max(size, abs(D[i, k]))
+        D[i, end] = total
+        D[i, end + 1] = 1.0 if i == end - 1 else 0.0
         if not size > 0.0 or not np.isfinite(size):
             return 0.0
         for k in range(end + 2):
             D[i, k] /= size
-    found = eliminate(D, end, end, end + 2)
-    if found == 0.0:
-        return 0.0
-    sign *= found
-    substitute(D, end, end, end + 2)
-    for which in range(2):
-        constant = 1.0 if which == 0 else 0.0
-        column = end + which
-        for k in range(q):
-            dy[which, k] = D[n + k, column]
-        for c in range(n):
-            dx[which, 0, c] = D[c, column]
-            dx[which, count * m, c] = sigma[c] * D[c, column] + constant * gap[c]
-        for j in range(count - 1, 0, -1):
-            for i in range(n - 1, -1, -1):
-                total = constant * store[j, i, 3 * n + q]
-                for k in range(i + 1, n):
-                    total -= store[j, i, k] * dx[which, j * m, k]
-                for k in range(n):
-                    total -= store[j, i, n + k] * dx[which, 0, k]
-                    total -= store[j, i, 2 * n + k] * dx[which, (j + 1) * m, k]
-                for k in range(q):
-                    total -= store[j, i, 3 * n + k] * dy[which, k]
-                dx[which, j * m, i] = total / store[j, i, i]
-        for j in range(count):
-            for k in range(m - 1):
-                for c in range(n):
-                    at = k * n + c
-                    total = constant * W[j, at, last]
-                    for d in range(n):
-                        total += W[j, at, d] * dx[which, j * m, d]
-                    for d in range(q):
-                        total += W[j, at, n + d] * dy[which, d]
-                    dx[which, j * m + 1 + k, c] = total
-    return sign
+    found = eliminate(D, end, end, end, end + 2)
+    if found != 0.0:
+        substitute(D, end, end, end + 2)
+    return found
 
 
-@routine
-def made_unit(
-    mesh: Array, weights: Array, value: Array, scale: Array, width: Array, dx: Array, dy: Array
-) -> float:
-    """Divide a tangent by its length, which is returned; that of none is 1."""
-    length = inner(mesh, weights, value, dx, dx, scale)
-    for k in range(1, dy.size):
-        length += (dy[k] / width[k - 1]) ** 2
-    length = np.sqrt(length) if length > 0.0 else 1.0
-    for i in range(dx.shape[0]):
-        for c in range(dx.shape[1]):
-            dx[i, c] /= length
-    for k in range(dy.size):
-        dy[k] /= length
-    return length
-
-
-@kernel
-def newton(
-    given: bool, first: Any, mode: int, par: Array, active: Any, forced: bool, clock: Any,
-    multiple: int, mesh: Array, nodes: Array, weights: Array, value: Array, slope: Array,
-    side: float, scale: Array, sizes: Array, width: Array, closure: Array, turns: Array,
-    rows: Array, rows_y: Array, target: Array, x: Array, y: Array, W: Array, dx: Array, dy: Array,
-    jet_: Array, tolerance: float, iterations: int, damped: bool, before: float,
-) -> tuple[int, int, float, float, float, float, float]:  # fmt: skip
-    """Newton's method for an orbit, in its place, with the derivatives of f given or taken here.
-
-    Returns how it ended, steps, sign of the determinant, residual, integral of the trace, the size
-    of the last step and the length of the tangent before it is made 1.
-    """
-    m, n, q = nodes.size, x.shape[1], y.size
-    places = x.shape[0]
-    right, gap = np.zeros(q), np.zeros(n)
-    border = rows_y.copy()
-    w = np.zeros(2 * q + 2)
-    sign, residual, divergence, size = 0.0, np.inf, np.nan, before
-    for step in range(1, iterations + 1):
-        for r in range(q):
-            right[r] = target[r]
+@inline
+def carry_back(
+    store: Array, W: Array, ends: Array, gap: Array, sigma: Array, m: int, whole: bool,
+    dx: Array, dy: Array,
+) -> None:  # fmt: skip
+    """Fill dx and dy from x_0 and y at the ends; without right sides but the last unless whole."""
+    count, n, q = W.shape[0], gap.size, dy.size
+    constant = 1.0 if whole else 0.0
+    for k in range(q):
+        dy[k] = ends[n + k]
+    for c in range(n):
+        dx[0, c] = ends[c]
+        dx[count * m, c] = sigma[c] * ends[c] + constant * gap[c]
+    for j in range(count - 1, 0, -1):
+        for i in range(n - 1, -1, -1):
+            total = constant * store[j, i, 3 * n + q]
+            for k in range(i + 1, n):
+                total -= store[j, i, k] * dx[j * m, k]
+            for k in range(n):
+                total -= store[j, i, n + k] * dx[0, k]
+                total -= store[j, i, 2 * n + k] * dx[(j + 1) * m, k]
             for k in range(q):
-                right[r] -= rows_y[r, k] * y[k]
-        for i in range(places):
-            for c in range(n):
-                for r in range(q):
-                    right[r] -= rows[r, i, c] * x[i, c]
-        if forced:
-            own = active.size - 1
-            for k in range(own):
-                w[k] = y[1 + k]
-            call(clock, w, 0, par, 0, own)
-            border[0, 0] = 1.0
-            for k in range(own):
-                border[0, 1 + k] = -multiple * w[own + 1 + k]
-            right[0] = multiple * w[own] - y[0]
-        if not given:
-            jets(first, mode, par, active, forced, mesh, nodes, value, x, y, sizes, jet_)
-        sign, residual, speed, divergence = condense(
-            jet_, forced, mesh, nodes, weights, value, slope, side, scale, x, y, W
-        )
-        if sign == 0.0:
-            return NOT_FINITE, step, sign, residual, divergence, size, 1.0
-        for c in range(n):
-            gap[c] = closure[c] * x[0, c] + turns[c] - x[places - 1, c]
-        sign *= solve(W, rows, border, right, gap, closure, m, dx, dy)
-        if sign == 0.0:
-            return SINGULAR, step, sign, residual, divergence, size, 1.0
-        size = abs(dy[0, 0]) / y[0]
-        for k in range(1, q):
-            size = max(size, abs(dy[0, k]) / width[k - 1])
-        for i in range(places):
-            for c in range(n):
-                size = max(size, abs(dx[0, i, c]) / scale[c])
-        if not np.isfinite(size):
-            return DIVERGED, step, sign, residual, divergence, size, 1.0
-        part = min(1.0, 0.5 / size) if damped and size > 0.0 else 1.0
-        for i in range(places):
-            for c in range(n):
-                x[i, c] += part * dx[0, i, c]
-        for k in range(q):
-            y[k] += part * dy[0, k]
-        if not y[0] > 0.0:
-            return DIVERGED, step, sign, residual, divergence, size, 1.0
-        # Of a small orbit the residual is rounding of the states, whose sizes are 1 here.
-        rounded = residual * min(speed, 1.0) < ROUNDING
-        flat = size > 0.25 * before and size < FLAT and rounded
-        # The residual is that before the step: one that is not yet rounding is looked at again.
-        small = size <= tolerance and (rounded or before <= tolerance)
-        if part == 1.0 and (small or flat):
-            length = made_unit(mesh, weights, value, scale, width, dx[1], dy[1])
-            return FOUND, step, sign, residual, divergence, size, length
-        if not damped and before < np.inf and size > 2.0 * before:
-            return DIVERGED, step, sign, residual, divergence, size, 1.0
-        before = size
-    return ON_ITS_WAY, iterations, sign, residual, divergence, size, 1.0
+                total -= store[j, i, 3 * n + k] * dy[k]
+            dx[j * m, i] = total / store[j, i, i]
+    for j in range(count):
+        for at in range((m - 1) * n):
+            total = constant * W[j, at, n + q]
+            for d in range(n):
+                total += W[j, at, d] * dx[j * m, d]
+            for d in range(q):
+                total += W[j, at, n + d] * dy[d]
+            dx[j * m + 1 + at // n, at % n] = total

@@ -90,9 +90,17 @@ def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Arr
 
 
 @kernel
-def iterate(G: Array, Q: Array, R: Array, log: Array, turn: Array, cut: Array) -> None:
-    """Orthogonal iteration until blocks of unlike multipliers part: where they do, ``cut`` is 1."""
+def iterate(G: Array) -> tuple[Array, Array, Array, Array]:
+    """Orthogonal iteration until blocks of unlike multipliers part: where they do, ``cut`` is 1.
+
+    Returns R, log and turn as `triangular` leaves them, and cut; log is NaN if G is not finite.
+    """
     n = G.shape[1]
+    Q, R, log, turn = np.eye(n), np.empty((n, n)), np.full(n, np.nan), np.empty((n, n))
+    cut = np.ones(n)
+    for one in G.flat:
+        if not np.isfinite(one):
+            return R, log, turn, cut
     for _ in range(PASSES // 2):
         triangular(G, 2, Q, R, log, turn)
         settled, finite = True, np.isfinite(log[n - 1])
@@ -107,6 +115,7 @@ def iterate(G: Array, Q: Array, R: Array, log: Array, turn: Array, cut: Array) -
             finite = finite and np.isfinite(log[i])
         if settled or not finite:
             break
+    return R, log, turn, cut
 
 
 def multipliers(G: Array) -> tuple[Complex, float]:
@@ -116,19 +125,15 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     holds multipliers of like size: so small ones are as accurate, relative to themselves, as
     large ones.
     """
-    n = G.shape[1]
-    Q, R, log, turn = np.eye(n), np.empty((n, n)), np.empty(n), np.empty((n, n))
-    cut = np.ones(n)
-    unknown = np.full(n, np.nan, dtype=complex), np.nan
-    if not np.isfinite(G).all():
-        return unknown
-    iterate(np.ascontiguousarray(G), Q, R, log, turn, cut)
+    R, log, turn, cut = iterate(np.ascontiguousarray(G))
     values, logs, first = [], 0.0, 0
-    for last in (np.flatnonzero(cut) + 1).tolist():
+    for last, parted in enumerate(cut.tolist(), 1):
+        if not parted:
+            continue
         here = slice(first, last)
         if last == first + 1:
             top, found = float(log[first]), [float(turn[first, first] * R[first, first])]
-            known = math.isfinite(found[0])
+            known = math.isfinite(found[0]) and not math.isnan(top)
         else:
             top = float(np.max(log[here]))
             with np.errstate(all="ignore"):
@@ -136,7 +141,7 @@ def multipliers(G: Array) -> tuple[Complex, float]:
             known = bool(np.isfinite(block).all())
             found = np.linalg.eigvals(block).tolist() if known else []
         if not known:
-            return unknown
+            return np.full(len(cut), np.nan, dtype=complex), np.nan
         size = math.exp(top) if top < LARGEST else math.inf
         # Of the values found: the triangle's own would be right even where they are not.
         logs += sum(math.log(abs(one)) if one != 0.0 else -math.inf for one in found)
@@ -150,7 +155,8 @@ def multipliers(G: Array) -> tuple[Complex, float]:
 def across(G: Array, f: Array, scale: Array, A: Array) -> tuple[float, float]:
     """Part the flow from what is across it: fill A, on scaled axes.
 
-    Returns the multiplier that belongs to f along the orbit, and how far f is carried off itself.
+    Returns the multiplier that belongs to f along the orbit, and how far f is carried off itself;
+    NaN if f vanishes or is not finite.
     Each matrix takes f to f at the next interval, so it is a product of numbers that are near 1:
     as accurate as the orbit, where that of the whole product drowns in the rounding of others. A is
     what is left across f, in frames that reflections of the first axis into f give.
@@ -161,7 +167,11 @@ def across(G: Array, f: Array, scale: Array, A: Array) -> tuple[float, float]:
         length[j] = 0.0
         for c in range(n):
             v[j, c] = f[j, c] / scale[c]
+            if not np.isfinite(v[j, c]):
+                return np.nan, np.nan
             length[j] = max(length[j], abs(v[j, c]))
+        if length[j] == 0.0:
+            return np.nan, np.nan
         total = 0.0
         for c in range(n):
             v[j, c] /= length[j]

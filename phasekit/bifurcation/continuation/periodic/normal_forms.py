@@ -68,19 +68,17 @@ def at_fold(line: Linear, dx: Array, dy: Array, stretch: float | None = None) ->
     Of a forced system ``stretch`` is the part by which its period grows with the parameter.
     """
     cycles, orbit = line.cycles, line.orbit
-    v = line.unit(dx)
-    # v' = A v - rate F, where the family changes its period.
-    rate = -float(dy[0]) / orbit.y[0] * float(np.max(np.abs(v)) / np.max(np.abs(dx)))
-    at = line.at(v)
     if cycles.forced:
-        columns, rows = [at], [at]
-        rate = 0.0
+        v, alpha = line.unit(dx), 0.0
         if stretch is None:
             stretch = float(cycles.own_period(orbit.y)[1][0]) / orbit.y[0]
     else:
-        columns, rows = [at, line.f], [at, line.f]
+        # A part along the flow, which depends on how phases are compared, would count in its size.
+        v, alpha = line.across(dx)
         stretch = 0.0
-    a = line.solve(0.5 * line.second(v, v) - rate * line.times_A(v), columns, rows)[1][0]
+    at = line.at(v)
+    columns = rows = [at] if cycles.forced else [at, line.f]
+    a = line.solve(0.5 * line.second(v, v) - alpha * line.times_A(v), columns, rows)[1][0]
     b = line.solve(line.by_parameter(stretch), columns, rows)[1][0]
     return {"a": float(a), "b": float(b)}
 

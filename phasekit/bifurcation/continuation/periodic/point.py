@@ -84,6 +84,32 @@ class State:
     arclength: float
     since: int  # points since the mesh was last fitted
     since_start: int = 0
+    #: The point before on the same mesh, and its tangent.
+    behind: tuple[Orbit, Array, Array] | None = None
+
+    def ahead(self, cycles: Cycles, step: float) -> Orbit:
+        """Where the family is expected a step along the tangent.
+
+        On the cubic through the last two points with their tangents: in the plane that the step
+        leads to, as the tangent's part is that of the curve itself.
+        """
+        orbit, dx, dy = self.orbit, self.dx, self.dy
+        if self.behind is None:
+            return Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+        last, ex, ey = self.behind
+        gap_x, gap_y = last.x - orbit.x, last.y - orbit.y
+        back = cycles.inner(orbit.mesh, gap_x, dx, gap_y, dy)
+        along = cycles.inner(orbit.mesh, ex, dx, ey, dy)
+        if not (back < 0.0 < along):
+            return Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+        r = step / back
+        # By the gap, the last tangent and this one.
+        g, t, u = r * r * (3.0 - 2.0 * r), step * r * (r - 1.0) / along, step * (1.0 - r) ** 2
+        return Orbit(
+            orbit.mesh,
+            orbit.x + (g * gap_x + t * ex + u * dx),
+            orbit.y + (g * gap_y + t * ey + u * dy),
+        )
 
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:

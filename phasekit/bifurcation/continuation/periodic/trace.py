@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, ends
+from phasekit.bifurcation.continuation.periodic import collocation, ends, homoclinic
 from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
@@ -43,7 +43,9 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
         made, state_or_stop = advance(cycles, state)
         if made is None:
             assert isinstance(state_or_stop, Stop)
-            return Track(tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop))
+            return Track(
+                tuple(found), state, homoclinic.when_stuck(cycles, state, start, state_or_stop)
+            )
         assert isinstance(state_or_stop, State)
         end = ends.end_of(cycles, state, made, start)
         if end is not None:
@@ -80,6 +82,7 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
         after = State(
             solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step),
             state.arclength + step, state.since + 1, state.since_start + 1,
+            (state.orbit, state.dx, state.dy),
         )  # fmt: skip
         return point, _meshed(cycles, after)
     where = ", ".join(f"{name} = {v:.9g}" for name, v in _named(cycles, state.orbit).items())
@@ -97,7 +100,7 @@ def _named(cycles: Cycles, orbit: Orbit) -> dict[str, float]:
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
     """Newton's method a step ahead, and the cosine of the turn; or why there is no point."""
     orbit, dx, dy = state.orbit, state.dx, state.dy
-    guess = Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+    guess = state.ahead(cycles, step)
     if not guess.y[0] > 0.0:
         return "the period vanished"
     for _ in range(4):
@@ -136,11 +139,22 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
 def _meshed(cycles: Cycles, state: State) -> State:
     """The state with a mesh that follows the orbit, every few points."""
     if state.since < REMESH:
-        return state
-    mesh = fitted(cycles, state.orbit)
-    orbit, (dx,) = cycles.on(mesh, state.orbit, state.dx)
+        return _moved(cycles, state, state.orbit.mesh)
+    moved = _moved(cycles, state, fitted(cycles, state.orbit))
     before = max(cycles.mesh_error(state.orbit), cycles.options.mesh_tolerance)
-    if not cycles.mesh_error(orbit) <= WORSE * before:
-        return replace(state, since=0)
-    length = np.sqrt(cycles.inner(mesh, dx, dx, state.dy, state.dy))
-    return replace(state, orbit=orbit, dx=dx / length, dy=state.dy / length, since=0)
+    if not cycles.mesh_error(moved.orbit) <= WORSE * before:
+        return replace(_moved(cycles, state, state.orbit.mesh), since=0)
+    dx, dy = moved.dx, moved.dy
+    length = np.sqrt(cycles.inner(moved.orbit.mesh, dx, dx, dy, dy))
+    return replace(moved, dx=dx / length, dy=dy / length, since=0)
+
+
+def _moved(cycles: Cycles, state: State, mesh: Array) -> State:
+    """The state on a mesh, with the point behind it."""
+    orbit, dx, behind = state.orbit, state.dx, state.behind
+    if orbit.mesh is not mesh:
+        orbit, (dx,) = cycles.on(mesh, orbit, dx)
+    if behind is not None and behind[0].mesh is not mesh:
+        last, (ex,) = cycles.on(mesh, *behind[:2])
+        behind = last, ex, behind[2]
+    return replace(state, orbit=orbit, dx=dx, behind=behind)

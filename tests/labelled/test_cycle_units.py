@@ -1,0 +1,99 @@
+"""Families of periodic orbits in other units: the same ones, with their numbers scaled."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+import phasekit as pk
+
+UNITS = {
+    "states, small": (1e-9, 1e-9, 1.0, 1.0),
+    "states, large": (1e9, 1e9, 1.0, 1.0),
+    "time, short": (1.0, 1.0, 1e-9, 1.0),
+    "time, long": (1.0, 1.0, 1e9, 1.0),
+    "parameter, small": (1.0, 1.0, 1.0, 1e-9),
+    "parameter, large": (1.0, 1.0, 1.0, 1e9),
+    "each another": (1e9, 1.0, 1e-9, 1e9),
+}
+
+
+@functools.cache
+def reaction(a, b, t, q):
+    """The family of the reaction with u1 in units of 1/a, u2 of 1/b, time of 1/t, p1 of 1/q."""
+    u, v, p = f"(u1/{a!r})", f"(u2/{b!r})", f"(p1/{q!r})"
+    problem = pk.Problem(
+        [
+            f"{a / t!r}*(-{u} + {p}*(1 - {u})*exp({v}))",
+            f"{b / t!r}*(-{v} + {p}*14*(1 - {u})*exp({v}) - 3*{v})",
+        ],
+        ("u1", "u2"), {"p1": 0.1 * q},
+    )  # fmt: skip
+    rest = pk.continuation(problem, "p1", x0=[0.1 * a, 0.5 * b], span=(0.05 * q, 0.5 * q))
+    return rest.special("H")[0].switch()
+
+
+@pytest.mark.parametrize("units", UNITS.values(), ids=UNITS)
+def test_the_reaction_in_other_units(units):
+    a, b, t, q = units
+    one, other = reaction(1.0, 1.0, 1.0, 1.0), reaction(*units)
+    assert [stop.reason for stop in other.stops] == ["hopf", "hopf"]
+    assert [s.kind for s in other.special_points] == ["end", "fold_of_cycles", "end"]
+    assert other.points.sizes["point"] == one.points.sizes["point"]
+    for name, unit in (("p1", q), ("period", t), ("u1_max", a), ("u2_mean", b)):
+        assert np.allclose(other.points[name] / unit, one.points[name], rtol=1e-8, atol=0.0)
+    (fold,), (same,) = one.special("LPC"), other.special("LPC")
+    assert same["p1"] / q == pytest.approx(fold["p1"], rel=1e-12)
+    assert same["p1"] / q == pytest.approx(0.161696128898, rel=1e-11)
+    assert same["period"] / t == pytest.approx(fold["period"], rel=1e-9)
+    if a == b:  # a length of both states
+        assert abs(same.normal_form["a"]) * a * t == pytest.approx(
+            abs(fold.normal_form["a"]), rel=1e-7
+        )
+        assert abs(same.normal_form["b"]) * t * q / a == pytest.approx(
+            abs(fold.normal_form["b"]), rel=1e-7
+        )
+
+
+@pytest.mark.parametrize("t", [1e-6, 1e6])
+def test_a_forced_function_in_other_units_of_time(t):
+    """Its derivative by time is a difference over a part of the period."""
+
+    def duffing(x, d, w, F, s):
+        return [x[1] / t, (F * np.cos(w * s) - d * x[1] - x[0] - x[0] ** 3) / t]
+
+    problem = pk.Problem(
+        duffing, ("x", "v"), {"w": 0.9 / t, "d": 0.04, "F": 0.015}, time="s", period="2*pi/w"
+    )
+    options = pk.ContinuationOptions(intervals=20, max_step=0.2)
+    rest = pk.periodic_orbit(problem, [0.0, 0.0], options=options)
+    response = pk.continuation(problem, "w", orbit=rest, span=(0.9 / t, 1.2 / t), options=options)
+    folds = [fold["w"] * t for fold in response.special("LPC")]
+    assert np.allclose(sorted(folds), [1.043913708797, 1.049262399236], rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize("t", [1e-12, 1e9])
+def test_a_conservative_family_in_other_units_of_time(t):
+    well = pk.Problem([f"v/{t!r}", f"-g*sin(x)/{t!r}"], ("x", "v"), {"g": 1.0}, conservative=True)
+    first = pk.periodic_orbit(well, [1.0, 0.0], 6.7 * t)
+    exact = 6.699975664370451  # 4 K(sin^2(1/2))
+    assert float(first.period) / t == pytest.approx(exact, rel=1e-10)
+    family = pk.continuation(well, "period", orbit=first, span=(1.0 * t, 9.0 * t))
+    assert [stop.reason for stop in family.stops] == ["hopf", "bound"]
+    assert float(family.points.period[0]) / t == pytest.approx(2 * np.pi, rel=1e-3)
+    alike = pk.continuation(well, "g", orbit=first, span=(0.9, 1.1), fix="period")
+    assert [stop.reason for stop in alike.stops] == ["bound", "bound"]
+    top, g = alike.points.x_max.values, alike.points.g.values
+    assert np.allclose(4.0 * ellipk(np.sin(top / 2) ** 2), exact * np.sqrt(g), rtol=1e-8, atol=0.0)
+
+
+@pytest.mark.parametrize("t", [1.0, 1e9])
+def test_energy_that_is_lost_is_noticed_in_any_units_of_time(t):
+    damped = pk.Problem(
+        [f"v/{t!r}", f"-(sin(x) + g*v)/{t!r}"], ("x", "v"), {"g": 1e-4}, conservative=True
+    )
+    with pytest.raises(pk.ConvergenceError, match="not conserved"):
+        pk.periodic_orbit(damped, [1.0, 0.0], 6.7 * t)
