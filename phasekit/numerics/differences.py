@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.numerics.compile import Array, kernel, routine
+from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.native import call, twin
 
 # How the right-hand side comes: with its derivatives, or alone, to be differenced.
@@ -26,6 +26,7 @@ KNOWN = 1e-10  # relative error that rounding alone does not exceed
 MIXED = 2.0**-12  # of mixed second differences
 
 
+@inline
 def spare_size(n: int, m: int) -> int:
     """Length of what `jet` and `bend` need for themselves."""
     return m + 10 * n

@@ -7,9 +7,10 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
+from phasekit.numerics import differences
 
 
 @pytest.mark.parametrize("m", [2, 4, 7])
@@ -34,6 +35,27 @@ def test_interpolation_and_functional():
     # The integral of |x|^2, which Gauss points have exactly up to degree 7; x.x has degree 8.
     exact = (1 / 9 - 2 / 6 + 1 / 3) + 1 / 7
     assert np.isclose(np.sum(row * x), exact, rtol=1e-5)
+
+
+def test_derivatives_of_code_stay_within_their_work_array(monkeypatch):
+    """Interpreted, an index beyond an array raises; compiled, it writes over other memory."""
+    monkeypatch.setattr(along, "jet", differences._jet)
+
+    def f(x, p, z, out):
+        out[:3] = p[0] * x[1] * x[2], np.sin(x[0]) + p[1], x[0] ** 3
+
+    c, mesh = collocation.scheme(4), np.linspace(0.0, 1.0, 3)
+    x = np.random.default_rng(1).uniform(0.5, 1.5, (9, 3))
+    out = np.empty((8, 18))
+    along.jets.py_func(
+        f, differences.SHARP, np.array([2.0, 3.0]), np.array([0, 1]), False, mesh, c.nodes,
+        c.value, x, np.array([1.0, 2.0, 3.0]), np.ones(5), out,
+    )  # fmt: skip
+    x1, x2, x3 = collocation.at_gauss(x, 4).reshape(8, 3).T
+    o, l = np.zeros(8), np.ones(8)  # noqa: E741
+    rows = [[o, 2 * x3, 2 * x2, x2 * x3, o], [np.cos(x1), o, o, o, l], [3 * x1**2, o, o, o, o]]
+    np.testing.assert_allclose(out[:, :3].T, [2 * x2 * x3, np.sin(x1) + 3, x1**3], rtol=1e-14)
+    np.testing.assert_allclose(out[:, 3:].T, np.concatenate(rows), rtol=1e-10, atol=1e-11)
 
 
 @pytest.mark.parametrize("seed", range(4))

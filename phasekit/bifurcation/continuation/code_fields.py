@@ -93,7 +93,8 @@ def _wrap(function: Any, n: int, order: tuple[int, ...], less: bool) -> Any:
     try:
         exec("\n".join(lines), space)
         return cfunc(signature)(space["wrapped"])
-    except Exception:
+    except Exception as first:
+        error = first
         if n == 1:
             lines[-1] = "    out[0] = value" + " - x[0]" * less
             try:

@@ -33,6 +33,7 @@ UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservativ
 TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
 LONGEST = 2000  # steps of the slowest time scale that a search for a return may take
 SAMPLES = 2001
+STILL = 1e-5  # part of the largest range that is the error of a simulation
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
@@ -326,6 +327,8 @@ def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
         for i in np.flatnonzero(angles > 0.0):
             gaps[:, i] -= angles[i] * np.round(gaps[:, i] / angles[i])
         sizes = np.ptp(states, axis=0)
+        # What a state at rest moves by is the error of the simulation, which does not return.
+        sizes = np.maximum(sizes, STILL * np.max(sizes, where=angles == 0.0, initial=0.0))
         sizes = np.where(angles > 0.0, np.where(angles > 0.0, angles, 1.0), sizes)
         sizes = np.where(sizes > 0.0, sizes, 1.0)
         normal = run.f(0.0, x) / sizes**2

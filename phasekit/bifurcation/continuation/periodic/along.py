@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.numerics.compile import Array, kernel
-from phasekit.numerics.differences import jet
+from phasekit.numerics.differences import jet, spare_size
 from phasekit.numerics.native import call
 
 STILL = 1e-3  # part of the largest amplitude that others count as at least
@@ -267,7 +267,7 @@ def jets(
     count = n + n * (n + a)
     u, sizes, value_at = 0, n + a, 2 * (n + a)
     spare = value_at + count
-    w = np.zeros(spare + n + a + 7 * n)
+    w = np.zeros(spare + spare_size(n, n + a))
     for i in range(n + a):
         w[sizes + i] = scale[i]
     if forced:

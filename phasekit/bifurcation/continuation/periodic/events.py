@@ -30,12 +30,14 @@ from phasekit.bifurcation.continuation.periodic.criteria import (
 )
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
+from phasekit.bifurcation.continuation.periodic.linear import Linear
 from phasekit.bifurcation.continuation.periodic.normal_forms import (
     VERTICAL,
     at_branching,
     at_doubling,
     at_fold,
     at_torus,
+    known,
 )
 from phasekit.bifurcation.continuation.periodic.on_curves import SAME, CurveTest, tests_of
 from phasekit.bifurcation.continuation.periodic.point import Point, vertical
@@ -44,7 +46,6 @@ from phasekit.bifurcation.special_points import KINDS
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
-NOTHING = 1e-9  # size of a coefficient, as all change by their scales, that is rounding
 JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 
 
@@ -96,7 +97,9 @@ def _events(
     for event, before, after in zip(_looked_for(cycles), left, right, strict=True):
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
-        if isinstance(event, CurveTest) and max(abs(before), abs(after)) < NOTHING:
+        if isinstance(event, CurveTest) and not (
+            event.signed(cycles, a, before) or event.signed(cycles, b, after)
+        ):
             continue  # a coefficient that is zero all along
 
         def value(point: Point, forced: bool, event: Any = event) -> float:
@@ -171,8 +174,8 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
         )  # fmt: skip
     if not test.holds(nontrivial(point.multipliers, stretch.cycles.forced)):
         return None
-    form = test.normal_form(stretch.cycles, point)
-    return Found(test.kind, point, -1, interval, "converged", "", form)
+    form, message = test.normal_form(stretch.cycles, point)
+    return Found(test.kind, point, -1, interval, "converged", message, form)
 
 
 def _stands(cycles: Cycles, point: Point) -> bool:
@@ -194,7 +197,7 @@ class CycleTest:
     value : callable
         The test function of a point, forced or not, whose sign changes.
     normal_form : callable
-        Coefficients at the point.
+        Coefficients at the point, and what is to be said of them.
     holds : callable
         Whether it is such a point, by its multipliers but for the one that is always 1.
     root : callable
@@ -203,32 +206,40 @@ class CycleTest:
 
     kind: str
     value: Value
-    normal_form: Callable[[Cycles, Point], dict[str, float]] = lambda cycles, point: {}
+    normal_form: Callable[[Cycles, Point], tuple[dict[str, float], str]]
     holds: Callable[[list[complex]], bool] = lambda multipliers: True
     root: Callable[[Stretch, Value], Point | None] = root
 
 
-def _form_of_fold(cycles: Cycles, point: Point) -> dict[str, float]:
-    return at_fold(cycles, point.orbit, point.dx, point.dy)
+Form = tuple[dict[str, float], str]
 
 
-def _form_of_branching(cycles: Cycles, point: Point) -> dict[str, float]:
+def _form_of_fold(cycles: Cycles, point: Point) -> Form:
+    line = Linear(cycles, point.orbit)
+    return known(line, lambda line: at_fold(line, point.dx, point.dy), {"a": 1, "b": -1})
+
+
+def _form_of_branching(cycles: Cycles, point: Point) -> Form:
     own = point.dx, point.dy
     W = cycles.looked_at(point.orbit, *own).W
-    return at_branching(cycles, point.orbit, own, other_tangent(cycles, point.orbit, W, own))
+    other = other_tangent(cycles, point.orbit, W, own)
+    line = Linear(cycles, point.orbit)
+    return known(line, lambda line: at_branching(line, own, other), {"a": 1, "c": 2})
 
 
-def _form_of_doubling(cycles: Cycles, point: Point) -> dict[str, float]:
+def _form_of_doubling(cycles: Cycles, point: Point) -> Form:
     W = cycles.looked_at(point.orbit, point.dx, point.dy).W
-    return at_doubling(cycles, point.orbit, null_vector(cycles, point.orbit, W, -1.0))
+    v = null_vector(cycles, point.orbit, W, -1.0)
+    return known(Linear(cycles, point.orbit), lambda line: at_doubling(line, v), {"c": 2})
 
 
-def _form_of_torus(cycles: Cycles, point: Point) -> dict[str, float]:
+def _form_of_torus(cycles: Cycles, point: Point) -> Form:
     pairs = [mu for mu in nontrivial(point.multipliers, cycles.forced) if mu.imag > 0.0]
     if not pairs:
-        return {}
-    one = min(pairs, key=lambda mu: abs(abs(mu) - 1.0))
-    return at_torus(cycles, point.orbit, cmath.phase(one))
+        return {}, ""
+    angle = cmath.phase(min(pairs, key=lambda mu: abs(abs(mu) - 1.0)))
+    line = Linear(cycles, point.orbit)
+    return known(line, lambda line: at_torus(line, angle), {"d": 2, "d_imag": 2})
 
 
 def _near(critical: float) -> Callable[[list[complex]], bool]:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation
+from phasekit.bifurcation.continuation.periodic import collocation, lines
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.jets import Jets
 from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
@@ -29,7 +29,6 @@ Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 FOLD, DOUBLING, TORUS = "fold_of_cycles", "period_doubling", "torus"
-REACH = 2.0**-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,16 +151,18 @@ class _Both:
         out = np.zeros((count, wide * (1 + wide + a + more)))
         slopes = out[:, wide:].reshape(count, wide, wide + a + more)
         out[:, :n] = f
+        # Bends of what is itself differences need no more digits than those have.
+        rounding = lines.EPSILON if self.jets.exact else lines.DIFFERENCED
+        noise = rounding * np.max(np.max(np.abs(J), axis=0) * own, axis=1)
         slopes[:, :n, :n], slopes[:, :n, wide : wide + a] = A, J[:, :, n:]
         for part in range(1, parts + 1):
             here = slice(part * n, (part + 1) * n)
             v = x[:, here]
             length = float(np.max(np.abs(v) / c.scale[:n]))
-            h = REACH / length if length > 0.0 else 1.0
-            (one, two), (three, four) = (
-                (matrices(base + s * h * v)[1], matrices(base - s * h * v)[1]) for s in (1.0, 2.0)
-            )
-            bent = (8.0 * (one - two) - (three - four)) / (12.0 * h)
+            bent = lines.slope_along(
+                lambda k, v=v: matrices(base + k * v)[1],  # type: ignore[misc]
+                lines.REACH / length if length > 0.0 else 1.0, noise, own,
+            )  # fmt: skip
             at = collocation.at_gauss(v, m).reshape(count, n)
             out[:, here] = np.einsum("kij,kj->ki", A, at)
             slopes[:, here, :n], slopes[:, here, wide : wide + a] = bent[:, :, :n], bent[:, :, n:]

@@ -9,14 +9,14 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.fields import Field
-from phasekit.bifurcation.continuation.periodic import along
+from phasekit.bifurcation.continuation.periodic import along, lines
 from phasekit.bifurcation.continuation.periodic.collocation import at_gauss, scheme
 from phasekit.errors import PhasekitError
 from phasekit.numerics import differences
 
 Array = npt.NDArray[np.float64]
 
-STEP = 2.0**-10  # of differences of fourth order
+STEP = 2.0**-10  # of differences of fourth order, at first
 SAME = 1e-13  # by which f of many states at once may differ from f of each
 
 
@@ -46,6 +46,24 @@ class Jets:
             mesh, c.nodes, c.value, x, y, scale, out,
         )  # fmt: skip
         return out
+
+    @property
+    def exact(self) -> bool:
+        """Whether derivatives by states are known without differences of f."""
+        if isinstance(self.field, PythonField):
+            return self.field.jacobian is not None
+        return self.mode == differences.DERIVED
+
+    def values(self, u: Array) -> Array:
+        """F at points, the rows of u: states and active parameters."""
+        if not isinstance(self.field, PythonField):
+            return self.field.values(np.ascontiguousarray(u), self.par.copy(), self.active)
+        n = len(self.field.states)
+        given: dict[str, Any] = dict(zip(self.field.parameters, self.par.tolist(), strict=True))
+        for column, place in zip(u[:, n:].T, self.active, strict=True):
+            same = np.all(column == column[0])
+            given[self.field.parameters[place]] = float(column[0]) if same else column
+        return self._values(np.ascontiguousarray(u[:, :n]), given)
 
     def at_mesh(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
         """F at the beginning of each interval."""
@@ -84,20 +102,25 @@ class Jets:
                 field.slopes(one.copy(), self._at(given, i)) for i, one in enumerate(x)
             ]
             begin = n
+        columns = []
+        noise = lines.EPSILON * np.max(np.abs(f), axis=0)
         for j in range(begin, n + a):
             size = float(np.max(np.abs(x[:, j] if j < n else self._p(given, j - n))))
             h = STEP * 2.0 ** np.floor(np.log2(max(size, sizes[j])))
 
-            def at(k: float, j: int = j, h: float = h) -> Array:
+            def at(k: float, j: int = j) -> Array:
                 if j >= n:
                     name = names[j - n]
-                    return self._values(x, given | {name: given[name] + k * h})
+                    return self._values(x, given | {name: given[name] + k})
                 shifted = x.copy()
-                shifted[:, j] += k * h
+                shifted[:, j] += k
                 return self._values(shifted, given)
 
-            near, far = at(1.0) - at(-1.0), at(2.0) - at(-2.0)
-            slopes[:, :, j] = (8.0 * near - far) / (12.0 * h)
+            wide, near = ((at(k) - at(-k)) / (2.0 * k) for k in (2.0 * h, h))
+            columns.append((j, at, h, (wide, near)))
+            noise += lines.EPSILON * h / STEP * np.max(np.abs(near), axis=0)
+        for j, at, h, sides in columns:
+            slopes[:, :, j] = lines.slope_along(at, h, noise, sides=sides)
         out[:, n:] = slopes.reshape(len(x), -1)
         out[~np.isfinite(f).all(axis=1), :] = np.nan
         return out

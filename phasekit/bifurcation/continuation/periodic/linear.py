@@ -2,29 +2,32 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.multilinear import OfMatrices, OfValues
 
 Array = npt.NDArray[np.float64]
 
-REACH = 2.0**-8  # of differences along a function, beside the sizes of the states
-CLOSE = 2.0**-10  # the same of a parameter, beside its span
-
 
 class Linear:
-    """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g."""
+    """Linear equations along an orbit, in its own time: h' - A h + columns . unknowns = g.
 
-    def __init__(self, cycles: Cycles, orbit: Orbit) -> None:
+    A ``variant`` of the second and third derivatives is off by about their errors.
+    """
+
+    def __init__(self, cycles: Cycles, orbit: Orbit, variant: int = 0) -> None:
+        self.variant = variant
         self.cycles, self.orbit, self.m = cycles, orbit, cycles.m
         n = self.n = cycles.n
         whole = self._jets(orbit.x)
         self.f = whole[:, :n]
         self.slopes = whole[:, n:].reshape(len(whole), n, -1)
         self.A = self.slopes[:, :, :n]
-        self._along: dict[bytes, tuple[Array, Array]] = {}
 
     def _jets(self, x: Array, y: Array | None = None) -> Array:
         o = self.orbit
@@ -37,56 +40,54 @@ class Linear:
         """
         found = self.slopes[:, :, -1] + stretch * self.f
         if self.cycles.forced:
-            o = self.orbit
-            at = o.mesh[:-1, None] + np.diff(o.mesh)[:, None] * collocation.scheme(self.m).nodes
-            found = found + stretch * o.y[0] * at.reshape(-1, 1) * self.slopes[:, :, self.n]
+            time = stretch * self.orbit.y[0] * self._times[:, None]
+            found = found + time * self.slopes[:, :, self.n]
         return np.asarray(found)
 
     def at(self, h: Array) -> Array:
         """Values of a function at all Gauss points, one after another."""
         return collocation.at_gauss(h, self.m).reshape(-1, h.shape[1])
 
-    def bends(self, v: Array) -> tuple[Array, Array]:
-        """First and second derivatives of the matrices f_x along a function."""
-        key = v.tobytes()
-        if key not in self._along:
-            length = float(np.max(np.abs(v) / self.cycles.scale))
-            h = REACH / length if length > 0.0 else 1.0
-            n = self.n
-
-            def matrix(k: float) -> Array:
-                whole = self._jets(self.orbit.x + k * h * v)
-                return whole[:, n:].reshape(len(whole), n, -1)[:, :, :n]
-
-            (a, b), (c, d) = ((matrix(k), matrix(-k)) for k in (1.0, 2.0))
-            first = (8.0 * (a - b) - (c - d)) / (12.0 * h)
-            second = (16.0 * (a + b) - (c + d) - 30.0 * self.A) / (12.0 * h * h)
-            self._along[key] = first, second
-        return self._along[key]
-
-    def bends_along(self, dx: Array, dy: Array) -> Array:
-        """Derivative of the matrices f_x along a family, as period and parameter change, too."""
-        o = self.orbit
-        length = max(
-            float(np.max(np.abs(dx) / self.cycles.scale)) / REACH,
-            float(np.max(np.abs(dy[1:]) / self.cycles.width)) / CLOSE,
-        )
-        h = 1.0 / length
-
-        def matrix(k: float) -> Array:
-            whole = self._jets(o.x + k * h * dx, o.y + k * h * dy)
-            return whole[:, self.n :].reshape(len(whole), self.n, -1)[:, :, : self.n]
-
-        near, far = matrix(1.0) - matrix(-1.0), matrix(2.0) - matrix(-2.0)
-        return np.asarray((8.0 * near - far) / (12.0 * h))
-
     def second(self, v: Array, u: Array) -> Array:
         """B(v, u) at all Gauss points."""
-        return np.asarray(np.einsum("kij,kj->ki", self.bends(v)[0], self.at(u)))
+        return self._forms.second(v, np.zeros(1), u, self.variant)
 
     def third(self, v: Array, u: Array) -> Array:
         """C(v, v, u) at all Gauss points."""
-        return np.asarray(np.einsum("kij,kj->ki", self.bends(v)[1], self.at(u)))
+        return self._forms.third(v, u, self.variant)
+
+    def moved(self, dx: Array, dy: Array, u: Array) -> Array:
+        """Derivative of f_x u along a family, as period and parameter change, too."""
+        return self._forms.second(dx, dy, u, self.variant)
+
+    @cached_property
+    def _forms(self) -> OfMatrices | OfValues:
+        cycles, o = self.cycles, self.orbit
+        if not cycles.jets.exact:
+            u = self._wide(o.x, o.y)
+            return OfValues(cycles.jets.values, self._wide, u, cycles.sizes, self.slopes)
+
+        def matrices(dx: Array, dy: Array) -> Array:
+            whole = self._jets(o.x + dx, o.y + dy)
+            return whole[:, self.n :].reshape(self.slopes.shape)[:, :, : self.n]
+
+        return OfMatrices(matrices, self.at, cycles.scale, cycles.width)
+
+    def _wide(self, v: Array, y: Array) -> Array:
+        """States and active parameters at all Gauss points; of a forced system with its time."""
+        out = np.zeros((len(self.A), self.slopes.shape[2]))
+        out[:, : self.n] = self.at(v)
+        if self.cycles.forced:
+            out[:, self.n] = y[0] * self._times
+        out[:, out.shape[1] - len(y) + 1 :] = y[1:]
+        return out
+
+    @cached_property
+    def _times(self) -> Array:
+        """Gauss points."""
+        mesh = self.orbit.mesh
+        inside = np.diff(mesh)[:, None] * collocation.scheme(self.m).nodes
+        return np.asarray((mesh[:-1, None] + inside).ravel())
 
     def times_A(self, v: Array) -> Array:
         """A v at all Gauss points."""

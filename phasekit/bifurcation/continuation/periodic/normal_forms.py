@@ -11,30 +11,63 @@ dtau/dt = 1 + ... and
 ([Iooss1988]; [KuznetsovEtAl2005]). The coefficients are what makes linear equations solvable whose
 operator is singular; bordered by the functions concerned, these equations give them as unknowns,
 so that no adjoint function is needed. Critical functions have a mean square of 1 over a period.
-Second and third derivatives of f are differences of its first ones along the critical functions.
+Second and third derivatives of f are taken along the critical functions by `multilinear`; what
+coefficients change by with the errors of those is their error.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, unknown
 from phasekit.bifurcation.continuation.periodic.linear import Linear, wave
+from phasekit.bifurcation.continuation.periodic.multilinear import VARIANTS
 
 Array = npt.NDArray[np.float64]
 
+CLEAR = 1e-6  # relative error of a coefficient up to which nothing is said of it
 VERTICAL = 1e-5  # part along the parameter, beside its span, of a tangent that does not move it
 
 
-def at_fold(
-    cycles: Cycles, orbit: Orbit, dx: Array, dy: Array, stretch: float | None = None
-) -> dict[str, float]:
+def known(
+    line: Linear, form: Callable[[Linear], dict[str, float]], powers: dict[str, int]
+) -> tuple[dict[str, float], str]:
+    """Coefficients, NaN where their errors hide them, and what is to be said of their errors.
+
+    ``powers`` are those of the states with which coefficients of xi' go, where they have errors.
+    """
+    found = form(line)
+    errors = dict.fromkeys(found, 0.0)
+    # Those of matrices have one other variant.
+    for variant in range(1, 2 if line.cycles.jets.exact else VARIANTS):
+        line.variant = variant
+        other = form(line)
+        for name in found:
+            errors[name] = max(errors[name], abs(other.get(name, np.nan) - found[name]))
+    size = float(np.sqrt(np.mean(line.cycles.scale**2)))
+    said = []
+    for name, value in list(found.items()):
+        # Such a coefficient moves xi by its size in a period.
+        unit = 1.0 / (line.orbit.y[0] * size ** powers.get(name, 0))
+        if errors[name] <= max(CLEAR * abs(value), SMALL * unit):
+            continue
+        if errors[name] <= DIGITS * abs(value):
+            said.append(f"{name} is known to {errors[name]:.1g} only")
+        else:
+            found[name] = np.nan
+    missing = unknown(found)
+    return found, "; ".join([*said, *([missing] if missing else [])])
+
+
+def at_fold(line: Linear, dx: Array, dy: Array, stretch: float | None = None) -> dict[str, float]:
     """The coefficients a and b of a fold, from the tangent of its family.
 
     Of a forced system ``stretch`` is the part by which its period grows with the parameter.
     """
-    line = Linear(cycles, orbit)
+    cycles, orbit = line.cycles, line.orbit
     if cycles.forced:
         v, alpha = line.unit(dx), 0.0
         if stretch is None:
@@ -51,7 +84,7 @@ def at_fold(
 
 
 def at_branching(
-    cycles: Cycles, orbit: Orbit, own: tuple[Array, Array], other: tuple[Array, Array]
+    line: Linear, own: tuple[Array, Array], other: tuple[Array, Array]
 ) -> dict[str, float]:
     """The coefficients d and a at which two families cross, d and c at a pitchfork.
 
@@ -59,7 +92,7 @@ def at_branching(
     the singular equations. With the parameter mu from its value and h along a family on which it
     moves, x + xi v + mu h + ... goes with dtau/dt = 1 + alpha xi + ....
     """
-    line = Linear(cycles, orbit)
+    cycles, orbit = line.cycles, line.orbit
     (dx, dy), (ex, ey) = own, other
     p, r = float(dy[1] / cycles.width[0]), float(ey[1] / cycles.width[0])
     steep = abs(p) < VERTICAL
@@ -75,7 +108,7 @@ def at_branching(
     at = line.at(v)
     columns = rows = [at] if cycles.forced else [at, line.f]
     stretch = float(h_y[0]) / orbit.y[0]
-    g = np.einsum("kij,kj->ki", line.bends_along(h, h_y), at) + stretch * line.times_A(v)
+    g = line.moved(h, h_y, v) + stretch * line.times_A(v)
     g -= alpha * (line.times_A(h) + line.by_parameter(stretch))
     d = float(line.solve(g, columns, rows)[1][0])
     bent = 0.5 * line.second(v, v)
@@ -91,13 +124,12 @@ def at_branching(
     return {"d": d, "c": float(line.solve(cubic, columns, rows)[1][0])}
 
 
-def at_doubling(cycles: Cycles, orbit: Orbit, v: Array) -> dict[str, float]:
+def at_doubling(line: Linear, v: Array) -> dict[str, float]:
     """The coefficient c of a period doubling: the doubled orbits are stable beside it if c < 0."""
-    line = Linear(cycles, orbit)
     v = line.unit(v)
     at = line.at(v)
     g = line.second(v, v)
-    if cycles.forced:
+    if line.cycles.forced:
         h, unknown = line.solve(g, [], [])
         a1 = 0.0
     else:
@@ -108,22 +140,19 @@ def at_doubling(cycles: Cycles, orbit: Orbit, v: Array) -> dict[str, float]:
     return {"c": float(c)}
 
 
-def at_torus(
-    cycles: Cycles, orbit: Orbit, angle: float, v: Array | None = None
-) -> dict[str, float]:
+def at_torus(line: Linear, angle: float, v: Array | None = None) -> dict[str, float]:
     """The coefficient d of a torus bifurcation, of a pair of multipliers with an angle.
 
     Its critical function, real and imaginary part side by side, is ``v`` where it is known.
 
     The torus is stable beside it if the real part of d is negative.
     """
-    line = Linear(cycles, orbit)
-    n, omega = line.n, angle / orbit.y[0]
+    n, omega = line.n, angle / line.orbit.y[0]
     v = wave(line, omega) if v is None else line.unit(v)
     u, w = np.ascontiguousarray(v[:, :n]), np.ascontiguousarray(v[:, n:])
     second = line.second
     g = second(u, u) + second(w, w)
-    if cycles.forced:
+    if line.cycles.forced:
         h, unknown = line.solve(g, [], [])
         a1 = 0.0
     else:

@@ -23,6 +23,8 @@ from phasekit.bifurcation.continuation.periodic.criteria import (
 )
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, TORUS, Extended
+from phasekit.bifurcation.continuation.periodic.linear import Linear
+from phasekit.bifurcation.continuation.periodic.multilinear import VARIANTS
 from phasekit.bifurcation.continuation.periodic.normal_forms import (
     at_doubling,
     at_fold,
@@ -33,6 +35,7 @@ from phasekit.bifurcation.continuation.periodic.point import Point
 Array = npt.NDArray[np.float64]
 
 RESONANT = 0.05  # distance of half the angle from resonances 1 and 2 below which d says nothing
+NOTHING = 1e-9  # size of a function of the multipliers that is rounding
 SAME = 2e-5  # half the angle within which multipliers meet, at ends of curves
 
 
@@ -42,15 +45,24 @@ class CurveTest:
 
     kind: str
     of: str
-    function: Callable[[Extended, Point], float]
+    function: Callable[..., float]
     name: str = ""
     #: Whether the equations are singular there, so that it is known to `SAME` alone.
     blurred: bool = False
+    #: Whether it goes with second or third derivatives, of which there are variants.
+    bent: bool = False
 
     def value(self, cycles: Cycles, point: Point) -> float:
         """The number of an orbit with its critical function."""
         assert isinstance(cycles, Extended)
-        return self.function(cycles, point)
+        return float(self.function(cycles, point))
+
+    def signed(self, cycles: Cycles, point: Point, value: float) -> bool:
+        """Whether a value has a sign, and is not zero but for rounding."""
+        if not self.bent:
+            return abs(value) >= NOTHING
+        variants = (float(self.function(cycles, point, k)) for k in range(1, VARIANTS))
+        return max(abs(one - value) for one in variants) < abs(value)
 
 
 def _parted(cycles: Extended, point: Point) -> tuple[Cycles, Orbit, Array]:
@@ -60,7 +72,7 @@ def _parted(cycles: Extended, point: Point) -> tuple[Cycles, Orbit, Array]:
     return cycles.plain(orbit.y[2]), alone, orbit.x[:, n:].copy()
 
 
-def _coefficients(cycles: Extended, point: Point) -> tuple[float, float]:
+def _coefficients(cycles: Extended, point: Point, variant: int) -> tuple[float, float]:
     """Those of a fold, xi' = b + a xi^2, as xi and the parameter change by their scales.
 
     Their signs go with that of the critical function; both are infinite where it resonates.
@@ -73,28 +85,29 @@ def _coefficients(cycles: Extended, point: Point) -> tuple[float, float]:
     stretch = 0.0
     if cycles.forced:
         stretch = float(cycles.own_period(orbit.y)[1][0]) / float(orbit.y[0])
-    form = at_fold(one, alone, v, dy, stretch)
+    form = at_fold(Linear(one, alone, variant), v, dy, stretch)
     nothing = np.zeros(2)
     parts = one.inner(orbit.mesh, v, v, nothing, nothing)
     whole = one.replace(scale=np.ones(n)).inner(orbit.mesh, v, v, nothing, nothing)
     return form["a"] * whole / parts, form["b"] * float(one.width[0])
 
 
-def _bend(cycles: Extended, point: Point) -> float:
+def _bend(cycles: Extended, point: Point, variant: int = 0) -> float:
     """The quadratic coefficient beside both."""
-    a, b = _coefficients(cycles, point)
+    a, b = _coefficients(cycles, point, variant)
     return a / math.hypot(a, b)
 
 
-def _meet(cycles: Extended, point: Point) -> float:
+def _meet(cycles: Extended, point: Point, variant: int = 0) -> float:
     """The product of the left and the right critical function, with the sign of a."""
-    a, b = _coefficients(cycles, point)
+    a, b = _coefficients(cycles, point, variant)
     return math.copysign(1.0 / math.hypot(a, b), a)
 
 
-def _doubled(cycles: Extended, point: Point) -> float:
+def _doubled(cycles: Extended, point: Point, variant: int = 0) -> float:
     """The cubic coefficient of a period doubling."""
-    return at_doubling(*_parted(cycles, point))["c"] * _unit(cycles, point)
+    one, alone, v = _parted(cycles, point)
+    return at_doubling(Linear(one, alone, variant), v)["c"] * _unit(cycles, point)
 
 
 def _unit(cycles: Extended, point: Point) -> float:
@@ -107,13 +120,13 @@ def _angle(cycles: Extended, point: Point) -> float:
     return float(point.orbit.y[-1] * point.orbit.y[0])
 
 
-def _torus(cycles: Extended, point: Point) -> float:
+def _torus(cycles: Extended, point: Point, variant: int = 0) -> float:
     """The cubic coefficient of a torus; none next to resonances, where it is infinite."""
     angle = _angle(cycles, point)
     if min(abs(math.sin(0.5 * angle)), abs(math.cos(0.5 * angle))) < RESONANT:
         return math.nan
     one, alone, v = _parted(cycles, point)
-    return at_torus(one, alone, angle, v)["d"] * _unit(cycles, point)
+    return at_torus(Linear(one, alone, variant), angle, v)["d"] * _unit(cycles, point)
 
 
 def _at(turn: float) -> Callable[[Extended, Point], float]:
@@ -133,10 +146,10 @@ def _of(test: Callable[[Point, bool], float]) -> Callable[[Extended, Point], flo
 
 
 TESTS = (
-    CurveTest("cusp", FOLD, _bend),
-    CurveTest("resonance_1", FOLD, _meet),
+    CurveTest("cusp", FOLD, _bend, bent=True),
+    CurveTest("resonance_1", FOLD, _meet, bent=True),
     CurveTest("fold_flip", FOLD, _of(doubling_test)),
-    CurveTest("generalized_flip", DOUBLING, _doubled),
+    CurveTest("generalized_flip", DOUBLING, _doubled, bent=True),
     CurveTest("fold_flip", DOUBLING, _of(determinant)),
     CurveTest("resonance_2", DOUBLING, _of(second_doubling)),
     CurveTest(
@@ -149,7 +162,7 @@ TESTS = (
     ),
     CurveTest("resonance_3", TORUS, _at(1.0 / 3.0)),
     CurveTest("resonance_4", TORUS, _at(0.25)),
-    CurveTest("chenciner", TORUS, _torus),
+    CurveTest("chenciner", TORUS, _torus, bent=True),
 )  # fmt: skip
 
 

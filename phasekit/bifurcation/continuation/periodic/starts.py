@@ -161,6 +161,11 @@ def with_function(made: Extended, cycles: Cycles, point: Point, value: float) ->
         angle = float(np.angle(mu[np.argmin(np.abs(np.abs(mu) - 1.0))]))
         omega = angle / orbit.y[0]
         v = wave(Linear(cycles, orbit), omega)
+        # As large as the states, in whatever units those are.
+        n, nothing = cycles.n, np.zeros(cycles.q)
+        parts = (np.ascontiguousarray(part) for part in (v[:, :n], v[:, n:]))
+        square = sum(cycles.inner(orbit.mesh, one, one, nothing, nothing) for one in parts)
+        v = v / np.sqrt(square)
         y = np.append(y, omega)
     return Orbit(orbit.mesh, np.hstack([orbit.x, v]), y)
 

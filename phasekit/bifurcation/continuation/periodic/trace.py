@@ -93,7 +93,8 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
 
 def _named(cycles: Cycles, orbit: Orbit) -> dict[str, float]:
     names = [cycles.field.parameters[i] for i in cycles.active]
-    return dict(zip(["period", *names], orbit.y.tolist(), strict=True))
+    # On curves of folds and tori kappa or omega follows.
+    return dict(zip(["period", *names], orbit.y.tolist(), strict=False))
 
 
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
