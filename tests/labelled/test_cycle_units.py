@@ -97,3 +97,19 @@ def test_energy_that_is_lost_is_noticed_in_any_units_of_time(t):
     )
     with pytest.raises(pk.ConvergenceError, match="not conserved"):
         pk.periodic_orbit(damped, [1.0, 0.0], 6.7 * t)
+
+
+@pytest.mark.parametrize("size", [1e-9, 1e-6, 1e6, 1e9])
+@pytest.mark.parametrize("start", [2.0, 0.01])
+def test_states_of_different_units(size, start):
+    # Without scales: those in which the slopes of f balance.
+    uneven = pk.Problem(["y/s", "(mu - x**2)*y - x*s"], ("x", "y"), {"mu": 1.0, "s": size})
+    orbit = pk.periodic_orbit(uneven, [start, 0.0])
+    assert float(orbit.period) == pytest.approx(6.66328685932, rel=1e-11)  # Amore
+    if start == 2.0:
+        cycles = pk.continuation(uneven, "mu", orbit=orbit, span=(0.5, 1.5))
+        assert [stop.reason for stop in cycles.stops] == ["bound", "bound"]
+        assert np.all(cycles.points.liouville_error < 1e-7)
+        alike = pk.periodic_orbit(uneven.replace(mu=1.5), [2.0, 0.0])
+        last = int(cycles.points.mu.argmax("point"))
+        assert float(cycles.points.period[last]) == pytest.approx(float(alike.period), rel=1e-9)

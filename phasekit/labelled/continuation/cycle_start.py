@@ -26,6 +26,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     first_point,
     given_orbit,
     scale_of,
+    units_of,
 )
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfolding import (
@@ -125,7 +126,7 @@ def _family(
     fixed: bool = False,
 ) -> Cycles:  # fmt: skip
     guess, turns, multiple = given
-    scale = scale_of(guess.x)
+    scale = scale_of(guess.x, units_of(problem, guess.x[0]))
     return cycles_of(problem, free, spans, scale, turns, options, multiple, fixed)
 
 

@@ -53,15 +53,30 @@ def cycles_of(
     )  # fmt: skip
 
 
-def scale_of(x: FloatArray) -> FloatArray:
+def units_of(problem: Problem, x: FloatArray) -> FloatArray:
+    """Sizes that one size of all states has in their units, as far as f tells: 1 for the largest.
+
+    In those the slopes of f are balanced, each state's row against its column.
+    """
+    from scipy.linalg import matrix_balance
+
+    with np.errstate(all="ignore"):
+        slopes = problem.derivatives(x)[1]
+    if not np.isfinite(slopes).all():
+        return np.ones(len(x))
+    units: FloatArray = matrix_balance(slopes, permute=False, separate=True)[1][0]
+    return units / np.max(units)
+
+
+def scale_of(x: FloatArray, units: FloatArray) -> FloatArray:
     """Sizes of the states along an orbit; `ContinuationOptions.scales` knows better.
 
-    A state beside which another one is a million times as large may be one that rests at 0 but for
-    the errors of a simulation: of the same unit as that.
+    A state beside which another one is a million times as large, in those units, may be one that
+    rests at 0 but for the errors of a simulation: of the same size as that.
     """
     size = np.max(np.abs(x), axis=0)
-    top = float(np.max(size))
-    return np.asarray(np.where(size > RESTS * top, size, top if top > 0.0 else 1.0))
+    top = float(np.max(size / units))
+    return np.asarray(np.where(size > RESTS * top * units, size, (top or 1.0) * units))
 
 
 def given_orbit(problem: Problem, orbit: Any, value: float, m: int) -> Given:

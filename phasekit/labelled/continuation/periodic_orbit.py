@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
@@ -21,6 +22,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     orbit_of,
     sampled,
     scale_of,
+    units_of,
 )
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, number, reals
@@ -31,8 +33,8 @@ FloatArray = npt.NDArray[np.float64]
 
 UNCONSERVED = 1e-8  # damping over a period with which an orbit of a conservative system closes
 TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit is looked for
-LONGEST = 2000  # steps of the slowest time scale that a search for a return may take
 SAMPLES = 2001
+MOST = 3e6  # values of f that a search for a return takes at once
 STILL = 1e-5  # part of the largest range that is the error of a simulation
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
@@ -145,7 +147,7 @@ def periodic_orbit(
         guesses = [sampled(problem, at, x, period, value, options.degree)]
         return _found(problem, guesses, options, "from the samples")
     x = x.reshape(n)
-    run = _Simulation(problem)
+    run = _Simulation(problem, units_of(problem, x))
     if period is not None:
         with said("looking for a periodic orbit"):
             start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
@@ -192,8 +194,8 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
         # What unfolds a conservative family is a rate.
         width = 1.0 / float(guess.y[0]) if free else abs(value) or 1.0
         cycles = cycles_of(
-            problem, [name], [(value - width, value + width)], scale_of(guess.x), turns, options,
-            multiple,
+            problem, [name], [(value - width, value + width)],
+            scale_of(guess.x, units_of(problem, guess.x[0])), turns, options, multiple,
         )  # fmt: skip
         if free:
             found = starts.kept(cycles, guess, guess.x[0].copy())
@@ -220,8 +222,8 @@ def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -
 class _Simulation:
     """The motion of a problem from a state."""
 
-    def __init__(self, problem: Problem) -> None:
-        self.problem, n = problem, len(problem.state)
+    def __init__(self, problem: Problem, units: FloatArray) -> None:
+        self.problem, self.units, n = problem, units, len(problem.state)
         par = np.array([*problem.parameters.values(), *([0.0] if problem.time else [])])
         field: Any = problem.field
 
@@ -244,22 +246,33 @@ class _Simulation:
         self.f: Callable[[float, FloatArray], FloatArray] = f
 
     def __call__(
-        self, x: FloatArray, begin: float, length: float, samples: int = 2, **keywords: Any
+        self, x: FloatArray, begin: float, length: float, samples: int = 2, most: float = np.inf
     ) -> tuple[FloatArray, FloatArray]:
         """Times and states of the motion over some time; without samples, its own steps in parts.
 
-        So they are dense where the motion is fast.
+        So they are dense where the motion is fast. At most so many values of f are taken.
         """
         from scipy.integrate import solve_ivp
 
+        taken = itertools.count()
+
+        def f(t: float, x: FloatArray) -> FloatArray:
+            if next(taken) > most:
+                raise ConvergenceError(
+                    f"x0: {most:g} values of f do not lead from {start.tolist()} over the time "
+                    f"{length:.4g}; give a period"
+                )
+            return self.f(t, x)
+
+        start = x
         at = np.linspace(begin, begin + length, samples) if samples else None
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what LSODA says is said by its status, too
             try:
                 solution = solve_ivp(
-                    self.f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
+                    f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
                     dense_output=not samples,
-                    atol=1e-10 * (float(np.max(np.abs(x))) or 1e-6), **keywords,
+                    atol=1e-10 * (float(np.max(np.abs(x) / self.units)) or 1e-6) * self.units,
                 )  # fmt: skip
             except (ValueError, ArithmeticError) as error:
                 if isinstance(error, ParameterError):
@@ -296,7 +309,7 @@ def _searched(
     for times in TURNS if settle is None else TURNS[:1]:
         try:
             if times:
-                x = run(x, 0.0, (times - waited) * unit)[1][-1]
+                x = run(x, 0.0, (times - waited) * unit, most=MOST)[1][-1]
                 waited = times
             unit = unit or _pace(run, x)
             period = _return(problem, x, run)
@@ -310,8 +323,8 @@ def _searched(
 
 def _pace(run: _Simulation, x: FloatArray) -> float:
     """A time in which the state moves by about its own size."""
-    speed = float(np.linalg.norm(run.f(0.0, x)))
-    return 10.0 * (float(np.linalg.norm(x)) or 1e-3) / speed if speed > 0.0 else 0.0
+    speed, size = (float(np.linalg.norm(one / run.units)) for one in (run.f(0.0, x), x))
+    return 10.0 * (size or 1e-3) / speed if speed > 0.0 else 0.0
 
 
 def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
@@ -322,13 +335,14 @@ def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
     angles = np.array([problem.periods.get(name, 0.0) for name in problem.state])
     length = 2.0 * pace
     for _ in range(8):
-        at, states = run(x, 0.0, length, SAMPLES)
+        at, states = run(x, 0.0, length, SAMPLES, MOST)
         gaps = states - x
         for i in np.flatnonzero(angles > 0.0):
             gaps[:, i] -= angles[i] * np.round(gaps[:, i] / angles[i])
         sizes = np.ptp(states, axis=0)
         # What a state at rest moves by is the error of the simulation, which does not return.
-        sizes = np.maximum(sizes, STILL * np.max(sizes, where=angles == 0.0, initial=0.0))
+        largest = np.max(sizes / run.units, where=angles == 0.0, initial=0.0)
+        sizes = np.maximum(sizes, STILL * largest * run.units)
         sizes = np.where(angles > 0.0, np.where(angles > 0.0, angles, 1.0), sizes)
         sizes = np.where(sizes > 0.0, sizes, 1.0)
         normal = run.f(0.0, x) / sizes**2

@@ -62,7 +62,7 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
     """The next point, and the state from which to go on."""
     o = cycles.options
     step = min(state.step, o.max_step)
-    reason = ""
+    reason = "the branch turns ever more, or Newton's method takes ever more iterations"
     while step >= o.min_step:
         made = attempt(cycles, state, step)
         if isinstance(made, str):
