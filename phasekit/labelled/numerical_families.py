@@ -6,14 +6,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import EquilibriumKind, OrbitKind, ParameterError
 from phasekit.labelled.orbits import orbits
-from phasekit.labelled.phase_space import equilibria
+from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.phase.numerical.constants import constant, reduced
+from phasekit.phase.numerical.formula import Formula
 from phasekit.systems.as_system import single
 from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS
@@ -22,9 +25,18 @@ from phasekit.table.quantities import ROWS
 CLUSTER = 4
 #: Energies of equilibria that differ by less, relative to the largest of them, are one.
 SAME = 16.0 * float(np.finfo(float).eps)
+QUANTITIES = ("period", "frequency", "action", "period_error", "action_error")
 
 #: The centers that an orbit goes round, by their numbers; none for a rotation.
 Wells = tuple[int, ...]
+
+
+@dataclass
+class _Wall:
+    """A saddle, by its number among the saddles, and the side on which the orbits are."""
+
+    saddle: int
+    side: str
 
 
 @dataclass
@@ -35,6 +47,8 @@ class _Family:
     low: float
     high: float
     open: bool = False  # no separatrix ends it
+    floor: _Wall | None = None  # the saddle at its lowest energy, if it goes over that
+    wall: _Wall | None = None  # a saddle at its highest energy
 
     @property
     def label(self) -> str:
@@ -45,18 +59,32 @@ class _Family:
     def rises(self, bottom: float, level: FloatArray) -> FloatArray:
         """Energies above the deepest center, close to each other next to separatrices."""
         begin, height = self.low - bottom, self.high - self.low
+        if len(self.wells) == 1 and self.open:  # begins at its center
+            return begin + height * level**2
+        above, below = self.gaps(level)
+        return begin + np.where(np.isnan(below), above, height + below)
+
+    def gaps(self, level: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Energies above the lowest and below the highest, NaN where the other one is nearer."""
+        height, nothing = self.high - self.low, np.full(level.shape, np.nan)
         up, down = level**CLUSTER, (1.0 - level) ** CLUSTER
-        if len(self.wells) == 1:  # begins at its center
-            return begin + height * (level**2 if self.open else 1.0 - down)
         if self.open:
-            return begin + height * up
+            return height * up, nothing
+        if len(self.wells) == 1:
+            return nothing, -height * down
         both = 2.0 ** (CLUSTER - 1)
-        return begin + height * np.where(level < 0.5, both * up, 1.0 - both * down)
+        near = level < 0.5
+        return (
+            np.where(near, height * both * up, np.nan),
+            np.where(near, np.nan, -height * both * down),
+        )
 
 
 def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Dataset:
     """Orbits of each family of one system, which has a law of any potential."""
     single(system)
+    whole, (system, base) = system, _reduced(system)
+    energy_max = None if energy_max is None else energy_max - base
     points = equilibria(system)
     phi, energy = points.phi.values, points.energy.values
     centers = [int(k) for k in np.flatnonzero(points.kind.values == EquilibriumKind.CENTER)]
@@ -82,28 +110,62 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
         min(f.wells) if drop else min(f.wells or centers, key=lambda k: energy[k]) for f in found
     ]
     rises = [f.rises(energy[k], level) for f, k in zip(found, deepest, strict=True)]
-    start = np.repeat(phi[deepest], n)
-    orbit = orbits(system, start, np.sqrt(2.0 * np.concatenate([*rises, []])))
-    levels = [energy[k] + rise for k, rise in zip(deepest, rises, strict=True)]
+    levels = [base + (energy[k] + rise) for k, rise in zip(deepest, rises, strict=True)]
     shape = (len(found), n)
     data = {"energy_level": np.concatenate([*levels, []])}
-    for name in ("period", "frequency", "action", "period_error", "action_error"):
-        data[name] = orbit[name].values
+    orbits_ = [
+        _orbits(system, f, float(phi[k]), rise, level)
+        for f, k, rise in zip(found, deepest, rises, strict=True)
+    ]
+    for name in QUANTITIES:
+        data[name] = np.concatenate([*(one[name].values for one in orbits_), []])
     coords = {
         "family": variable(
             ("family",), np.array([f.label for f in found], LABEL_DTYPE),
             {"long_name": "family of orbits, by the numbers of its centers"},
         ),
-        "level": variable(("level",), level, input_attrs(system, "level")),
-        **{k: variable((), v, input_attrs(system, k)) for k, v in system.parameters.items()},
+        "level": variable(("level",), level, input_attrs(whole, "level")),
+        **{k: variable((), v, input_attrs(whole, k)) for k, v in whole.parameters.items()},
     }  # fmt: skip
-    attrs = {name: orbit[name].attrs for name in data if name in orbit}
+    attrs = {name: orbits_[0][name].attrs for name in QUANTITIES}
     attrs["energy_level"] = ROWS["energy_level"].attrs
     variables = {
         name: variable(("family", "level"), values.reshape(shape), attrs[name])
         for name, values in data.items()
     }
-    return xr.Dataset(variables, coords, dataset_attrs(system))
+    return xr.Dataset(variables, coords, dataset_attrs(whole))
+
+
+def _reduced(system: Model) -> tuple[Model, float]:
+    """A system without the constant part of its potential, and that part."""
+    law = system.law
+    formula = getattr(law, "base", law)
+    if not isinstance(formula, Formula):
+        return system, 0.0
+    base = float(constant(formula, [system.parameters[name] for name in formula.names]))
+    if not base:
+        return system, 0.0
+    expression = reduced(formula).expression
+    if formula is law:
+        return system.replace(expression=expression), base
+    own: Any = system
+    return own.replace(system=own.system.replace(expression=expression)), base
+
+
+def _orbits(
+    system: Model, family: _Family, center: float, rise: FloatArray, level: FloatArray
+) -> xr.Dataset:
+    """Orbits of a family: by their energies above a saddle, which keep the digits next to it."""
+    above, below = family.gaps(level)
+    parts = [(family.floor, above), (family.wall, below)]
+    if any(wall is None and np.isfinite(gap).any() for wall, gap in parts):
+        return orbits(system, np.full(rise.shape, center), np.sqrt(2.0 * rise))
+    found = [
+        orbits(system, gap=gap[np.isfinite(gap)], saddle=wall.saddle, side=wall.side)
+        for wall, gap in parts
+        if wall is not None and np.isfinite(gap).any()
+    ]
+    return xr.concat([one[list(QUANTITIES)] for one in found], "point", coords="minimal")
 
 
 def fall_per_turn(system: Model) -> float:
@@ -131,6 +193,7 @@ def _families(
     marks = marks[np.diff(marks, prepend=-np.inf) > SAME * scale]
     edges = np.append(marks, top)
     found: dict[Wells, _Family] = {}
+    walls = _Walls.of(system, SAME * scale)
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         middle = 0.5 * (low + high)
         here = [k for k in centers if energy[k] <= low + SAME * scale]
@@ -142,9 +205,54 @@ def _families(
             pairs = zip(sharing, here, strict=True)
             sharing = [w if w and min(w) == k else None for w, k in pairs]
         for wells in set(sharing) - {None}:
-            family = found.setdefault(wells, _Family(wells, float(low), float(high)))
+            arc = orbit.isel(point=sharing.index(wells))
+            if wells not in found:
+                found[wells] = _Family(wells, float(low), float(high))
+                found[wells].floor = walls.floor(arc, float(low))
+            family = found[wells]
             family.high, family.open = float(high), high == top
+            family.wall = walls.wall(arc, float(high))
     return sorted(found.values(), key=lambda f: (f.low, len(f.wells), f.wells))
+
+
+@dataclass(frozen=True)
+class _Walls:
+    """Saddles in this turn and those next to it, in the order of their places."""
+
+    number: npt.NDArray[np.intp]
+    place: FloatArray
+    energy: FloatArray
+    same: float
+
+    @classmethod
+    def of(cls, system: Model, same: float) -> _Walls:
+        """The saddles of a system; energies that differ by less than `same` are one."""
+        loops = separatrices(system)
+        place, energy = loops.saddle_phi.values, loops.saddle_energy.values
+        number = np.flatnonzero(np.isfinite(place))
+        period = getattr(getattr(system, "system", system), "period", None)
+        turns = np.arange(-2.0, 3.0)[:, None] if period else np.zeros((1, 1))
+        place = (place[number] + turns * (period or 0.0)).ravel()
+        energy = (energy[number] - turns * fall_per_turn(system)).ravel()
+        order = np.argsort(place)
+        number = np.tile(number, turns.size)
+        return cls(number[order], place[order], energy[order], same)
+
+    def wall(self, arc: xr.Dataset, energy: float) -> _Wall | None:
+        """A saddle of an energy next to an arc."""
+        last = int(np.searchsorted(self.place, arc.phi_min.item())) - 1
+        first = int(np.searchsorted(self.place, arc.phi_max.item()))
+        for k, side in ((first, "left"), (last, "right")):
+            if 0 <= k < self.place.size and abs(self.energy[k] - energy) <= self.same:
+                return _Wall(int(self.number[k]), side)
+        return None
+
+    def floor(self, arc: xr.Dataset, energy: float) -> _Wall | None:
+        """A saddle of an energy under an arc, or under a rotation, which has no ends."""
+        low, high = arc.phi_min.item(), arc.phi_max.item()
+        inside = ~((self.place <= low) | (self.place >= high))
+        level = np.flatnonzero(inside & (np.abs(self.energy - energy) <= self.same))
+        return _Wall(int(self.number[level[0]]), "right") if level.size else None
 
 
 def _wells(orbit: xr.Dataset, phi: FloatArray, here: list[int], every: list[int]) -> Any:
