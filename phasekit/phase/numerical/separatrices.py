@@ -46,7 +46,8 @@ class Branch:
     """What leaves each of some saddles to one side, one row each.
 
     `length` is the distance to the turning point, or to the saddle that it joins, which on a
-    circle may be the saddle itself; infinite where there is neither.
+    circle may be the saddle itself; infinite where there is neither. `slope` bounds V' at the
+    saddle, where rounding leaves one.
     """
 
     ground: Ground
@@ -58,6 +59,7 @@ class Branch:
     near: End
     far: End
     excess: Array
+    slope: Array
 
 
 def saddles_of(ground: Ground) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
@@ -102,7 +104,8 @@ def branch_of(ground: Ground, column: npt.NDArray[np.intp], side: float) -> Bran
     zero = np.zeros(saddle.shape)
     own = Anchor(systems, saddle, ground.near[rows, column])
     near = End(zero, far.turned, own, zero, zero)
-    return Branch(ground, saddle, side, length, joins, winds, near, end, excess)
+    slope = ground.slope[rows, column]
+    return Branch(ground, saddle, side, length, joins, winds, near, end, excess, slope)
 
 
 def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
