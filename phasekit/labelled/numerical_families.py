@@ -12,7 +12,7 @@ import xarray as xr
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import EquilibriumKind, OrbitKind, ParameterError
 from phasekit.labelled.orbits import orbits
-from phasekit.labelled.phase_space import equilibria, separatrices
+from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import FloatArray, bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.phase.numerical.constants import constant, reduced
@@ -104,7 +104,7 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
                 "energy_max: got nothing, wants the energy up to which orbits are taken, for no "
                 "saddle bounds them"
             )
-    found = _families(system, phi, energy, marks, centers, float(energy_max))
+    found = _families(system, points, marks, centers, float(energy_max))
     level = (np.arange(n) + 0.5) / n
     deepest = [
         min(f.wells) if drop else min(f.wells or centers, key=lambda k: energy[k]) for f in found
@@ -176,8 +176,7 @@ def fall_per_turn(system: Model) -> float:
 
 def _families(
     system: Model,
-    phi: FloatArray,
-    energy: FloatArray,
+    points: xr.Dataset,
     heights: FloatArray,
     centers: list[int],
     top: float,
@@ -188,12 +187,13 @@ def _families(
     which wells it shares. Under a torque a family is seen from its center of the least number,
     for from others its energies differ by those of turns.
     """
+    phi, energy = points.phi.values, points.energy.values
     marks = np.unique(heights[np.isfinite(heights) & (heights < top)])
     scale = float(np.abs(marks).max(initial=0.0))
     marks = marks[np.diff(marks, prepend=-np.inf) > SAME * scale]
     edges = np.append(marks, top)
     found: dict[Wells, _Family] = {}
-    walls = _Walls.of(system, SAME * scale)
+    walls = _Walls.of(system, points, SAME * scale)
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         middle = 0.5 * (low + high)
         here = [k for k in centers if energy[k] <= low + SAME * scale]
@@ -225,11 +225,15 @@ class _Walls:
     same: float
 
     @classmethod
-    def of(cls, system: Model, same: float) -> _Walls:
-        """The saddles of a system; energies that differ by less than `same` are one."""
-        loops = separatrices(system)
-        place, energy = loops.saddle_phi.values, loops.saddle_energy.values
-        number = np.flatnonzero(np.isfinite(place))
+    def of(cls, system: Model, points: xr.Dataset, same: float) -> _Walls:
+        """The saddles of a system; energies that differ by less than `same` are one.
+
+        None where equilibria are degenerate, for of these only some count as saddles.
+        """
+        kind = points.kind.values
+        saddle = (kind == EquilibriumKind.SADDLE) & ~np.any(kind == EquilibriumKind.DEGENERATE)
+        place, energy = points.phi.values[saddle], points.energy.values[saddle]
+        number = np.arange(place.size)
         period = getattr(getattr(system, "system", system), "period", None)
         turns = np.arange(-2.0, 3.0)[:, None] if period else np.zeros((1, 1))
         place = (place[number] + turns * (period or 0.0)).ravel()

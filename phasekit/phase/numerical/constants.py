@@ -48,10 +48,14 @@ def _split(formula: Formula) -> tuple[Formula, Callable[..., Any] | None]:
 
 def _parts(expression: Any, x: Any) -> tuple[Any, Any]:
     """An expression as the sum of a part without x and one with it."""
-    if expression.is_Mul:
-        factor, rest = expression.as_independent(x, as_Add=False)
-        if rest.is_Add:
-            still, moving = _parts(rest, x)
-            return factor * still, factor * moving
-    still, moving = expression.as_independent(x, as_Add=True)
-    return still, moving
+    if not expression.has(x):
+        return expression, expression * 0
+    if expression.is_Add:
+        parts = [_parts(term, x) for term in expression.args]
+        still, moving = (expression.func(*some) for some in zip(*parts, strict=True))
+        return still, moving
+    factor, rest = expression.as_independent(x, as_Add=False)
+    if expression.is_Mul and rest.is_Add:
+        still, moving = _parts(rest, x)
+        return factor * still, factor * moving
+    return expression * 0, expression

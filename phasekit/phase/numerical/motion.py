@@ -106,7 +106,7 @@ def _late(ground: Ground, states: States, v: Array) -> Array:
     """By how much starts come late because whole turns, which are rounded, were taken away."""
     with np.errstate(all="ignore"):
         slope, bend = ground.systems.slope(states.x), ground.systems.bend(states.x)
-        reach = np.abs(v) + np.abs(slope) / np.sqrt(np.abs(bend))
+        reach = np.hypot(v, slope / np.sqrt(np.abs(bend)))
         return np.where(states.turns == 0.0, 0.0, _EPS * np.abs(states.turns) / reach)
 
 
@@ -119,14 +119,17 @@ def _errors(
         height, slope = systems.potential(x), np.abs(systems.slope(x))
         pace = np.sqrt(np.abs(systems.bend(x))) + 1.0 / (1.0 + np.abs(time))
         off = np.abs(0.5 * v * v + height - energy) + _EPS * v * v
-        off += noise(systems, x, height)[0] + _EPS * np.abs(height)
+        rounding, push = noise(systems, x, height)
+        off += rounding + _EPS * np.abs(height)
+        push = (push - slope) / pace  # by rounding of V' alone
         size = v * v + (slope / pace) ** 2
         late = late + np.abs(time) * (off / size + 4.0 * _EPS)
         late = np.where(np.isfinite(late), late, 0.0)
         speed = np.abs(v)
         reach = speed + slope / pace
         phi = speed * late + 0.5 * slope * late**2 + off / (reach * pace) + 4.0 * _EPS * np.abs(x)
-        dphi = slope * late + off / reach + 4.0 * _EPS * speed
+        dphi = slope * late + off / reach + 4.0 * _EPS * speed + push
+        phi = phi + push / pace
     rest = (v == 0.0) & (slope == 0.0)
     return np.where(rest, 4.0 * _EPS * np.abs(x), phi), np.where(rest, 0.0, dphi)
 
