@@ -31,7 +31,7 @@ QUANTITIES = ("period", "frequency", "action", "period_error", "action_error")
 Wells = tuple[int, ...]
 
 
-@dataclass
+@dataclass(frozen=True)
 class _Wall:
     """A saddle, by its number among the saddles, and the side on which the orbits are."""
 
@@ -105,6 +105,8 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
                 "saddle bounds them"
             )
     found = _families(system, points, marks, centers, float(energy_max))
+    if not found:
+        raise bad("energy_max", base + energy_max, "an energy below which orbits come back")
     level = (np.arange(n) + 0.5) / n
     deepest = [
         min(f.wells) if drop else min(f.wells or centers, key=lambda k: energy[k]) for f in found
@@ -113,12 +115,8 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
     levels = [base + (energy[k] + rise) for k, rise in zip(deepest, rises, strict=True)]
     shape = (len(found), n)
     data = {"energy_level": np.concatenate([*levels, []])}
-    orbits_ = [
-        _orbits(system, f, float(phi[k]), rise, level)
-        for f, k, rise in zip(found, deepest, rises, strict=True)
-    ]
-    for name in QUANTITIES:
-        data[name] = np.concatenate([*(one[name].values for one in orbits_), []])
+    found_, attrs = _orbits(system, found, phi[deepest], rises, level)
+    data.update(found_)
     coords = {
         "family": variable(
             ("family",), np.array([f.label for f in found], LABEL_DTYPE),
@@ -127,7 +125,6 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
         "level": variable(("level",), level, input_attrs(whole, "level")),
         **{k: variable((), v, input_attrs(whole, k)) for k, v in whole.parameters.items()},
     }  # fmt: skip
-    attrs = {name: orbits_[0][name].attrs for name in QUANTITIES}
     attrs["energy_level"] = ROWS["energy_level"].attrs
     variables = {
         name: variable(("family", "level"), values.reshape(shape), attrs[name])
@@ -153,19 +150,40 @@ def _reduced(system: Model) -> tuple[Model, float]:
 
 
 def _orbits(
-    system: Model, family: _Family, center: float, rise: FloatArray, level: FloatArray
-) -> xr.Dataset:
-    """Orbits of a family: by their energies above a saddle, which keep the digits next to it."""
-    above, below = family.gaps(level)
-    parts = [(family.floor, above), (family.wall, below)]
-    if any(wall is None and np.isfinite(gap).any() for wall, gap in parts):
-        return orbits(system, np.full(rise.shape, center), np.sqrt(2.0 * rise))
-    found = [
-        orbits(system, gap=gap[np.isfinite(gap)], saddle=wall.saddle, side=wall.side)
-        for wall, gap in parts
-        if wall is not None and np.isfinite(gap).any()
-    ]
-    return xr.concat([one[list(QUANTITIES)] for one in found], "point", coords="minimal")
+    system: Model,
+    families: list[_Family],
+    starts: FloatArray,
+    rises: list[FloatArray],
+    level: FloatArray,
+) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Quantities of the orbits of families in a row, and their attributes.
+
+    By their energies above a saddle, which keep the digits next to it, where there is one; else
+    from their centers.
+    """
+    groups: dict[_Wall | None, list[tuple[npt.NDArray[np.intp], FloatArray]]] = {}
+    for number, (family, rise) in enumerate(zip(families, rises, strict=True)):
+        parts = [
+            (wall, np.flatnonzero(np.isfinite(gap)), gap)
+            for wall, gap in zip((family.floor, family.wall), family.gaps(level), strict=True)
+        ]
+        if any(wall is None and some.size for wall, some, _ in parts):
+            parts = [(None, np.arange(level.size), rise)]
+        for wall, some, gap in parts:
+            if some.size:
+                groups.setdefault(wall, []).append((number * level.size + some, gap[some]))
+    found = {name: np.full(len(families) * level.size, np.nan) for name in QUANTITIES}
+    attrs: dict[str, Any] = {}
+    for wall, members in groups.items():
+        rows, values = (np.concatenate(part) for part in zip(*members, strict=True))
+        if wall is None:
+            orbit = orbits(system, starts[rows // level.size], np.sqrt(2.0 * values))
+        else:
+            orbit = orbits(system, gap=values, saddle=wall.saddle, side=wall.side)
+        for name in QUANTITIES:
+            found[name][rows] = orbit[name].values
+            attrs[name] = orbit[name].attrs
+    return found, attrs
 
 
 def fall_per_turn(system: Model) -> float:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from phasekit.phase.numerical.equilibria import Equilibria, equilibria
 from phasekit.phase.numerical.formula import Shape
-from phasekit.phase.numerical.noise import noise
+from phasekit.phase.numerical.noise import noise, slope_noise
 from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.systems import Index, Systems
 
@@ -121,7 +121,8 @@ def survey(systems: Systems, points: Equilibria | None = None) -> Ground:
             reach = np.maximum(left, right)
             near = np.where(reach > 0.0, np.minimum(near, 2.0 * reach), near)
         near = _proved(systems, x, near)
-        blur, slope = noise(systems, x, points.energy)
+        blur, slope = noise(systems, x, points.energy), systems.slope(x)
+        slope = np.abs(slope) + slope_noise(systems, x, slope)
         # An equilibrium that is known so far only: V changes by the square.
         off = np.where(
             points.curvature != 0.0, 0.5 * slope * (slope / np.abs(points.curvature)), 0.0

@@ -57,7 +57,7 @@ def _end_errors(ground: Ground, states: Any, end: End) -> tuple[Array, Array]:
     if rows.size:
         few = end.anchor.take(rows)
         for place in (few.at, few.at + end.u[rows]):
-            away[rows] += noise(few.systems, place, few.systems.potential(place))[0]
+            away[rows] += noise(few.systems, place, few.systems.potential(place))
     return error + away, np.where(same, away[:, None], 0.0)
 
 

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from phasekit.errors import OrbitKind
 from phasekit.phase.numerical.collocation import follow
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.noise import noise
+from phasekit.phase.numerical.noise import noise, slope_noise
 from phasekit.phase.numerical.orbits import States, orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.quadrature import speeds
 from phasekit.phase.numerical.regions import smooth
@@ -119,9 +119,8 @@ def _errors(
         height, slope = systems.potential(x), np.abs(systems.slope(x))
         pace = np.sqrt(np.abs(systems.bend(x))) + 1.0 / (1.0 + np.abs(time))
         off = np.abs(0.5 * v * v + height - energy) + _EPS * v * v
-        rounding, push = noise(systems, x, height)
-        off += rounding + _EPS * np.abs(height)
-        push = (push - slope) / pace  # by rounding of V' alone
+        off += noise(systems, x, height) + _EPS * np.abs(height)
+        push = slope_noise(systems, x, slope) / pace
         size = v * v + (slope / pace) ** 2
         late = late + np.abs(time) * (off / size + 4.0 * _EPS)
         late = np.where(np.isfinite(late), late, 0.0)

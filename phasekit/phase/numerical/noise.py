@@ -1,4 +1,4 @@
-"""How far rounding may have moved V at places, and V' at equilibria."""
+"""How far rounding may have moved V and V'."""
 
 from __future__ import annotations
 
@@ -41,9 +41,9 @@ class _Terms(Bounds):
     _rules = {**Bounds._rules, **{k: _usual(rule) for k, rule in RULES.items() if k != "Abs"}}
 
 
-@functools.lru_cache(maxsize=128)
-def _bounds(formula: Formula) -> _Terms | None:
-    """Bounds of V and V' of (x, parameters); None where a function has no rule."""
+@functools.lru_cache(maxsize=256)
+def _bounds(formula: Formula, order: int) -> _Terms | None:
+    """Bounds of V or V' of (x, parameters); None where a function has no rule."""
     import sympy as sp
 
     from phasekit.laws.derivatives import derivative
@@ -51,24 +51,32 @@ def _bounds(formula: Formula) -> _Terms | None:
     if formula.expression is None:
         return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
+    expression = derivative(formula.expression, x) if order else formula.expression
     try:
-        return _Terms((formula.expression, derivative(formula.expression, x)), (x, *parameters))
+        return _Terms((expression,), (x, *parameters))
     except NoRule:
         return None
 
 
-def noise(systems: Systems, x: Array, height: Array) -> tuple[Array, Array]:
-    """Rounding of V at x, shape (systems, ...), where it is `height`; size of V' with its own.
+def noise(systems: Systems, x: Array, height: Array) -> Array:
+    """Rounding of V at x, shape (systems, ...), where it is `height`.
 
     By the terms that the formula adds up, where there are bounds of its functions.
     """
-    values, slopes = np.abs(height), np.abs(systems.slope(x))
-    rough = 2.0 * _EPS * values, slopes + 2.0 * _EPS * np.abs(systems.bend(x) * x)
-    bounds = _bounds(systems.formula)
+    return _rounding(systems, x, 0, 2.0 * _EPS * np.abs(height))
+
+
+def slope_noise(systems: Systems, x: Array, slope: Array) -> Array:
+    """Rounding of V' at x, where it is `slope`, in the same way."""
+    rough = 2.0 * _EPS * (np.abs(slope) + np.abs(systems.bend(x) * x))
+    return _rounding(systems, x, 1, rough)
+
+
+def _rounding(systems: Systems, x: Array, order: int, rough: Array) -> Array:
+    bounds = _bounds(systems.formula, order)
     if bounds is None:
         return rough
-    ((low, high), (least, most)), undefined = bounds(*((a, a) for a in (x, *systems.beside(x))))
+    ((low, high),), undefined = bounds(*((a, a) for a in (x, *systems.beside(x))))
     with np.errstate(all="ignore"):
-        found = _SHARE * (high - low), slopes + _SHARE * (most - least)
-    known = ~undefined & np.isfinite(found[0]) & np.isfinite(found[1])
-    return np.where(known, found[0], rough[0]), np.where(known, found[1], rough[1])
+        found = _SHARE * (high - low)
+    return np.where(~undefined & np.isfinite(found), found, rough)

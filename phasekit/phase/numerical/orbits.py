@@ -67,7 +67,7 @@ def states_of(ground: Ground, x: Array, v: Array) -> States:
     blur = 2.0 * _EPS * (2.0 * kinetic + slope)[:, None] + 4.0 * _EPS * np.maximum(
         np.abs(height)[:, None], np.abs(points.energy)
     )
-    away = noise(systems, home, height)[0] + _EPS * np.abs(turns) * np.abs(systems.slope(home))
+    away = noise(systems, home, height) + _EPS * np.abs(turns) * np.abs(systems.slope(home))
     error = (away + _EPS * kinetic)[:, None] + _EPS * np.abs(excess) + ground.blur
     if points.phi.shape[1]:
         offset = home[:, None] - points.phi
