@@ -145,9 +145,8 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
             ((kind == OrbitKind.LIBRATION) | (kind == OrbitKind.ROTATION)) & np.isfinite(period)
         )
         if rows.size:
-            own = States._make(field[rows] for field in states)
-            ends_ = left.take(rows), right.take(rows)
-            found[2:, rows] += errors_of_energies(ground.take(rows), own, *ends_, period[rows])
+            off = np.stack(errors_of_energies(ground, states, left, right, period))
+            found[2:, rows] += off[:, rows]
             found[:2][~(found[2:] <= WORST * found[:2])] = np.nan
         bend = ground.systems.bend(x)
         degenerate = np.any(
