@@ -5,10 +5,11 @@ import warnings
 import mpmath
 import numpy as np
 import pytest
+import sympy as sp
 from scipy.special import ellipkm1
 
 import phasekit as pk
-from phasekit.errors import OrbitKind
+from phasekit.errors import Loop, OrbitKind
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.formula import make_formula
@@ -213,3 +214,15 @@ def test_motions_far_round_the_circle_are_as_good_as_they_say(turns):
     off = np.abs(two.motion_dphi - one.motion_dphi)
     assert (off <= one.motion_dphi_error + two.motion_dphi_error).all()
     assert (two.motion_dphi_error < 1e-6).all()
+
+
+@pytest.mark.parametrize("shift", [0, 30, 100, 200, 300])
+def test_areas_are_no_further_off_than_they_say_where_terms_cancel(shift):
+    """Between the saddles of -(u^2 - 1)^2/4, multiplied out about another place: 4 sqrt(2)/3."""
+    x = sp.Symbol("x", real=True)
+    text = sp.expand(-(((x - shift) ** 2 - 1) ** 2) / 4)
+    found = functions.separatrices(make_formula(text, "x", (), None, None))
+    np.testing.assert_array_equal(found.loop, [Loop.HETEROCLINIC] * 2)
+    area, error = found.lobe_area[0, 1], found.lobe_area_error[0, 1]
+    assert abs(area - 4.0 * 2.0**0.5 / 3.0) <= error <= 1e-7 or np.isnan(area)
+    assert np.isfinite(area) or shift > 100

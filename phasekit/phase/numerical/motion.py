@@ -144,11 +144,8 @@ def separatrix_motion(branch: Branch, owner: Index, time: Array) -> MotionWithEr
     energy = branch.ground.systems.potential(branch.saddle)[rows[owner]]
     nothing = np.zeros(time.shape)
     phi_error, dphi_error = _errors(branch.ground, owner, x, v, nothing, nothing, energy)
-    # The saddle itself, from which places are counted, is where V' is 0 within rounding.
-    bend = np.abs(branch.ground.systems.bend(branch.saddle))
-    with np.errstate(all="ignore"):
-        place = np.where(bend > 0.0, branch.slope / bend, 0.0)
-    errors = (phi_error + place[owner], dphi_error + (place * np.sqrt(bend))[owner])
+    place, bend = branch.place_error, branch.ground.systems.bend(branch.saddle)
+    errors = (phi_error + place[owner], dphi_error + (place * np.sqrt(np.abs(bend)))[owner])
     lost = np.isnan(x) & np.isfinite(time) & np.isfinite(branch.length[owner])
     return MotionWithErrors(x, v, *(np.where(lost, np.inf, error) for error in errors))
 
