@@ -32,10 +32,10 @@ def height(x):
     return -a * mpmath.cos(x) + mpmath.cos(x) ** 2 / 2 - b * mpmath.sin(x)
 
 
-def lower_saddle():
+def saddle(which="lower"):
     a, b = mpmath.mpf(0.35), mpmath.mpf(0.12)
     slope = lambda x: a * mpmath.sin(x) - mpmath.sin(x) * mpmath.cos(x) - b * mpmath.cos(x)  # noqa: E731
-    return mpmath.findroot(slope, -0.19)
+    return mpmath.findroot(slope, {"lower": -0.19, "upper": -3.05}[which])
 
 
 def quiet(function, *args, **keywords):
@@ -89,22 +89,25 @@ def test_a_constant_is_in_no_result_but_energies(c):
             np.testing.assert_allclose(two[name] - c, one[name], rtol=0.0, atol=rounding)
 
 
-@pytest.mark.parametrize("place", [None, 0.4])
-def test_no_period_next_to_a_saddle_is_further_off_than_it_says(place):
+@pytest.mark.parametrize(
+    ("which", "place"), [("lower", None), ("lower", 0.4), ("lower", 7.5), ("upper", -1.3)]
+)
+def test_no_period_next_to_a_saddle_is_further_off_than_it_says(which, place):
     """States whose energies are known to 40 digits, against the closed form by the gap."""
-    excess = -(10.0 ** np.random.default_rng(8).uniform(-14.0, -2.0, 200))
+    rng = np.random.default_rng(8)
+    excess = rng.choice([-1.0, 1.0], 200) * 10.0 ** rng.uniform(-14.0, -2.0, 200)
     plain = system(1000.0)
     x = pk.equilibria(plain).phi.values[3] if place is None else place
     with mpmath.workdps(40):
-        top, here = height(lower_saddle()), height(mpmath.mpf(float(x)))
+        top, here = height(saddle(which)), height(mpmath.mpf(float(x)))
         v = np.array([float(mpmath.sqrt(2 * (top + mpmath.mpf(e) - here))) for e in excess])
         gaps = np.array([float(mpmath.mpf(w) ** 2 / 2 + here - top) for w in v])
-    want = quiet(pk.orbits, CLOSED, gap=gaps, saddle="lower", side="right")
+    want = quiet(pk.orbits, CLOSED, gap=gaps, saddle=which, side="right")
     got = quiet(pk.orbits, plain, x, v)
     known = np.isfinite(got.period.values)
     # No digit is lost that the energy has; what it does not have is not told.
-    assert known[gaps < -1e-8].all()
-    assert not known[gaps > -1e-11].any()
+    assert known[np.abs(gaps) > 1e-8].all()
+    assert not known[np.abs(gaps) < 1e-11].any()
     asymptotic = got.orbit_kind.values == OrbitKind.ASYMPTOTIC
     for name in ("period", "action"):
         value, error = got[name].values, got[f"{name}_error"].values
@@ -120,7 +123,7 @@ def test_energies_that_are_given_lose_what_the_constant_takes(c):
     top = pk.equilibria(CLOSED).energy.sel(equilibrium="lower_saddle").item()
     levels = c + top - 10.0 ** np.linspace(-1.0, -12.0, 40)
     with mpmath.workdps(40):
-        exact = height(lower_saddle())
+        exact = height(saddle())
         gaps = np.array([float(mpmath.mpf(h) - mpmath.mpf(c) - exact) for h in levels])
     below = gaps < 0.0
     want = pk.orbits(CLOSED, gap=gaps[below], saddle="lower", side="right").period.values
