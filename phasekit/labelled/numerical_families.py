@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
@@ -14,6 +15,8 @@ from phasekit.labelled.orbits import orbits
 from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import FloatArray, bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.phase.numerical.constants import constant, reduced
+from phasekit.phase.numerical.formula import Formula
 from phasekit.systems.as_system import single
 from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS
@@ -22,9 +25,18 @@ from phasekit.table.quantities import ROWS
 CLUSTER = 4
 #: Energies of equilibria that differ by less, relative to the largest of them, are one.
 SAME = 16.0 * float(np.finfo(float).eps)
+QUANTITIES = ("period", "frequency", "action", "period_error", "action_error")
 
 #: The centers that an orbit goes round, by their numbers; none for a rotation.
 Wells = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class _Wall:
+    """A saddle, by its number among the saddles, and the side on which the orbits are."""
+
+    saddle: int
+    side: str
 
 
 @dataclass
@@ -35,6 +47,8 @@ class _Family:
     low: float
     high: float
     open: bool = False  # no separatrix ends it
+    floor: _Wall | None = None  # the saddle at its lowest energy, if it goes over that
+    wall: _Wall | None = None  # a saddle at its highest energy
 
     @property
     def label(self) -> str:
@@ -45,18 +59,32 @@ class _Family:
     def rises(self, bottom: float, level: FloatArray) -> FloatArray:
         """Energies above the deepest center, close to each other next to separatrices."""
         begin, height = self.low - bottom, self.high - self.low
+        if len(self.wells) == 1 and self.open:  # begins at its center
+            return begin + height * level**2
+        above, below = self.gaps(level)
+        return begin + np.where(np.isnan(below), above, height + below)
+
+    def gaps(self, level: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Energies above the lowest and below the highest, NaN where the other one is nearer."""
+        height, nothing = self.high - self.low, np.full(level.shape, np.nan)
         up, down = level**CLUSTER, (1.0 - level) ** CLUSTER
-        if len(self.wells) == 1:  # begins at its center
-            return begin + height * (level**2 if self.open else 1.0 - down)
         if self.open:
-            return begin + height * up
+            return height * up, nothing
+        if len(self.wells) == 1:
+            return nothing, -height * down
         both = 2.0 ** (CLUSTER - 1)
-        return begin + height * np.where(level < 0.5, both * up, 1.0 - both * down)
+        near = level < 0.5
+        return (
+            np.where(near, height * both * up, np.nan),
+            np.where(near, np.nan, -height * both * down),
+        )
 
 
 def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Dataset:
     """Orbits of each family of one system, which has a law of any potential."""
     single(system)
+    whole, (system, base) = system, _reduced(system)
+    energy_max = None if energy_max is None else energy_max - base
     points = equilibria(system)
     phi, energy = points.phi.values, points.energy.values
     centers = [int(k) for k in np.flatnonzero(points.kind.values == EquilibriumKind.CENTER)]
@@ -76,34 +104,86 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
                 "energy_max: got nothing, wants the energy up to which orbits are taken, for no "
                 "saddle bounds them"
             )
-    found = _families(system, phi, energy, marks, centers, float(energy_max))
+    found = _families(system, points, marks, centers, float(energy_max))
+    if not found:
+        raise bad("energy_max", base + energy_max, "an energy below which orbits come back")
     level = (np.arange(n) + 0.5) / n
     deepest = [
         min(f.wells) if drop else min(f.wells or centers, key=lambda k: energy[k]) for f in found
     ]
     rises = [f.rises(energy[k], level) for f, k in zip(found, deepest, strict=True)]
-    start = np.repeat(phi[deepest], n)
-    orbit = orbits(system, start, np.sqrt(2.0 * np.concatenate([*rises, []])))
-    levels = [energy[k] + rise for k, rise in zip(deepest, rises, strict=True)]
+    levels = [base + (energy[k] + rise) for k, rise in zip(deepest, rises, strict=True)]
     shape = (len(found), n)
     data = {"energy_level": np.concatenate([*levels, []])}
-    for name in ("period", "frequency", "action", "period_error", "action_error"):
-        data[name] = orbit[name].values
+    found_, attrs = _orbits(system, found, phi[deepest], rises, level)
+    data.update(found_)
     coords = {
         "family": variable(
             ("family",), np.array([f.label for f in found], LABEL_DTYPE),
             {"long_name": "family of orbits, by the numbers of its centers"},
         ),
-        "level": variable(("level",), level, input_attrs(system, "level")),
-        **{k: variable((), v, input_attrs(system, k)) for k, v in system.parameters.items()},
+        "level": variable(("level",), level, input_attrs(whole, "level")),
+        **{k: variable((), v, input_attrs(whole, k)) for k, v in whole.parameters.items()},
     }  # fmt: skip
-    attrs = {name: orbit[name].attrs for name in data if name in orbit}
     attrs["energy_level"] = ROWS["energy_level"].attrs
     variables = {
         name: variable(("family", "level"), values.reshape(shape), attrs[name])
         for name, values in data.items()
     }
-    return xr.Dataset(variables, coords, dataset_attrs(system))
+    return xr.Dataset(variables, coords, dataset_attrs(whole))
+
+
+def _reduced(system: Model) -> tuple[Model, float]:
+    """A system without the constant part of its potential, and that part."""
+    law = system.law
+    formula = getattr(law, "base", law)
+    if not isinstance(formula, Formula):
+        return system, 0.0
+    base = float(constant(formula, [system.parameters[name] for name in formula.names]))
+    if not base:
+        return system, 0.0
+    expression = reduced(formula).expression
+    if formula is law:
+        return system.replace(expression=expression), base
+    own: Any = system
+    return own.replace(system=own.system.replace(expression=expression)), base
+
+
+def _orbits(
+    system: Model,
+    families: list[_Family],
+    starts: FloatArray,
+    rises: list[FloatArray],
+    level: FloatArray,
+) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Quantities of the orbits of families in a row, and their attributes.
+
+    By their energies above a saddle, which keep the digits next to it, where there is one; else
+    from their centers.
+    """
+    groups: dict[_Wall | None, list[tuple[npt.NDArray[np.intp], FloatArray]]] = {}
+    for number, (family, rise) in enumerate(zip(families, rises, strict=True)):
+        parts = [
+            (wall, np.flatnonzero(np.isfinite(gap)), gap)
+            for wall, gap in zip((family.floor, family.wall), family.gaps(level), strict=True)
+        ]
+        if any(wall is None and some.size for wall, some, _ in parts):
+            parts = [(None, np.arange(level.size), rise)]
+        for wall, some, gap in parts:
+            if some.size:
+                groups.setdefault(wall, []).append((number * level.size + some, gap[some]))
+    found = {name: np.full(len(families) * level.size, np.nan) for name in QUANTITIES}
+    attrs: dict[str, Any] = {}
+    for wall, members in groups.items():
+        rows, values = (np.concatenate(part) for part in zip(*members, strict=True))
+        if wall is None:
+            orbit = orbits(system, starts[rows // level.size], np.sqrt(2.0 * values))
+        else:
+            orbit = orbits(system, gap=values, saddle=wall.saddle, side=wall.side)
+        for name in QUANTITIES:
+            found[name][rows] = orbit[name].values
+            attrs[name] = orbit[name].attrs
+    return found, attrs
 
 
 def fall_per_turn(system: Model) -> float:
@@ -114,8 +194,7 @@ def fall_per_turn(system: Model) -> float:
 
 def _families(
     system: Model,
-    phi: FloatArray,
-    energy: FloatArray,
+    points: xr.Dataset,
     heights: FloatArray,
     centers: list[int],
     top: float,
@@ -126,11 +205,13 @@ def _families(
     which wells it shares. Under a torque a family is seen from its center of the least number,
     for from others its energies differ by those of turns.
     """
+    phi, energy = points.phi.values, points.energy.values
     marks = np.unique(heights[np.isfinite(heights) & (heights < top)])
     scale = float(np.abs(marks).max(initial=0.0))
     marks = marks[np.diff(marks, prepend=-np.inf) > SAME * scale]
     edges = np.append(marks, top)
     found: dict[Wells, _Family] = {}
+    walls = _Walls.of(system, points, SAME * scale)
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         middle = 0.5 * (low + high)
         here = [k for k in centers if energy[k] <= low + SAME * scale]
@@ -142,9 +223,58 @@ def _families(
             pairs = zip(sharing, here, strict=True)
             sharing = [w if w and min(w) == k else None for w, k in pairs]
         for wells in set(sharing) - {None}:
-            family = found.setdefault(wells, _Family(wells, float(low), float(high)))
+            arc = orbit.isel(point=sharing.index(wells))
+            if wells not in found:
+                found[wells] = _Family(wells, float(low), float(high))
+                found[wells].floor = walls.floor(arc, float(low))
+            family = found[wells]
             family.high, family.open = float(high), high == top
+            family.wall = walls.wall(arc, float(high))
     return sorted(found.values(), key=lambda f: (f.low, len(f.wells), f.wells))
+
+
+@dataclass(frozen=True)
+class _Walls:
+    """Saddles in this turn and those next to it, in the order of their places."""
+
+    number: npt.NDArray[np.intp]
+    place: FloatArray
+    energy: FloatArray
+    same: float
+
+    @classmethod
+    def of(cls, system: Model, points: xr.Dataset, same: float) -> _Walls:
+        """The saddles of a system; energies that differ by less than `same` are one.
+
+        None where equilibria are degenerate, for of these only some count as saddles.
+        """
+        kind = points.kind.values
+        saddle = (kind == EquilibriumKind.SADDLE) & ~np.any(kind == EquilibriumKind.DEGENERATE)
+        place, energy = points.phi.values[saddle], points.energy.values[saddle]
+        number = np.arange(place.size)
+        period = getattr(getattr(system, "system", system), "period", None)
+        turns = np.arange(-2.0, 3.0)[:, None] if period else np.zeros((1, 1))
+        place = (place[number] + turns * (period or 0.0)).ravel()
+        energy = (energy[number] - turns * fall_per_turn(system)).ravel()
+        order = np.argsort(place)
+        number = np.tile(number, turns.size)
+        return cls(number[order], place[order], energy[order], same)
+
+    def wall(self, arc: xr.Dataset, energy: float) -> _Wall | None:
+        """A saddle of an energy next to an arc."""
+        last = int(np.searchsorted(self.place, arc.phi_min.item())) - 1
+        first = int(np.searchsorted(self.place, arc.phi_max.item()))
+        for k, side in ((first, "left"), (last, "right")):
+            if 0 <= k < self.place.size and abs(self.energy[k] - energy) <= self.same:
+                return _Wall(int(self.number[k]), side)
+        return None
+
+    def floor(self, arc: xr.Dataset, energy: float) -> _Wall | None:
+        """A saddle of an energy under an arc, or under a rotation, which has no ends."""
+        low, high = arc.phi_min.item(), arc.phi_max.item()
+        inside = ~((self.place <= low) | (self.place >= high))
+        level = np.flatnonzero(inside & (np.abs(self.energy - energy) <= self.same))
+        return _Wall(int(self.number[level[0]]), "right") if level.size else None
 
 
 def _wells(orbit: xr.Dataset, phi: FloatArray, here: list[int], every: list[int]) -> Any:

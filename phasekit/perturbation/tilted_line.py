@@ -17,6 +17,7 @@ from phasekit.laws.perturbed import TiltedConservative
 from phasekit.perturbation.tilted_orbits import CELLS, SPAN, followed, repeated
 from phasekit.perturbation.tilted_potential import equilibria_of_cells, tilted
 from phasekit.phase.numerical import orbits as rounds
+from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import saddles_of
@@ -73,6 +74,11 @@ class Cells:
         """Length of the circle; on a line nothing returns."""
         return np.inf if self.formula.period is None else self.formula.period
 
+    @property
+    def constant(self) -> Array:
+        """What belongs to the energies of each system but not to its motion."""
+        return np.asarray(constant(self.formula, self.own) + 0.0 * self.torque)
+
     def level(self) -> tuple[Index, list[Array]]:
         """States without a torque, with the parameters of their potential."""
         cells = np.flatnonzero(self.torque[self.number] == 0.0)
@@ -109,12 +115,13 @@ class Slope:
     def of(cls, cells: Cells, systems: Index) -> Slope:
         """Find the equilibria of some systems, and repeat those of a circle."""
         own, torque = [p[systems] for p in cells.own], cells.torque[systems]
-        points = equilibria_of_cells(cells.formula, own, torque)
+        level = reduced(cells.formula)
+        points = equilibria_of_cells(level, own, torque)
         count = np.isfinite(points.phi).sum(axis=1)
         first = np.zeros(systems.size, np.intp)
-        if cells.formula.period is not None:
-            points, first = repeated(points, torque, cells.formula.period), count
-        line = Systems(unrolled(cells.formula), (*own, torque), systems.size)
+        if level.period is not None:
+            points, first = repeated(points, torque, level.period), count
+        line = Systems(unrolled(level), (*own, torque), systems.size)
         return cls(survey(line, points), torque, first, count, cells.period)
 
     def take(self, rows: Index) -> Slope:

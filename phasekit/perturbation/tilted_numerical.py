@@ -49,7 +49,8 @@ def orbits(law: TiltedConservative, *inputs: npt.ArrayLike) -> TiltedOrbits:
         if np.isfinite(cells.period):
             states = states._replace(turns=np.broadcast_to(turns, near.shape))
         found = slope.orbits(states, v[some])
-        whole = 0.5 * v[some] ** 2 + slope.ground.systems.potential(x[some])
+        level = slope.ground.systems.potential(x[some]) + cells.constant[cells.number[some]]
+        whole = 0.5 * v[some] ** 2 + level
         _enter(cells, out, some, found, whole)
     return TiltedOrbits._make(cells.shaped(out))
 
@@ -68,7 +69,9 @@ def orbits_at_energy(
     for slope, some in cells.parts():
         usable = slope.ground.points.kind == EquilibriumKind.CENTER
         column, there = slope.column(usable, center)
-        states = states_at_energy(slope.ground, h[some], column, there)
+        base = cells.constant[cells.number[some]]
+        size = np.abs(h[some]) + np.abs(base)
+        states = states_at_energy(slope.ground, h[some] - base, column, there, size)
         _enter(cells, out, some, slope.orbits(states, np.sqrt(2.0 * states.kinetic)), h[some])
     return TiltedOrbits._make(cells.shaped(out))
 
@@ -94,7 +97,8 @@ def orbits_at_gap(
             continue
         states = states_at_gap(slope.ground, gap[some], column, there, side)
         found = slope.orbits(states, np.sqrt(2.0 * states.kinetic))
-        _enter(cells, out, some, found, points.energy[rows, column] + gap[some])
+        base = points.energy[rows, column] + cells.constant[cells.number[some]]
+        _enter(cells, out, some, found, base + gap[some])
     return TiltedOrbits._make(cells.shaped(out))
 
 
@@ -153,7 +157,11 @@ def separatrices(law: TiltedConservative, *parameters: npt.ArrayLike) -> Tilted:
         size = (flat.size,) if own else ()
         level = [np.broadcast_to(x, (flat.size, *x.shape[len(size) :])) for x in found]
         parts.append((flat, level))
-    parts += [(some, _of_turn(slope)) for slope, some in cells.parts()]
+    place = Tilted._fields.index("saddle_energy")
+    for slope, some in cells.parts():
+        fields = _of_turn(slope)
+        fields[place] = fields[place] + cells.constant[cells.number[some]][:, None]
+        parts.append((some, fields))
     width = max((fields[2].shape[1] for _, fields in parts), default=0)
     out = []
     for i, name in enumerate(Tilted._fields[:-1]):

@@ -283,19 +283,21 @@ def followed(
         back = np.where(np.isfinite(back), back, 0.0)
         kinetic = np.clip(states.kinetic - turn * back, 0.0, highest)
         kinetic = np.where(back > 0.0, kinetic, states.kinetic)
-        blur = states.blur + np.where(back > 0.0, 4.0 * 2.0**-52 * states.kinetic, 0.0)[:, None]
+        lost = np.where(back > 0.0, 4.0 * 2.0**-52 * states.kinetic, 0.0)[:, None]
+        blur = states.blur + lost
         moved = states._replace(
             turns=states.turns + side * period * back,
             kinetic=kinetic,
             excess=states.excess - (states.kinetic - kinetic)[:, None],
             blur=blur,
+            error=states.error + lost,
         )
         found = rounds.orbits_of(ground, moved, v)
     kind = found.orbit_kind
     # Whether it comes to rest at a saddle of some turn is hidden by rounding where turns are.
     hidden = (back > 0.0) & (np.fmax.reduce(blur, axis=1) > HIDDEN * turn)
     runs = (kind == OrbitKind.UNBOUNDED) | ((back > 0.0) & (kind == OrbitKind.LIBRATION)) | hidden
-    lost = {
+    unknown = {
         name: np.where(runs, np.nan, getattr(found, name))
         for name in ("period", "frequency", "action", "period_error", "action_error")
     }
@@ -303,7 +305,7 @@ def followed(
     high = np.where(runs & (N > 0.0), np.inf, found.phi_max)
     kind = np.where(runs, OrbitKind.RUNNING, kind).astype(np.int8)
     return found._replace(
-        orbit_kind=kind, phi_min=low, phi_max=high, amplitude=0.5 * (high - low), **lost
+        orbit_kind=kind, phi_min=low, phi_max=high, amplitude=0.5 * (high - low), **unknown
     )
 
 

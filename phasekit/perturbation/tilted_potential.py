@@ -16,6 +16,7 @@ from phasekit.errors import EquilibriumKind
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.phase.numerical import functions
+from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
 from phasekit.phase.numerical.formula import Formula, make_formula
@@ -48,7 +49,10 @@ def equilibria(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Equili
     columns = np.stack([np.broadcast_to(values[n], shape).reshape(-1) for n in names]) + 0.0
     # Cells that differ in damping and drive alone have the same equilibria.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
-    found = equilibria_of_cells(formula, list(cells[:-1]), cells[-1])
+    own = list(cells[:-1])
+    found = equilibria_of_cells(reduced(formula), own, cells[-1])
+    base = np.broadcast_to(constant(formula, own), cells[-1].shape)
+    found = found._replace(energy=found.energy + base[:, None])
     return Equilibria._make(x[which.reshape(-1)].reshape(shape + x.shape[1:]) for x in found)
 
 

@@ -81,7 +81,10 @@ class Potential(Model):
 
     Periods, actions, areas and motions come with estimates of their errors (``period_error`` and so
     on). A period, an action or an area whose error may exceed 1e-8 of it is NaN, and a
-    RuntimeWarning says how many and why.
+    RuntimeWarning says how many and why. The errors hold what rounding of V does next to saddles,
+    where periods follow the last digits of the energy: there ``gap`` in place of a state, or of an
+    energy, keeps them. What does not depend on the coordinate is in no difference of V, so that a
+    constant changes energies alone.
 
     Examples
     --------

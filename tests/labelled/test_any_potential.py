@@ -108,6 +108,8 @@ def test_families_that_cannot_be():
         pk.orbit_families(pk.Potential("-x^2", "x"))
     with pytest.raises(pk.ParameterError, match="wants a single system"):
         pk.orbit_families(pk.Potential("a*x^2", "x", {"a": [1.0, 2.0]}))
+    with pytest.raises(pk.ParameterError, match=r"energy_max: got 4.9, wants an energy below"):
+        pk.orbit_families(pk.Potential("x^2 + 5", "x"), energy_max=4.9)
 
 
 def test_results_have_the_coordinate_by_its_own_name():

@@ -110,8 +110,13 @@ def test_families_below_any_energy():
     found = pk.orbit_families(well, 3, energy_max=1e15)
     assert found.family.values.tolist() == ["well_0", "well_2", "wells_0_2"]
     shallow = pk.Potential("1 + 1e-13*(x^4/4 - x^2/2 + 0.1*x)", "x")
+    same, whole = pk.orbit_families(shallow, 3), pk.orbit_families(well, 3)
+    assert same.family.values.tolist() == ["well_0", "well_2", "wells_0_2"]
+    np.testing.assert_allclose(same.period * 1e-13**0.5, whole.period, rtol=1e-12)
+    # An offset that is no term of its own takes the digits with it.
+    hidden = pk.Potential("(1 + 1e-13*(x^4/4 - x^2/2 + 0.1*x))^2/2", "x", interval=(-3.0, 3.0))
     with pytest.warns(RuntimeWarning, match="period of .* values are NaN"):
-        names = pk.orbit_families(shallow, 3).family.values.tolist()
+        names = pk.orbit_families(hidden, 3).family.values.tolist()
     assert names == ["well_0", "well_2", "wells_0_2"]
 
 

@@ -86,22 +86,13 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
         left = pace * np.abs(x - here) + np.abs(target - rate)
         size_of = np.hypot(pace * rate, ground.systems.slope(here))
         left = left + pace * blurs[0] + blurs[1]
-        # What rounding does to the energy of the state changes the time from its origin.
-        gap = _gap(ground, orbit)
-        spread = np.finfo(float).eps * (v * v + np.abs(orbit.orbit_energy)) / gap
-        late = (orbit.period_error + spread / pace) / orbit.period
+        # What is not known of the energy changes the time from its origin.
+        late = orbit.period_error / orbit.period
         error = pace * left / size_of + np.abs(pace * step) + 2.0 * np.pi * late
     angle = pace * time
     back = ~turns & (v > 0.0)
     angle = np.where(back, 2.0 * np.pi - angle, angle) % (2.0 * np.pi)
     return np.where(error <= WORST, angle, np.nan), error
-
-
-def _gap(ground: Ground, orbit: Orbits) -> Array:
-    """How far the energy of an orbit is from that of the nearest saddle; infinite without one."""
-    flat = ground.points.kind != EquilibriumKind.CENTER
-    off = np.abs(orbit.orbit_energy[:, None] - ground.points.energy)
-    return np.asarray(np.min(np.where(flat & (off > 0.0), off, np.inf), axis=1, initial=np.inf))
 
 
 def _origins(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, Array]:

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from phasekit.phase.numerical.equilibria import Equilibria, equilibria
 from phasekit.phase.numerical.formula import Shape
+from phasekit.phase.numerical.noise import noise, slope_noise
 from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.systems import Index, Systems
 
@@ -32,16 +33,22 @@ _FINE_NODES, _FINE_WEIGHTS = _gauss(13)
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """Systems with their equilibria, and how far from each of these Gauss' rule holds."""
+    """Systems with their equilibria, and how far from each of these Gauss' rule holds.
+
+    Rounding may have moved the energies of equilibria by `blur`, and V' there is at most `slope`.
+    """
 
     systems: Systems
     points: Equilibria
     near: Array
+    blur: Array
+    slope: Array
 
     def take(self, rows: Index) -> Ground:
         """The systems of some rows, which may repeat."""
         points = Equilibria._make(field[rows] for field in self.points)
-        return Ground(self.systems.take(rows), points, self.near[rows])
+        own = (self.near, self.blur, self.slope)
+        return Ground(self.systems.take(rows), points, *(field[rows] for field in own))
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +121,13 @@ def survey(systems: Systems, points: Equilibria | None = None) -> Ground:
             reach = np.maximum(left, right)
             near = np.where(reach > 0.0, np.minimum(near, 2.0 * reach), near)
         near = _proved(systems, x, near)
-    return Ground(systems, points, near)
+        blur, slope = noise(systems, x, points.energy), systems.slope(x)
+        slope = np.abs(slope) + slope_noise(systems, x, slope)
+        # An equilibrium that is known so far only: V changes by the square.
+        off = np.where(
+            points.curvature != 0.0, 0.5 * slope * (slope / np.abs(points.curvature)), 0.0
+        )
+    return Ground(systems, points, near, blur + off, slope)
 
 
 def _proved(systems: Systems, x: Array, near: Array) -> Array:

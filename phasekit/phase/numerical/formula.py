@@ -163,7 +163,7 @@ def make_formula(
     arguments = [x, *(symbols[name] for name in names)]
     shape, coefficients = _shape(slope, x, period)
     values, slopes, bends = (
-        _array_function(array_code(arguments, f, _shared)) for f in (potential, slope, bend)
+        array_function(array_code(arguments, f, shared)) for f in (potential, slope, bend)
     )
     series = None if coefficients is None else array_code(arguments[1:], coefficients)
     return Formula(
@@ -208,7 +208,7 @@ def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[An
     return slope, bend
 
 
-def _shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:
+def shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:
     """Take out what occurs twice, and write small powers as products, which numpy does faster.
 
     In this order: sympy miscounts factors that it has been told not to collect.
@@ -221,7 +221,9 @@ def _shared(expression: Any) -> tuple[list[tuple[Any, Any]], Any]:
     return [(symbol, products(part)) for symbol, part in parts], products(rest)
 
 
-def _array_function(function: Callable[..., Any]) -> Callable[..., Array]:
+def array_function(function: Callable[..., Any]) -> Callable[..., Array]:
+    """Code as a function of reals that broadcast; NaN where its values are not real."""
+
     @functools.wraps(function)
     def called(x: npt.ArrayLike, *parameters: npt.ArrayLike) -> Array:
         if type(x) is not np.ndarray or x.dtype != np.float64:

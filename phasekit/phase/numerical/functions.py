@@ -21,6 +21,7 @@ from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical import separatrices as loops
 from phasekit.phase.numerical.angles import AnglesWithErrors
 from phasekit.phase.numerical.angles import angles as find_angles
+from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
@@ -70,12 +71,13 @@ def phase_velocity(formula: Formula, *inputs: npt.ArrayLike) -> Array:
 
 def equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Equilibria:
     """All equilibria, from left to right on the last axis."""
-    systems, shape = make_systems(formula, parameters)
+    systems, shape = make_systems(reduced(formula), parameters)
     if systems.size <= _KEPT:
         points = _survey(formula, parameters)[0].points
     else:
         points = find_equilibria(systems)
-    return Equilibria._make(np.array(f).reshape(shape + f.shape[1:]) for f in points)
+    found = Equilibria._make(np.array(f).reshape(shape + f.shape[1:]) for f in points)
+    return found._replace(energy=found.energy + _constants(formula, parameters, 1))
 
 
 def separatrices(formula: Formula, *parameters: npt.ArrayLike) -> Separatrices:
@@ -87,9 +89,12 @@ def phase_space(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibri
     """Equilibria and separatrices at once."""
     ground, shape = _survey(formula, parameters)
     found = loops.separatrices(ground)
+    points = Equilibria._make(f.reshape(shape + f.shape[1:]) for f in ground.points)
+    found = Separatrices._make(f.reshape(shape + f.shape[1:]) for f in found)
+    base = _constants(formula, parameters, 1)
     return (
-        Equilibria._make(f.reshape(shape + f.shape[1:]) for f in ground.points),
-        Separatrices._make(f.reshape(shape + f.shape[1:]) for f in found),
+        points._replace(energy=points.energy + base),
+        found._replace(saddle_energy=found.saddle_energy + base),
     )
 
 
@@ -110,7 +115,8 @@ def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
     *parameters, phi, dphi = inputs
     ground, shape, (x, v) = _cells(formula, parameters, (phi, dphi))
-    return _shaped(rounds.orbits(ground, x, v), shape)
+    found = _shaped(rounds.orbits(ground, x, v), shape)
+    return found._replace(orbit_energy=found.orbit_energy + _constants(formula, parameters))
 
 
 def angles(formula: Formula, *inputs: npt.ArrayLike) -> AnglesWithErrors:
@@ -124,24 +130,29 @@ def angles(formula: Formula, *inputs: npt.ArrayLike) -> AnglesWithErrors:
 def orbits_at_energy(formula: Formula, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
     *parameters, level = inputs
-    ground, shape, (h,) = _cells(formula, parameters, (level,))
+    base = _constants(formula, parameters)
+    ground, shape, (h, still) = _cells(formula, parameters, (level, base))
     points = ground.points
     usable = points.kind == EquilibriumKind.CENTER
     column, there = _pick(points.energy, usable, center)
-    states = states_at_energy(ground, h, column, there)
-    found = rounds.orbits_of(ground, states, np.sqrt(2.0 * states.kinetic))
-    return _shaped(found, shape)
+    states = states_at_energy(ground, h - still, column, there, np.abs(h) + np.abs(still))
+    found = _shaped(rounds.orbits_of(ground, states, np.sqrt(2.0 * states.kinetic)), shape)
+    return found._replace(orbit_energy=found.orbit_energy + base)
 
 
-def states_at_energy(ground: Ground, h: Array, column: Index, there: Any) -> rounds.States:
-    """States of an energy at a center, by its column."""
+def states_at_energy(
+    ground: Ground, h: Array, column: Index, there: Any, size: Array | float = 0.0
+) -> rounds.States:
+    """States of an energy at a center, by its column; `size` is that of numbers it is made of."""
     points, rows = ground.points, np.arange(h.size)
     excess = h[:, None] - points.energy
     x = np.where(there, _at(points.phi, rows, column), np.nan)
     kinetic = np.where(there, _at(excess, rows, column), np.nan)
     kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
-    size = np.maximum(np.abs(h)[:, None], np.abs(points.energy))
-    return rounds.States(x, np.zeros(x.shape), kinetic, excess, 4.0 * np.finfo(float).eps * size)
+    size = np.maximum(np.maximum(np.abs(h), size)[:, None], np.abs(points.energy))
+    error = np.finfo(float).eps * size + ground.blur
+    blur = 4.0 * np.finfo(float).eps * size
+    return rounds.States(x, np.zeros(x.shape), kinetic, excess, blur, error)
 
 
 def orbits_at_gap(
@@ -155,7 +166,8 @@ def orbits_at_gap(
     states = states_at_gap(ground, gap, column, there, side)
     found = rounds.orbits_of(ground, states, np.sqrt(2.0 * states.kinetic))
     energies = np.where(found.orbit_kind >= 0, height + gap, np.nan)
-    return _shaped(found._replace(orbit_energy=energies), shape)
+    found = _shaped(found._replace(orbit_energy=energies), shape)
+    return found._replace(orbit_energy=found.orbit_energy + _constants(formula, parameters))
 
 
 def states_at_gap(
@@ -179,8 +191,10 @@ def states_at_gap(
     kinetic = np.where(there, _at(excess, rows, start), np.nan)
     kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
     x = np.where(there, _at(points.phi, rows, start), np.nan)
-    blur = np.zeros(excess.shape)
-    return rounds.States(x, np.zeros(x.shape), kinetic, excess, blur)
+    own = np.arange(excess.shape[1]) == column[:, None]
+    error = ground.blur + _at(ground.blur, rows, column)[:, None]
+    error = np.where(own, 0.0, error + np.finfo(float).eps * np.abs(excess))
+    return rounds.States(x, np.zeros(x.shape), kinetic, excess, np.zeros(excess.shape), error)
 
 
 def flow(formula: Formula, *inputs: npt.ArrayLike) -> Motion:
@@ -233,10 +247,12 @@ def separatrix_motion_with_errors(
 
 
 def _survey(formula: Formula, parameters: Sequence[npt.ArrayLike]) -> tuple[Ground, Shape]:
-    systems, shape = make_systems(formula, tuple(parameters))
+    systems, shape = make_systems(reduced(formula), tuple(parameters))
     if systems.size > _KEPT:
         return survey(systems), shape
-    return _surveyed(formula, systems.size, tuple(p.tobytes() for p in systems.parameters)), shape
+    return _surveyed(
+        systems.formula, systems.size, tuple(p.tobytes() for p in systems.parameters)
+    ), shape
 
 
 @functools.lru_cache(maxsize=32)
@@ -244,6 +260,12 @@ def _surveyed(formula: Formula, size: int, parameters: tuple[bytes, ...]) -> Gro
     """The ground of a few systems, which calls in a row ask for again."""
     arrays = tuple(np.frombuffer(values) for values in parameters)
     return survey(Systems(formula, arrays, size))
+
+
+def _constants(formula: Formula, parameters: Sequence[npt.ArrayLike], axes: int = 0) -> Any:
+    """The constant parts of V, to be added to energies with so many axes of their own behind."""
+    base = np.asarray(constant(formula, parameters))
+    return base.reshape(base.shape + (1,) * axes) if base.ndim else base
 
 
 def _cells(

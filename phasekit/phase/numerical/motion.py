@@ -16,7 +16,8 @@ import numpy.typing as npt
 from phasekit.errors import OrbitKind
 from phasekit.phase.numerical.collocation import follow
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.orbits import orbits_of, resting_ends, states_of
+from phasekit.phase.numerical.noise import noise, slope_noise
+from phasekit.phase.numerical.orbits import States, orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.quadrature import speeds
 from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.separatrices import Branch, branch_of
@@ -92,13 +93,21 @@ def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motio
     shift = states.turns[owner] + np.where(rotating, rounds * turn * np.sign(v[owner]), 0.0)
     out_x, out_v = (np.where(np.isfinite(time), out, np.nan) for out in (out_x, out_v))
     round_error = orbit.period_error[owner] + 2.0 * _EPS * np.where(turning, period, 0.0)
-    late = np.abs(rounds) * np.where(turning, round_error, 0.0)
+    late = np.abs(rounds) * np.where(turning, round_error, 0.0) + _late(ground, states, v)[owner]
     energy = orbit.orbit_energy[owner]
     errors = _errors(ground, owner, out_x, out_v, rest, late, energy)
     lost = np.isnan(out_x) & np.isfinite(time) & (kind != OrbitKind.NOT_COMPUTED)
     lost &= kind != OrbitKind.UNBOUNDED
     phi_error, dphi_error = (np.where(lost, np.inf, error) for error in errors)
     return MotionWithErrors(out_x + shift, out_v, phi_error + _EPS * np.abs(shift), dphi_error)
+
+
+def _late(ground: Ground, states: States, v: Array) -> Array:
+    """By how much starts come late because whole turns, which are rounded, were taken away."""
+    with np.errstate(all="ignore"):
+        slope, bend = ground.systems.slope(states.x), ground.systems.bend(states.x)
+        reach = np.hypot(v, slope / np.sqrt(np.abs(bend)))
+        return np.where(states.turns == 0.0, 0.0, _EPS * np.abs(states.turns) / reach)
 
 
 def _errors(
@@ -109,14 +118,17 @@ def _errors(
     with np.errstate(all="ignore"):
         height, slope = systems.potential(x), np.abs(systems.slope(x))
         pace = np.sqrt(np.abs(systems.bend(x))) + 1.0 / (1.0 + np.abs(time))
-        off = np.abs(0.5 * v * v + height - energy) + _EPS * (v * v + np.abs(height))
+        off = np.abs(0.5 * v * v + height - energy) + _EPS * v * v
+        off += noise(systems, x, height) + _EPS * np.abs(height)
+        push = slope_noise(systems, x, slope) / pace
         size = v * v + (slope / pace) ** 2
         late = late + np.abs(time) * (off / size + 4.0 * _EPS)
         late = np.where(np.isfinite(late), late, 0.0)
         speed = np.abs(v)
         reach = speed + slope / pace
         phi = speed * late + 0.5 * slope * late**2 + off / (reach * pace) + 4.0 * _EPS * np.abs(x)
-        dphi = slope * late + off / reach + 4.0 * _EPS * speed
+        dphi = slope * late + off / reach + 4.0 * _EPS * speed + push
+        phi = phi + push / pace
     rest = (v == 0.0) & (slope == 0.0)
     return np.where(rest, 4.0 * _EPS * np.abs(x), phi), np.where(rest, 0.0, dphi)
 
@@ -131,7 +143,9 @@ def separatrix_motion(branch: Branch, owner: Index, time: Array) -> MotionWithEr
     rows = np.arange(branch.saddle.size)
     energy = branch.ground.systems.potential(branch.saddle)[rows[owner]]
     nothing = np.zeros(time.shape)
-    errors = _errors(branch.ground, owner, x, v, nothing, nothing, energy)
+    phi_error, dphi_error = _errors(branch.ground, owner, x, v, nothing, nothing, energy)
+    place, bend = branch.place_error, branch.ground.systems.bend(branch.saddle)
+    errors = (phi_error + place[owner], dphi_error + (place * np.sqrt(np.abs(bend)))[owner])
     lost = np.isnan(x) & np.isfinite(time) & np.isfinite(branch.length[owner])
     return MotionWithErrors(x, v, *(np.where(lost, np.inf, error) for error in errors))
 

@@ -9,7 +9,9 @@ import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.differences import Anchor, Ground
-from phasekit.phase.numerical.periods import librations, rotations
+from phasekit.phase.numerical.energy_errors import errors_of_energies
+from phasekit.phase.numerical.noise import noise
+from phasekit.phase.numerical.periods import WORST, librations, rotations
 from phasekit.phase.numerical.systems import Systems
 from phasekit.phase.numerical.turning_points import End, find_end
 
@@ -48,7 +50,9 @@ class States(NamedTuple):
     excess: Array
     """Energy above each equilibrium, shape (orbits, equilibria)."""
     blur: Array
-    """What rounding may have done to that."""
+    """What rounding of the state may have done to that."""
+    error: Array
+    """What rounding on the way to it may have done."""
 
 
 def states_of(ground: Ground, x: Array, v: Array) -> States:
@@ -57,12 +61,14 @@ def states_of(ground: Ground, x: Array, v: Array) -> States:
     kinetic = 0.5 * v * v
     points, systems = ground.points, ground.systems
     height = systems.potential(home)
-    energy = kinetic + height
-    excess = energy[:, None] - points.energy
+    # The digits that a state shares with an equilibrium are not lost in their energy.
+    excess = kinetic[:, None] + (height[:, None] - points.energy)
     slope = np.abs(systems.slope(home) * home)
     blur = 2.0 * _EPS * (2.0 * kinetic + slope)[:, None] + 4.0 * _EPS * np.maximum(
         np.abs(height)[:, None], np.abs(points.energy)
     )
+    away = noise(systems, home, height) + _EPS * np.abs(turns) * np.abs(systems.slope(home))
+    error = (away + _EPS * kinetic)[:, None] + _EPS * np.abs(excess) + ground.blur
     if points.phi.shape[1]:
         offset = home[:, None] - points.phi
         period = systems.formula.period
@@ -75,7 +81,9 @@ def states_of(ground: Ground, x: Array, v: Array) -> States:
             excess[rows, columns] = kinetic[rows] + Anchor(few, at, near).rise(u)
             size = u * u * (np.abs(few.bend(at)) + np.abs(few.bend(at + u)))
             blur[rows, columns] = 2.0 * _EPS * ((2.0 * kinetic + slope)[rows] + size)
-    return States(home, turns, kinetic, excess, blur)
+            off = 2.0 * _EPS * (kinetic[rows] + size)
+            error[rows, columns] = off + np.abs(u) * ground.slope[rows, columns]
+    return States(home, turns, kinetic, excess, blur, error)
 
 
 def _wrapped(ground: Ground, x: Array) -> tuple[Array, Array]:
@@ -133,6 +141,13 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
             found[:, rows] = rotations(
                 ground.take(rows), x[rows], states.kinetic[rows], states.excess[rows]
             )
+        rows = np.flatnonzero(
+            ((kind == OrbitKind.LIBRATION) | (kind == OrbitKind.ROTATION)) & np.isfinite(period)
+        )
+        if rows.size:
+            off = np.stack(errors_of_energies(ground, states, left, right, period))
+            found[2:, rows] += off[:, rows]
+            found[:2][~(found[2:] <= WORST * found[:2])] = np.nan
         bend = ground.systems.bend(x)
         degenerate = np.any(
             (points.phi == x[:, None]) & (points.kind == EquilibriumKind.DEGENERATE), axis=1

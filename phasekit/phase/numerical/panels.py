@@ -231,7 +231,9 @@ def _sums(halves: _Halves, panels: _Panels, timed: bool) -> tuple[Array, Array, 
             part = width * (values @ _WEIGHTS)
             most = np.max(np.abs(values), axis=1)
             rest = np.max(np.abs((values @ _TO_SERIES.T)[:, -2:]), axis=1)
-            error = width * rest * np.minimum(rest / most, 1.0)
+            # The rule errs by terms of twice the order, a series of which the first is as the
+            # square of the last here.
+            error = 4.0 * width * rest * np.minimum(rest / most, 1.0)
             error += width * ((values * 0.5 * unsure) @ _WEIGHTS)
             error += 0.5 * part * halves.blur[panels.half] / scale
             poor |= ~(rest <= _LOOSE * most) & ~stuck

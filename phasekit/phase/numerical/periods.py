@@ -82,7 +82,8 @@ def librations(ground: Ground, x: Array, excess: Array, left: End, right: End) -
             # Rules that differ in their points alone say nothing of how well V'' is known.
             tail = np.max(np.abs(bend @ to_series[-4:].T), axis=1)
             least = np.min(root, axis=1) ** 2
-            rows, fine = _settle(found, rows, fine, coarse, tail / least)
+            rounding = _EPS * np.max(np.abs(bend), axis=1) / least
+            rows, fine = _settle(found, rows, fine, coarse, tail / least, rounding)
         if not rows.size:
             return found
         coarse = fine
@@ -100,8 +101,13 @@ def _settle(
     fine: tuple[Array, Array],
     coarse: tuple[Array, Array],
     tail: Array,
+    rounding: Array,
 ) -> tuple[Index, tuple[Array, Array]]:
-    """Accept what two rules agree on; return the rows that are left, and the finer rule there."""
+    """Accept what two rules agree on; return the rows that are left, and the finer rule there.
+
+    `tail` is what the series of V'' leaves out, or has of its rounding in each term, as part of
+    the least that it is integrated to; `rounding` that of V'' as it is evaluated.
+    """
     differences = [np.abs(f - c) / f for f, c in zip(fine, coarse, strict=True)]
     good = np.all([d <= _AGREE for d in differences], axis=0) & (tail <= 1e-12)
     done = rows[good]
@@ -114,7 +120,7 @@ def _settle(
     ):
         value[done] = f[good]
         # The error is the square of the difference: it falls by as many powers again.
-        error[done] = (f * (d * d + tail + 16.0 * _EPS))[good]
+        error[done] = (f * (d * d + 4.0 * tail + rounding + 16.0 * _EPS))[good]
     return rows[~good], (fine[0][~good], fine[1][~good])
 
 
@@ -157,7 +163,8 @@ def rotations(ground: Ground, x: Array, kinetic: Array, excess: Array) -> Round:
             turn * np.mean(speed, axis=1) / (2.0 * np.pi),
         )
         if coarse is not None:
-            rows, fine = _settle(found, rows, fine, coarse, np.zeros(rows.size))
+            nothing = np.zeros(rows.size)
+            rows, fine = _settle(found, rows, fine, coarse, nothing, nothing)
         if not rows.size:
             return found
         coarse = fine

@@ -46,7 +46,8 @@ class Branch:
     """What leaves each of some saddles to one side, one row each.
 
     `length` is the distance to the turning point, or to the saddle that it joins, which on a
-    circle may be the saddle itself; infinite where there is neither.
+    circle may be the saddle itself; infinite where there is neither. `place_error` is how
+    far rounding of V' may have moved the saddle.
     """
 
     ground: Ground
@@ -58,6 +59,7 @@ class Branch:
     near: End
     far: End
     excess: Array
+    place_error: Array
 
 
 def saddles_of(ground: Ground) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
@@ -102,7 +104,10 @@ def branch_of(ground: Ground, column: npt.NDArray[np.intp], side: float) -> Bran
     zero = np.zeros(saddle.shape)
     own = Anchor(systems, saddle, ground.near[rows, column])
     near = End(zero, far.turned, own, zero, zero)
-    return Branch(ground, saddle, side, length, joins, winds, near, end, excess)
+    bend = np.abs(points.curvature[rows, column])
+    with np.errstate(all="ignore"):
+        off = np.where(bend > 0.0, ground.slope[rows, column] / bend, 0.0)
+    return Branch(ground, saddle, side, length, joins, winds, near, end, excess, off)
 
 
 def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
@@ -114,8 +119,11 @@ def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
     pieces = between(ground, start, length, branch.excess[rows], *ends)
     with np.errstate(all="ignore"):
         found = integrate(ground, pieces, timed=False)
-        known = found.area_error <= WORST * found.area
-    return np.where(known, found.area, np.nan), found.area_error
+        # Either end may lie beside where V' is 0; the area goes with the square of the length.
+        off = branch.place_error[rows] / length
+        error = found.area_error + 4.0 * found.area * np.where(length > 0.0, off, 0.0)
+        known = error <= WORST * found.area
+    return np.where(known, found.area, np.nan), error
 
 
 def separatrices(ground: Ground) -> Separatrices:

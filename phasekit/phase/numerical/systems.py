@@ -35,22 +35,23 @@ class Systems:
 
     def potential(self, x: Array) -> Array:
         """V at x of shape (systems, ...)."""
-        return self.formula.values(x, *self._beside(x))
+        return self.formula.values(x, *self.beside(x))
 
     def slope(self, x: Array) -> Array:
         """V' at x of shape (systems, ...)."""
-        return self.formula.slopes(x, *self._beside(x))
+        return self.formula.slopes(x, *self.beside(x))
 
     def bend(self, x: Array) -> Array:
         """V'' at x of shape (systems, ...)."""
-        return self.formula.bends(x, *self._beside(x))
+        return self.formula.bends(x, *self.beside(x))
 
     def coefficients(self) -> npt.NDArray[np.complex128] | Array:
         """Coefficients of V', shape (systems, n); see `Formula.slope_coefficients`."""
         found = self.formula.slope_coefficients(self.parameters)
         return np.broadcast_to(found, (self.size, found.shape[-1]))
 
-    def _beside(self, x: Array) -> tuple[Array, ...]:
+    def beside(self, x: Array) -> tuple[Array, ...]:
+        """The parameters, in shapes that broadcast against x of shape (systems, ...)."""
         extra = (1,) * (x.ndim - 1)
         return tuple(p.reshape(p.shape + extra) for p in self.parameters)
 
