@@ -1,29 +1,36 @@
-"""Elimination on pieces of a flat array, interpreted, against NumPy."""
+"""Elimination on pieces of a flat array, interpreted and compiled, against NumPy."""
 
 import numpy as np
 import pytest
 
 from phasekit.bifurcation.continuation.kernels import newton
 from phasekit.numerics import native
+from phasekit.numerics.compile import kernel
 
 
-@pytest.mark.parametrize("n", [2, 5, 7, 40])
-def test_elimination_gives_both_solutions_and_the_sign_of_the_determinant(n):
+@kernel
+def compiled(w, a, b, n):
+    return native.solve(w, a, b, n)
+
+
+@pytest.mark.parametrize("n", [2, 5, 7, 40, 100])
+@pytest.mark.parametrize("solve", [native.solve, compiled])
+def test_elimination_gives_both_solutions_and_the_sign_of_the_determinant(solve, n):
     rng = np.random.default_rng(n)
     seen = set()
     for _ in range(8):
         matrix, right = rng.normal(size=(n, n)), rng.normal(size=(n, 2))
         w = np.concatenate([[7.0], matrix.ravel(), right.ravel(), [9.0]])
-        sign = native.solve(w, 1, 1 + n * n, n)
+        sign = solve(w, 1, 1 + n * n, n)
         np.testing.assert_allclose(
             w[1 + n * n : -1].reshape(n, 2), np.linalg.solve(matrix, right), rtol=1e-9
         )
-        assert native.orientation(w, 1, n, sign) == np.linalg.slogdet(matrix)[0]
+        assert sign == np.linalg.slogdet(matrix)[0]
         assert (w[0], w[-1]) == (7.0, 9.0)
         seen.add(sign)
     assert seen == {1.0, -1.0}
     w = np.concatenate([np.ones(n * n), np.ones(2 * n)])
-    assert native.solve(w, 0, n * n, n) == 0.0
+    assert solve(w, 0, n * n, n) == 0.0
 
 
 @pytest.mark.parametrize("n", [2, newton.FEW, newton.FEW + 1])
