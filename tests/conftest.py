@@ -58,8 +58,15 @@ FAST = "not slow"
 SLOW = (
     "published",
     "properties",
+    "labelled/test_cycle_branch_points.py",
+    "labelled/test_cycle_forms.py",
+    "loads/test_functions.py",
+    "maps/test_hostile_files.py",
+    "maps/test_interrupts.py",
     "maps/test_store_damage.py",
     "maps/test_store_failures.py",
+    "perturbation/test_escape.py",
+    "phase/test_phase_space_kernel.py",
     "phase/test_portrait_kernel.py",
     "plot/test_layout.py",
 )

@@ -103,6 +103,7 @@ def unit(ds, line):
     return (line - low) / (high - low)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("system", "x", "y"), PLANES, ids=IDS)
 def test_the_count_changes_at_the_curves_and_nowhere_else(system, x, y):
     """Along random segments, by 3,000 counts each."""

@@ -288,7 +288,6 @@ def check(loop: Curve, got, rotators: bool, context) -> None:
     assert (rms >= mean * (1 - 1e-12)).all()
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("rotators", [False, True], ids=["forces", "rotators"])
 @pytest.mark.parametrize("name", DISKS)
 def test_loops(name, rotators):

@@ -247,6 +247,7 @@ BRAKED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("system", "name", "ratio", "brake"), BRAKED if ORBITS else BRAKED[:2] + BRAKED[4:]
 )
@@ -382,6 +383,7 @@ def test_two_wells_on_one_level_share_alike_by_formula_and_by_coefficients(start
     assert numerical[2] == pytest.approx(closed[2], rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_of_three_wells_left_and_right_are_not_all():
     """From rotation it may fall into the third one, which two shares would hide."""
     text = "cos(x) + 0.5*cos(2*x) + 0.7*cos(3*x) + 0.1*sin(x)"
@@ -394,6 +396,7 @@ def test_of_three_wells_left_and_right_are_not_all():
     assert outside.sum() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_a_circle_that_is_gone_round_several_times():
     """Its cells are alike: the shares are those of one, and all cells together turn."""
     eight = "cos(x)^2/2 - 0.35*cos(x) - 0.12*sin(x)"

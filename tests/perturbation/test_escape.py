@@ -67,7 +67,6 @@ def test_washboard(bias, damping, side, simulated, error):
     assert 0.0 < found.escape_error.item() < 0.2
 
 
-@pytest.mark.slow
 def test_two_ends_of_a_well():
     """Y(D) over each of equal ends, Y(2 D) over one alone."""
     D = np.array([0.01, 0.3, 2.0, 50.0])
@@ -211,7 +210,6 @@ def test_the_washboard_in_the_limits_of_kramers():
     assert mirrored[1] == pytest.approx(there[0], rel=1e-9)
 
 
-@pytest.mark.slow
 def test_cold_wells_are_left_at_the_least_rates_that_there_are():
     """Where exp(-barrier/kT) is subnormal the rate is, and nowhere NaN."""
     kT = np.geomspace(2.6e-3, 3.2e-3, 25)

@@ -115,6 +115,7 @@ def test_random_systems(family):
     raise AssertionError("too few systems")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("A", [1.5, -1.5])
 @pytest.mark.parametrize("u", [0.1, 1e-4, 1e-8, 1e-12, 1e-15])
 def test_small_lobes_next_to_a_fold(A, u):
@@ -123,6 +124,7 @@ def test_small_lobes_next_to_a_fold(A, u):
         check(A, size * np.cos(theta) ** 3, -size * np.sin(theta) ** 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("u", [1e-3, 1e-7, 1e-12])
 def test_small_lobes_next_to_a_cusp(u):
     """Both lobes are small next to the cusp that is like a center."""
@@ -132,6 +134,7 @@ def test_small_lobes_next_to_a_cusp(u):
         check(-2.0, -2.0 * tongue * part, 2.0 * (1 - u))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("digits", [10, 20, 30, 60, 100, 200, 300])
 def test_exponent_next_to_a_cusp(digits):
     """On |C| = A a saddle's V'' goes with B^(2/3), and a center's on |B| = A with C^(2/3).

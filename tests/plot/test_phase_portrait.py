@@ -260,6 +260,7 @@ def test_the_legend_lies_outside(ax):
     assert pk.plot.phase_portrait(EIGHT, legend=False).get_legend() is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", [1, 2])
 def test_the_legend_is_not_cut_off(rows):
     figure, panels = plt.subplots(rows, 2, squeeze=False)
