@@ -23,7 +23,6 @@ def mathieu(a, q):
     return pk.Perturbed(MATHIEU.replace(a=a), modulation={"a": pk.Harmonic(-2.0 * q, 2.0)})
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("q", [0.3, 1.7])
 def test_mathieus_boundaries_by_the_trace_of_the_map(order, q):
@@ -92,7 +91,6 @@ def test_the_exponent_of_a_chaotic_motion():
     assert 0.05 < rate < 0.3
 
 
-@pytest.mark.slow
 def test_exponents_of_quadratic_damping_are_negative_where_it_moves():
     system = pk.Perturbed(EIGHT, quadratic=0.5, forcing=pk.Harmonic(0.5, 1.0))
     ds = pk.lyapunov(system, 0.1, 0.0, time=300.0)
