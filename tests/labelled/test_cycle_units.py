@@ -109,6 +109,7 @@ def test_states_of_different_units(size, start):
     if start == 2.0:
         cycles = pk.continuation(uneven, "mu", orbit=orbit, span=(0.5, 1.5))
         assert [stop.reason for stop in cycles.stops] == ["bound", "bound"]
+        assert cycles.points.sizes["point"] > 3
         assert np.all(cycles.points.liouville_error < 1e-7)
         alike = pk.periodic_orbit(uneven.replace(mu=1.5), [2.0, 0.0])
         last = int(cycles.points.mu.argmax("point"))

@@ -63,7 +63,7 @@ def periodic_orbit(
         Time that is simulated first, so that transients decay. By default none with a period given,
         and otherwise as much as it takes.
     options : ContinuationOptions, optional
-        ``degree``, ``intervals``, ``mesh_tolerance``.
+        ``degree``, ``intervals``, ``mesh_tolerance``, ``scales``.
 
     Returns
     -------
@@ -77,10 +77,12 @@ def periodic_orbit(
     ParameterError
         If an argument is unusable.
     ConvergenceError
-        If no periodic orbit is found.
+        If no periodic orbit is found, or a search for a return takes more than 3e6 values of f.
 
     Notes
     -----
+    States may differ in their units: they are measured in those in which the slopes of f balance.
+
     The orbit solves ``dx/ds = T f(x)`` with ``x(1) = x(0)`` (for angles up to whole turns) and a
     phase condition, by collocation at Gauss points on a mesh that adapts itself
     ([AscherMattheijRussell1995] chapter 5, [Doedel1991]); of a forced system T is given. Floquet
