@@ -20,7 +20,7 @@ from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
 from phasekit.systems.system import Model
-from phasekit.table.quantities import PASSES, QUANTITIES, variant
+from phasekit.table.quantities import ROWS, TABLE, variant
 from phasekit.table.row import LAW, Pass, Quantity
 
 
@@ -89,7 +89,7 @@ def first_line(thing: Any) -> str:
 
 
 def _quantities() -> str:
-    groups = dict.fromkeys(row.group for row in QUANTITIES)
+    groups = dict.fromkeys(row.group for row in ROWS.values())
     return page(
         "# Quantities",
         "Every row of the table of quantities: what `sweep(of=...)` and the labelled functions "
@@ -121,8 +121,8 @@ def _ladder(rung: type[Law], depth: int = 0) -> Iterator[str]:
 
 
 def _group(group: str) -> Iterator[str]:
-    rows = [row for row in QUANTITIES if row.group == group]
-    passes = [one for one in PASSES if group in one.groups]
+    rows = [row for row in ROWS.values() if row.group == group]
+    passes = [one for one in TABLE.passes if group in one.groups]
     yield f"## {group}"
     if passes:
         head = ("of", "from", "named in the call", "may be given", "computed by")
@@ -253,7 +253,7 @@ def _codes() -> str:
 
 
 def _enum(cls: type[IntEnum]) -> Iterator[str]:
-    held = codes(row.name for row in QUANTITIES if row.flags is cls)
+    held = codes(row.name for row in ROWS.values() if row.flags is cls)
     yield f"## {cls.__name__}"
     yield f"{{py:obj}}`phasekit.{cls.__name__}`: {first_line(cls)} Held by {held}."
     yield table(("value", "name"), [(str(one.value), code(one.name.lower())) for one in cls])

@@ -33,8 +33,7 @@ SECTIONS = dict(
 def registries(monkeypatch):
     """The tables and registries as they were before."""
     known, rows = dict(models()), dict(quantities.ROWS)
-    monkeypatch.setattr(quantities, "QUANTITIES", quantities.QUANTITIES)
-    monkeypatch.setattr(quantities, "PASSES", quantities.PASSES)
+    monkeypatch.setattr(quantities.TABLE, "passes", quantities.TABLE.passes)
     kinds = dict(KINDS)
     monkeypatch.setattr(curve_tests, "TESTS", list(curve_tests.TESTS))
     yield
@@ -110,12 +109,12 @@ ROW = Quantity("depth", "depth", ("saddle",), "float64", "s-2", "depth", "V(1)",
     ],
 )
 def test_what_cannot_be_added_is_refused_and_changes_nothing(row, passes, message):
-    before = (dict(quantities.ROWS), quantities.QUANTITIES, quantities.PASSES)
+    before = (dict(quantities.ROWS), quantities.TABLE.passes)
     changed = {name: row.get(name, getattr(ROW, name)) for name in ROW.__slots__}
     lines = [Pass(np.abs, ("energy",), groups) for groups in passes]
     with pytest.raises(pk.ParameterError, match=message):
         quantities.add(Quantity(**changed), *lines)
-    assert (quantities.ROWS, quantities.QUANTITIES, quantities.PASSES) == before
+    assert (quantities.ROWS, quantities.TABLE.passes) == before
 
 
 def test_a_system_is_one_class():

@@ -12,7 +12,7 @@ import phasekit as pk
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
-from phasekit.table.quantities import PASSES, QUANTITIES
+from phasekit.table.quantities import ROWS, TABLE
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: What has no docstring of its own: numbers, a string, a module.
@@ -182,14 +182,14 @@ def cells(line):
 
 def test_each_row_of_the_table_is_on_its_page_with_its_group(pages):
     sections = dict(re.findall(r"^## (\w+)\n(.*?)(?=^## |\Z)", pages["quantities"], re.M | re.S))
-    assert len(QUANTITIES) > 80
-    for row in QUANTITIES:
+    assert len(ROWS) > 80
+    for row in ROWS.values():
         (line,) = re.findall(rf"^\| `{row.name}` \|.*$", sections[row.group], re.MULTILINE)
         found = cells(line)
         assert f"`{row.units}`" in found
         assert any(cell.startswith(f"`{row.equation}`") for cell in found)
         assert all(f"`{dim}`" in line for dim in row.dims)
-    for one in PASSES:
+    for one in TABLE.passes:
         for group in set(one.groups) - {"labels"}:
             (line,) = (
                 x

@@ -10,6 +10,7 @@ from __future__ import annotations
 import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 from math import prod
 from typing import Any
@@ -17,14 +18,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.progress import progress_bar
 from phasekit.cells.request import Request, ask
 from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords, own_names
-from phasekit.cells.tiling import cut, run_tasks, tiles
 from phasekit.labels.arguments import FloatArray
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.grid import refuse_too_large, variable
+from phasekit.labels.grid import cut, refuse_too_large, tiles, variable
 from phasekit.systems.system import Model
-from phasekit.table.quantities import ROWS, pass_of
+from phasekit.table.quantities import ROWS, TABLE
 from phasekit.table.row import Pass, Quantity
 
 
@@ -50,7 +51,7 @@ class Cells:
             elif name in self.inputs:
                 self.computed[name] = self.model.in_domain(name, self.inputs[name])
             else:
-                self.run(pass_of(ROWS[name].group, self.passes))
+                self.run(TABLE.pass_of(ROWS[name].group, self.passes))
         return self.computed[name]
 
     def run(self, one: Pass) -> None:
@@ -60,7 +61,7 @@ class Cells:
         self.done.add(one)
         arrays = [self.get(name) for name in one.inputs]
         with np.errstate(all="ignore"):  # invalid cells give NaN, and no warning
-            self.computed.update(one.call(*arrays))
+            self.computed.update(TABLE.call(one, *arrays))
 
 
 def evaluate(
@@ -99,21 +100,27 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         },
         sizes,
     )
-    out: dict[str, xr.Variable] = {}
+    filled: dict[str, Any] = {}
     tasks: list[tuple[Callable[[], None], int]] = []
     for part in request.parts:
         shape = tuple(sizes[dim] for dim in part.dims)
         results = {
             row.name: np.empty(shape + row.label_shape, dtype=row.dtype) for row in part.rows
         }
+        filled.update(results)
         arrays = {name: grid.aligned(name, part.dims) for name in part.inputs}
         for tile in tiles(shape):
             task = functools.partial(fill, type(request.system), part.passes, arrays, results, tile)
             tasks.append((task, prod(piece.stop - piece.start for piece in tile)))
-        for row in part.rows:
-            out[row.name] = variable((*part.dims, *row.dims), results[row.name], row.attrs)
     run_tasks(tasks, progress)
-    return assemble(request, {row.name: out[row.name] for row in request.rows})
+    dims = {row.name: part.dims for part in request.parts for row in part.rows}
+    return assemble(
+        request,
+        {
+            row.name: variable((*dims[row.name], *row.dims), filled[row.name], row.attrs)
+            for row in request.rows
+        },
+    )
 
 
 def fill(
@@ -130,6 +137,25 @@ def fill(
     with np.errstate(over="ignore"):  # where a result is kept in single precision
         for name, result in results.items():
             result[tile] = cells.computed[name]
+
+
+def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | None) -> None:
+    """Run tasks in threads (the kernels release the interpreter), with a bar that counts cells."""
+    if len(tasks) <= 1 and progress is not True:
+        for task, _ in tasks:
+            task()
+        return
+    from phasekit.numerics.launch import cpus  # here, because it loads the kernels
+
+    with progress_bar(sum(cells for _, cells in tasks), progress) as bar:
+        pool = ThreadPoolExecutor(max_workers=max(1, min(cpus(), len(tasks))))
+        try:
+            futures = {pool.submit(task): cells for task, cells in tasks}
+            for future in as_completed(futures):
+                future.result()
+                bar.update(futures[future])
+        finally:
+            pool.shutdown(cancel_futures=True)
 
 
 # ------------------------------------------------------------------------------ lazily

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.cells.tiling import cut, tiles
 from phasekit.errors import ParameterError
 from phasekit.labels.coordinates import LABELS, Labels
-from phasekit.labels.grid import make_grid
+from phasekit.labels.grid import cut, make_grid, tiles
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedRouthian
 from phasekit.systems.system import Model

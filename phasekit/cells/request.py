@@ -7,7 +7,6 @@ that fits answers.
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,11 +22,9 @@ from phasekit.laws.perturbed import (
     TiltedTrigonometric,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.as_system import stands_on
-from phasekit.systems.system import Model
-from phasekit.table import quantities
-from phasekit.table.quantities import ROWS, pass_of, plan_passes
-from phasekit.table.row import LAW, Pass, Quantity
+from phasekit.systems.system import Model, stands_on
+from phasekit.table.quantities import ROWS, TABLE
+from phasekit.table.row import Pass, Quantity, depth
 
 
 @dataclass(frozen=True)
@@ -129,7 +126,7 @@ def needs_of(system: Model, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ...
             if name in derived:
                 found.update(dict.fromkeys(own))
             elif name in ROWS:
-                left.extend(reversed(pass_of(ROWS[name].group, passes).inputs))
+                left.extend(reversed(TABLE.pass_of(ROWS[name].group, passes).inputs))
             else:
                 found[name] = None
         needs[one] = tuple(found)
@@ -184,11 +181,13 @@ def passes_of(
         If a row is not offered on the rung of the system's law.
     """
     rows = tuple(rows)
-    for group in dict.fromkeys(row.group for row in rows):
-        if not is_offered(system, group):
-            refuse(system, rungs_of(group), group)
+    passes = TABLE.plan(rows, system.rung)
+    computed = {group for one in passes for group in one.groups}
+    for row in rows:
+        if row.group not in computed:
+            refuse(system, TABLE.rungs_of(row.group), row.group)
     states = {*given, *system.parameters}
-    return tuple(bound(one, system, states) for one in plan_passes(rows, system.rung))
+    return tuple(one.bound(system, states) for one in passes)
 
 
 def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
@@ -209,50 +208,11 @@ def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
 def inputs_of(system: Model, rows: Iterable[Quantity]) -> tuple[Quantity, ...]:
     """The rows that others are computed from, where labels are numbered: these go along."""
     rows = tuple(rows)
-    if system.rung.labels_fixed or not all(is_offered(system, row.group) for row in rows):
+    if system.rung.labels_fixed or not all(TABLE.offers(system.rung, row.group) for row in rows):
         return ()
-    names = (name for one in plan_passes(rows, system.rung) for name in one.inputs)
+    names = (name for one in TABLE.plan(rows, system.rung) for name in one.inputs)
     found = {ROWS[name]: None for name in names if name in ROWS and ROWS[name] not in rows}
     return (*found, *inputs_of(system, (*rows, *found))) if found else ()
-
-
-def rungs_of(group: str) -> set[type[Law]]:
-    """The rungs on which a group is computed."""
-    return {one.of for one in quantities.PASSES if group in one.groups}
-
-
-def is_offered(system: Model, group: str) -> bool:
-    """Whether a group is computed on the rung of a system's law."""
-    return any(group in one.groups and issubclass(system.rung, one.of) for one in quantities.PASSES)
-
-
-def depth(rung: type) -> int:
-    """How special a rung is."""
-    return len(rung.__mro__)
-
-
-def bound(one: Pass, system: Model, given: set[str], options: dict[str, Any] | None = None) -> Pass:
-    """Return a line of the table for one system: with its law, options and optional states."""
-    extra = {state: keyword for state, keyword in one.optional if state in given}
-    if LAW not in one.inputs and not options and not extra:
-        return one
-    function = one.resolved
-    inputs = one.inputs
-    if LAW in inputs:
-        function = functools.partial(function, system.law_of_parameters)
-        own = tuple(system.parameters)
-        inputs = tuple(x for name in inputs for x in (own if name == LAW else (name,)))
-    if options:
-        function = functools.partial(function, **options)
-    if extra:
-        function = functools.partial(_with_keywords, function, tuple(extra.values()))
-    return Pass(function, (*inputs, *extra), one.groups, one.of)
-
-
-def _with_keywords(function: Any, keywords: tuple[str, ...], *arrays: Any, **options: Any) -> Any:
-    """Call a function whose last arrays go by keyword."""
-    own = len(arrays) - len(keywords)
-    return function(*arrays[:own], **dict(zip(keywords, arrays[own:], strict=True)), **options)
 
 
 def fitted(
@@ -269,9 +229,10 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
-        words: list[Any] = [system.law.words(r.name, r.units, r.long_name) for r in kept]
-        told = (replace(row, **w) if w else row for row, w in zip(kept, words, strict=True))
-        return tuple(told), passes
+        if system.rung.words is not Law.words:  # it has its own
+            words: list[Any] = [system.law.words(r.name, r.units, r.long_name) for r in kept]
+            kept = [replace(row, **own) for row, own in zip(kept, words, strict=True)]
+        return kept, passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
@@ -280,6 +241,6 @@ def fitted(
         labelled |= any(row.group in ("orbits", "action_angle") for row in kept)
     if issubclass(system.rung, PerturbedConservative) and not labelled:
         return numbered.worded(system, kept), passes  # no equilibrium is looked for
-    counts = [one for one in quantities.PASSES if one.groups == ("labels",)]
+    counts = [one for one in TABLE.passes if one.groups == ("labels",)]
     count = max((o for o in counts if issubclass(system.rung, o.of)), key=lambda o: depth(o.of))
-    return numbered.fitted(system, kept, passes, bound(count, system, set(system.parameters)))
+    return numbered.fitted(system, kept, passes, count.bound(system, set(system.parameters)))

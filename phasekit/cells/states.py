@@ -13,14 +13,13 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
-from phasekit.cells.request import bound, depth, refuse
+from phasekit.cells.request import refuse
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, numeric, one_of
 from phasekit.labels.coordinates import AXES, LABELS
-from phasekit.systems.as_system import as_system
-from phasekit.systems.system import Model
-from phasekit.table import quantities
-from phasekit.table.row import Pass, Quantity
+from phasekit.systems.system import Model, as_system
+from phasekit.table.quantities import TABLE
+from phasekit.table.row import Pass, Quantity, depth
 
 CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
 SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
@@ -97,7 +96,7 @@ def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
     """
     fitting = [
         one
-        for one in quantities.PASSES
+        for one in TABLE.passes
         if group in one.groups and start in one.inputs and set(one.options) == set(options)
     ]
     rungs = [one.of for one in fitting if issubclass(system.rung, one.of)]
@@ -110,7 +109,7 @@ def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
         name: str(system.rung.default[name] if value is None else value)
         for name, value in options.items()
     }
-    return bound(one, system, set(), chosen), notes
+    return one.bound(system, set(), chosen), notes
 
 
 def _option(system: Model, name: str, value: Any) -> int | None:

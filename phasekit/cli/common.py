@@ -183,7 +183,7 @@ def say_invalid(ds: xr.Dataset) -> None:
     """Say how many cells of a map hold nothing, if any."""
     if "n_equilibria" not in ds:
         return
-    from phasekit.cells.tiling import tiles
+    from phasekit.labels.grid import tiles
 
     counts = ds["n_equilibria"]
     invalid = sum(int((counts[tile].values == -1).sum()) for tile in tiles(counts.shape, 1 << 24))

@@ -10,7 +10,7 @@ from phasekit.errors import StoreError
 from phasekit.explorer.page import page
 from phasekit.labels.arguments import bad
 from phasekit.laws.ladder import Conservative
-from phasekit.systems.as_system import as_system, single
+from phasekit.systems.system import as_system, single
 
 #: Height of the page in a notebook, in pixels of the screen.
 HEIGHT = 900

@@ -19,8 +19,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.perturbed import PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.as_system import as_system, stands_on
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system, stands_on
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import FROM_MOTION
 

@@ -28,8 +28,8 @@ from phasekit.motion.lost import tell_open
 from phasekit.motion.shares import damping_time
 from phasekit.motion.strobe import check_period, common_period
 from phasekit.numerics.waits import said
-from phasekit.systems.as_system import single
 from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.system import single
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 

@@ -19,8 +19,7 @@ from phasekit.labels.arguments import (
     unknown,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.as_system import as_system
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Pass
 

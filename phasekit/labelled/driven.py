@@ -23,8 +23,8 @@ from phasekit.labels.arguments import (
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
-from phasekit.systems.as_system import as_system
 from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.system import as_system
 from phasekit.table.quantities import ROWS, select
 from phasekit.table.row import STATE, Pass
 

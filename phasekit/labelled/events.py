@@ -15,9 +15,8 @@ from phasekit.motion.integrate import integrate
 from phasekit.motion.method import unit_of
 from phasekit.motion.prescribed import span
 from phasekit.motion.steps import InitialValue
-from phasekit.systems.as_system import single
 from phasekit.systems.driven_rotor import event_of
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, single
 
 ARGUMENTS = ("t", "phi", "dphi")
 

@@ -25,8 +25,7 @@ from phasekit.perturbation.tilted_families import TiltedFamilies
 from phasekit.perturbation.tilted_families import families as tilted_families
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
 from phasekit.phase.exact.separatrices import phase_space
-from phasekit.systems.as_system import as_system
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Pass
 

@@ -13,8 +13,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad, pair, unknown, whole
 from phasekit.labels.grid import LABEL_DTYPE, refuse_too_large, variable
-from phasekit.systems.as_system import as_system
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 
 _PARTS = 33
 

@@ -18,9 +18,8 @@ from phasekit.cells.states import at_states
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import NumberLike, bad, numeric, one_of, state_arguments
 from phasekit.labels.conversion import in_si
-from phasekit.systems.as_system import as_system
 from phasekit.systems.disk import GyroRotorDisk
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 from phasekit.table.loads import DISK
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity

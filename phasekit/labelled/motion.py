@@ -24,8 +24,7 @@ from phasekit.labels.arguments import (
 )
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
-from phasekit.systems.as_system import as_system
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 from phasekit.table.quantities import select
 
 

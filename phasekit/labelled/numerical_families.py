@@ -17,8 +17,7 @@ from phasekit.labels.arguments import FloatArray, bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.formula import Formula
-from phasekit.systems.as_system import single
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, single
 from phasekit.table.quantities import ROWS
 
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.

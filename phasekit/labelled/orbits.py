@@ -25,7 +25,7 @@ from phasekit.labels.arguments import (
     one_of,
     state_arguments,
 )
-from phasekit.systems.as_system import as_system
+from phasekit.systems.system import as_system
 from phasekit.table.quantities import select
 
 #: Families that have orbits of given action.

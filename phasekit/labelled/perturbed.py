@@ -23,7 +23,7 @@ from phasekit.labels.arguments import (
     whole,
 )
 from phasekit.labels.coordinates import LABELS
-from phasekit.systems.as_system import as_system
+from phasekit.systems.system import as_system
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
 

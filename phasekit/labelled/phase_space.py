@@ -14,9 +14,8 @@ from phasekit.labels.arguments import (
     bad,
     call_checked,
 )
-from phasekit.systems.as_system import as_system
 from phasekit.systems.parameter import warn_of_invalid
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 from phasekit.table.quantities import select
 
 

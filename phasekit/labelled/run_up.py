@@ -17,8 +17,8 @@ from phasekit.labels.arguments import (
 from phasekit.labels.grid import variable
 from phasekit.motion.flow import accelerations
 from phasekit.motion.prescribed import prescribed_at, span, table_of
-from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.system import as_system, single
 
 
 @call_checked

@@ -24,9 +24,9 @@ from phasekit.motion.flow import pointwise
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
-from phasekit.systems.as_system import as_system, single
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.problem import Problem
+from phasekit.systems.system import as_system, single
 from phasekit.table.quantities import ROWS
 
 

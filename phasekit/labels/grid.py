@@ -1,4 +1,4 @@
-"""Cells of a map: parameters and states aligned by the names of their dims, and their memory.
+"""Cells of a map: parameters and states aligned by the names of their dims, tiles, and memory.
 
 A scalar has no dim, a bare 1-D array lies on a dim of its own (named after the parameter, or
 `point` for states), a DataArray keeps its dims. `Grid` holds all of them as xarray Variables, so
@@ -8,8 +8,9 @@ that one place knows how cells are laid out; what is computed on them is not its
 from __future__ import annotations
 
 import functools
+import itertools
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -25,6 +26,9 @@ from phasekit.labels.arguments import FloatArray, Value, describe
 #: warning. From 2026.9 on xarray reads them back from zarr as they were written; netCDF gives
 #: fixed-width ones, which `restore` turns back.
 LABEL_DTYPE = np.dtypes.StringDType()
+
+#: Cells of a tile: large enough that calls cost nothing, small enough to stay in the cache.
+TILE_CELLS = 1 << 16
 
 #: Part of the available memory that one map may take: the caller needs some for its use.
 SHARE = 0.8
@@ -184,6 +188,37 @@ def _broadcast(function: Callable[..., tuple[Any, ...]], *arrays: FloatArray) ->
     shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
     results = tuple(np.array(np.broadcast_to(result, shape)) for result in function(*arrays))
     return results if len(results) > 1 else results[0]
+
+
+# ------------------------------------------------------------------------------ tiles
+
+
+def cut(array: FloatArray, tile: tuple[slice, ...]) -> FloatArray:
+    """Return a tile of an array whose axes of length 1 stand for whole dims."""
+    return array[
+        tuple(
+            part if size > 1 else slice(None) for part, size in zip(tile, array.shape, strict=True)
+        )
+    ]
+
+
+def tiles(shape: Sequence[int], cells: int = TILE_CELLS) -> Iterator[tuple[slice, ...]]:
+    """Cut a box of cells into even tiles of at most `cells`, whole along the last axes.
+
+    >>> [tuple((s.start, s.stop) for s in tile) for tile in tiles((3, 2), 4)]
+    [((0, 2), (0, 2)), ((2, 3), (0, 2))]
+    """
+    steps, room = [], max(cells, 1)
+    for size in reversed(shape):
+        parts = -(-size // max(min(size, room), 1))
+        step = -(-size // max(parts, 1))
+        steps.append(step)
+        room //= step
+    cuts = [
+        [slice(i, min(i + step, size)) for i in range(0, size, step)]
+        for size, step in zip(shape, reversed(steps), strict=True)
+    ]
+    return itertools.product(*cuts)
 
 
 # ------------------------------------------------------------------------------ memory

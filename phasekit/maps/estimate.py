@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any
 
-from phasekit.cells.tiling import cut
 from phasekit.errors import StoreError
-from phasekit.labels.grid import human
+from phasekit.labels.grid import cut, human
 from phasekit.maps.left import Left
 from phasekit.maps.place import Place
 from phasekit.maps.stored_arrays import codecs

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from phasekit.cells.request import Request, needs_of, passes_of
-from phasekit.cells.tiling import cut
 from phasekit.errors import StoreError
+from phasekit.labels.grid import cut
 from phasekit.maps.marks import Index, Inputs, Marks
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place

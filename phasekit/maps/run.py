@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from phasekit.cells.progress import progress_bar
 from phasekit.cells.request import Request
-from phasekit.cells.tiling import progress_bar
 from phasekit.errors import StoreError
 from phasekit.maps import workers as run
 from phasekit.maps.clusters import connected, on_cluster

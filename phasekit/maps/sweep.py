@@ -10,7 +10,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.evaluate import compute
-from phasekit.cells.request import Request, ask, inputs_of, is_offered, needs_of, passes_of
+from phasekit.cells.request import Request, ask, inputs_of, needs_of, passes_of
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
@@ -18,9 +18,8 @@ from phasekit.labels.grid import refuse_too_large
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.options import StoreOptions, check_dtypes, without_store
 from phasekit.maps.whole import WholeTarget, open_map, target_of
-from phasekit.systems.as_system import as_system
 from phasekit.systems.parameter import warn_of_invalid
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
 
@@ -116,9 +115,7 @@ def sweep(
         flag("progress", progress)
     place = None if store is None else target_of(store)
     system = as_system(system)
-    rows = select(of)
-    if of is OFFERED:
-        rows = tuple(row for row in rows if is_offered(system, row.group))
+    rows = select(of, system.rung if of is OFFERED else None)
     if place is not None and not place.is_netcdf and system.rung.labels_fixed:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 

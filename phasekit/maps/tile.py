@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from phasekit.cells.evaluate import fill
-from phasekit.cells.tiling import tiles
 from phasekit.errors import StoreError
 from phasekit.labels.arguments import FloatArray
+from phasekit.labels.grid import tiles
 from phasekit.maps import files
 from phasekit.maps.marks import Mark, key_of
 from phasekit.maps.place import Place

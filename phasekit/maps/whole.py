@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.schema import restore
-from phasekit.cells.tiling import tiles
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import bad, flag
+from phasekit.labels.grid import tiles
 from phasekit.maps import netcdf
 from phasekit.maps.place import NETCDF, ZARR, Place, place_of
 from phasekit.maps.stored_arrays import read_plan, reason, refuse_strange, zarr_group

@@ -21,8 +21,8 @@ from phasekit.plot.parts.circle import TURN
 from phasekit.plot.parts.plane import StatePlane
 from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import starts_of_pairs
-from phasekit.systems.as_system import single
 from phasekit.systems.perturbed import Perturbed
+from phasekit.systems.system import single
 
 FloatArray = NDArray[np.float64]
 

@@ -24,7 +24,7 @@ from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units
 from phasekit.plot.phase_portrait import curves_of, levels_of, starts_of
 from phasekit.plot.time_history import TIME, motions_of
-from phasekit.systems.as_system import as_system
+from phasekit.systems.system import as_system
 
 FloatArray = NDArray[np.float64]
 Plane = tuple[str, str]

@@ -18,7 +18,7 @@ from phasekit.labels.arguments import FloatArray, bad
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.parts.units import Units
-from phasekit.systems.as_system import single
+from phasekit.systems.system import single
 
 #: Energies of saddles, with the names of their looks.
 Walls: TypeAlias = list[tuple[str, float]]

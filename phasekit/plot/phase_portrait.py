@@ -18,7 +18,7 @@ from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
 from phasekit.plot.parts.circle import TURN, Circle
 from phasekit.plot.parts.units import Units, coordinate_symbol, printed
-from phasekit.systems.as_system import single
+from phasekit.systems.system import single
 
 FloatArray = NDArray[np.float64]
 

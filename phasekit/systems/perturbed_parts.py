@@ -24,10 +24,9 @@ from phasekit.laws.perturbed import (
     modulation_names,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.as_system import as_system
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system
 
 OWN = (
     Parameter(name="damping", units="s-1", long_name="linear damping"),

@@ -8,9 +8,8 @@ from typing import Any, Self
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Conservative
-from phasekit.systems.as_system import as_system, stands_on
 from phasekit.systems.problem_parts import names_of, specified, values_of
-from phasekit.systems.system import Model
+from phasekit.systems.system import Model, as_system, stands_on
 
 
 class ProblemSources:

@@ -9,39 +9,34 @@ from __future__ import annotations
 
 import html
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
-from phasekit.errors import ParameterError
-from phasekit.labels.arguments import bad, unknown
-from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.laws.perturbed import PerturbedRouthian
-from phasekit.laws.trigonometric import Trigonometric
 from phasekit.table import loads, motion, numerical, orbits, perturbed, phase_space, steady
-from phasekit.table.row import REGISTERED, Pass, Quantity
+from phasekit.table.row import Quantity, Table
 
-QUANTITIES: tuple[Quantity, ...] = (
-    *phase_space.QUANTITIES,
-    *orbits.QUANTITIES,
-    *loads.QUANTITIES,
-    *steady.QUANTITIES,
-    *motion.QUANTITIES,
-    *perturbed.QUANTITIES,
+TABLE = Table(
+    (
+        *phase_space.QUANTITIES,
+        *orbits.QUANTITIES,
+        *loads.QUANTITIES,
+        *steady.QUANTITIES,
+        *motion.QUANTITIES,
+        *perturbed.QUANTITIES,
+    ),
+    (
+        *phase_space.PASSES,
+        *orbits.PASSES,
+        *loads.PASSES,
+        *steady.PASSES,
+        *numerical.PASSES,
+        *motion.PASSES,
+        *perturbed.PASSES,
+    ),
 )
-#: Every row by its name.
-ROWS = REGISTERED
-ROWS.update({row.name: row for row in QUANTITIES})
-
-#: Passes over the cells; `phasekit.cells.request` finds the one for a system.
-PASSES: tuple[Pass, ...] = (
-    *phase_space.PASSES,
-    *orbits.PASSES,
-    *loads.PASSES,
-    *steady.PASSES,
-    *numerical.PASSES,
-    *motion.PASSES,
-    *perturbed.PASSES,
-)
+#: Every row by its name, those that a name means, and how a user adds one.
+ROWS, select, add = TABLE.rows, TABLE.select, TABLE.add
 
 
 def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
@@ -51,121 +46,11 @@ def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
     return {"equation": row.general} if row.general else {}
 
 
-def add(row: Quantity, *passes: Pass) -> None:
-    """Add a quantity, a group of its own, with the passes that compute it.
-
-    From then on `sweep` and `quantities` have it; so have worker processes, where this is called
-    in the module that defines the function.
-
-    Parameters
-    ----------
-    row : Quantity
-        The row.
-    *passes : Pass
-        Lines that compute its group, one for each rung of the ladder of laws.
-
-    Raises
-    ------
-    ParameterError
-        If its name or group is taken, a dim is unknown, or no pass computes it.
-
-    Examples
-    --------
-    >>> add(ROWS["phi"], PASSES[0])
-    Traceback (most recent call last):
-    phasekit.errors.ParameterError: row: got 'phi', wants a name that is not taken
-    """
-    global QUANTITIES, PASSES
-    if row.name in {*ROWS, *LABELS, *STATES}:
-        raise bad("row", row.name, "a name that is not taken")
-    if row.group in {other.group for other in QUANTITIES}:
-        raise bad("row", row.name, f"a group of its own; {row.group!r} is taken")
-    for dim in row.dims:
-        if dim not in (row.labels or LABELS):
-            raise unknown("row: dim", dim, row.labels or LABELS)
-    if not passes or any(one.groups != (row.group,) for one in passes):
-        groups = [group for one in passes for group in one.groups]
-        raise bad("passes", groups, f"one or several that compute the group {row.group!r} alone")
-    ROWS[row.name] = row
-    QUANTITIES += (row,)
-    PASSES += passes
-
-
-_NO_LISTS = (bytes, Mapping)
-
-
-def select(of: str | Iterable[str]) -> tuple[Quantity, ...]:
-    """Return the rows that `of` names: groups, quantities, or several of either.
-
-    Raises
-    ------
-    ParameterError
-        If a name is unknown or nothing is named.
-    """
-    offered = _offered()
-    groups = dict.fromkeys(row.group for row in offered.values())
-    try:
-        names = (of,) if isinstance(of, str) else () if isinstance(of, _NO_LISTS) else tuple(of)
-    except TypeError:
-        names = ()
-    if not names:
-        raise bad("of", of, "a name or a list of names", "pk.quantities() lists them")
-    for name in names:
-        row = ROWS.get(name) if isinstance(name, str) else None
-        if row is not None and name not in offered:
-            raise ParameterError(
-                f"of: got {name!r}, which needs an argument of its own; call pk.{row.group}"
-            )
-        if not isinstance(name, str) or (name not in offered and name not in groups):
-            valid = [*groups, *offered]
-            raise unknown("of: the quantity", name, valid, listed="pk.quantities()")
-    whole = {name for name in names if name not in offered}
-    return tuple(row for row in offered.values() if row.name in names or row.group in whole)
-
-
-def _offered() -> dict[str, Quantity]:
-    """The rows that passes compute, by name."""
-    computed = {group for one in PASSES for group in one.groups}
-    return {row.name: row for row in QUANTITIES if row.group in computed}
-
-
-def plan_passes(rows: Iterable[Quantity], rung: type[Law] = Trigonometric) -> tuple[Pass, ...]:
-    """Return the passes that compute the rows on a rung, as few as the table has."""
-    missing = {row.group for row in rows}
-    lines, chosen = fitting(rung), list[Pass]()
-    for candidate in lines:
-        if missing.issuperset(candidate.groups):
-            chosen.append(candidate)
-            missing.difference_update(candidate.groups)
-    for group in sorted(missing):  # its passes compute others as well, which are not wanted
-        if not any(group in one.groups for one in chosen):
-            chosen.append(next(one for one in reversed(lines) if group in one.groups))
-    return tuple(chosen)
-
-
-def fitting(rung: type[Law]) -> list[Pass]:
-    """Return the lines of the table for a rung: of each group the most special ones."""
-    able = [one for one in PASSES if issubclass(rung, one.of) and not one.options]
-    special = {group: max(len(one.of.__mro__) for one in able if group in one.groups)
-               for group in {group for one in able for group in one.groups}}  # fmt: skip
-    return [
-        one for one in able if all(len(one.of.__mro__) == special[group] for group in one.groups)
-    ]
-
-
-def pass_of(group: str, chosen: Sequence[Pass], rung: type[Law] = Trigonometric) -> Pass:
-    """Return the pass for a group: one of those chosen, else the one that computes the least."""
-    for candidate in (*chosen, *reversed(fitting(rung))):
-        if group in candidate.groups:
-            return candidate
-    raise KeyError(group)
-
-
 class Quantities(Mapping[str, Quantity]):
     """The quantities that a sweep offers, by name; prints as a table."""
 
     def __init__(self) -> None:
-        self._rows = _offered()
+        self._rows = TABLE.offered
 
     @property
     def groups(self) -> dict[str, tuple[str, ...]]:

@@ -1,4 +1,6 @@
-"""What the table is made of: rows, what is computed, and passes, by which function and from what.
+"""What the table is: rows, what is computed, and passes, by which function and from what.
+
+`Table` chooses among them: the most special lines that fit the rung of a law answer.
 
 In derived units the radian is 1 and left out: angles are in rad, rates in s-1, energies (per unit
 of inertia about the shaft) in s-2, areas of the phase plane and actions in s-1.
@@ -6,15 +8,18 @@ of inertia about the shaft) in s-2, areas of the phase plane and actions in s-1.
 
 from __future__ import annotations
 
+import functools
 import importlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
-from phasekit.labels.coordinates import LABELS, Labels
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import bad, unknown
+from phasekit.labels.coordinates import LABELS, STATES, Labels
 from phasekit.laws.ladder import Law
 from phasekit.laws.trigonometric import Trigonometric
 
@@ -34,8 +39,8 @@ SIDES = ("saddle", "side")
 FROM_ENERGY = "[Veljovic2015] (14), corrected coefficients"
 FROM_MOTION = "[Veljovic2015] (12), corrected coefficients"
 
-#: Every row by its name; filled where the table is put together.
-REGISTERED: dict[str, Quantity] = {}
+#: What holds names, and is no list of them.
+_NO_LISTS = (bytes, Mapping)
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,13 +122,174 @@ class Pass:
         function: Callable[..., Any] = getattr(importlib.import_module(module), name)
         return function
 
-    def call(self, *arrays: Any) -> dict[str, Any]:
-        """Return the arrays by the names of the quantities."""
-        result = self.resolved(*arrays)
-        results = result if len(self.groups) > 1 else (result,)
+    def bound(self, system: Any, given: set[str], options: dict[str, Any] | None = None) -> Pass:
+        """Return the line for one system: with its law, options and optional states."""
+        extra = {state: keyword for state, keyword in self.optional if state in given}
+        if LAW not in self.inputs and not options and not extra:
+            return self
+        function = self.resolved
+        inputs = self.inputs
+        if LAW in inputs:
+            function = functools.partial(function, system.law_of_parameters)
+            own = tuple(system.parameters)
+            inputs = tuple(x for name in inputs for x in (own if name == LAW else (name,)))
+        if options:
+            function = functools.partial(function, **options)
+        if extra:
+            function = functools.partial(_with_keywords, function, tuple(extra.values()))
+        return Pass(function, (*inputs, *extra), self.groups, self.of)
+
+
+def _with_keywords(function: Any, keywords: tuple[str, ...], *arrays: Any, **options: Any) -> Any:
+    """Call a function whose last arrays go by keyword."""
+    own = len(arrays) - len(keywords)
+    return function(*arrays[:own], **dict(zip(keywords, arrays[own:], strict=True)), **options)
+
+
+def depth(rung: type) -> int:
+    """How special a rung is."""
+    return len(rung.__mro__)
+
+
+class Table:
+    """Rows by name and passes, and the choice among them."""
+
+    def __init__(self, rows: Iterable[Quantity], passes: Iterable[Pass]) -> None:
+        self.rows = {row.name: row for row in rows}
+        self.passes = tuple(passes)
+
+    def add(self, row: Quantity, *passes: Pass) -> None:
+        """Add a quantity, a group of its own, with the passes that compute it.
+
+        From then on `sweep` and `quantities` have it; so have worker processes, where this is
+        called in the module that defines the function.
+
+        Parameters
+        ----------
+        row : Quantity
+            The row.
+        *passes : Pass
+            Lines that compute its group, one for each rung of the ladder of laws.
+
+        Raises
+        ------
+        ParameterError
+            If its name or group is taken, a dim is unknown, or no pass computes it.
+
+        Examples
+        --------
+        >>> from phasekit.table.quantities import ROWS, TABLE
+        >>> TABLE.add(ROWS["phi"], TABLE.passes[0])
+        Traceback (most recent call last):
+        phasekit.errors.ParameterError: row: got 'phi', wants a name that is not taken
+        """
+        if row.name in {*self.rows, *LABELS, *STATES}:
+            raise bad("row", row.name, "a name that is not taken")
+        if row.group in {other.group for other in self.rows.values()}:
+            raise bad("row", row.name, f"a group of its own; {row.group!r} is taken")
+        for dim in row.dims:
+            if dim not in (row.labels or LABELS):
+                raise unknown("row: dim", dim, row.labels or LABELS)
+        if not passes or any(one.groups != (row.group,) for one in passes):
+            groups = [group for one in passes for group in one.groups]
+            wants = f"one or several that compute the group {row.group!r} alone"
+            raise bad("passes", groups, wants)
+        self.rows[row.name] = row
+        self.passes += passes
+
+    @property
+    def offered(self) -> dict[str, Quantity]:
+        """The rows that passes compute, by name."""
+        computed = {group for one in self.passes for group in one.groups}
+        return {name: row for name, row in self.rows.items() if row.group in computed}
+
+    def select(
+        self, of: str | Iterable[str], rung: type[Law] | None = None
+    ) -> tuple[Quantity, ...]:
+        """Return the rows that `of` names: groups, quantities, or several of either.
+
+        With a rung, only those of them that are computed there.
+
+        Raises
+        ------
+        ParameterError
+            If a name is unknown or nothing is named.
+        """
+        offered = self.offered
+        groups = dict.fromkeys(row.group for row in offered.values())
+        try:
+            names = (of,) if isinstance(of, str) else () if isinstance(of, _NO_LISTS) else tuple(of)
+        except TypeError:
+            names = ()
+        if not names:
+            raise bad("of", of, "a name or a list of names", "pk.quantities() lists them")
+        for name in names:
+            row = self.rows.get(name) if isinstance(name, str) else None
+            if row is not None and name not in offered:
+                raise ParameterError(
+                    f"of: got {name!r}, which needs an argument of its own; call pk.{row.group}"
+                )
+            if not isinstance(name, str) or (name not in offered and name not in groups):
+                valid = [*groups, *offered]
+                raise unknown("of: the quantity", name, valid, listed="pk.quantities()")
+        whole = {name for name in names if name not in offered}
+        if rung is not None:
+            able = {g for one in self.passes if issubclass(rung, one.of) for g in one.groups}
+            groups = {group: None for group in groups if group in able}
+        return tuple(
+            row
+            for row in offered.values()
+            if row.group in groups and (row.name in names or row.group in whole)
+        )
+
+    def rungs_of(self, group: str) -> set[type[Law]]:
+        """The rungs on which a group is computed."""
+        return {one.of for one in self.passes if group in one.groups}
+
+    def offers(self, rung: type[Law], group: str) -> bool:
+        """Whether a group is computed on a rung."""
+        return any(issubclass(rung, one) for one in self.rungs_of(group))
+
+    def plan(self, rows: Iterable[Quantity], rung: type[Law] = Trigonometric) -> tuple[Pass, ...]:
+        """Return the passes that compute the rows on a rung, as few as the table has.
+
+        Groups that are not computed there are left out.
+        """
+        missing = {row.group for row in rows}
+        lines, chosen = self.fitting(rung), list[Pass]()
+        for candidate in lines:
+            if missing.issuperset(candidate.groups):
+                chosen.append(candidate)
+                missing.difference_update(candidate.groups)
+        for group in sorted(missing):  # its passes compute others as well, which are not wanted
+            if not any(group in one.groups for one in chosen):
+                chosen += [one for one in reversed(lines) if group in one.groups][:1]
+        return tuple(chosen)
+
+    def fitting(self, rung: type[Law]) -> list[Pass]:
+        """Return the lines for a rung: of each group the most special ones."""
+        able = [one for one in self.passes if issubclass(rung, one.of) and not one.options]
+        special = {group: max(depth(one.of) for one in able if group in one.groups)
+                   for group in {group for one in able for group in one.groups}}  # fmt: skip
+        return [one for one in able if all(depth(one.of) == special[g] for g in one.groups)]
+
+    def pass_of(self, group: str, chosen: Sequence[Pass]) -> Pass:
+        """Return the pass for a group: one of those chosen, else the one that computes the least.
+
+        What is not chosen is computed from (A, B, C), the only rung whose quantities need no law.
+        """
+        for candidate in chosen:
+            if group in candidate.groups:
+                return candidate
+        return next(one for one in reversed(self.fitting(Trigonometric)) if group in one.groups)
+
+    def call(self, one: Pass, *arrays: Any) -> dict[str, Any]:
+        """Call the function of a pass; return the arrays by the names of the quantities."""
+        result = one.resolved(*arrays)
+        results = result if len(one.groups) > 1 else (result,)
         named: dict[str, Any] = {}
-        for group, part in zip(self.groups, results, strict=True):
-            names = [row.name for row in REGISTERED.values() if row.group == group]
+        for group, part in zip(one.groups, results, strict=True):
+            names = [row.name for row in self.rows.values() if row.group == group]
             if names[0] in getattr(part, "_fields", ()):
                 named.update(part._asdict())
             else:

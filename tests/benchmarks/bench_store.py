@@ -32,7 +32,7 @@ import phasekit as pk
 from phasekit.maps.stored_arrays import codec, codecs
 from phasekit.maps.tile import PIECE, compute_cells
 from phasekit.numerics.launch import one_thread
-from phasekit.table.quantities import plan_passes, select
+from phasekit.table.quantities import TABLE
 
 DISK = {"beta": 0.3, "e": 0.00115, "a": 0.002, "r": 0.2, "omega1": 2.5, "m": 1.5, "half_span": 0.1}
 CODES = ["n_equilibria", "topology", "figure_eight"]
@@ -197,14 +197,16 @@ class OneTile:
 
     def __init__(self, subject: str, dtype: str | None = None) -> None:
         disk = pk.GyroRotorDisk(**DISK)
-        rows = tuple(row for row in select(SUBJECTS[subject]) if issubclass(disk.rung, row.of))
+        rows = tuple(
+            row for row in TABLE.select(SUBJECTS[subject]) if issubclass(disk.rung, row.of)
+        )
         if dtype is not None:
             from dataclasses import replace
 
             rows = tuple(
                 replace(row, dtype=dtype) if row.dtype == "float64" else row for row in rows
             )
-        self.rows, self.passes = rows, plan_passes(rows)
+        self.rows, self.passes = rows, TABLE.plan(rows)
         self.model = type(disk)
         self.inputs = {name: np.full((1, 1), value) for name, value in disk.parameters.items()}
         self.inputs["beta"] = np.linspace(0.01, 1.5, self.shape[0])[:, None]
@@ -229,7 +231,7 @@ class OneTile:
         with one_thread(), np.errstate(all="ignore"):
             for i in range(0, self.shape[0], step):
                 for one in self.passes:
-                    one.call(*(x[i : i + step] for x in (A, B, C)))
+                    TABLE.call(one, *(x[i : i + step] for x in (A, B, C)))
 
     def write(self, store: Any, compressors: Any, shape: tuple[int, int] | None = None) -> None:
         results = self.compute()

@@ -14,7 +14,7 @@ from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
-from phasekit.table.quantities import PASSES, ROWS
+from phasekit.table.quantities import ROWS, TABLE
 
 SYSTEMS = (
     pk.Coefficients(1.0, 0.35, 0.12),
@@ -31,12 +31,12 @@ CHOICES = {"center": None, "saddle": None, "side": "right"}
 SHARED = sorted(
     {
         (one.groups, tuple(x for x in one.inputs if x in STATES), one.options)
-        for one in PASSES
+        for one in TABLE.passes
         if one.of is Conservative
     }
     & {
         (one.groups, tuple(x for x in one.inputs if x in STATES), one.options)
-        for one in PASSES
+        for one in TABLE.passes
         if one.of is Trigonometric
     }
 )

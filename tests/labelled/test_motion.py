@@ -96,12 +96,12 @@ def test_motions_in_a_sweep():
 
 
 def test_tiles_in_threads_make_the_same_motion(monkeypatch):
-    from phasekit.cells import tiling
+    from phasekit.labels import grid
 
     swept = DISK.replace(beta=np.linspace(0, 1.5, 5))
     whole = pk.flow(swept, PHI, DPHI, T)
     for cells in (1, 7, 20):
-        monkeypatch.setattr(tiling.tiles, "__defaults__", (cells,))
+        monkeypatch.setattr(grid.tiles, "__defaults__", (cells,))
         xr.testing.assert_identical(pk.flow(swept, PHI, DPHI, T), whole)
 
 

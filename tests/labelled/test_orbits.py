@@ -10,7 +10,7 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import action_angle as angle_floor
 from phasekit.phase.exact import orbits as floor
-from phasekit.table.quantities import ROWS, plan_passes, select
+from phasekit.table.quantities import ROWS, TABLE, select
 
 C = pk.Coefficients(4.3, 1.2, 0.7)  # figure-eight
 SINGLE = pk.Coefficients(0.4, 1.2, 0.7)  # one saddle
@@ -306,9 +306,9 @@ def test_rows_and_fields_of_the_floor_below_are_the_same():
         # besides, there are rows of systems under a torque alone
         rows = [row.name for row in select(group) if issubclass(Trigonometric, row.of)]
         assert rows == list(fields)
-    assert [p.groups for p in plan_passes(select("orbits"))] == [("orbits",)]
+    assert [p.groups for p in TABLE.plan(select("orbits"))] == [("orbits",)]
     for of in ("angle", ["angle", "twist"], ["angle", "period"]):
-        assert [p.groups for p in plan_passes(select(of))] == [("orbits", "action_angle")]
+        assert [p.groups for p in TABLE.plan(select(of))] == [("orbits", "action_angle")]
 
 
 def test_orbits_in_a_sweep():
@@ -400,12 +400,12 @@ def test_lazy_equals_eager(call):
 
 
 def test_states_of_tiles_and_threads(monkeypatch):
-    from phasekit.cells import tiling
+    from phasekit.labels import grid
 
     axes = {"beta": np.linspace(0.0, 1.5, 5), "state_phi": PHI, "state_dphi": DPHI}
     of = ["orbits", "action_angle"]
     whole = pk.sweep(DISK, axes, of=of)
-    monkeypatch.setattr(tiling.tiles, "__defaults__", (17,))
+    monkeypatch.setattr(grid.tiles, "__defaults__", (17,))
     xr.testing.assert_identical(pk.sweep(DISK, axes, of=of), whole)
 
 

@@ -18,7 +18,7 @@ from witnesses.kill_harness import Map, content, local_cluster, processes_of, wa
 
 import phasekit as pk
 from phasekit import cli
-from phasekit.cells import tiling
+from phasekit.cells import progress
 from phasekit.maps import interrupts, run
 
 pytest.importorskip("zarr")
@@ -161,7 +161,7 @@ def test_what_the_store_says_is_counted(tmp_path, monkeypatch):
     def interrupted(tally, tile):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(tiling._NoBar, "update", interrupted)
+    monkeypatch.setattr(progress._NoBar, "update", interrupted)
     with pytest.raises(KeyboardInterrupt, match=r"^1 of 8 tiles"):
         SHAPE.sweep(tmp_path / "map.zarr", workers=1, progress=False)
 
@@ -239,7 +239,7 @@ def test_the_same_command_says_how_much_is_left(tmp_path, third, capsys):
 
 
 def test_bars_do_not_flood_logs(capfd):
-    with tiling.progress_bar(10_000, True) as bar:
+    with progress.progress_bar(10_000, True) as bar:
         for _ in range(20):
             time.sleep(0.11)  # longer than a terminal's bar waits
             bar.update(500)

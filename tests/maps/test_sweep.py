@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.cells import tiling
+from phasekit.cells import evaluate
 from phasekit.labels import grid
 from phasekit.phase.exact.separatrices import phase_space
 
@@ -85,7 +85,7 @@ def test_tiles_in_threads_make_the_same_map(monkeypatch):
     axes = {"beta": np.linspace(0.01, 1.5, 13), "a": np.linspace(0, 0.05, 11)}
     whole = pk.sweep(DISK, axes)
     for cells in (1, 7, 30):
-        monkeypatch.setattr(tiling.tiles, "__defaults__", (cells,))
+        monkeypatch.setattr(grid.tiles, "__defaults__", (cells,))
         xr.testing.assert_identical(pk.sweep(DISK, axes), whole)
 
 
@@ -93,7 +93,7 @@ def test_tiles_in_threads_make_the_same_map(monkeypatch):
 @pytest.mark.parametrize("cells", [1, 4, 6, 10**6])
 def test_tiles_cover_each_cell_once(shape, cells):
     seen = np.zeros(shape, dtype=int)
-    for tile in tiling.tiles(shape, cells):
+    for tile in grid.tiles(shape, cells):
         assert seen[tile].size <= cells
         seen[tile] += 1
     assert (seen == 1).all()
@@ -104,11 +104,11 @@ def test_an_error_in_a_tile_is_raised(monkeypatch):
         raise RuntimeError("no")
 
     with pytest.raises(RuntimeError, match="no"):
-        tiling.run_tasks([(fail, 1), (lambda: None, 1)], False)
+        evaluate.run_tasks([(fail, 1), (lambda: None, 1)], False)
 
 
 def test_progress_bar_counts_cells_and_is_quiet_by_default(capfd, monkeypatch):
-    monkeypatch.setattr(tiling.tiles, "__defaults__", (2,))
+    monkeypatch.setattr(grid.tiles, "__defaults__", (2,))
     pk.sweep(DISK, beta=[0.1, 0.2, 0.3, 0.4])
     pk.sweep(DISK, beta=[0.1, 0.2, 0.3, 0.4], progress=False)
     assert capfd.readouterr().err == ""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.cells import tiling
+from phasekit.cells import progress
 from phasekit.motion.attractors import TOO_WEAK, find
 from phasekit.motion.lost import EXHAUSTED, FAILED
 from phasekit.motion.shares import SIDE, SLOTS
@@ -128,7 +128,7 @@ def test_stored_shares_are_the_same_however_they_were_made(tmp_path, monkeypatch
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(tiling._NoBar, "update", interrupted)
+        patch.setattr(progress._NoBar, "update", interrupted)
         with pytest.raises(KeyboardInterrupt, match=r"^1 of 2 tiles"):
             pk.sweep(
                 DRIVEN, forcing_amplitude=amplitudes[:2], store=tmp_path / "map.zarr",

@@ -9,7 +9,7 @@ import numba
 import pytest
 from numba.core import event
 
-from phasekit.cells import tiling
+from phasekit.cells import progress
 from phasekit.numerics import compiling, waits
 
 
@@ -98,6 +98,6 @@ def test_a_notebook_is_looked_at(monkeypatch):
     assert not waits.watched()
     notebook(monkeypatch, {"IPKernelApp": {}})
     assert waits.watched()
-    with tiling.progress_bar(10, None) as bar:
+    with progress.progress_bar(10, None) as bar:
         assert bar.total == 10
         bar.update(10)

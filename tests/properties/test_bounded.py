@@ -13,10 +13,10 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.cells.request import is_offered, passes_of
+from phasekit.cells.request import passes_of
 from phasekit.labels.coordinates import STATES
 from phasekit.loads import functions
-from phasekit.table.quantities import ROWS
+from phasekit.table.quantities import ROWS, TABLE
 
 CELLS = int(os.environ.get("PHASEKIT_EXTREME", "6"))
 SPECIAL = [0.0, -0.0, 1e16, 1e300, -1e300, 1.7e308, 5e-324, np.inf, -np.inf, np.nan]
@@ -40,7 +40,9 @@ def swept(system, group, rng):
     return pk.sweep(system, axes, of=group)
 
 
-GROUPS = dict.fromkeys(row.group for row in pk.quantities().values() if is_offered(DISK, row.group))
+GROUPS = dict.fromkeys(
+    row.group for row in pk.quantities().values() if TABLE.offers(DISK.rung, row.group)
+)
 LOADS = [group for group in GROUPS if "forces" in group or "rotators" in group]
 
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.labels.coordinates import LABELS
+from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.equilibria import Equilibria
 from phasekit.phase.exact.separatrices import Separatrices
-from phasekit.table import quantities as table
-from phasekit.table.quantities import PASSES, QUANTITIES, ROWS, plan_passes, select
+from phasekit.table.quantities import ROWS, TABLE, select
+from phasekit.table.row import Pass, Quantity
 
 C = pk.Coefficients(4.3, 1.2, 0.7)
 DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
@@ -44,7 +44,7 @@ def test_variables_follow_from_their_rows(name, variable):
     assert "_FillValue" not in result.encoding
 
 
-@pytest.mark.parametrize("row", QUANTITIES, ids=lambda row: row.name)
+@pytest.mark.parametrize("row", ROWS.values(), ids=lambda row: row.name)
 def test_rows_are_complete(row):
     assert row.units
     assert row.long_name
@@ -59,13 +59,13 @@ def test_rows_are_complete(row):
 
 
 def test_names_are_unique_and_distinct_from_dims_and_parameters():
-    assert len(ROWS) == len(QUANTITIES)
+    assert len(ROWS) == len(list(ROWS.values()))
     from phasekit.systems.registry import models
 
     parameters = {p.name for model in models().values() for p in model.declared}
     # Lyapunov exponents are counted on a dim of this name; a saddle's stands in other results.
     dims = set(LABELS) - {"exponent"}
-    assert not set(ROWS) & (dims | parameters | set(table.STATES))
+    assert not set(ROWS) & (dims | parameters | set(STATES))
 
 
 def test_rows_and_fields_of_the_floor_below_are_the_same():
@@ -75,13 +75,13 @@ def test_rows_and_fields_of_the_floor_below_are_the_same():
 
 
 def test_groups_share_one_pass():
-    assert [p.groups for p in plan_passes(select(("equilibria", "separatrices")))] == [
+    assert [p.groups for p in TABLE.plan(select(("equilibria", "separatrices")))] == [
         ("equilibria", "separatrices")
     ]
-    assert [p.groups for p in plan_passes(select(("phi", "topology")))] == [
+    assert [p.groups for p in TABLE.plan(select(("phi", "topology")))] == [
         ("equilibria", "separatrices")
     ]
-    assert [p.groups for p in plan_passes(select("phi"))] == [("equilibria",)]
+    assert [p.groups for p in TABLE.plan(select("phi"))] == [("equilibria",)]
 
 
 def test_quantities_reads_as_a_table_and_a_mapping():
@@ -105,7 +105,7 @@ def test_a_new_row_needs_nothing_but_a_row_and_a_pass(monkeypatch):
     def heights(phi, e, beta):
         return -(e * np.sin(beta))[..., None] * np.cos(phi)
 
-    row = table.Quantity(
+    row = Quantity(
         "height",
         "heights",
         ("equilibrium",),
@@ -115,10 +115,9 @@ def test_a_new_row_needs_nothing_but_a_row_and_a_pass(monkeypatch):
         "-e sin(beta) cos(phi)",
         "-",
     )
-    one = table.Pass(heights, ("phi", "e", "beta"), ("heights",))
-    monkeypatch.setitem(table.ROWS, "height", row)
-    monkeypatch.setattr(table, "QUANTITIES", (*QUANTITIES, row))
-    monkeypatch.setattr(table, "PASSES", (*PASSES, one))
+    one = Pass(heights, ("phi", "e", "beta"), ("heights",))
+    monkeypatch.setitem(ROWS, "height", row)
+    monkeypatch.setattr(TABLE, "passes", (*TABLE.passes, one))
     ds = pk.sweep(DISK, beta=[0.1, 0.2], a=[0.0, 0.01], of=("heights", "phi", "energy"))
     expected = -DISK.e * np.sin(ds.beta) * np.cos(ds.phi)
     np.testing.assert_allclose(ds.height, expected, rtol=1e-15)
