@@ -515,6 +515,7 @@ def test_help_tells_the_units(capsys):
     assert "radius of the disk, m or cm or mm or um" in words
 
 
+@pytest.mark.slow
 def test_basins(tmp_path, capsys):
     argv = ["basins", "--model", "Coefficients", "--A", "1", "--B", "0.35", "--C", "0.12",
             "--damping", "0.2", "--phi", "-180:180deg:41", "--dphi", "-1:1:21"]  # fmt: skip

@@ -316,6 +316,7 @@ def test_at_equilibria_of_a_map(what):
         np.testing.assert_array_equal(here.deviation_couple, one.deviation_couple)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["forces", "rotators"])
 def test_over_separatrices_of_a_map(what):
     method = MAP.phasekit.bearing_forces if what == "forces" else MAP.phasekit.rotators
@@ -337,6 +338,7 @@ def test_over_separatrices_of_a_map(what):
     np.testing.assert_array_equal(peak.isel(side=0).notnull(), MAP.loop > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["forces", "rotators"])
 def test_over_orbits_of_a_map(what):
     method = MAP.phasekit.bearing_forces if what == "forces" else MAP.phasekit.rotators

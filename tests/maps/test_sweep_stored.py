@@ -222,6 +222,7 @@ def test_scripts_need_no_guard(tmp_path):
     assert "40.0/40.0" in done.stderr
 
 
+@pytest.mark.slow
 def test_many_ways_make_the_same_files(tmp_path):
     for number, workers in enumerate((1, 2)):
         pk.sweep(DISK, AXES, store=tmp_path / f"{number}.zarr", chunks=3, workers=workers)

@@ -65,6 +65,7 @@ def test_fast_drives_neither_overflow_nor_vanish_too_soon():
     assert np.isfinite(transforms(0.0, 1.0, 0.0, *at, 1e5, 1.0, 1.0, 1.0, 1.0)[1]).all()
 
 
+@pytest.mark.slow
 def test_compiled_and_interpreted_kernels_agree():
     rng = np.random.default_rng(5)
     A, B, C = rng.normal(size=(3, 40))

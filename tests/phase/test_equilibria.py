@@ -181,6 +181,7 @@ def test_degenerate_points_are_told_apart_exactly(system, factor):
         check(A, B, C)
 
 
+@pytest.mark.slow
 def test_one_unit_off_a_degenerate_point_is_not_degenerate():
     for A, B, C in DEGENERATE:
         for towards in (0.0, np.inf):

@@ -262,6 +262,7 @@ def test_a_degenerate_maximum_is_a_saddle_and_an_inflection_is_none():
 # --------------------------------------------------------------------- orbits
 
 
+@pytest.mark.slow
 def test_orbits_of_the_rotor():
     A, B, C, phi, dphi = systems(600)
     dphi[::3] = 0.0
