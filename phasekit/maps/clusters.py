@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import contextlib
+import gc
 from collections.abc import Generator, Iterable, Iterator
 from itertools import islice
 from typing import Any
@@ -29,10 +30,16 @@ def connected(client: Any) -> Iterator[Any]:
         return
     if not isinstance(client, str) or not client:
         raise bad("client", client, "a dask.distributed.Client or the address of a scheduler")
+    made: Any = None
     try:
-        made: Any = distributed.Client(client, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
+        made = distributed.Client(client, timeout=10, set_as_default=False)  # type: ignore[no-untyped-call]
     except (OSError, ValueError) as error:
-        raise StoreError(f"client: no scheduler answers at {client}: {error}") from error
+        because = str(error)
+    if made is None:
+        # Its client joins the thread of its event loop when it is collected: here, for in a thread
+        # of another event loop, where the garbage collection may run, that waits for ever.
+        gc.collect()
+        raise StoreError(f"client: no scheduler answers at {client}: {because}")
     try:
         yield made
     finally:

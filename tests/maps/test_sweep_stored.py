@@ -4,6 +4,7 @@ import pickle
 import shutil
 import subprocess
 import sys
+import threading
 
 import numpy as np
 import pytest
@@ -526,14 +527,17 @@ def test_tiles_that_no_process_can_hold(tmp_path):
 
 def test_no_scheduler_there(tmp_path):
     pytest.importorskip("distributed")
+    before = set(threading.enumerate())
     with pytest.raises(pk.StoreError, match="client: no scheduler answers at nowhere"):
         pk.sweep(DISK, AXES, store=tmp_path / "map.zarr", client="nowhere://x")
+    # Otherwise its thread is waited for where it is collected, or 20 s at the end of the process.
+    assert [one.name for one in threading.enumerate() if one not in before] == []
 
 
 def test_on_a_cluster(tmp_path):
     distributed = pytest.importorskip("distributed")
     with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=":0"
     ) as cluster:
         address = cluster.scheduler_address
         ds = pk.sweep(DISK, AXES, store=tmp_path / "map.zarr", chunks=2, client=address)
