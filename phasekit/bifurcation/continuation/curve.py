@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -111,27 +113,27 @@ class Curve:
     ends: tuple[str, ...] = ()
     discrete: bool = False
 
-    @property
+    @functools.cached_property
     def n(self) -> int:
         """Number of states."""
         return len(self.field.states)
 
-    @property
+    @functools.cached_property
     def m(self) -> int:
         """Number of states and free parameters."""
         return self.n + len(self.active)
 
-    @property
+    @functools.cached_property
     def size(self) -> int:
         """Number of unknowns."""
         return defining.unknowns(self.kind, self.n, len(self.active))
 
-    @property
+    @functools.cached_property
     def rows(self) -> int:
         """Number of equations."""
         return defining.equations(self.kind, self.n)
 
-    @property
+    @functools.cached_property
     def keeps(self) -> bool:
         """Whether the derivatives of f are kept at each point."""
         return self.kind != EQUILIBRIUM or self.n <= KEPT
@@ -141,17 +143,23 @@ class Curve:
         """Whether derivatives by the states are given, and no differences."""
         return isinstance(self.field, SymbolicField) or bool(getattr(self.field, "jacobian", None))
 
-    @property
+    @functools.cached_property
     def weight(self) -> Array:
         """Weights of lengths: of the mean square of states, and of free parameters."""
         weight = np.zeros(self.size)
         weight[: self.m] = 1.0 / self.scale[: self.m] ** 2
         weight[: self.n] /= self.n
+        weight.flags.writeable = False
         return weight
+
+    @functools.cached_property
+    def _places(self) -> npt.NDArray[np.int64]:
+        """Places of the free parameters, for kernels."""
+        return np.array(self.active, dtype=np.int64)
 
     def length(self, difference: Array) -> float:
         """Length of a difference of unknowns."""
-        return float(np.sqrt(np.sum(self.weight * difference**2)))
+        return math.sqrt(np.add.reduce(self.weight * difference**2))
 
     def _kernel(self, kernel: Any) -> Any:
         return kernel if self.field.compiled else kernel.py_func
@@ -188,7 +196,7 @@ class Curve:
         with np.errstate(all="ignore"):
             steps = kernel(
                 *self._functions(sharp=True), self.kind, n, self.par.copy(),
-                np.array(self.active, dtype=np.int64), w, aim,
+                self._places, w, aim,
                 self.options.tolerance if tolerance is None else tolerance, iterations,
             )  # fmt: skip
         places = defining.places(self.kind, n, len(self.active))
@@ -208,17 +216,15 @@ class Curve:
     def at(self, u: Array, *, sharp: bool = True) -> tuple[Array, Array]:
         """F and its derivatives by states and free parameters, to a few digits unless sharp."""
         n, m = self.n, self.m
-        w = np.zeros(2 * m + n + n * m + differences.spare_size(n, m))
-        w[:m] = u[:m]
-        w[m : 2 * m] = self.scale[:m]
         out = 2 * m
-        first, _, mode = self._functions(sharp=sharp)
-        w = np.concatenate([w, np.zeros(n + n * m + 4 * m)])
         spare = out + n + n * m
-        active = np.array(self.active, dtype=np.int64)
+        w = np.zeros(spare + differences.spare_size(n, m) + n + n * m + 4 * m)
+        w[:m] = u[:m]
+        w[m:out] = self.scale[:m]
+        first, _, mode = self._functions(sharp=sharp)
         kernel = self._kernel(defining.first_derivatives)
         with np.errstate(all="ignore"):
-            kernel(first, mode, n, w, 0, self.par.copy(), active, m, out, spare)
+            kernel(first, mode, n, w, 0, self.par.copy(), self._places, m, out, spare)
         return w[out : out + n].copy(), w[out + n : spare].reshape(n, m).copy()
 
     def values(self, u: Array) -> Array:
@@ -280,7 +286,7 @@ class Curve:
         with np.errstate(all="ignore"):
             self._kernel(defining.bend_all)(
                 first, second, self.field.mode, n, self.par.copy(),
-                np.array(self.active, dtype=np.int64), self.scale[:m].copy(),
+                self._places, self.scale[:m].copy(),
                 np.ascontiguousarray(u[:, :m]), np.ascontiguousarray(z), out,
             )  # fmt: skip
         return out.reshape(-1, n, m)
@@ -301,7 +307,7 @@ class Curve:
         with np.errstate(all="ignore"):
             kernel(
                 self.field.first(self.active), function, self.field.mode, n, w, 0, self.par.copy(),
-                np.array(self.active, dtype=np.int64), m, place, out, out + count,
+                self._places, m, place, out, out + count,
             )  # fmt: skip
         return w[out : out + count].copy()
 
@@ -331,7 +337,6 @@ class Curve:
         w[: state.size] = state
         kernel = self._kernel(trace.trace)
         functions = self._functions()
-        active = np.array(self.active, dtype=np.int64)
         columns = 2 * size + trace.RECORDED
         chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
         records = []
@@ -342,7 +347,7 @@ class Curve:
                 record = np.empty((min(left, chunk), columns))
                 slopes = np.empty((len(record), n * self.m))
                 count, reason, which = kernel(
-                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record, slopes
+                    *functions, self.kind, n, self.par.copy(), self._places, fixed, w, record, slopes
                 )
                 records.append(record[:count])
                 kept.append(slopes[:count] if self.keeps else slopes[:count, :0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -69,8 +70,9 @@ def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.
     matrices = slopes[..., :n]
     if n == 2:
         values = _eigenvalues_of_two(matrices)
-        real = _symmetric(_in_even_units(matrices), accuracy)
-        values.imag[real] = 0.0
+        if values.imag.any():
+            real = _symmetric(_in_even_units(matrices), accuracy)
+            values.imag[real] = 0.0
         return values
     finite = np.isfinite(slopes).all(axis=(-2, -1))
     result = np.full(slopes.shape[:-2] + (n,), np.nan, dtype=complex)
@@ -87,8 +89,8 @@ def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.
 
 
 def _symmetric(matrices: Array, accuracy: float) -> npt.NDArray[np.bool_]:
-    size = np.max(np.abs(matrices), axis=(-2, -1), initial=0.0)
-    gap = np.max(np.abs(matrices - np.swapaxes(matrices, -1, -2)), axis=(-2, -1), initial=0.0)
+    size = np.abs(matrices).max(axis=(-2, -1), initial=0.0)
+    gap = np.abs(matrices - matrices.swapaxes(-1, -2)).max(axis=(-2, -1), initial=0.0)
     return np.asarray(gap <= 4.0 * accuracy * size)
 
 
@@ -97,40 +99,44 @@ def _in_even_units(matrices: Array) -> Array:
 
     Along the edges of a spanning forest of the entries, (d_j/d_i)^2 = |A_ji/A_ij|.
     """
-    if not matrices.size or _symmetric(matrices, 0.0).all():
+    transposed = matrices.swapaxes(-1, -2)
+    if (matrices == transposed).all():
         return matrices
     # No units change the sign of A_ij A_ji.
-    products = matrices * np.swapaxes(matrices, -1, -2)
-    size = np.max(np.abs(matrices), axis=(-2, -1))
-    if np.all(np.min(products, axis=(-2, -1)) < -((OPPOSITE * size) ** 2)):
+    absolute = np.abs(matrices)
+    size = absolute.max(axis=(-2, -1))
+    least = (matrices * transposed).min(axis=(-2, -1))
+    if (least < -((OPPOSITE * size) ** 2)).all():
         return matrices
-    sizes = np.abs(matrices).reshape(-1, *matrices.shape[-2:]).sum(axis=0)
+    sizes = absolute.reshape(-1, *matrices.shape[-2:]).sum(axis=0)
     both = np.sqrt(sizes * sizes.T)
-    if not np.any(both):
+    most = both.max()
+    if most == 0.0:
         return matrices
-    # Zeros by differences are zeros but for rounding.
-    log = _along_a_forest(both > 1e-12 * np.max(both), sizes)
     with np.errstate(all="ignore"):
-        unit = np.exp(log - np.mean(log))
+        # Zeros by differences are zeros but for rounding.
+        log = _along_a_forest(both > 1e-12 * most, sizes)
+        unit = np.exp(log - log.mean())
         even = matrices * unit / unit[:, None]
     return even if np.isfinite(even).all() else matrices
 
 
 def _along_a_forest(joined: npt.NDArray[np.bool_], sizes: Array) -> Array:
     """Logarithms of units d with d_j/d_i = (|A_ji/A_ij|)^(1/2) along the edges of a forest."""
-    with np.errstate(all="ignore"):
-        half = 0.5 * (np.log(sizes.T) - np.log(sizes))
-    log = np.full(len(sizes), np.nan)
-    for root in range(len(sizes)):
-        if not np.isnan(log[root]):
-            continue
-        log[root] = 0.0
-        reached = [root]
+    logs = np.log(sizes)
+    half, edges = (0.5 * (logs.T - logs)).tolist(), joined.tolist()
+    left = dict.fromkeys(range(len(sizes)))  # in order
+    found = [0.0] * len(sizes)
+    while left:
+        reached = [next(iter(left))]
+        del left[reached[0]]
         for i in reached:
-            new = np.flatnonzero(joined[i] & np.isnan(log))
-            log[new] = log[i] + half[i, new]
-            reached.extend(new.tolist())
-    return log
+            new = [j for j in left if edges[i][j]]
+            for j in new:
+                found[j] = found[i] + half[i][j]
+                del left[j]
+            reached += new
+    return np.array(found)
 
 
 def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
@@ -158,12 +164,12 @@ def orientation(curve: Curve, tangent: Array, slopes: Array) -> tuple[Array, Arr
     m = curve.m
     scale = curve.scale[:m]
     top = slopes * scale
-    rows = np.max(np.abs(top), axis=-1, keepdims=True)
-    rows = np.where(rows > 0.0, rows, 1.0)
+    rows = np.abs(top).max(axis=-1, keepdims=True)
+    rows[~(rows > 0.0)] = 1.0
     bottom = tangent[..., :m] / scale
     matrix = np.concatenate([top / rows, bottom[..., None, :]], axis=-2)
     sign, log = np.linalg.slogdet(matrix)
-    return np.asarray(sign), np.asarray(log + np.sum(np.log(rows[..., 0]), axis=-1))
+    return np.asarray(sign), np.asarray(log + np.log(rows[..., 0]).sum(axis=-1))
 
 
 def test_functions(
@@ -190,7 +196,7 @@ def test_functions(
         log,
         pair,
         below,
-        np.asarray(np.sum(values.imag == 0.0, axis=-1)),
+        np.asarray((values.imag == 0.0).sum(axis=-1)),
         flip_function(values) if curve.discrete else nothing,
         unstable_of(curve, values, neutral=neutral),
         values,
@@ -205,8 +211,8 @@ def unstable_of(
     The size of a multiplier is a rounded number, and may be exactly 1.
     """
     least = (KEPT if neutral else ROUNDED) if curve.discrete else 0.0
-    floor = np.maximum(least, blur) * np.max(np.abs(values), axis=-1)
-    return np.asarray(np.sum(curve.growth(values) > floor[..., None], axis=-1))
+    floor = np.maximum(least, blur) * np.abs(values).max(axis=-1)
+    return np.asarray((curve.growth(values) > floor[..., None]).sum(axis=-1))
 
 
 def flip_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -218,7 +224,7 @@ def flip_function(values: npt.NDArray[np.complex128]) -> Array:
 
 def product_function(values: npt.NDArray[np.complex128]) -> Array:
     """The least mu_i mu_j - 1 of real and conjugate pairs, with the sign of the product of all."""
-    i, j = np.triu_indices(values.shape[-1], 1)
+    i, j = _twos(values.shape[-1])
     a, b = values[..., i], values[..., j]
     real = ((a.imag == 0.0) & (b.imag == 0.0)) | (a == np.conj(b))
     excess = (a * b).real - 1.0
@@ -226,6 +232,14 @@ def product_function(values: npt.NDArray[np.complex128]) -> Array:
     least = np.min(np.where(real, np.abs(excess), np.inf), axis=-1, initial=np.inf)
     least = np.where(np.isfinite(least), least, 1.0)
     return np.asarray(np.where(negative % 2 == 1, -least, least))
+
+
+@functools.cache
+def _twos(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Places of all twos of n numbers."""
+    i, j = np.triu_indices(n, 1)
+    i.flags.writeable = j.flags.writeable = False
+    return i, j
 
 
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -244,15 +258,15 @@ def pair_sums(values: npt.NDArray[np.complex128]) -> tuple[Array, npt.NDArray[np
         least = rows[:, 0].reshape(values.shape[:-1])
         negative = rows[:, 1].astype(int).reshape(values.shape[:-1])
     else:
-        i, j = np.triu_indices(n, 1)
+        i, j = _twos(n)
         a, b = values[..., i], values[..., j]
         sums = a.real + b.real
         real = a.imag == -b.imag
         real &= (a.imag == 0.0) | (a.real == b.real)
-        negative = np.sum(real & (sums < 0.0), axis=-1)
-        least = np.min(np.where(real, np.abs(sums), np.inf), axis=-1, initial=np.inf)
+        negative = (real & (sums < 0.0)).sum(axis=-1)
+        least = np.where(real, np.abs(sums), np.inf).min(axis=-1, initial=np.inf)
         least = np.where(np.isfinite(least), least, 1.0)
-    tiny = least <= SAME * np.max(np.abs(values), axis=-1)
+    tiny = least <= SAME * np.abs(values).max(axis=-1)
     return np.asarray(np.where(negative % 2 == 1, -least, least)), np.where(tiny, -1, negative)
 
 
