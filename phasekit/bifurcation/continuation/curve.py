@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.rows import largest
 from phasekit.numerics import differences
 
 Array = npt.NDArray[np.float64]
@@ -257,7 +258,7 @@ class Curve:
                 nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
                 value[value <= nothing] = 0.0
             ratio = np.where(value > 0.0, value / terms, 0.0)
-            return np.asarray(np.max(ratio, axis=1, initial=0.0))
+            return np.asarray(largest(ratio))
 
     def linear(self, slopes: Array) -> Array:
         """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""

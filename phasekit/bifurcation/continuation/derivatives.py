@@ -257,14 +257,17 @@ class _Ladder:
         noises = np.full((WINDOW + 1, count, n), np.inf)
         for width in range(least, WINDOW + 1):
             weights = _weights(order, width)
-            unit = self.steps[: count - width + 1, None] ** (2 if order == 3 else 0)
             place = slice(0, count - width + 1)
             for kept, given, by in (
                 (values, data, weights),
                 (noises, errors, np.abs(weights)),
             ):
-                windows = np.lib.stride_tricks.sliding_window_view(given, width, axis=0)
-                kept[width, place] = windows @ by / unit
+                step, across = given.strides
+                windows = np.ndarray(
+                    (count - width + 1, n, width), float, given, 0, (step, across, step)
+                )
+                found = windows @ by
+                kept[width, place] = found / self.steps[place, None] ** 2 if order == 3 else found
         return self._best(values, noises, least)
 
     def _best(self, values: Array, noises: Array, least: int) -> tuple[Estimate, int, bool]:

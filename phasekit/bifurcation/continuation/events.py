@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.path import Path, Sample, between
+from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.spectrum import (
     Tests,
     is_conservative,
@@ -92,7 +93,7 @@ def _on_ends(
     for end in (0, len(keep) - 1):
         # The path may come to its end in ever smaller steps.
         gap = (path.u[keep] - path.u[keep[end]])[:, : curve.m] / curve.scale[: curve.m]
-        away = np.flatnonzero(np.max(np.abs(gap), axis=1) > 1e-3)
+        away = np.flatnonzero(largest(gap) > 1e-3)
         if not len(away):
             continue
         beside = int(away[0] if end == 0 else away[-1])

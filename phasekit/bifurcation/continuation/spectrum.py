@@ -10,12 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.rows import across, count, largest, largest_entry
 
 Array = npt.NDArray[np.float64]
 OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding
 ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
 KEPT = 1e-7  # the same where areas are kept: multipliers that meet part with the root of rounding
 SAME = 1e-10  # part of the largest eigenvalue by which two others are told apart
+NEAR = 1e-5  # a spectrum with a pair that sums to more, relative, is not that of such a system
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
 
 
@@ -70,7 +72,9 @@ def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.
     matrices = slopes[..., :n]
     if n == 2:
         values = _eigenvalues_of_two(matrices)
-        if values.imag.any():
+        # Units leave a, d and b c as they are: only next to double ones rounding makes pairs.
+        near = np.abs(values.imag) <= OPPOSITE * np.abs(values.real)
+        if (near & (values.imag != 0.0)).any():
             real = _symmetric(_in_even_units(matrices), accuracy)
             values.imag[real] = 0.0
         return values
@@ -89,9 +93,8 @@ def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.
 
 
 def _symmetric(matrices: Array, accuracy: float) -> npt.NDArray[np.bool_]:
-    size = np.abs(matrices).max(axis=(-2, -1), initial=0.0)
-    gap = np.abs(matrices - matrices.swapaxes(-1, -2)).max(axis=(-2, -1), initial=0.0)
-    return np.asarray(gap <= 4.0 * accuracy * size)
+    gap = largest_entry(matrices - matrices.swapaxes(-1, -2))
+    return np.asarray(gap <= 4.0 * accuracy * largest_entry(matrices))
 
 
 def _in_even_units(matrices: Array) -> Array:
@@ -103,12 +106,11 @@ def _in_even_units(matrices: Array) -> Array:
     if (matrices == transposed).all():
         return matrices
     # No units change the sign of A_ij A_ji.
-    absolute = np.abs(matrices)
-    size = absolute.max(axis=(-2, -1))
-    least = (matrices * transposed).min(axis=(-2, -1))
-    if (least < -((OPPOSITE * size) ** 2)).all():
+    products = (matrices * transposed).reshape(*matrices.shape[:-2], -1)
+    least = -((OPPOSITE * largest_entry(matrices)) ** 2)
+    if (across(np.minimum, products) < least).all():
         return matrices
-    sizes = absolute.reshape(-1, *matrices.shape[-2:]).sum(axis=0)
+    sizes = np.abs(matrices).reshape(-1, *matrices.shape[-2:]).sum(axis=0)
     both = np.sqrt(sizes * sizes.T)
     most = both.max()
     if most == 0.0:
@@ -164,7 +166,7 @@ def orientation(curve: Curve, tangent: Array, slopes: Array) -> tuple[Array, Arr
     m = curve.m
     scale = curve.scale[:m]
     top = slopes * scale
-    rows = np.abs(top).max(axis=-1, keepdims=True)
+    rows = largest(top)[..., None]
     rows[~(rows > 0.0)] = 1.0
     bottom = tangent[..., :m] / scale
     matrix = np.concatenate([top / rows, bottom[..., None, :]], axis=-2)
@@ -196,7 +198,7 @@ def test_functions(
         log,
         pair,
         below,
-        np.asarray((values.imag == 0.0).sum(axis=-1)),
+        np.asarray(count(values.imag == 0.0)),
         flip_function(values) if curve.discrete else nothing,
         unstable_of(curve, values, neutral=neutral),
         values,
@@ -211,8 +213,8 @@ def unstable_of(
     The size of a multiplier is a rounded number, and may be exactly 1.
     """
     least = (KEPT if neutral else ROUNDED) if curve.discrete else 0.0
-    floor = np.maximum(least, blur) * np.abs(values).max(axis=-1)
-    return np.asarray((curve.growth(values) > floor[..., None]).sum(axis=-1))
+    floor = np.maximum(least, blur) * largest(values)
+    return np.asarray(count(curve.growth(values) > floor[..., None]))
 
 
 def flip_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -263,10 +265,10 @@ def pair_sums(values: npt.NDArray[np.complex128]) -> tuple[Array, npt.NDArray[np
         sums = a.real + b.real
         real = a.imag == -b.imag
         real &= (a.imag == 0.0) | (a.real == b.real)
-        negative = (real & (sums < 0.0)).sum(axis=-1)
-        least = np.where(real, np.abs(sums), np.inf).min(axis=-1, initial=np.inf)
+        negative = count(real & (sums < 0.0))
+        least = across(np.minimum, np.where(real, np.abs(sums), np.inf), initial=np.inf)
         least = np.where(np.isfinite(least), least, 1.0)
-    tiny = least <= SAME * np.abs(values).max(axis=-1)
+    tiny = least <= SAME * largest(values)
     return np.asarray(np.where(negative % 2 == 1, -least, least)), np.where(tiny, -1, negative)
 
 
@@ -309,9 +311,15 @@ def is_conservative(values: npt.NDArray[np.complex128], *, discrete: bool = Fals
         rows = np.array([np.poly(row).real for row in values])
         gap = np.max(np.abs(rows - rows[:, ::-1]), axis=-1) / np.max(np.abs(rows), axis=-1)
     else:
-        size = np.max(np.abs(values), axis=-1, initial=1e-300)
-        order = np.sort_complex(values)
-        mirror = np.sort_complex(-values)
-        gap = np.abs(order - mirror).max(axis=-1) / np.where(size > 0.0, size, 1.0)
+        gap = _off_mirror(values[:1])
+        if gap[0] < NEAR:
+            gap = _off_mirror(values)
     # Beside the size of the spectrum; at points where pairs meet it is the root of rounding.
-    return bool(np.median(gap) <= NEUTRAL and np.max(gap) < 1e-5)
+    return bool(np.max(gap) < NEAR and np.median(gap) <= NEUTRAL)
+
+
+def _off_mirror(values: npt.NDArray[np.complex128]) -> Array:
+    """By how much spectra are not their mirror images, beside their sizes."""
+    size = np.max(np.abs(values), axis=-1, initial=1e-300)
+    gap = np.abs(np.sort_complex(values) - np.sort_complex(-values)).max(axis=-1)
+    return np.asarray(gap / np.where(size > 0.0, size, 1.0))
