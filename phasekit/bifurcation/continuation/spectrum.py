@@ -78,18 +78,25 @@ def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.
             real = _symmetric(_in_even_units(matrices), accuracy)
             values.imag[real] = 0.0
         return values
-    finite = np.isfinite(slopes).all(axis=(-2, -1))
+    finite = np.isfinite(slopes)
+    if finite.all():
+        return _eigenvalues_of_finite(matrices, accuracy)
     result = np.full(slopes.shape[:-2] + (n,), np.nan, dtype=complex)
-    given = matrices[finite]
-    even = _in_even_units(given)
-    real = _symmetric(even, accuracy)
-    values = np.empty(given.shape[:-1], dtype=complex)
-    values[~real] = np.linalg.eigvals(given[~real])
-    if real.any():
-        # The lower triangle alone counts for LAPACK; the mean of both is the better one.
-        values[real] = np.linalg.eigvalsh(0.5 * (even + np.swapaxes(even, -1, -2))[real])
-    result[finite] = values
+    whole = finite.all(axis=(-2, -1))
+    result[whole] = _eigenvalues_of_finite(matrices[whole], accuracy)
     return result
+
+
+def _eigenvalues_of_finite(matrices: Array, accuracy: float) -> npt.NDArray[np.complex128]:
+    even = _in_even_units(matrices)
+    real = _symmetric(even, accuracy)
+    if not real.any():
+        return np.linalg.eigvals(matrices).astype(complex, copy=False)
+    values = np.empty(matrices.shape[:-1], dtype=complex)
+    values[~real] = np.linalg.eigvals(matrices[~real])
+    # The lower triangle alone counts for LAPACK; the mean of both is the better one.
+    values[real] = np.linalg.eigvalsh(0.5 * (even + np.swapaxes(even, -1, -2))[real])
+    return values
 
 
 def _symmetric(matrices: Array, accuracy: float) -> npt.NDArray[np.bool_]:
