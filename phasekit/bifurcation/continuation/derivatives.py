@@ -207,7 +207,7 @@ class Derivatives:
     def _at(self, given: Any) -> Array:
         """F, or what stands for it, at the point."""
         if given is not None:
-            return self._values(self.u[None], given)[0]
+            return np.asarray(self._values(self.u[None], given)[0])
         if self._middle is None:
             self._middle = self.curve.values(self.u[None])[0]
         return self._middle
