@@ -277,10 +277,16 @@ def foreign(expression: Any, symbols: Iterable[Any], also: Iterable[Any] = ()) -
 
 def bounded(expression: Any) -> None:
     """Refuse an expression that `Nodes` would not have made, because of the size of its numbers."""
-    for node in set(sp.preorder_traversal(expression)):
+    seen, queue = set(), [expression]
+    while queue:
+        node = queue.pop()
+        if node in seen:
+            continue
+        seen.add(node)
         checked(node)
         if type(node) in _FAR_CLASSES:
             _near(type(node).__name__, node.args)
+        queue.extend(node.args)
 
 
 def _near(name: str, arguments: Sequence[Any]) -> list[Any]:

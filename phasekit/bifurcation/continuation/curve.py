@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,8 +17,10 @@ from phasekit.bifurcation.continuation.kernels import defining, newton, trace
 from phasekit.bifurcation.continuation.kernels import state as state_places
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
-from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.rows import largest
+from phasekit.bifurcation.continuation.stops import Stop as Stop
+from phasekit.bifurcation.continuation.stops import said
 from phasekit.numerics import differences
 
 Array = npt.NDArray[np.float64]
@@ -23,6 +28,7 @@ Array = npt.NDArray[np.float64]
 CHUNK = 256
 MOST = 1 << 20  # derivatives at a time, where they are not kept
 KEPT = 16  # states up to which derivatives are kept at each point
+LAST = 16  # points whose derivatives are remembered
 TIGHT = 1e-13
 
 
@@ -40,14 +46,6 @@ class Point:
     def converged(self) -> bool:
         """Whether Newton's method came to an end."""
         return self.steps > 0
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Why a curve ends: full, bound, closed, stuck or not_finite; and what says so in words."""
-
-    reason: str
-    message: str
 
 
 @dataclass(frozen=True)
@@ -111,27 +109,27 @@ class Curve:
     ends: tuple[str, ...] = ()
     discrete: bool = False
 
-    @property
+    @functools.cached_property
     def n(self) -> int:
         """Number of states."""
         return len(self.field.states)
 
-    @property
+    @functools.cached_property
     def m(self) -> int:
         """Number of states and free parameters."""
         return self.n + len(self.active)
 
-    @property
+    @functools.cached_property
     def size(self) -> int:
         """Number of unknowns."""
         return defining.unknowns(self.kind, self.n, len(self.active))
 
-    @property
+    @functools.cached_property
     def rows(self) -> int:
         """Number of equations."""
         return defining.equations(self.kind, self.n)
 
-    @property
+    @functools.cached_property
     def keeps(self) -> bool:
         """Whether the derivatives of f are kept at each point."""
         return self.kind != EQUILIBRIUM or self.n <= KEPT
@@ -141,17 +139,23 @@ class Curve:
         """Whether derivatives by the states are given, and no differences."""
         return isinstance(self.field, SymbolicField) or bool(getattr(self.field, "jacobian", None))
 
-    @property
+    @functools.cached_property
     def weight(self) -> Array:
         """Weights of lengths: of the mean square of states, and of free parameters."""
         weight = np.zeros(self.size)
         weight[: self.m] = 1.0 / self.scale[: self.m] ** 2
         weight[: self.n] /= self.n
+        weight.flags.writeable = False
         return weight
+
+    @functools.cached_property
+    def _places(self) -> npt.NDArray[np.int64]:
+        """Places of the free parameters, for kernels."""
+        return np.array(self.active, dtype=np.int64)
 
     def length(self, difference: Array) -> float:
         """Length of a difference of unknowns."""
-        return float(np.sqrt(np.sum(self.weight * difference**2)))
+        return math.sqrt(np.add.reduce(self.weight * difference**2))
 
     def _kernel(self, kernel: Any) -> Any:
         return kernel if self.field.compiled else kernel.py_func
@@ -188,7 +192,7 @@ class Curve:
         with np.errstate(all="ignore"):
             steps = kernel(
                 *self._functions(sharp=True), self.kind, n, self.par.copy(),
-                np.array(self.active, dtype=np.int64), w, aim,
+                self._places, w, aim,
                 self.options.tolerance if tolerance is None else tolerance, iterations,
             )  # fmt: skip
         places = defining.places(self.kind, n, len(self.active))
@@ -205,21 +209,36 @@ class Curve:
             int(steps),
         )  # fmt: skip
 
+    @functools.cached_property
+    def _known(self) -> dict[tuple[Any, ...], Any]:
+        """What was last asked for of derivatives: special points ask for the same many times."""
+        return {}
+
+    def _once(self, make: Callable[..., Any], *given: Any) -> Any:
+        key = (make.__name__, *(z.tobytes() if isinstance(z, np.ndarray) else z for z in given))
+        found = self._known.get(key)
+        if found is None:
+            if len(self._known) >= min(LAST, MOST // (self.n * self.m)):
+                self._known.clear()
+            found = self._known[key] = make(*given)
+        return found
+
     def at(self, u: Array, *, sharp: bool = True) -> tuple[Array, Array]:
         """F and its derivatives by states and free parameters, to a few digits unless sharp."""
+        value, slopes = self._once(self._at, np.asarray(u[: self.m], dtype=float), sharp)
+        return value.copy(), slopes.copy()
+
+    def _at(self, u: Array, sharp: bool) -> tuple[Array, Array]:
         n, m = self.n, self.m
-        w = np.zeros(2 * m + n + n * m + differences.spare_size(n, m))
-        w[:m] = u[:m]
-        w[m : 2 * m] = self.scale[:m]
         out = 2 * m
-        first, _, mode = self._functions(sharp=sharp)
-        w = np.concatenate([w, np.zeros(n + n * m + 4 * m)])
         spare = out + n + n * m
-        active = np.array(self.active, dtype=np.int64)
+        w = np.zeros(spare + differences.spare_size(n, m) + n + n * m + 4 * m)
+        w[:m], w[m:out] = u, self.scale[:m]
+        first, _, mode = self._functions(sharp=sharp)
         kernel = self._kernel(defining.first_derivatives)
         with np.errstate(all="ignore"):
-            kernel(first, mode, n, w, 0, self.par.copy(), active, m, out, spare)
-        return w[out : out + n].copy(), w[out + n : spare].reshape(n, m).copy()
+            kernel(first, mode, n, w, 0, self.par.copy(), self._places, m, out, spare)
+        return w[out : out + n], w[out + n : spare].reshape(n, m)
 
     def values(self, u: Array) -> Array:
         """F at many points, the rows of u."""
@@ -251,7 +270,7 @@ class Curve:
                 nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
                 value[value <= nothing] = 0.0
             ratio = np.where(value > 0.0, value / terms, 0.0)
-            return np.asarray(np.max(ratio, axis=1, initial=0.0))
+            return np.asarray(largest(ratio))
 
     def linear(self, slopes: Array) -> Array:
         """The matrix whose eigenvalues decide: f_x, of a map that of the map itself."""
@@ -266,9 +285,12 @@ class Curve:
         """The derivatives of f_u z by states and free parameters, shape (n, m)."""
         full = np.zeros(self.m)
         full[: z.size] = z
-        second = self.field.second(self.active)
+        bent: Array = self._once(self._bend, np.asarray(u[: self.m], dtype=float), full)
+        return bent.copy()
+
+    def _bend(self, u: Array, z: Array) -> Array:
         jet = self.n * (1 + self.m)
-        out = self._derive(second, u, full, jet + self.n * self.m)
+        out = self._derive(self.field.second(self.active), u, z, jet + self.n * self.m)
         return out[jet:].reshape(self.n, self.m)
 
     def bend_all(self, u: Array, z: Array) -> Array:
@@ -280,7 +302,7 @@ class Curve:
         with np.errstate(all="ignore"):
             self._kernel(defining.bend_all)(
                 first, second, self.field.mode, n, self.par.copy(),
-                np.array(self.active, dtype=np.int64), self.scale[:m].copy(),
+                self._places, self.scale[:m].copy(),
                 np.ascontiguousarray(u[:, :m]), np.ascontiguousarray(z), out,
             )  # fmt: skip
         return out.reshape(-1, n, m)
@@ -301,7 +323,7 @@ class Curve:
         with np.errstate(all="ignore"):
             kernel(
                 self.field.first(self.active), function, self.field.mode, n, w, 0, self.par.copy(),
-                np.array(self.active, dtype=np.int64), m, place, out, out + count,
+                self._places, m, place, out, out + count,
             )  # fmt: skip
         return w[out : out + count].copy()
 
@@ -331,7 +353,6 @@ class Curve:
         w[: state.size] = state
         kernel = self._kernel(trace.trace)
         functions = self._functions()
-        active = np.array(self.active, dtype=np.int64)
         columns = 2 * size + trace.RECORDED
         chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
         records = []
@@ -342,8 +363,9 @@ class Curve:
                 record = np.empty((min(left, chunk), columns))
                 slopes = np.empty((len(record), n * self.m))
                 count, reason, which = kernel(
-                    *functions, self.kind, n, self.par.copy(), active, fixed, w, record, slopes
-                )
+                    *functions, self.kind, n, self.par.copy(), self._places, fixed, w, record,
+                    slopes,
+                )  # fmt: skip
                 records.append(record[:count])
                 kept.append(slopes[:count] if self.keeps else slopes[:count, :0])
                 left -= count
@@ -353,47 +375,7 @@ class Curve:
 
     def stop_of(self, reason: int, which: int, w: Array) -> Stop:
         """Say why a track ends in the state w."""
-        names = [*self.field.states, *(self.field.parameters[i] for i in self.active)]
-        where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
-        where += ", ..." if len(names) > 4 else ""
-        if reason == trace.BOUND and which >= self.m:
-            return Stop("bound", f"branches no longer meet on the curve beyond {where}")
-        if reason == trace.BOUND:
-            over = w[which] - self.low[which] > 0.5 * (self.high[which] - self.low[which])
-            if not np.isfinite(self.low[which]) or not np.isfinite(self.high[which]):
-                over = bool(np.isfinite(self.high[which])) or w[which] > 0.0
-            side, bound = ("upper", self.high) if over else ("lower", self.low)
-            return Stop("bound", f"{names[which]} met its {side} bound {bound[which]:.9g}")
-        if reason == trace.CLOSED:
-            return Stop("closed", f"the curve closed on its start at {where}")
-        if reason == trace.STUCK:
-            step = f"min_step = {self.options.min_step:g}"
-            words = {
-                newton.DIVERGED: f"Newton's method converged for no step longer than {step}",
-                newton.SINGULAR: f"the derivatives of f are singular beyond, for every step "
-                f"longer than {step}",
-                TURNS: f"the curve turns by more than max_turn = {self.options.max_turn:g} "
-                f"within {step}",
-                CROSSES: f"branches cross or pass each other within {step}",
-            }
-            return Stop("stuck", f"{words[which]} at {where}{self._differences()}")
-        if reason == trace.NOT_FINITE:
-            failure = self.field.failure
-            said = "" if failure is None else f": it raised {type(failure).__name__}: {failure}"
-            return Stop("not_finite", f"f is not finite beyond {where}{said}")
-        return Stop(
-            "max_points", f"max_points were computed, the last at {where}; extend() goes on"
-        )
-
-    def _differences(self) -> str:
-        """What else may end a curve whose derivatives are differences, in words."""
-        if self.knows_slopes:
-            return ""
-        width = 2.0 * differences.COARSE
-        return (
-            f"; derivatives are differences over {width:.0e} of an unknown and miss what f does "
-            "within less: a formula or jac knows them"
-        )
+        return said(self, reason, which, w)
 
     def replace(self, **changes: Any) -> Curve:
         """A copy with changes."""

@@ -10,6 +10,7 @@ several directions are combinations of lines (polarisation), and a line is sampl
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -27,6 +28,7 @@ Vector = npt.NDArray[Any]  # real or complex
 
 EPSILON = 2.0**-52
 APART = 7.7e-13  # neighbours that show rounding; no power of two, which would hide it
+STEPS = np.arange(-8.0, 9.0)  # of neighbours
 LEVELS = 24  # steps of a line: from half the size of the unknowns, each half the one before
 MORE = 10  # further ones, where the best lie at an end
 FARTHEST, WIDEST = 44, -19
@@ -84,8 +86,9 @@ class Derivatives:
         self.reach = np.maximum(np.abs(self.u), curve.scale[: curve.m])
         self.value, self.slopes = curve.at(self.u)
         # By line: samples by level, and derivatives by order.
-        self._lines: dict[bytes, tuple[dict[int, tuple[Array, Array]], dict[int, Estimate]]] = {}
+        self._lines: dict[bytes, tuple[dict[int, Array], dict[int, Estimate]]] = {}
         self._noise: Array | None = None
+        self._middle: Array | None = None
         self.widest = WIDEST
 
     def first(self, a: Vector) -> Estimate:
@@ -141,7 +144,7 @@ class Derivatives:
 
     def rounding(self) -> Array:
         """Size of the rounding errors of f, as they show between neighbours in relative size."""
-        return self._noise_of(np.abs(self.u), lambda u: self.curve.values(u[None])[0])
+        return self._shown(np.abs(self.u), self.curve.values)
 
     def doubt(self, noise: Array) -> None:
         """Take rounding errors of f for no smaller than these."""
@@ -175,24 +178,24 @@ class Derivatives:
                 results[order] = self._sampled(z, order, samples)
         return sign**order * results[order]
 
-    def _sampled(self, z: Array, order: int, samples: dict[int, tuple[Array, Array]]) -> Estimate:
+    def _sampled(self, z: Array, order: int, samples: dict[int, Array]) -> Estimate:
         given = self.curve.field.slopes_along(self.curve.par, self.curve.active, self.u, z)
-        length = float(np.max(np.abs(z) / self.reach))
+        length = float((np.abs(z) / self.reach).max())
+        noise = self._noise_of(z, given)
+        middle = self._at(given)
+        # Terms of f may cancel, as along a null vector, where their rounding does not.
+        terms = np.abs(self.slopes) @ np.abs(z) if given is None else np.zeros(self.curve.n)
         first, last = 1, LEVELS
         while True:
             levels = range(first, last + 1)
             missing = [k for k in levels if k not in samples]
-            steps = [s * 2.0**-k / length for k in missing for s in (1.0, -1.0)]
             if missing:
-                found = self._values(self.u + np.array(steps)[:, None] * z, given)
-                samples.update({k: (found[2 * i], found[2 * i + 1]) for i, k in enumerate(missing)})
-            ahead, behind = (np.array([samples[k][s] for k in levels]) for s in (0, 1))
-            ladder = _Ladder(
-                np.array([2.0**-k / length for k in levels]), ahead, behind,
-                self._values(self.u[None], given)[0], self._noise_of(z, given),
-                # Terms of f may cancel, as along a null vector, where their rounding does not.
-                np.abs(self.slopes) @ np.abs(z) if given is None else np.zeros(self.curve.n),
-            )  # fmt: skip
+                steps = np.array([s * 2.0**-k / length for k in missing for s in (1.0, -1.0)])
+                found = self._values(self.u + steps[:, None] * z, given)
+                samples.update(zip(missing, found.reshape(len(missing), 2, -1), strict=True))
+            sides = np.array([samples[k] for k in levels])
+            steps = np.array([2.0**-k / length for k in levels])
+            ladder = _Ladder(steps, sides[:, 0], sides[:, 1], middle, noise, terms)
             estimate, finest, wide = ladder.derivative(order if given is None else order - 1)
             if finest >= len(ladder.steps) - 3 and last < FARTHEST:
                 last += MORE
@@ -200,6 +203,14 @@ class Derivatives:
                 first -= MORE
             else:
                 return estimate
+
+    def _at(self, given: Any) -> Array:
+        """F, or what stands for it, at the point."""
+        if given is not None:
+            return np.asarray(self._values(self.u[None], given)[0])
+        if self._middle is None:
+            self._middle = self.curve.values(self.u[None])[0]
+        return self._middle
 
     def _values(self, points: Array, given: Any) -> Array:
         if given is None:
@@ -212,20 +223,22 @@ class Derivatives:
         At least that of the unknowns, by which f changes; and what differences over tiny steps
         show, of a smooth function nothing else (J. More, S. Wild, SIAM J. Sci. Comput. 33 (2011)).
         """
-        if given is None and self._noise is not None:
-            return self._noise
-        tiny = APART * (self.reach if given is None else z)
-        found = self._values(self.u + np.arange(-8.0, 9.0)[:, None] * tiny, given)
-        noise = EPSILON * np.max(np.abs(found), axis=0, initial=0.0)
-        for order in (4, 5):
-            differences = np.diff(found, n=order, axis=0)
-            size = factorial(2 * order) / factorial(order) ** 2
-            level = np.sqrt(np.mean(differences**2, axis=0) / size)
-            noise = np.maximum(noise, np.where(np.isfinite(level), level, 0.0))
-        if given is None:
+        if given is not None:
+            return self._shown(z, lambda points: self._values(points, given))
+        if self._noise is None:
             terms = np.abs(self.slopes) @ np.abs(self.u)
-            noise = np.maximum(noise, EPSILON * np.where(np.isfinite(terms), terms, 0.0))
-            self._noise = noise
+            terms = EPSILON * np.where(np.isfinite(terms), terms, 0.0)
+            self._noise = np.maximum(self._shown(self.reach, self.curve.values), terms)
+        return self._noise
+
+    def _shown(self, z: Array, values: Callable[[Array], Array]) -> Array:
+        found = values(self.u + STEPS[:, None] * (APART * z))
+        noise = EPSILON * np.abs(found).max(axis=0, initial=0.0)
+        for order in (4, 5):
+            found = np.diff(found, n=order if order == 4 else 1, axis=0)
+            size = factorial(2 * order) / factorial(order) ** 2
+            level = np.sqrt((found**2).mean(axis=0) / size)
+            noise = np.maximum(noise, np.where(np.isfinite(level), level, 0.0))
         return np.asarray(noise)
 
 
@@ -257,21 +270,24 @@ class _Ladder:
         noises = np.full((WINDOW + 1, count, n), np.inf)
         for width in range(least, WINDOW + 1):
             weights = _weights(order, width)
-            unit = self.steps[: count - width + 1, None] ** (2 if order == 3 else 0)
             place = slice(0, count - width + 1)
             for kept, given, by in (
                 (values, data, weights),
                 (noises, errors, np.abs(weights)),
             ):
-                windows = np.lib.stride_tricks.sliding_window_view(given, width, axis=0)
-                kept[width, place] = windows @ by / unit
+                step, across = given.strides
+                windows = np.ndarray(
+                    (count - width + 1, n, width), float, given, 0, (step, across, step)
+                )
+                found = windows @ by
+                kept[width, place] = found / self.steps[place, None] ** 2 if order == 3 else found
         return self._best(values, noises, least)
 
     def _best(self, values: Array, noises: Array, least: int) -> tuple[Estimate, int, bool]:
         _, count, n = values.shape
         # What the same window says one step on; and how far all shorter steps are from it.
         cut = np.full_like(values, np.inf)
-        cut[:, :-1] = np.abs(np.diff(values, axis=1))
+        np.abs(values[:, 1:] - values[:, :-1], out=cut[:, :-1])
         plain = values[least]
         slack = 2.0 * cut[least] + SLACK * noises[least]
         # All shorter steps at once: the range that they all allow.
@@ -282,20 +298,21 @@ class _Ladder:
         errors = cut + noises
         errors[:, :-1] += np.maximum(np.maximum(low[1:] - values[:, :-1], 0.0),
                                      values[:, :-1] - high[1:])  # fmt: skip
-        errors = np.where(np.isfinite(errors), errors, np.inf).reshape(-1, n)
-        best = np.argmin(errors, axis=0)
+        errors[~np.isfinite(errors)] = np.inf
+        errors = errors.reshape(-1, n)
+        best = errors.argmin(axis=0)
         columns = np.arange(n)
         error = errors[best, columns]
         value = np.where(np.isfinite(error), values.reshape(-1, n)[best, columns], np.nan)
+        width, place = np.divmod(best, count)
+        wide = (place <= 1) & np.isfinite(value)
+        poor = False
+        if wide.any():
+            unit = np.maximum(np.abs(self.odd).max(axis=0), 1e-300)[wide]
+            poor = bool((error[wide] / unit).max() > POOR * (np.abs(value)[wide] / unit).max())
         # Entries that are exact show nothing of the steps that they need.
-        places = np.where(error > 0.0, best % count + best // count - 1, 0)
-        unit = np.maximum(np.max(np.abs(self.odd), axis=0), 1e-300)
-        wide = (best % count <= 1) & np.isfinite(value)
-        poor = np.max(error[wide] / unit[wide], initial=0.0) > POOR * np.max(
-            np.abs(value)[wide] / unit[wide], initial=0.0
-        )
-        finest = int(np.max(places, initial=0))
-        return Estimate(value, CAUTION * error), finest, bool(poor)
+        finest = int(np.where(error > 0.0, place + width - 1, 0).max(initial=0))
+        return Estimate(value, CAUTION * error), finest, poor
 
 
 @cache

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 
@@ -10,9 +11,11 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.path import Path, Sample, between
+from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.spectrum import (
     Tests,
     is_conservative,
+    orientation,
     test_functions,
     unstable_of,
 )
@@ -55,9 +58,9 @@ def brackets(
     seek = _Seek(curve, pairs, detect, neutral)
     found: list[Bracket] = []
     signs = {name: np.sign(getattr(tests, name)) for name in TESTS}
+    sample = functools.cache(functools.partial(seek.known, path, keep, tests))
     for i in seek.interesting(tests, signs):
-        a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i : i + 2])
-        for bracket in seek.explore(a, b, DEPTH, force=True):
+        for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
     for i in np.flatnonzero(np.diff(keep) > 1).tolist():  # on a point left out there may be one
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
@@ -90,7 +93,7 @@ def _on_ends(
     for end in (0, len(keep) - 1):
         # The path may come to its end in ever smaller steps.
         gap = (path.u[keep] - path.u[keep[end]])[:, : curve.m] / curve.scale[: curve.m]
-        away = np.flatnonzero(np.max(np.abs(gap), axis=1) > 1e-3)
+        away = np.flatnonzero(largest(gap) > 1e-3)
         if not len(away):
             continue
         beside = int(away[0] if end == 0 else away[-1])
@@ -171,6 +174,14 @@ class _Seek:
             three = np.exp(three - np.max(three, axis=0))
         return three[0], three[1], three[2]
 
+    def known(self, path: Path, keep: npt.NDArray[np.int64], tests: Tests, i: int) -> Sample:
+        """A point of the path whose test functions are known."""
+        k = keep[i]
+        sample = Sample(path.u[k], path.tangent[k], path.slopes[k])
+        own = Tests(*(getattr(tests, f.name)[i] for f in fields(Tests)))
+        self.seen[id(sample)] = (sample, own)
+        return sample
+
     def tests(self, sample: Sample) -> Tests:
         key = id(sample)
         if key not in self.seen:
@@ -182,12 +193,19 @@ class _Seek:
         return self.seen[key][1]
 
     def value(self, name: str, unit: float) -> Callable[[Sample], float]:
-        """A test function of samples; that of branch points in units of exp(unit)."""
+        """A test function of samples; that of branch points in units of exp(unit).
+
+        Others take longer, and are not taken for it.
+        """
+        curve = self.curve
 
         def of(sample: Sample) -> float:
-            tests = self.tests(sample)
-            size = float(np.exp(np.minimum(tests.volume - unit, 50.0))) if name == "branch" else 1.0
-            return size * float(getattr(tests, name))
+            if name == "fold":
+                return float(sample.tangent[curve.n] / curve.scale[curve.n])
+            if name == "branch":
+                sign, volume = orientation(curve, sample.tangent, sample.slopes)
+                return float(np.exp(np.minimum(volume - unit, 50.0))) * float(sign)
+            return float(getattr(self.tests(sample), name))
 
         return of
 
@@ -238,6 +256,7 @@ class _Seek:
         And, if there is none, one next to which the determinant touches zero.
         """
         touch = None
+        inside = functools.cache(lambda s: between(self.curve, a, b, s))
         for name in TESTS:
             if (name == "pair" and not self.pairs) or (name == "flip" and not self.curve.discrete):
                 continue
@@ -247,7 +266,7 @@ class _Seek:
             ratio = 0.5 * (np.sqrt(5.0) - 1.0)
             marks: list[tuple[float, float]] = []
             for s in (1.0 - ratio, ratio):
-                sample = between(self.curve, a, b, s)
+                sample = inside(s)
                 if sample is None:
                     break
                 if sign * test(sample) <= 0.0:
@@ -255,6 +274,7 @@ class _Seek:
                 marks.append((s, sign * test(sample)))
             if len(marks) < 2:
                 continue
+            ends = min(sign * test(a), sign * test(b))
             for _ in range(12):  # golden section
                 (s1, v1), (s2, v2) = marks
                 if v1 < v2:
@@ -263,13 +283,13 @@ class _Seek:
                 else:
                     low = s1
                     new = low + ratio * (high - low)
-                sample = between(self.curve, a, b, new)
+                sample = inside(new)
                 if sample is None:
                     break
                 value = sign * test(sample)
                 if value <= 0.0:
                     return sample, None
-                if name == "branch" and value < TOUCH * min(sign * test(a), sign * test(b)):
+                if name == "branch" and value < TOUCH * ends:
                     touch = sample
                 marks = sorted([(new, value), marks[0] if v1 < v2 else marks[1]])
         return None, touch

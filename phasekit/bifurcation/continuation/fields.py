@@ -82,16 +82,20 @@ class SymbolicField(Field):
 
     def with_terms(self, u: Array, par: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
         """F at many points, the rows of u, and the sums of the sizes of its terms there."""
+        n, out = len(self.states), self._both(u, par, active)
+        return out[:, :n], np.abs(out[:, n:])
+
+    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
+        """F at many points, the rows of u."""
+        return self._both(u, par, active)[:, : len(self.states)]
+
+    def _both(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
         n = len(self.states)
         out = np.empty((len(u), 2 * n))
         function = _terms(self.expressions, self.states, self.parameters, active)
         places = np.array(active, dtype=np.int64)
         differences.values(function, 2 * n, par, places, u, out)
-        return out[:, :n], np.abs(out[:, n:])
-
-    def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
-        """F at many points, the rows of u."""
-        return self.with_terms(u, par, active)[0]
+        return out
 
     def third(self, active: tuple[int, ...]) -> int:
         """Machine code for the third derivative along three directions."""

@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.acceptance import accepted
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
+from phasekit.bifurcation.continuation.rows import across, largest
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 
 Array = npt.NDArray[np.float64]
@@ -148,9 +149,10 @@ def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArra
     values = eigenvalues_of(curve.linear(slopes), accuracy=accuracy)
     if curve.kind != EQUILIBRIUM:
         return slopes, values
-    size = np.max(np.abs(values), axis=1)
+    size = largest(values)
     with np.errstate(all="ignore"):
-        doubtful = np.min(np.abs(curve.growth(values)), axis=1) < DOUBTFUL * np.nanmax(size)
+        least = across(np.minimum, np.abs(curve.growth(values)))
+        doubtful = least < DOUBTFUL * np.nanmax(size)
     if doubtful.any():
         for i in np.flatnonzero(doubtful):
             slopes[i] = curve.at(u[i])[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,12 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.rows import across, count, largest, largest_entry
 
 Array = npt.NDArray[np.float64]
 OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding
 ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
 KEPT = 1e-7  # the same where areas are kept: multipliers that meet part with the root of rounding
 SAME = 1e-10  # part of the largest eigenvalue by which two others are told apart
+NEAR = 1e-5  # a spectrum with a pair that sums to more, relative, is not that of such a system
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
 
 
@@ -69,27 +72,36 @@ def eigenvalues_of(slopes: Array, *, accuracy: float = 1e-13) -> npt.NDArray[np.
     matrices = slopes[..., :n]
     if n == 2:
         values = _eigenvalues_of_two(matrices)
-        real = _symmetric(_in_even_units(matrices), accuracy)
-        values.imag[real] = 0.0
+        # Units leave a, d and b c as they are: only next to double ones rounding makes pairs.
+        near = np.abs(values.imag) <= OPPOSITE * np.abs(values.real)
+        if (near & (values.imag != 0.0)).any():
+            real = _symmetric(_in_even_units(matrices), accuracy)
+            values.imag[real] = 0.0
         return values
-    finite = np.isfinite(slopes).all(axis=(-2, -1))
+    finite = np.isfinite(slopes)
+    if finite.all():
+        return _eigenvalues_of_finite(matrices, accuracy)
     result = np.full(slopes.shape[:-2] + (n,), np.nan, dtype=complex)
-    given = matrices[finite]
-    even = _in_even_units(given)
-    real = _symmetric(even, accuracy)
-    values = np.empty(given.shape[:-1], dtype=complex)
-    values[~real] = np.linalg.eigvals(given[~real])
-    if real.any():
-        # The lower triangle alone counts for LAPACK; the mean of both is the better one.
-        values[real] = np.linalg.eigvalsh(0.5 * (even + np.swapaxes(even, -1, -2))[real])
-    result[finite] = values
+    whole = finite.all(axis=(-2, -1))
+    result[whole] = _eigenvalues_of_finite(matrices[whole], accuracy)
     return result
 
 
+def _eigenvalues_of_finite(matrices: Array, accuracy: float) -> npt.NDArray[np.complex128]:
+    even = _in_even_units(matrices)
+    real = _symmetric(even, accuracy)
+    if not real.any():
+        return np.linalg.eigvals(matrices).astype(complex, copy=False)
+    values = np.empty(matrices.shape[:-1], dtype=complex)
+    values[~real] = np.linalg.eigvals(matrices[~real])
+    # The lower triangle alone counts for LAPACK; the mean of both is the better one.
+    values[real] = np.linalg.eigvalsh(0.5 * (even + np.swapaxes(even, -1, -2))[real])
+    return values
+
+
 def _symmetric(matrices: Array, accuracy: float) -> npt.NDArray[np.bool_]:
-    size = np.max(np.abs(matrices), axis=(-2, -1), initial=0.0)
-    gap = np.max(np.abs(matrices - np.swapaxes(matrices, -1, -2)), axis=(-2, -1), initial=0.0)
-    return np.asarray(gap <= 4.0 * accuracy * size)
+    gap = largest_entry(matrices - matrices.swapaxes(-1, -2))
+    return np.asarray(gap <= 4.0 * accuracy * largest_entry(matrices))
 
 
 def _in_even_units(matrices: Array) -> Array:
@@ -97,40 +109,43 @@ def _in_even_units(matrices: Array) -> Array:
 
     Along the edges of a spanning forest of the entries, (d_j/d_i)^2 = |A_ji/A_ij|.
     """
-    if not matrices.size or _symmetric(matrices, 0.0).all():
+    transposed = matrices.swapaxes(-1, -2)
+    if (matrices == transposed).all():
         return matrices
     # No units change the sign of A_ij A_ji.
-    products = matrices * np.swapaxes(matrices, -1, -2)
-    size = np.max(np.abs(matrices), axis=(-2, -1))
-    if np.all(np.min(products, axis=(-2, -1)) < -((OPPOSITE * size) ** 2)):
+    products = (matrices * transposed).reshape(*matrices.shape[:-2], -1)
+    least = -((OPPOSITE * largest_entry(matrices)) ** 2)
+    if (across(np.minimum, products) < least).all():
         return matrices
     sizes = np.abs(matrices).reshape(-1, *matrices.shape[-2:]).sum(axis=0)
     both = np.sqrt(sizes * sizes.T)
-    if not np.any(both):
+    most = both.max()
+    if most == 0.0:
         return matrices
-    # Zeros by differences are zeros but for rounding.
-    log = _along_a_forest(both > 1e-12 * np.max(both), sizes)
     with np.errstate(all="ignore"):
-        unit = np.exp(log - np.mean(log))
+        # Zeros by differences are zeros but for rounding.
+        log = _along_a_forest(both > 1e-12 * most, sizes)
+        unit = np.exp(log - log.mean())
         even = matrices * unit / unit[:, None]
     return even if np.isfinite(even).all() else matrices
 
 
 def _along_a_forest(joined: npt.NDArray[np.bool_], sizes: Array) -> Array:
     """Logarithms of units d with d_j/d_i = (|A_ji/A_ij|)^(1/2) along the edges of a forest."""
-    with np.errstate(all="ignore"):
-        half = 0.5 * (np.log(sizes.T) - np.log(sizes))
-    log = np.full(len(sizes), np.nan)
-    for root in range(len(sizes)):
-        if not np.isnan(log[root]):
-            continue
-        log[root] = 0.0
-        reached = [root]
+    logs = np.log(sizes)
+    half, edges = (0.5 * (logs.T - logs)).tolist(), joined.tolist()
+    left = dict.fromkeys(range(len(sizes)))  # in order
+    found = [0.0] * len(sizes)
+    while left:
+        reached = [next(iter(left))]
+        del left[reached[0]]
         for i in reached:
-            new = np.flatnonzero(joined[i] & np.isnan(log))
-            log[new] = log[i] + half[i, new]
-            reached.extend(new.tolist())
-    return log
+            new = [j for j in left if edges[i][j]]
+            for j in new:
+                found[j] = found[i] + half[i][j]
+                del left[j]
+            reached += new
+    return np.array(found)
 
 
 def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
@@ -158,12 +173,12 @@ def orientation(curve: Curve, tangent: Array, slopes: Array) -> tuple[Array, Arr
     m = curve.m
     scale = curve.scale[:m]
     top = slopes * scale
-    rows = np.max(np.abs(top), axis=-1, keepdims=True)
-    rows = np.where(rows > 0.0, rows, 1.0)
+    rows = largest(top)[..., None]
+    rows[~(rows > 0.0)] = 1.0
     bottom = tangent[..., :m] / scale
     matrix = np.concatenate([top / rows, bottom[..., None, :]], axis=-2)
     sign, log = np.linalg.slogdet(matrix)
-    return np.asarray(sign), np.asarray(log + np.sum(np.log(rows[..., 0]), axis=-1))
+    return np.asarray(sign), np.asarray(log + np.log(rows[..., 0]).sum(axis=-1))
 
 
 def test_functions(
@@ -190,7 +205,7 @@ def test_functions(
         log,
         pair,
         below,
-        np.asarray(np.sum(values.imag == 0.0, axis=-1)),
+        np.asarray(count(values.imag == 0.0)),
         flip_function(values) if curve.discrete else nothing,
         unstable_of(curve, values, neutral=neutral),
         values,
@@ -205,8 +220,8 @@ def unstable_of(
     The size of a multiplier is a rounded number, and may be exactly 1.
     """
     least = (KEPT if neutral else ROUNDED) if curve.discrete else 0.0
-    floor = np.maximum(least, blur) * np.max(np.abs(values), axis=-1)
-    return np.asarray(np.sum(curve.growth(values) > floor[..., None], axis=-1))
+    floor = np.maximum(least, blur) * largest(values)
+    return np.asarray(count(curve.growth(values) > floor[..., None]))
 
 
 def flip_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -218,7 +233,7 @@ def flip_function(values: npt.NDArray[np.complex128]) -> Array:
 
 def product_function(values: npt.NDArray[np.complex128]) -> Array:
     """The least mu_i mu_j - 1 of real and conjugate pairs, with the sign of the product of all."""
-    i, j = np.triu_indices(values.shape[-1], 1)
+    i, j = _twos(values.shape[-1])
     a, b = values[..., i], values[..., j]
     real = ((a.imag == 0.0) & (b.imag == 0.0)) | (a == np.conj(b))
     excess = (a * b).real - 1.0
@@ -226,6 +241,14 @@ def product_function(values: npt.NDArray[np.complex128]) -> Array:
     least = np.min(np.where(real, np.abs(excess), np.inf), axis=-1, initial=np.inf)
     least = np.where(np.isfinite(least), least, 1.0)
     return np.asarray(np.where(negative % 2 == 1, -least, least))
+
+
+@functools.cache
+def _twos(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """Places of all twos of n numbers."""
+    i, j = np.triu_indices(n, 1)
+    i.flags.writeable = j.flags.writeable = False
+    return i, j
 
 
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -244,15 +267,15 @@ def pair_sums(values: npt.NDArray[np.complex128]) -> tuple[Array, npt.NDArray[np
         least = rows[:, 0].reshape(values.shape[:-1])
         negative = rows[:, 1].astype(int).reshape(values.shape[:-1])
     else:
-        i, j = np.triu_indices(n, 1)
+        i, j = _twos(n)
         a, b = values[..., i], values[..., j]
         sums = a.real + b.real
         real = a.imag == -b.imag
         real &= (a.imag == 0.0) | (a.real == b.real)
-        negative = np.sum(real & (sums < 0.0), axis=-1)
-        least = np.min(np.where(real, np.abs(sums), np.inf), axis=-1, initial=np.inf)
+        negative = count(real & (sums < 0.0))
+        least = across(np.minimum, np.where(real, np.abs(sums), np.inf), initial=np.inf)
         least = np.where(np.isfinite(least), least, 1.0)
-    tiny = least <= SAME * np.max(np.abs(values), axis=-1)
+    tiny = least <= SAME * largest(values)
     return np.asarray(np.where(negative % 2 == 1, -least, least)), np.where(tiny, -1, negative)
 
 
@@ -295,9 +318,15 @@ def is_conservative(values: npt.NDArray[np.complex128], *, discrete: bool = Fals
         rows = np.array([np.poly(row).real for row in values])
         gap = np.max(np.abs(rows - rows[:, ::-1]), axis=-1) / np.max(np.abs(rows), axis=-1)
     else:
-        size = np.max(np.abs(values), axis=-1, initial=1e-300)
-        order = np.sort_complex(values)
-        mirror = np.sort_complex(-values)
-        gap = np.abs(order - mirror).max(axis=-1) / np.where(size > 0.0, size, 1.0)
+        gap = _off_mirror(values[:1])
+        if gap[0] < NEAR:
+            gap = _off_mirror(values)
     # Beside the size of the spectrum; at points where pairs meet it is the root of rounding.
-    return bool(np.median(gap) <= NEUTRAL and np.max(gap) < 1e-5)
+    return bool(np.max(gap) < NEAR and np.median(gap) <= NEUTRAL)
+
+
+def _off_mirror(values: npt.NDArray[np.complex128]) -> Array:
+    """By how much spectra are not their mirror images, beside their sizes."""
+    size = np.max(np.abs(values), axis=-1, initial=1e-300)
+    gap = np.abs(np.sort_complex(values) - np.sort_complex(-values)).max(axis=-1)
+    return np.asarray(gap / np.where(size > 0.0, size, 1.0))

@@ -62,11 +62,15 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
 
     from scipy.optimize import root
 
+    tried = np.array(u)
+
     def f(x: Array) -> Array:
-        return np.asarray(curve.values(np.append(x, u[n:])[None])[0])
+        tried[:n] = x
+        return np.asarray(curve.values(tried[None])[0])
 
     def jacobian(x: Array) -> Array:
-        return curve.at(np.append(x, u[n:]))[1][:, :n]
+        tried[:n] = x
+        return curve.at(tried)[1][:, :n]
 
     for method in ("hybr", "lm"):
         try:

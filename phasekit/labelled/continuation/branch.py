@@ -352,15 +352,15 @@ def make_branch(
     names = tuple(curve.field.parameters[i] for i in curve.active)
     specials = [*placed, *_ends(curve, path)]
     specials.sort(key=lambda one: (one.index, one.along))
-    points, places = points_of(problem, curve, path, specials, eigenvalues, record)
+    points, places, values = points_of(problem, curve, path, specials, eigenvalues, record)
     branch = Branch(
         problem, names, curve.field.states, curve, start, (backward, forward), points, (),
         path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
         (*path.messages, *doubts, *narrow(curve, path)),
     )  # fmt: skip
     made = tuple(
-        special_point(problem, curve, one.special, place, branch)
-        for one, place in zip(specials, places, strict=True)
+        special_point(problem, curve, one.special, own, place, branch)
+        for one, own, place in zip(specials, values, places, strict=True)
     )
     object.__setattr__(branch, "special_points", made)
     return branch

@@ -39,8 +39,8 @@ def points_of(
     specials: list[Placed],
     eigenvalues: npt.NDArray[np.complex128],
     record: Record,
-) -> tuple[xr.Dataset, list[int]]:
-    """The points of a path with its special points among them, and the places of these."""
+) -> tuple[xr.Dataset, list[int], npt.NDArray[np.complex128]]:
+    """The points of a path with its special points, the places of these, and their eigenvalues."""
     n, m = curve.n, curve.m
     inner = [one for one in specials if one.special.kind != "end"]
     where = np.array([one.index + 1 for one in inner], dtype=np.int64)
@@ -49,6 +49,8 @@ def points_of(
     shift = np.searchsorted(where, np.arange(path.count), side="right")
     own = np.arange(path.count) + shift
     mine = where + np.arange(len(inner))
+    there = np.array([eigenvalues_at(curve, one.special.u) for one in specials], dtype=complex)
+    there = there.reshape(-1, n)
     u = np.empty((total, m))
     t = np.empty((total, m))
     info = np.zeros((total, trace.RECORDED))
@@ -69,11 +71,11 @@ def points_of(
             if curve.period[j] > 0.0:
                 u[i, j] += curve.period[j] * np.round((before[j] - u[i, j]) / curve.period[j])
         t[i] = (s.tangent if s.tangent is not None else path.tangent[one.index])[:m]
-        values[i] = eigenvalues_at(curve, s.u)
         gap = np.zeros(curve.size)
         gap[:m] = u[i] - before[:m]
         info[i, trace.ARCLENGTH] = path.info[one.index, trace.ARCLENGTH] + curve.length(gap)
         label[i] = KINDS[s.kind].label
+    values[mine] = there[[one.special.kind != "end" for one in specials]]
     places = []
     seen = 0
     for one in specials:
@@ -91,7 +93,8 @@ def points_of(
     residual = np.empty(total)
     residual[own] = path.residual
     residual[mine] = curve.residuals(u[mine], [curve.at(point)[1] for point in u[mine]])
-    return _dataset(problem, curve, u, t, info, values, label, record, kappa, residual), places
+    ds = _dataset(problem, curve, u, t, info, values, label, record, kappa, residual)
+    return ds, places, there
 
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:

@@ -231,9 +231,11 @@ def _start(problem: Problem, x0: Any) -> FloatArray:
 
 def _labelled_start(problem: Problem, x0: str | None) -> FloatArray:
     """An equilibrium of a system by its label; the first that exists if there is none."""
-    from phasekit.labelled.phase_space import equilibria
+    from phasekit.cells.evaluate import evaluate
+    from phasekit.table.quantities import ROWS
 
-    ds = equilibria(problem.system)
+    assert problem.system is not None
+    ds = evaluate(problem.system, [ROWS["phi"]])
     labels = [str(label) for label in ds.equilibrium.values]
     there = [name for name, phi in zip(labels, ds.phi.values, strict=True) if np.isfinite(phi)]
     if x0 is None and there:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.special_points import KINDS
-from phasekit.labelled.continuation.branch_points import eigenvalues_at, wrap
+from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
@@ -257,8 +257,9 @@ def _point_of(branch: Of, place: int) -> SpecialPoint[Of]:
 
 
 def special_point(
-    problem: Problem, curve: Curve, special: Special, index: int, branch: Of
-) -> SpecialPoint[Of]:
+    problem: Problem, curve: Curve, special: Special, eigenvalues: npt.NDArray[np.complex128],
+    index: int, branch: Of,
+) -> SpecialPoint[Of]:  # fmt: skip
     """A special point of a branch, angles wrapped."""
     n = curve.n
     parameters = dict(problem.parameters)
@@ -272,5 +273,5 @@ def special_point(
     return SpecialPoint(
         special.kind, x, MappingProxyType(parameters), special.interval, special.residual,
         special.status, special.message, MappingProxyType(dict(special.normal_form)),
-        eigenvalues_at(curve, special.u), index, special, branch,
+        eigenvalues, index, special, branch,
     )  # fmt: skip
