@@ -25,7 +25,7 @@ from phasekit.phase.numerical.systems import Systems
 Array = npt.NDArray[np.float64]
 
 #: Fields with an entry for each equilibrium.
-LISTED = ("phi", "kind", "energy", "curvature", "natural_frequency", "exponent")
+LISTED = ("phi", "kind", "energy", "curvature", "natural_frequency", "exponent", "phi_error")
 
 
 @functools.lru_cache(maxsize=32)

@@ -12,6 +12,7 @@ from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.isolation import bracketed, isolate, slope_bounds
 from phasekit.phase.numerical.partition import noise_at, partition
+from phasekit.phase.numerical.places import Places, located
 from phasekit.phase.numerical.series import (
     Roots,
     exact_base,
@@ -51,6 +52,8 @@ class Equilibria(NamedTuple):
     equilibrium; else NaN."""
     n_gaps: npt.NDArray[np.int64]
     """Number of such stretches."""
+    phi_error: Array
+    """Bound of the error of `phi`; NaN where there is none."""
 
 
 class Zeros(NamedTuple):
@@ -63,8 +66,8 @@ class Zeros(NamedTuple):
     n_gaps: npt.NDArray[np.int64]
 
 
-def equilibria(systems: Systems) -> Equilibria:
-    """All equilibria of each system.
+def equilibria(systems: Systems, *, counted: bool = False) -> Equilibria:
+    """All equilibria of each system; if they are only counted, without what places lack.
 
     Raises
     ------
@@ -97,7 +100,25 @@ def equilibria(systems: Systems) -> Equilibria:
             few = systems.take(rest)
             proved = not polynomial and slope_bounds(systems.formula) is not None
             zeros = _replaced(zeros, rest, _isolated(few) if proved else _sampled(few))
-    return _collect(systems, zeros, exact)
+    error = np.full(zeros.phi.shape, np.nan)
+    if not counted:
+        zeros, error = _placed(systems, zeros, exact)
+    return _collect(systems, zeros, error, exact)
+
+
+def _placed(
+    systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]
+) -> tuple[Zeros, Array]:
+    """Zeros with all digits that V' has, and their errors; exact ones are the nearest doubles."""
+    phi = zeros.phi.copy()
+    error = np.maximum(0.5 * np.spacing(np.abs(phi)), np.nextafter(0.0, 1.0))
+    inexact = np.ones(systems.size, dtype=bool)
+    inexact[list(exact)] = False
+    cell, slot = np.nonzero(np.isfinite(phi) & inexact[:, None])
+    found, sign = zeros.phi[cell, slot], zeros.sign[cell, slot]
+    places = Places(systems.take(cell), found, sign, cell, zeros.phi)
+    phi[cell, slot], error[cell, slot] = located(places)
+    return zeros._replace(phi=phi), error
 
 
 def _isolated(systems: Systems) -> Zeros:
@@ -258,13 +279,15 @@ def _merged(systems: Systems, root: Array, noise: Array) -> npt.NDArray[np.bool_
     return np.asarray((bend == 0.0) | ~(np.maximum(*changed) < 0.5 * np.abs(bend)))
 
 
-def _collect(systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]) -> Equilibria:
+def _collect(
+    systems: Systems, zeros: Zeros, error: Array, exact: dict[int, list[Fraction]]
+) -> Equilibria:
     order = np.argsort(zeros.phi, axis=1)  # NaN last
     found = np.take_along_axis(zeros.phi, order, axis=1) + 0.0  # no -0.0
-    sign = np.take_along_axis(zeros.sign, order, axis=1)
+    sign, error = (np.take_along_axis(field, order, axis=1) for field in (zeros.sign, error))
     count = np.isfinite(found).sum(axis=1)
     most = int(count.max(initial=0))
-    found, sign = found[:, :most], sign[:, :most]
+    found, sign, error = (field[:, :most] for field in (found, sign, error))
     there = np.isfinite(found)
     curvature, energy = systems.bend(found), systems.potential(found)
     for row, coefficients in exact.items():
@@ -283,5 +306,5 @@ def _collect(systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]) -
     valid = systems.finite
     number = np.where(valid, count, -1).astype(np.int16)
     complete = zeros.complete & valid
-    proofs = complete, zeros.gaps, zeros.n_gaps
+    proofs = complete, zeros.gaps, zeros.n_gaps, error
     return Equilibria(found, kind, energy + 0.0, curvature, center, saddle, number, *proofs)

@@ -104,11 +104,19 @@ def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int, Array]
     Besides the widest stretch that could not be excluded in the systems where there is such, and
     the number of these: low, high, number, shape (n, 3).
     """
-    ground, _ = _survey(formula, parameters)
-    rows, _ = loops.saddles_of(ground)
-    points = ground.points
+    systems, _ = make_systems(reduced(formula), parameters)
+    if systems.size <= _KEPT:
+        points = _survey(formula, parameters)[0].points
+    else:
+        points = find_equilibria(systems, counted=True)
+    saddles = np.sum(points.kind == EquilibriumKind.SADDLE, axis=1)
+    flat = np.flatnonzero(np.any(points.kind == EquilibriumKind.DEGENERATE, axis=1))
+    if flat.size:
+        few = Equilibria._make(field[flat] for field in points)
+        rows, _ = loops.saddles_of(survey(systems.take(flat), few))
+        saddles[flat] = np.bincount(rows, minlength=flat.size)
     open_ = np.column_stack([points.gaps, points.n_gaps])[points.n_gaps > 0]
-    return ground.points.phi.shape[1], int(np.bincount(rows, minlength=1).max()), open_
+    return points.phi.shape[1], int(saddles.max(initial=0)), open_
 
 
 def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:

@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.intervals import exact_numbers
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
@@ -168,13 +169,6 @@ def _enter(
 # ------------------------------------------------------------------------- exact arithmetic
 
 
-def _of_fractions(formula: Formula) -> Any:
-    import sympy as sp
-
-    floats = formula.expression.atoms(sp.Float)
-    return formula.expression.xreplace({f: _fraction(float(f)) for f in floats})
-
-
 def _fraction(value: float) -> Any:
     import sympy as sp
 
@@ -187,7 +181,7 @@ def _symbolic(formula: Formula) -> list[Any] | None:
     import sympy as sp
 
     x = sp.Symbol(formula.coordinate, real=True)
-    slope = sp.diff(_of_fractions(formula), x)
+    slope = sp.diff(exact_numbers(formula.expression), x)
     if not slope.is_polynomial(x):
         return None
     return list(sp.Poly(sp.expand(slope), x).all_coeffs()[::-1])
@@ -297,7 +291,7 @@ def exact_base(formula: Formula, parameters: tuple[float, ...]) -> Fraction:
             (formula.coordinate, *formula.names), (0.0, *parameters), strict=True
         )
     }
-    base = _of_fractions(formula).xreplace(values)
+    base = exact_numbers(formula.expression).xreplace(values)
     base = base if base.is_Rational else sp.Rational(base.evalf(60))
     return Fraction(int(base.p), int(base.q))
 
