@@ -17,6 +17,7 @@ from phasekit.numerics.double_double import dd_add, dd_divide, dd_multiply
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.intervals import Bounds, NoRule, exact_numbers
 from phasekit.phase.numerical.rounding import Interval
+from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
 
@@ -65,8 +66,8 @@ class Extended(Bounds):
 
 
 @functools.lru_cache(maxsize=128)
-def extended(formula: Formula) -> Extended | None:
-    """V, V' and V'' of (x, parameters); None where a function has no rule."""
+def extended(formula: Formula, orders: tuple[int, ...]) -> Extended | None:
+    """V or derivatives of it, of (x, parameters); None where a function has no rule."""
     import sympy as sp
 
     from phasekit.laws.derivatives import derivative
@@ -75,8 +76,17 @@ def extended(formula: Formula) -> Extended | None:
         return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
     potential = exact_numbers(formula.expression)
-    slopes = [derivative(potential, x, order) for order in (1, 2)]
+    found = [derivative(potential, x, order) if order else potential for order in orders]
     try:
-        return Extended((potential, *slopes), (x, *parameters))
+        return Extended(found, (x, *parameters))
     except NoRule:
         return None
+
+
+def values(systems: Systems, x: Array, *orders: int) -> list[Interval] | None:
+    """V or derivatives of it at x, one place of each system, as sums of two doubles."""
+    function = extended(systems.formula, orders)
+    if function is None:
+        return None
+    zero = np.zeros(x.shape)
+    return function((x, zero), *((p, zero) for p in systems.parameters))[0]

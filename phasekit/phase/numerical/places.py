@@ -8,12 +8,12 @@ equilibrium, the error is how far the nearest points lie at which the sign of V'
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.numerical.extended import extended
+from phasekit.phase.numerical.extended import extended, values
 from phasekit.phase.numerical.isolation import bounds_on, slope_bounds
 from phasekit.phase.numerical.systems import Index, Systems
 
@@ -62,7 +62,7 @@ def located(places: Places) -> tuple[Array, Array]:
         ends = _bounds(places.systems, places.x)
         error = _errors(places, ends, _bounds)
         poor = np.flatnonzero((error > _POOR * np.spacing(np.abs(places.x))) & (places.sign != 0.0))
-        if not poor.size or extended(places.systems.formula) is None:
+        if not poor.size or extended(places.systems.formula, (1, 2)) is None:
             return places.x, error
         few = places.take(poor)
         fresh = few._replace(x=_newton(few.systems, few.x))
@@ -147,9 +147,10 @@ def _scattered(systems: Systems, x: Array) -> Ends:
 
 def _fine(systems: Systems, x: Array) -> Ends:
     """Bounds in double-double arithmetic, where it has the digits."""
-    ends = _bounds(systems, x)
+    ends, inner = _bounds(systems, x), values(systems, x, 1, 2)
+    assert inner is not None
     found: list[Array] = []
-    for (value, rest), low, high in zip(_values(systems, x), ends[::2], ends[1::2], strict=True):
+    for (value, rest), low, high in zip(inner, ends[::2], ends[1::2], strict=True):
         width = high - low
         off = _FINER * width + _EPS * np.abs(value)
         usable = (width > _TINY) & np.isfinite(off + rest)
@@ -157,20 +158,13 @@ def _fine(systems: Systems, x: Array) -> Ends:
     return found[0], found[1], found[2], found[3]
 
 
-def _values(systems: Systems, x: Array) -> Any:
-    """V' and V'' as sums of two doubles."""
-    function = extended(systems.formula)
-    assert function is not None
-    zero = np.zeros(x.shape)
-    (_, slope, bend), _ = function((x, zero), *((p, zero) for p in systems.parameters))
-    return slope, bend
-
-
 def _newton(systems: Systems, x: Array) -> Array:
     """Newton's method with all digits of V' and V''."""
     x, rows = x.copy(), np.arange(x.size)
     for _ in range(_STEPS):
-        (slope, _), (bend, _) = _values(systems.take(rows), x[rows])
+        inner = values(systems.take(rows), x[rows], 1, 2)
+        assert inner is not None
+        (slope, _), (bend, _) = inner
         step = slope / bend
         step = np.where(np.isfinite(step), step, 0.0)
         x[rows] -= step

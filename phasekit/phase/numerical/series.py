@@ -63,27 +63,27 @@ def degrees(coefficients: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
 def discs(coefficients: npt.NDArray[Any], spread: Array) -> tuple[Complex, Array, Flags]:
     """Roots of polynomials of full degree, radii of Smith's discs, and whether none touch.
 
-    Rounding may have moved coefficients by `spread` on their way.
+    Nor may they touch where rounding on the way has moved coefficients by `spread`.
     """
     z = companion_roots(coefficients)
     n = z.shape[1]
     with np.errstate(all="ignore"):
         value = np.zeros(z.shape, dtype=complex)
-        size = np.zeros(z.shape)
-        # Coefficients, products and sums are rounded.
-        off = 8.0 * (n + 3) * _EPS * np.abs(coefficients) + spread
+        size, moved = np.zeros((2, *z.shape))
         for k in range(n, -1, -1):
             value = value * z + coefficients[:, k, None]
-            size = size * np.abs(z) + off[:, k, None]
-        most = np.abs(value) + size
+            size = size * np.abs(z) + np.abs(coefficients[:, k, None])
+            moved = moved * np.abs(z) + spread[:, k, None]
+        # Coefficients, products and sums are rounded.
+        most = np.abs(value) + 8.0 * (n + 3) * _EPS * size
         apart = np.abs(z[:, :, None] - z[:, None, :])
         apart[:, np.arange(n), np.arange(n)] = 1.0
         product = np.abs(coefficients[:, n, None]) * np.prod(apart, axis=2)
-        radius = 1.01 * n * most / product
+        radius, wide = (1.01 * n * size / product for size in (most, most + moved))
         apart[:, np.arange(n), np.arange(n)] = np.inf
         # Twice the radii, so that mirrored discs keep apart as well.
-        separate = apart > 2.0 * (radius[:, :, None] + radius[:, None, :])
-        clear = separate.all(axis=(1, 2)) & np.isfinite(radius).all(axis=1)
+        separate = apart > 2.0 * (wide[:, :, None] + wide[:, None, :])
+        clear = separate.all(axis=(1, 2)) & np.isfinite(wide).all(axis=1)
     return z, radius, np.asarray(clear)
 
 
