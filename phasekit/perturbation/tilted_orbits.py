@@ -134,7 +134,8 @@ def ground_of(cells: Cells, systems: Index) -> Ground:
     count = points[6]
     nothing = np.full((len(N), 2), np.nan)
     proofs = [count.astype(np.int16), count >= 0, nothing, np.zeros(len(N), np.int64)]
-    found = repeated(Equilibria._make([*points[:6], *proofs]), N)
+    unknown = np.full(points[0].shape, np.nan)
+    found = repeated(Equilibria._make([*points[:6], *proofs, unknown]), N)
     return survey(Systems(TILTED, (A, B, C, N), len(N)), found)
 
 
@@ -144,7 +145,7 @@ def repeated(points: Equilibria, torque: Array, period: float = TURN) -> Equilib
     if not points.phi.shape[1]:  # nothing stands: one place, which stays empty
         empty = np.full((len(points.phi), 1), np.nan)
         kinds = np.full(empty.shape, EquilibriumKind.ABSENT, np.int8)
-        points = Equilibria._make([empty, kinds, *[empty] * 4, *list(points)[6:]])
+        points = Equilibria._make([empty, kinds, *[empty] * 4, *list(points)[6:-1], empty])
     rows, width = points.phi.shape
 
     def spread(field: Any, shift: Any = 0.0) -> Any:
@@ -154,11 +155,11 @@ def repeated(points: Equilibria, torque: Array, period: float = TURN) -> Equilib
     order = np.argsort(phi, axis=1)
     fields: list[Any] = [phi, spread(points.kind, np.zeros(turns.shape, np.int8))]
     fields.append(spread(points.energy, -torque[:, None, None] * turns))
-    others = (points.curvature, points.natural_frequency, points.exponent)
+    others = (points.curvature, points.natural_frequency, points.exponent, points.phi_error)
     fields += [spread(field, np.zeros(turns.shape)) for field in others]
-    listed = [np.take_along_axis(field, order, axis=1) for field in fields]
-    proofs: list[Any] = list(points)[6:]
-    return Equilibria._make([*listed, *proofs])
+    *listed, error = (np.take_along_axis(field, order, axis=1) for field in fields)
+    proofs: list[Any] = list(points)[6:-1]
+    return Equilibria._make([*listed, *proofs, error])
 
 
 def home(phi: Array, period: float = TURN) -> tuple[Array, Array]:

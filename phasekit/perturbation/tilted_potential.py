@@ -16,7 +16,7 @@ from phasekit.errors import EquilibriumKind
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.phase.numerical import functions
-from phasekit.phase.numerical.constants import constant, reduced
+from phasekit.phase.numerical.constants import reduced
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
 from phasekit.phase.numerical.formula import Formula, make_formula
@@ -25,7 +25,7 @@ from phasekit.phase.numerical.systems import Systems
 Array = npt.NDArray[np.float64]
 
 #: Fields with an entry for each equilibrium.
-LISTED = ("phi", "kind", "energy", "curvature", "natural_frequency", "exponent")
+LISTED = ("phi", "kind", "energy", "curvature", "natural_frequency", "exponent", "phi_error")
 
 
 @functools.lru_cache(maxsize=32)
@@ -51,8 +51,11 @@ def equilibria(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Equili
     cells, which = np.unique(columns, axis=1, return_inverse=True)
     own = list(cells[:-1])
     found = equilibria_of_cells(reduced(formula), own, cells[-1])
-    base = np.broadcast_to(constant(formula, own), cells[-1].shape)
-    found = found._replace(energy=found.energy + base[:, None])
+    energy, still = found.energy.copy(), cells[-1] == 0.0
+    for rows, one, used in ((still, formula, own), (~still, tilted(formula), cells)):
+        inputs = [column[rows] for column in used]
+        energy[rows] = functions.energies(one, inputs, found.phi[rows], energy[rows])
+    found = found._replace(energy=energy)
     return Equilibria._make(x[which.reshape(-1)].reshape(shape + x.shape[1:]) for x in found)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phasekit.laws.ladder import Conservative
-from phasekit.table.row import FROM_ENERGY, FROM_MOTION, LAW, STATE, Pass, Quantity
+from phasekit.table.row import BRANCHES, FROM_ENERGY, FROM_MOTION, LAW, STATE, Pass, Quantity
 
 _NUMERICAL = "phasekit.phase.numerical.functions:"
 
@@ -14,6 +14,10 @@ NUMERICAL_ROWS: dict[str, tuple[Quantity, ...]] = {
                  "whether it is proved that there are these equilibria and no others",
                  "bounds of V' and V'' over all pieces; disjoint discs; exact isolation of roots",
                  "[MooreKearfottCloud2009]; [Smith1970]"),
+        Quantity("phi_error", "equilibria", BRANCHES, "float64", "rad",
+                 "bound of the error of the angle",
+                 "bounds of V' over |V''|; the nearest points at which the sign of V' is known",
+                 "[MooreKearfottCloud2009]"),
     ),
     "separatrices": (
         Quantity("winding_area_error", "separatrices", ("saddle",), "float64", "s-1",

@@ -167,7 +167,8 @@ class ArcLength:
         # All of them, and no stretch that may hold others.
         count, gaps = np.array([phi.size], np.int16), np.full((1, 2), np.nan)
         none = np.zeros(1, np.int64)
-        points = Equilibria._make((*rows, count, np.array([True]), gaps, none))
+        unknown = np.full((1, phi.size), np.nan)
+        points = Equilibria._make((*rows, count, np.array([True]), gaps, none, unknown))
         return survey(Systems(self.formula(), (), 1), points)
 
     def orbit(self, ground: Ground, x: float, v: float) -> rounds.Orbits:

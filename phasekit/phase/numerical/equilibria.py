@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
+from phasekit.phase.numerical.extended import values
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.isolation import bracketed, isolate, slope_bounds
 from phasekit.phase.numerical.partition import noise_at, partition
+from phasekit.phase.numerical.places import Places, located
 from phasekit.phase.numerical.series import (
     Roots,
     exact_base,
@@ -51,6 +53,8 @@ class Equilibria(NamedTuple):
     equilibrium; else NaN."""
     n_gaps: npt.NDArray[np.int64]
     """Number of such stretches."""
+    phi_error: Array
+    """Bound of the error of `phi`; NaN where there is none."""
 
 
 class Zeros(NamedTuple):
@@ -63,8 +67,8 @@ class Zeros(NamedTuple):
     n_gaps: npt.NDArray[np.int64]
 
 
-def equilibria(systems: Systems) -> Equilibria:
-    """All equilibria of each system.
+def equilibria(systems: Systems, *, counted: bool = False) -> Equilibria:
+    """All equilibria of each system; if they are only counted, without what places lack.
 
     Raises
     ------
@@ -97,7 +101,25 @@ def equilibria(systems: Systems) -> Equilibria:
             few = systems.take(rest)
             proved = not polynomial and slope_bounds(systems.formula) is not None
             zeros = _replaced(zeros, rest, _isolated(few) if proved else _sampled(few))
-    return _collect(systems, zeros, exact)
+    if counted:
+        return _collect(systems, zeros, np.full(zeros.phi.shape, np.nan))
+    found = _collect(systems, *_placed(systems, zeros, exact))
+    return _sharp(systems, found, exact)
+
+
+def _placed(
+    systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]
+) -> tuple[Zeros, Array]:
+    """Zeros with all digits that V' has, and their errors; exact ones are the nearest doubles."""
+    phi = zeros.phi.copy()
+    error = np.maximum(0.5 * np.spacing(np.abs(phi)), np.nextafter(0.0, 1.0))
+    inexact = np.ones(systems.size, dtype=bool)
+    inexact[list(exact)] = False
+    cell, slot = np.nonzero(np.isfinite(phi) & inexact[:, None])
+    found, sign = zeros.phi[cell, slot], zeros.sign[cell, slot]
+    places = Places(systems.take(cell), found, sign, cell, zeros.phi)
+    phi[cell, slot], error[cell, slot] = located(places)
+    return zeros._replace(phi=phi), error
 
 
 def _isolated(systems: Systems) -> Zeros:
@@ -258,30 +280,46 @@ def _merged(systems: Systems, root: Array, noise: Array) -> npt.NDArray[np.bool_
     return np.asarray((bend == 0.0) | ~(np.maximum(*changed) < 0.5 * np.abs(bend)))
 
 
-def _collect(systems: Systems, zeros: Zeros, exact: dict[int, list[Fraction]]) -> Equilibria:
+def _collect(systems: Systems, zeros: Zeros, error: Array) -> Equilibria:
     order = np.argsort(zeros.phi, axis=1)  # NaN last
     found = np.take_along_axis(zeros.phi, order, axis=1) + 0.0  # no -0.0
-    sign = np.take_along_axis(zeros.sign, order, axis=1)
+    sign, error = (np.take_along_axis(field, order, axis=1) for field in (zeros.sign, error))
     count = np.isfinite(found).sum(axis=1)
     most = int(count.max(initial=0))
-    found, sign = found[:, :most], sign[:, :most]
+    found, sign, error = (field[:, :most] for field in (found, sign, error))
     there = np.isfinite(found)
-    curvature, energy = systems.bend(found), systems.potential(found)
-    for row, coefficients in exact.items():
-        at = found[row, : count[row]]
-        base = exact_base(systems.formula, tuple(float(p[row]) for p in systems.parameters))
-        energy[row, : count[row]], curvature[row, : count[row]] = exact_heights(
-            base, coefficients, at
-        )
     with np.errstate(invalid="ignore"):
-        # The sign is proved; rounding may have turned that of a value next to 0.
-        curvature = np.where(there, np.where(sign == 0.0, 0.0, sign * np.abs(curvature)), np.nan)
         kind = np.where(sign == 0.0, DEGENERATE, np.where(sign > 0.0, CENTER, SADDLE))
-        kind = np.where(there, kind, ABSENT).astype(np.int8)
-        center = np.where(kind == CENTER, np.sqrt(np.abs(curvature)), np.nan)
-        saddle = np.where(kind == SADDLE, np.sqrt(np.abs(curvature)), np.nan)
+    kind = np.where(there, kind, ABSENT).astype(np.int8)
+    heights = systems.potential(found), systems.bend(found)
     valid = systems.finite
     number = np.where(valid, count, -1).astype(np.int16)
     complete = zeros.complete & valid
-    proofs = complete, zeros.gaps, zeros.n_gaps
-    return Equilibria(found, kind, energy + 0.0, curvature, center, saddle, number, *proofs)
+    scales = _scales(kind, *heights)
+    return Equilibria(found, kind, *scales, number, complete, zeros.gaps, zeros.n_gaps, error)
+
+
+def _scales(kind: Any, energy: Array, curvature: Array) -> tuple[Array, Array, Array, Array]:
+    """Energies, curvatures, frequencies and exponents, by kinds that are proved."""
+    # Rounding may have turned the sign of a value next to 0.
+    size = np.where(kind == ABSENT, np.nan, np.where(kind == DEGENERATE, 0.0, np.abs(curvature)))
+    center, saddle = (np.where(kind == one, np.sqrt(size), np.nan) for one in (CENTER, SADDLE))
+    return energy + 0.0, np.where(kind == SADDLE, -size, size), center, saddle
+
+
+def _sharp(systems: Systems, found: Equilibria, exact: dict[int, list[Fraction]]) -> Equilibria:
+    """Equilibria with all digits of V and V'' that the formula allows."""
+    energy, curvature = found.energy.copy(), found.curvature.copy()
+    cell, slot = np.nonzero(np.isfinite(found.phi))
+    fine = values(systems.take(cell), found.phi[cell, slot], 0, 2)
+    if fine is None and not exact:
+        return found
+    for field, (value, rest) in zip((energy, curvature), fine or (), strict=False):
+        usable = np.isfinite(value + rest)
+        field[cell[usable], slot[usable]] = value[usable]
+    for row, coefficients in exact.items():
+        at = found.phi[row, np.isfinite(found.phi[row])]
+        base = exact_base(systems.formula, tuple(float(p[row]) for p in systems.parameters))
+        energy[row, : at.size], curvature[row, : at.size] = exact_heights(base, coefficients, at)
+    one, two, three, four = _scales(found.kind, energy, curvature)
+    return found._replace(energy=one, curvature=two, natural_frequency=three, exponent=four)

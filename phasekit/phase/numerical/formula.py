@@ -161,7 +161,7 @@ def make_formula(
     potential = take_formula(expression, symbols, "expression", declare)
     slope, bend = _derivatives(potential, x, symbols)
     arguments = [x, *(symbols[name] for name in names)]
-    shape, coefficients = _shape(slope, x, period)
+    shape, coefficients = shape_of(slope, x, period)
     values, slopes, bends = (
         array_function(array_code(arguments, f, shared)) for f in (potential, slope, bend)
     )
@@ -238,7 +238,7 @@ def array_function(function: Callable[..., Any]) -> Callable[..., Array]:
     return called
 
 
-def _shape(slope: Any, x: Any, period: float | None) -> tuple[Shape, list[Any] | None]:
+def shape_of(slope: Any, x: Any, period: float | None) -> tuple[Shape, list[Any] | None]:
     """Tell what V' is, with its coefficients if it has such."""
     import sympy as sp
 

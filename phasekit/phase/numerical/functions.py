@@ -25,6 +25,7 @@ from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.differences import Ground, survey
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
+from phasekit.phase.numerical.extended import values
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.orbits import Orbits
@@ -77,7 +78,7 @@ def equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Equilibria:
     else:
         points = find_equilibria(systems)
     found = Equilibria._make(np.array(f).reshape(shape + f.shape[1:]) for f in points)
-    return found._replace(energy=found.energy + _constants(formula, parameters, 1))
+    return found._replace(energy=energies(formula, parameters, found.phi, found.energy))
 
 
 def separatrices(formula: Formula, *parameters: npt.ArrayLike) -> Separatrices:
@@ -91,11 +92,9 @@ def phase_space(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibri
     found = loops.separatrices(ground)
     points = Equilibria._make(f.reshape(shape + f.shape[1:]) for f in ground.points)
     found = Separatrices._make(f.reshape(shape + f.shape[1:]) for f in found)
-    base = _constants(formula, parameters, 1)
-    return (
-        points._replace(energy=points.energy + base),
-        found._replace(saddle_energy=found.saddle_energy + base),
-    )
+    energy = energies(formula, parameters, points.phi, points.energy)
+    height = energies(formula, parameters, found.saddle_phi, found.saddle_energy)
+    return points._replace(energy=energy), found._replace(saddle_energy=height)
 
 
 def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
@@ -104,11 +103,19 @@ def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int, Array]
     Besides the widest stretch that could not be excluded in the systems where there is such, and
     the number of these: low, high, number, shape (n, 3).
     """
-    ground, _ = _survey(formula, parameters)
-    rows, _ = loops.saddles_of(ground)
-    points = ground.points
+    systems, _ = make_systems(reduced(formula), parameters)
+    if systems.size <= _KEPT:
+        points = _survey(formula, parameters)[0].points
+    else:
+        points = find_equilibria(systems, counted=True)
+    saddles = np.sum(points.kind == EquilibriumKind.SADDLE, axis=1)
+    flat = np.flatnonzero(np.any(points.kind == EquilibriumKind.DEGENERATE, axis=1))
+    if flat.size:
+        few = Equilibria._make(field[flat] for field in points)
+        rows, _ = loops.saddles_of(survey(systems.take(flat), few))
+        saddles[flat] = np.bincount(rows, minlength=flat.size)
     open_ = np.column_stack([points.gaps, points.n_gaps])[points.n_gaps > 0]
-    return ground.points.phi.shape[1], int(np.bincount(rows, minlength=1).max()), open_
+    return points.phi.shape[1], int(saddles.max(initial=0)), open_
 
 
 def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
@@ -266,6 +273,23 @@ def _constants(formula: Formula, parameters: Sequence[npt.ArrayLike], axes: int 
     """The constant parts of V, to be added to energies with so many axes of their own behind."""
     base = np.asarray(constant(formula, parameters))
     return base.reshape(base.shape + (1,) * axes) if base.ndim else base
+
+
+def energies(
+    formula: Formula, parameters: Sequence[npt.ArrayLike], phi: Array, energy: Array
+) -> Array:
+    """Energies at equilibria with the constant parts of V; V as a whole where these cancel."""
+    total = np.asarray(energy + _constants(formula, parameters, 1))
+    lost = np.nonzero(np.abs(total) < 0.5 * np.abs(energy))
+    if lost[0].size:
+        shapes = [np.shape(p) + (1,) * bool(np.shape(p)) for p in parameters]
+        columns = (np.reshape(p, shape) for p, shape in zip(parameters, shapes, strict=True))
+        own = tuple(np.broadcast_to(np.asarray(p, float), phi.shape)[lost] for p in columns)
+        fine = values(Systems(formula, own, lost[0].size), phi[lost], 0)
+        if fine is not None:
+            whole = np.add(*fine[0])
+            total[lost] = np.where(np.isfinite(whole), whole, total[lost])
+    return total
 
 
 def _cells(

@@ -29,6 +29,14 @@ def point(x: npt.ArrayLike) -> Interval:
     return x, x
 
 
+def exact_numbers(expression: Any) -> Any:
+    """An expression with the fractions that its doubles are: sympy rounds what it makes of them."""
+    import sympy as sp
+
+    floats = expression.atoms(sp.Float)
+    return expression.xreplace({f: sp.Rational(*float(f).as_integer_ratio()) for f in floats})
+
+
 def constant_bounds(expression: Any) -> Interval:
     """Bounds of an expression without symbols."""
     if expression.is_Float:
@@ -86,7 +94,9 @@ def whole_power(n: int) -> Callable[..., Interval]:
         m = abs(n)
         if m == 1:
             return a
-        low, high = (np.power(np.asarray(end, dtype=float), m) for end in a)
+        low = high = np.power(np.asarray(a[0], dtype=float), m)
+        if a[1] is not a[0]:
+            high = np.power(np.asarray(a[1], dtype=float), m)
         if m % 2:
             return wide(low, high)
         through = (np.asarray(a[0]) <= 0.0) & (np.asarray(a[1]) >= 0.0)
@@ -305,6 +315,7 @@ def bounds_of_slopes(potential: Any, names: tuple[str, ...]) -> Bounds | str:
     from phasekit.laws.derivatives import derivative
 
     symbols = [sp.Symbol(name, real=True) for name in names]
+    potential = exact_numbers(potential)
     slopes = [derivative(potential, symbols[0], order) for order in (1, 2)]
     try:
         return Bounds(slopes, symbols)

@@ -18,7 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.phase.numerical.coefficients import slope_coefficients, spreads
 from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.intervals import exact_numbers
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
@@ -58,26 +60,30 @@ def degrees(coefficients: npt.NDArray[Any]) -> npt.NDArray[np.intp]:
     return np.asarray(np.max(np.where(coefficients != 0.0, powers, 0), axis=1, initial=0))
 
 
-def discs(coefficients: npt.NDArray[Any]) -> tuple[Complex, Array, Flags]:
-    """Roots of polynomials of full degree, radii of Smith's discs, and whether none touch."""
+def discs(coefficients: npt.NDArray[Any], spread: Array) -> tuple[Complex, Array, Flags]:
+    """Roots of polynomials of full degree, radii of Smith's discs, and whether none touch.
+
+    Nor may they touch where rounding on the way has moved coefficients by `spread`.
+    """
     z = companion_roots(coefficients)
     n = z.shape[1]
     with np.errstate(all="ignore"):
         value = np.zeros(z.shape, dtype=complex)
-        size = np.zeros(z.shape)
+        size, moved = np.zeros((2, *z.shape))
         for k in range(n, -1, -1):
             value = value * z + coefficients[:, k, None]
             size = size * np.abs(z) + np.abs(coefficients[:, k, None])
+            moved = moved * np.abs(z) + spread[:, k, None]
         # Coefficients, products and sums are rounded.
         most = np.abs(value) + 8.0 * (n + 3) * _EPS * size
         apart = np.abs(z[:, :, None] - z[:, None, :])
         apart[:, np.arange(n), np.arange(n)] = 1.0
         product = np.abs(coefficients[:, n, None]) * np.prod(apart, axis=2)
-        radius = 1.01 * n * most / product
+        radius, wide = (1.01 * n * size / product for size in (most, most + moved))
         apart[:, np.arange(n), np.arange(n)] = np.inf
         # Twice the radii, so that mirrored discs keep apart as well.
-        separate = apart > 2.0 * (radius[:, :, None] + radius[:, None, :])
-        clear = separate.all(axis=(1, 2)) & np.isfinite(radius).all(axis=1)
+        separate = apart > 2.0 * (wide[:, :, None] + wide[:, None, :])
+        clear = separate.all(axis=(1, 2)) & np.isfinite(wide).all(axis=1)
     return z, radius, np.asarray(clear)
 
 
@@ -88,10 +94,13 @@ def of_polynomials(systems: Systems) -> Roots:
     found = _none(systems.size, width)
     finite = np.isfinite(coefficients).all(axis=1)
     degree = np.where(finite, degrees(coefficients), 0)
-    found.clear[degree == 0] = True
+    spread = spreads(systems, coefficients)
+    known = _of_known_degree(coefficients, spread, degree)
+    found.clear[(degree == 0) & known] = True
     for n in np.unique(degree[degree > 0]):
         rows = np.flatnonzero(degree == n)
-        z, radius, clear = discs(coefficients[rows, : n + 1])
+        z, radius, clear = discs(coefficients[rows, : n + 1], spread[rows, : n + 1])
+        clear &= known[rows]
         real = (z.imag == 0.0) & clear[:, None]
         leading = np.sign(coefficients[rows, n])
         _enter(found, rows, z.real, radius, real, leading, clear)
@@ -116,12 +125,15 @@ def of_fourier_sums(systems: Systems) -> Roots:
     found = _none(systems.size, max(2 * coefficients.shape[1] - 2, 1))
     finite = np.isfinite(coefficients).all(axis=1)
     degree = np.where(finite, degrees(coefficients), 0)
-    found.clear[(degree == 0) & finite] = True
+    spread = spreads(systems, coefficients)
+    known = _of_known_degree(coefficients, spread, degree)
+    found.clear[(degree == 0) & finite & known] = True
     for n in np.unique(degree[degree > 0]):
         rows = np.flatnonzero(degree == n)
-        upper = coefficients[rows, : n + 1]
+        upper, off = coefficients[rows, : n + 1], spread[rows, : n + 1]
         whole = np.concatenate([np.conj(upper[:, :0:-1]), upper.real[:, :1], upper[:, 1:]], axis=1)
-        z, radius, clear = discs(whole)
+        z, radius, clear = discs(whole, np.concatenate([off[:, :0:-1], off], axis=1))
+        clear &= known[rows]
         on_circle = np.abs(np.abs(z) - 1.0) <= radius
         clear &= np.all(np.where(on_circle, radius, 0.0) < 0.1, axis=1)
         angle = np.angle(z) * (period / (2.0 * np.pi))
@@ -137,6 +149,12 @@ def of_fourier_sums(systems: Systems) -> Roots:
         for field, values in ((found.phi, angle), (found.sign, after), (found.radius, slack)):
             field[rows[:, None], np.arange(2 * n)] = np.where(there, values, np.nan)
     return found
+
+
+def _of_known_degree(coefficients: npt.NDArray[Any], spread: Array, degree: Any) -> Flags:
+    """Whether rounding of coefficients cannot have changed the degree."""
+    beyond = np.arange(coefficients.shape[1]) >= np.maximum(degree, 1)[:, None]
+    return np.asarray(~np.any(beyond & (spread > 0.25 * np.abs(coefficients)), axis=1))
 
 
 def _next(there: Flags) -> npt.NDArray[np.intp]:
@@ -168,36 +186,17 @@ def _enter(
 # ------------------------------------------------------------------------- exact arithmetic
 
 
-def _of_fractions(formula: Formula) -> Any:
-    import sympy as sp
-
-    floats = formula.expression.atoms(sp.Float)
-    return formula.expression.xreplace({f: _fraction(float(f)) for f in floats})
-
-
 def _fraction(value: float) -> Any:
     import sympy as sp
 
     return sp.Rational(*value.as_integer_ratio())
 
 
-@functools.lru_cache(maxsize=128)
-def _symbolic(formula: Formula) -> list[Any] | None:
-    """Coefficients of V', lowest first, with every number as the fraction that it is."""
-    import sympy as sp
-
-    x = sp.Symbol(formula.coordinate, real=True)
-    slope = sp.diff(_of_fractions(formula), x)
-    if not slope.is_polynomial(x):
-        return None
-    return list(sp.Poly(sp.expand(slope), x).all_coeffs()[::-1])
-
-
 def exact_coefficients(formula: Formula, parameters: tuple[float, ...]) -> list[Fraction] | None:
     """Coefficients of V' for the doubles that parameters are; None where they are irrational."""
     import sympy as sp
 
-    symbolic = _symbolic(formula)
+    symbolic = slope_coefficients(formula)
     if symbolic is None:
         return None
     values = {
@@ -297,7 +296,7 @@ def exact_base(formula: Formula, parameters: tuple[float, ...]) -> Fraction:
             (formula.coordinate, *formula.names), (0.0, *parameters), strict=True
         )
     }
-    base = _of_fractions(formula).xreplace(values)
+    base = exact_numbers(formula.expression).xreplace(values)
     base = base if base.is_Rational else sp.Rational(base.evalf(60))
     return Fraction(int(base.p), int(base.q))
 
