@@ -187,7 +187,16 @@ def passes_of(
         if row.group not in computed:
             refuse(system, TABLE.rungs_of(row.group), row.group)
     states = {*given, *system.parameters}
-    return tuple(one.bound(system, states) for one in passes)
+    return tuple(_whole(one, system, states) for one in passes)
+
+
+def _whole(one: Pass, system: Model, states: set[str]) -> Pass:
+    """Return a line for one system with those that it starts from."""
+    lines, missing = TABLE.behind(one, system.rung)
+    if missing is not None:
+        refuse(system, TABLE.rungs_of(missing), missing)
+    behind = tuple(other.bound(system, states) for other in lines)
+    return replace(one.bound(system, states), behind=behind)
 
 
 def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
