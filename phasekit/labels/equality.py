@@ -33,7 +33,7 @@ def equal(left: Any, right: Any, without: Container[str] = ()) -> bool:
         return len(left) == len(right) and all(
             equal(x, y, without) for x, y in zip(left, right, strict=True)
         )
-    if isinstance(left, (xr.Dataset, xr.DataArray)):
+    if isinstance(left, (xr.Dataset, xr.DataArray, xr.Variable)):
         return bool(left.identical(right))
     if isinstance(left, (np.ndarray, np.generic, float, complex)):
         return np.array_equal(left, right, equal_nan=np.asarray(left).dtype.kind in "fc")

@@ -150,3 +150,35 @@ def test_what_travelled_goes_on(elsewhere):
     assert len(fold.branch.plot().lines)
     assert len({fold, of_formulas().special("LP")[0]}) == 1
     assert len({long, short, long.extend(5)}) == 2
+
+
+def test_what_travels_does_not_change():
+    for branch in (of_formulas(), of_cycles()):
+        point = branch.special_points[0]
+        for array in (point.x, point.eigenvalues, branch.points.special.values):
+            with pytest.raises(ValueError, match="read-only"):
+                array[0] = array[0]
+        for mapping in (point.parameters, point.normal_form):
+            with pytest.raises(TypeError, match="does not support item assignment"):
+                mapping["mu"] = 3.0
+    disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)
+    driven = pk.Perturbed(disk, modulation={"omega1": pk.Harmonic(0.1, 2.0)}, drift={"e": 0.1})
+    for mapping in (driven.modulation, driven.drift):
+        with pytest.raises(TypeError, match="does not support item assignment"):
+            mapping["e"] = 3.0
+    assert travelled(driven) == driven
+    assert "modulation={'omega1'" in repr(driven)
+
+
+def test_pages_and_motion_at_a_momentum_are_equal_by_value():
+    disk = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.01, r=0.1, omega1=15.0, m=2.0)
+    rotor, pendulum = pk.FreeGyroRotor(disk, 0.02), pk.Pendulum(length=0.5)
+    for one, again, other in (
+        (rotor.amended(0.5), rotor.amended(0.5), rotor.amended(0.6)),
+        (pk.explore(pendulum), pk.explore(pendulum), pk.explore(pendulum.replace(length=1.0))),
+    ):
+        for same in (again, travelled(one), copy.copy(one), copy.deepcopy(one)):
+            assert same == one
+            assert hash(same) == hash(one)
+        assert other != one
+        assert one != 1.0

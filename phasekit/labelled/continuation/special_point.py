@@ -282,9 +282,10 @@ def special_point(
     for j in range(n):
         if curve.period[j] > 0.0:
             x[j] = wrap(x[j], float(curve.period[j]))
-    x.flags.writeable = False
+    eigenvalues = eigenvalues_at(curve, special.u).copy()
+    x.flags.writeable = eigenvalues.flags.writeable = False
     return SpecialPoint(
         special.kind, x, MappingProxyType(parameters), special.interval, special.residual,
         special.status, special.message, MappingProxyType(dict(special.normal_form)),
-        eigenvalues_at(curve, special.u), index, special, branch,
+        eigenvalues, index, special, branch,
     )  # fmt: skip
