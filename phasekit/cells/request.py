@@ -187,7 +187,16 @@ def passes_of(
         if row.group not in computed:
             refuse(system, TABLE.rungs_of(row.group), row.group)
     states = {*given, *system.parameters}
-    return tuple(one.bound(system, states) for one in passes)
+    return tuple(_whole(one, system, states) for one in passes)
+
+
+def _whole(one: Pass, system: Model, states: set[str]) -> Pass:
+    """Return a line for one system with those that it starts from."""
+    lines, missing = TABLE.behind(one, system.rung)
+    if missing is not None:
+        refuse(system, TABLE.rungs_of(missing), missing)
+    behind = tuple(other.bound(system, states) for other in lines)
+    return replace(one.bound(system, states), behind=behind)
 
 
 def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
@@ -229,10 +238,7 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
-        if system.rung.words is not Law.words:  # it has its own
-            words: list[Any] = [system.law.words(r.name, r.units, r.long_name) for r in kept]
-            kept = [replace(row, **own) for row, own in zip(kept, words, strict=True)]
-        return kept, passes
+        return worded(system, kept), passes
     from phasekit.cells import numbered  # loads scipy, which named labels do not need
 
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
@@ -244,3 +250,11 @@ def fitted(
     counts = [one for one in TABLE.passes if one.groups == ("labels",)]
     count = max((o for o in counts if issubclass(system.rung, o.of)), key=lambda o: depth(o.of))
     return numbered.fitted(system, kept, passes, count.bound(system, set(system.parameters)))
+
+
+def worded(system: Model, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+    """Return rows of a system with fixed labels, with what its law alone says of them."""
+    if system.rung.words is Law.words:
+        return rows
+    words: list[Any] = [system.law.words(row.name, row.units, row.long_name) for row in rows]
+    return [replace(row, **own) for row, own in zip(rows, words, strict=True)]

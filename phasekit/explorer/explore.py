@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,7 @@ def explore(system: Any) -> Explorer:
     return Explorer(found, page(found, parameters))
 
 
+@dataclass(frozen=True, repr=False)
 class Explorer:
     """The page of a system; a notebook shows it.
 
@@ -81,9 +83,8 @@ class Explorer:
     True
     """
 
-    def __init__(self, system: Any, text: str) -> None:
-        self.system = system
-        self.html = text
+    system: Any
+    html: str
 
     def save(self, path: str | Path) -> Path:
         """Write the page to a file.

@@ -22,8 +22,10 @@ from phasekit.labels.arguments import (
     number,
     state_arguments,
 )
+from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
+from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import Model, as_system
 from phasekit.table.quantities import select
 
@@ -44,19 +46,19 @@ def flow(
     Parameters
     ----------
     system : system
-        Any system. Without damping and drive there is no integration, so no error that grows
-        with steps.
+        Any system. In a potential without damping and drive there is no integration, so no error
+        that grows with steps. A `FreeGyroRotor` moves at its momentum.
     phi0, dphi0 : float, 1-D array_like or xarray.DataArray
         States at t = 0: angles in rad, angular velocities in s^-1.
     t : float, 1-D array_like or xarray.DataArray
         Times in s, of either sign and in any order. A bare array makes the dim ``time``.
     rtol, atol : float, optional
-        Of a `Perturbed` system: the error of a step that is allowed, relative (default 1e-10) and
-        absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is relative to
-        one radian. On a line, of motions whose states are below 1 as yet, the absolute error is
-        that part of the greatest: lengths may be in any unit.
+        Of a motion that is integrated: the error of a step that is allowed, relative (default
+        1e-10) and absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is
+        relative to one radian. On a line, of motions whose states are below 1 as yet, the absolute
+        error is that part of the greatest: lengths may be in any unit.
     events : callable or mapping of str to callable, optional
-        Of one motion of a `Perturbed` system: functions of (t, phi, dphi) whose zeros are looked
+        Of one motion that is integrated: functions of (t, phi, dphi) whose zeros are looked
         for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True
         or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. A function
         that comes to 1e-8 of its values around and turns back touches zero and counts, unless it
@@ -103,12 +105,14 @@ def flow(
     """
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
     system = as_system(system)
-    if not issubclass(system.rung, PerturbedConservative):
+    if issubclass(system.rung, Conservative):
         for name, value in (("rtol", rtol), ("atol", atol), ("events", events)):
             if value is not None:
-                raise bad(name, value, "nothing, because this system's motion is exact")
+                hint = "pk.Perturbed(system) takes them"
+                raise bad(name, value, "nothing, because this system's motion is exact", hint)
     else:
-        refuse_noise(system)
+        if issubclass(system.rung, PerturbedConservative):
+            refuse_noise(system)
         tolerances = checked_tolerances(rtol, atol)
         (one,) = passes_of(system, select("motion"))
         one = replace(one, function=functools.partial(one.resolved, **tolerances))
@@ -118,7 +122,8 @@ def flow(
             return ds
         from phasekit.labelled.events import with_events
 
-        return with_events(ds, system, events, tolerances)
+        moved = system if issubclass(system.rung, PerturbedConservative) else Perturbed(system)
+        return with_events(ds, moved, events, tolerances)
     return at_states(system, select("motion"), states)
 
 

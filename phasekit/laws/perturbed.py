@@ -52,6 +52,18 @@ class Rate:
 
     parameter: str
     euler: Callable[[Mapping[str, Any]], tuple[Any, Any, Any]]
+    #: The class that states it, and under which name.
+    stated: tuple[type, str] | None = field(default=None, init=False, compare=False, repr=False)
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Remember which class states it."""
+        object.__setattr__(self, "stated", (owner, name))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel by the name of the class, whose function may be a lambda."""
+        if self.stated is not None:
+            return getattr, self.stated
+        return Rate, (self.parameter, self.euler)
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import assemble
-from phasekit.cells.request import Request
+from phasekit.cells.request import Request, worded
 from phasekit.cells.schema import label_coords
 from phasekit.errors import ParameterError, PhasekitError, StoreError
 from phasekit.labels.coordinates import LABELS, STATES
@@ -29,6 +29,7 @@ from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan, fingerprint
 from phasekit.maps.plan_file import GROUP, PLAN_KEY, plan_bytes, plan_from
 from phasekit.systems.registry import models
+from phasekit.systems.system import Model
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 
@@ -80,13 +81,13 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
     before: dict[str, bytes | None] = {}
     known: dict[str, str] = {}
     if old is None:
-        documents = _documents(ds, plan, {}, compressor)
+        documents = _documents(ds, plan, {}, compressor, request.system)
         # What says that this is a map comes first, then what it will be.
         files.put(store, {"zarr.json": documents["zarr.json"]})
         write_plan(place, replace(plan, parts=()))
     else:
         root = dict(zarr_group(place.open(read_only=True)).attrs)
-        documents = _documents(ds, plan, root, compressor)
+        documents = _documents(ds, plan, root, compressor, request.system)
         kept = {part.name: part for part in old.parts if _same_tiles(part, plan)}
         dropped = {row for part in old.parts if part.name not in kept for row in part.quantities}
         known = {k: v for k, v in old.documents.items() if k.split("/")[0] not in dropped}
@@ -117,7 +118,7 @@ def _same_tiles(part: StoredPart, plan: Plan) -> bool:
 
 
 def _documents(
-    ds: xr.Dataset, plan: Plan, root: Mapping[str, Any], compressor: str
+    ds: xr.Dataset, plan: Plan, root: Mapping[str, Any], compressor: str, system: Model
 ) -> dict[str, bytes]:
     """Return what describes the arrays of a plan, and its coordinates, as they will be stored.
 
@@ -142,7 +143,7 @@ def _documents(
     group.attrs.put({**attrs, _NAMED: " ".join(sorted(named))} if named else attrs)
     for part in plan.parts:
         _create_marks(group, part, part.grid(plan.sizes))
-        for row in part.rows:
+        for row in worded(system, part.rows):
             shape = tuple(plan.sizes[dim] for dim in part.dims) + row.label_shape
             _create(group, part, row, shape, compressor)
     kept.pop(PLAN_KEY, None)  # is written last

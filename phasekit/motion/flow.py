@@ -9,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.perturbed import (
+    OWN,
     PerturbedConservative,
+    PerturbedRouthian,
     drift_name,
     forcing_names,
     modulation_names,
@@ -96,6 +98,27 @@ def flow(
     order = np.argsort((*outer, *inner))
     results = found.reshape(*cells, *(shape[axis] for axis in inner), 2)
     return Motion(*(results[..., i].transpose(order) for i in range(2)))
+
+
+def at_momentum(law: Any, *arrays: npt.ArrayLike, **how: Any) -> Motion:
+    """States after times, at momenta that are constant: `flow` without damping and drive.
+
+    Parameters
+    ----------
+    law : Routhian
+        The law as a function of its parameters.
+    *arrays : array_like
+        Its parameters, then angles and angular velocities at t = 0, then times; they broadcast.
+    **how
+        As of `flow`.
+
+    Returns
+    -------
+    Motion
+    """
+    count = len(law.names)
+    alone = PerturbedRouthian(law, (*law.names, *OWN), law.names, torqued=False)
+    return flow(alone, *arrays[:count], *np.zeros(len(OWN)), *arrays[count:], **how)
 
 
 def _motions(

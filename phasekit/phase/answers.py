@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from phasekit.errors import Loop, ParameterError
 from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import PerturbedConservative, TiltedRouthian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
 from phasekit.phase.exact.orbits import orbits
@@ -56,9 +56,9 @@ class Answers:
     momentum : (str, float, str), optional
         Name, value and unit of the momentum that is constant.
     tilt : float
-        What V falls by in a turn of an angle; where it does, one turn is looked at as a line.
+        What V falls by in a turn; where it does, one turn is looked at as a line.
     cut_at : callable, optional
-        The same of the turn that begins at another angle, where V falls.
+        The same of the turn that begins at another coordinate, where V falls.
     """
 
     coordinate: str
@@ -80,6 +80,11 @@ class Answers:
     tilt: float = 0.0
     cut_at: Callable[[float], Answers] | None = None
 
+    @property
+    def turn(self) -> float | None:
+        """Length of the circle, also of one that is looked at as a line; None on a line."""
+        return self.period if self.cut_at is None else self.ends[1] - self.ends[0]
+
 
 @functools.singledispatch
 def answers(law: Law, values: Mapping[str, float]) -> Answers:
@@ -98,8 +103,10 @@ def answers(law: Law, values: Mapping[str, float]) -> Answers:
     [-1.047, 0.0, 1.047, 3.142]
     """
     if isinstance(law, PerturbedConservative):
+        # At constant momenta a torque keeps an energy, too, but no orbits are known.
+        without = "without a torque" if isinstance(law, TiltedRouthian) else "whose energy stays"
         raise ParameterError(
-            f"system: got {law.called}, wants one whose energy stays, perturbed.system; "
+            f"system: got {law.called}, wants one {without}, perturbed.system; "
             "pk.plot.damped_portrait draws motions under damping and a torque"
         )
     raise ParameterError(f"system: got {law.called}, wants one of one degree of freedom")

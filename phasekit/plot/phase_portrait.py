@@ -16,7 +16,7 @@ from phasekit.labels.arguments import bad, one_of, reals
 from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
-from phasekit.plot.parts.circle import TURN, Circle
+from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units, coordinate_symbol, printed
 from phasekit.systems.system import single
 
@@ -182,16 +182,17 @@ class Picture:
             raise bad("angles", shown.angles, wants)
         scale = units.scale(*place), units.scale(*rate)
         if shown.cut is not None:
-            if not known.is_angle and known.period is None:
+            if known.turn is None:
                 raise bad("cut", shown.cut, "None, for the coordinate is not on a circle")
-            low = Circle.cut_at(shown.cut, scale[0], known.period or TURN).low
+            low = Circle.cut_at(shown.cut, scale[0], known.turn).low
             land = LevelCurves.of(known if known.cut_at is None else known.cut_at(low), low)
         chosen = (
             land.levels(1.0 / (6.0 * density)) if energies is None else levels_of(land, energies)
         )
         starts = [] if orbits is None else starts_of(land, orbits)
-        if known.cut_at is not None:  # angles, though the picture is one of a line
-            starts = [(float(Circle(land.window[0]).home(x)), v) for x, v in starts]
+        if known.cut_at is not None and known.turn is not None:  # though the picture is of a line
+            turn = Circle(land.window[0], known.turn)
+            starts = [(float(turn.home(x)), v) for x, v in starts]
         symbol = coordinate_symbol(known.coordinate)
         circle = Circle(land.window[0], known.period)
         return cls(land, chosen, starts, units, rate, symbol, scale, circle)

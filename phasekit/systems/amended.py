@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
 from phasekit.labels.arguments import bad, numeric, reals
+from phasekit.labels.equality import same_fields
 from phasekit.labels.grid import variable
 from phasekit.labels.units import UNITS_OF
 from phasekit.laws.ladder import Lawful, Routhian
@@ -70,6 +71,16 @@ class Amended(Lawful):
     _machine: TwoDegrees
     _attrs: Mapping[str, str]
     _coords: Mapping[str, xr.Variable]
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same machine at the same momentum."""
+        if type(self) is not type(other):
+            return NotImplemented
+        return same_fields(self, other)
+
+    def __hash__(self) -> int:
+        """Hash of the momentum."""
+        return hash(self.p)
 
     @property
     def law(self) -> Routhian:

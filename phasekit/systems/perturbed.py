@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, ClassVar, NoReturn, Self
 
 import numpy as np
@@ -121,8 +122,8 @@ class Perturbed(Model):
     torque: Value
     kT: Value
     forcing: tuple[Harmonic, ...]
-    modulation: dict[str, Harmonic]
-    drift: dict[str, Value]
+    modulation: Mapping[str, Harmonic]
+    drift: Mapping[str, Value]
     omega1: Any
 
     def __init__(
@@ -150,8 +151,8 @@ class Perturbed(Model):
             "system": base,
             **own,
             "forcing": drive.forcing,
-            "modulation": drive.modulation,
-            "drift": drive.drift,
+            "modulation": MappingProxyType(drive.modulation),
+            "drift": MappingProxyType(drive.drift),
             "omega1": parts.prescribed(omega1, base, varying),
             "declared": (*base.declared, *declared),
             "rung": parts.rung_of(base, own, bool(drive.declared) or omega1 is not None),
@@ -284,7 +285,8 @@ class Perturbed(Model):
     def arguments(self) -> dict[str, Any]:
         """What makes it again, by keyword."""
         names = ("system", *OWN, "forcing", "modulation", "drift", "omega1")
-        return {name: getattr(self, name) for name in names}
+        own = {name: getattr(self, name) for name in names}
+        return {**own, "modulation": dict(self.modulation), "drift": dict(self.drift)}
 
     @property
     def definition(self) -> dict[str, str]:
@@ -357,7 +359,7 @@ class Perturbed(Model):
             one = len(self.forcing) == 1
             shown.append(f"forcing={self.forcing[0] if one else list(self.forcing)!r}")
         if self.modulation:
-            shown.append(f"modulation={self.modulation!r}")
+            shown.append(f"modulation={dict(self.modulation)!r}")
         if self.drift:
             rates = ", ".join(f"{name!r}: {brief(rate)}" for name, rate in self.drift.items())
             shown.append(f"drift={{{rates}}}")

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.labels.arguments import bad, flag, reals, unknown, whole
+from phasekit.labels.equality import equal
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import PerturbedConservative
@@ -328,6 +329,17 @@ class Problem(ProblemSources):
             raise bad("x", x, wants)
         par = np.array([*self.parameters.values(), *(time for _ in self._times())])
         return jet_of(self._own, par, x)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it has the same equations and values; functions are equal to themselves."""
+        if type(self) is not type(other):
+            return NotImplemented
+        slots = (name for name in Problem.__slots__ if not name.startswith("_"))
+        return all(equal(getattr(self, name), getattr(other, name)) for name in slots)
+
+    def __hash__(self) -> int:
+        """Hash of states, parameters and their values."""
+        return hash((self.state, frozenset(self.parameters.items())))
 
     def __repr__(self) -> str:
         """Write the equations, if they are formulas, and the parameters."""

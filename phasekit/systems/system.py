@@ -76,6 +76,8 @@ class Model(ModelValue):
         if own is not None:
             units = {parameter.name: parameter.units for parameter in getattr(cls, "declared", ())}
             law = checked_products(cls.__name__, own.__func__, units)
+            # By these names it travels to worker processes, whatever it was called before.
+            law.__module__, law.__qualname__ = cls.__module__, f"{cls.__qualname__}.products"
             cls.products = staticmethod(law)  # type: ignore[assignment, method-assign]
 
     @staticmethod

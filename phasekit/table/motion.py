@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from phasekit.labels.coordinates import LABELS
+from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.table.row import LAW, STATE, Pass, Quantity
 
@@ -79,6 +80,7 @@ QUANTITIES: tuple[Quantity, ...] = (
 
 PASSES: tuple[Pass, ...] = (
     Pass("phasekit.motion.flow:flow", (LAW, *STATE, "time"), ("motion",), _OF),
+    Pass("phasekit.motion.flow:at_momentum", (LAW, *STATE, "time"), ("motion",), Routhian),
     Pass("phasekit.motion.strobe:lyapunov", (LAW, *STATE, "time"), ("lyapunov",), _OF),
     Pass(
         "phasekit.motion.shares:fractions", (LAW, "box_phi", "box_dphi"), ("basin_fractions",), _OF

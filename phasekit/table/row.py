@@ -11,7 +11,7 @@ from __future__ import annotations
 import functools
 import importlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 from typing import Any
 
@@ -112,6 +112,8 @@ class Pass:
     options: tuple[str, ...] = ()
     #: States that it can do without, with their keywords.
     optional: tuple[tuple[str, str], ...] = ()
+    #: Lines for the same system that compute the quantities among its inputs, and theirs.
+    behind: tuple[Pass, ...] = ()
 
     @property
     def resolved(self) -> Callable[..., Any]:
@@ -137,7 +139,7 @@ class Pass:
             function = functools.partial(function, **options)
         if extra:
             function = functools.partial(_with_keywords, function, tuple(extra.values()))
-        return Pass(function, (*inputs, *extra), self.groups, self.of)
+        return replace(self, function=function, inputs=(*inputs, *extra), options=(), optional=())
 
 
 def _with_keywords(function: Any, keywords: tuple[str, ...], *arrays: Any, **options: Any) -> Any:
@@ -273,15 +275,28 @@ class Table:
                    for group in {group for one in able for group in one.groups}}  # fmt: skip
         return [one for one in able if all(depth(one.of) == special[g] for g in one.groups)]
 
-    def pass_of(self, group: str, chosen: Sequence[Pass]) -> Pass:
-        """Return the pass for a group: one of those chosen, else the one that computes the least.
+    def behind(self, one: Pass, rung: type[Law]) -> tuple[list[Pass], str | None]:
+        """Return the lines for the quantities from which a line starts, in the end, on a rung.
 
-        What is not chosen is computed from (A, B, C), the only rung whose quantities need no law.
+        Each is the one that computes the least. Besides the group that nothing there computes.
         """
-        for candidate in chosen:
-            if group in candidate.groups:
-                return candidate
-        return next(one for one in reversed(self.fitting(Trigonometric)) if group in one.groups)
+        left, found = [name for name in one.inputs if name in self.rows], list[Pass]()
+        lines = self.fitting(rung)[::-1] if left else []
+        while left:
+            group = self.rows[left.pop()].group
+            if any(group in other.groups for other in found):
+                continue
+            able = [other for other in lines if group in other.groups]
+            if not able:
+                return found, group
+            found.append(able[0])
+            left += [name for name in able[0].inputs if name in self.rows]
+        return found, None
+
+    def pass_of(self, group: str, chosen: Sequence[Pass]) -> Pass:
+        """Return the line for a group: one of those chosen, else one behind them."""
+        behind = (other for one in chosen for other in one.behind)
+        return next(one for one in (*chosen, *behind) if group in one.groups)
 
     def call(self, one: Pass, *arrays: Any) -> dict[str, Any]:
         """Call the function of a pass; return the arrays by the names of the quantities."""

@@ -38,6 +38,8 @@ ROUTH: dict[str, dict[str, str]] = {
     "energy_integral": {"units": "J", "long_name": "energy at the momentum",
                         "equation": "(M22 - M12^2/M11) phi'^2/2 + V_p"},
     "phase_velocity": {"equation": "sqrt(2 (h - V_p)/(M22 - M12^2/M11))"},
+    "motion_phi": {"equation": "M phi'' + M' phi'^2/2 + V_p' = 0, M = M22 - M12^2/M11"},
+    "motion_dphi": {"equation": "M phi'' + M' phi'^2/2 + V_p' = 0, M = M22 - M12^2/M11"},
 }  # fmt: skip
 for _words in ROUTH.values():
     _words["source"] = ROUTH_OF

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import sympy
 import xarray as xr
 
 import phasekit as pk
-from phasekit.cells.request import passes_of
+from phasekit.cells import evaluate, request
+from phasekit.cells.request import inputs_of, passes_of
 from phasekit.cells.states import at_states, pass_from
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
 from phasekit.table.quantities import ROWS, TABLE
+from phasekit.table.row import Pass, Quantity
 
 SYSTEMS = (
     pk.Coefficients(1.0, 0.35, 0.12),
@@ -108,3 +112,42 @@ def test_rungs_are_the_only_thing_that_systems_are_asked_for():
     driven = {PerturbedTrigonometric, PerturbedConservative}
     assert rungs <= {Trigonometric, Conservative, Routhian} | driven
     assert isinstance(pk.equilibria(SYSTEMS[1]), xr.Dataset)
+
+
+def barrier(saddle_energy, energy):
+    return np.nanmax(saddle_energy, axis=-1) - np.nanmin(energy, axis=-1)
+
+
+def test_what_a_row_starts_from_is_that_of_the_same_rung(monkeypatch):
+    """A torque changes energies: what is computed from them is computed from these."""
+    row = Quantity("barrier", "barrier", (), "float64", "s-2", "barrier", "h_s - V", "-")
+    twice = replace(row, name="twice", group="twice")
+    monkeypatch.setattr(TABLE, "rows", {**ROWS, "barrier": row, "twice": twice})
+    lines = (
+        Pass(barrier, ("saddle_energy", "energy"), ("barrier",), of=Law),
+        Pass(lambda barrier: 2.0 * barrier, ("barrier",), ("twice",), of=Law),
+    )
+    monkeypatch.setattr(TABLE, "passes", (*TABLE.passes, *lines))
+    monkeypatch.setattr(request, "ROWS", TABLE.rows)
+    monkeypatch.setattr(evaluate, "ROWS", TABLE.rows)
+    tilted = pk.Perturbed(pk.Coefficients(4.0, 1.0, 0.5), torque=0.2)
+    as_formula = pk.Potential(
+        "-cos(q) + a*cos(q)^2/2 - sin(q)/2", "q", {"a": 4.0}, period=2 * np.pi
+    )  # fmt: skip
+    A = np.array([4.0, 4.4, 4.8])
+    of = [row, twice]
+    for system, axis in ((tilted, "A"), (pk.Perturbed(as_formula, torque=0.2), "a")):
+        swept = system.replace(**{axis: A})
+        known = pk.equilibria(swept).merge(pk.separatrices(swept), compat="override")
+        wanted = known.saddle_energy.max("saddle") - known.energy.min("equilibrium")
+        rows = [*of, *inputs_of(swept, of)]
+        found = evaluate.evaluate(swept, rows)
+        np.testing.assert_allclose(found.barrier, wanted, rtol=1e-13)
+        np.testing.assert_array_equal(found.twice, 2.0 * found.barrier)
+    chunked = xr.DataArray(A, dims="A").chunk({"A": 2})
+    lazy = evaluate.evaluate(tilted.replace(A=chunked), of)
+    assert lazy.barrier.chunks is not None
+    first = pk.separatrices(tilted).saddle_energy.max() - pk.equilibria(tilted).energy.min()
+    np.testing.assert_allclose(lazy.barrier[0], first, rtol=1e-13)
+    with pytest.raises(pk.ParameterError, match="without damping and drive .* for separatrices"):
+        evaluate.evaluate(tilted.replace(damping=0.1), of)

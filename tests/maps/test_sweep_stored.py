@@ -12,8 +12,12 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.labels import grid
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.maps import run, tile
 from phasekit.maps.plan import LAYOUT
+from phasekit.maps.sweep import plan_sweep
+from phasekit.maps.workers import keeps_here
+from phasekit.systems.registry import models
 
 zarr = pytest.importorskip("zarr")
 
@@ -52,6 +56,45 @@ def test_a_stored_map_is_the_one_in_memory(chunks, tmp_path):
     xr.testing.assert_identical(ds.load(), WHOLE)
     with pk.open_map(tmp_path / "map.zarr") as again:
         assert list(again.data_vars) == list(WHOLE.data_vars)
+
+
+LAWS = (
+    pk.Coefficients(4.0, 1.0, 0.5), pk.Reduced(0.25, 0.125, 4.0), DISK, pk.Pendulum(length=1.0),
+    pk.ParticleOnCircle(radius=1.0, omega=4.0), pk.StonerWohlfarth(K=-2.0, h_x=1.0, h_y=0.5),
+    pk.JosephsonJunction(plasma_frequency=1.0), pk.SpinOrbit(mean_motion=1.0, asymmetry=0.1),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("system", LAWS, ids=lambda system: type(system).__name__)
+def test_perturbed_maps_are_computed_in_other_processes(system, tmp_path):
+    assert {type(one) for one in LAWS} == {m for m in models().values() if m.rung is Trigonometric}
+    driven = pk.Perturbed(system, damping=0.1, forcing=pk.Harmonic(0.2, 1.3))
+    tilted = pk.Perturbed(system, torque=0.1)
+    for one, of in ((driven, "melnikov"), (tilted, "separatrices"), (system, "equilibria")):
+        axis = next(iter(system.parameters))
+        axes = {axis: system.parameters[axis] * np.array([1.0, 1.1])}
+        job = plan_sweep(one, axes, of=of, store=tmp_path / f"{of}.zarr", chunks=1)
+        assert job.count == 2
+        assert keeps_here(next(job.tiles())) is None
+
+
+def test_a_stored_map_under_a_torque_says_so(tmp_path):
+    system = pk.Perturbed(LAWS[0], torque=0.01)
+    axes = {"A": np.linspace(4, 5, 4), "state_phi": [0.1, 0.2], "state_dphi": [0.0, 0.1]}
+    of = ["equilibria", "separatrices", "orbits"]
+    memory = pk.sweep(system, axes, of=of)
+    assert memory.phi.equation == "V'(phi) = torque"
+    store = tmp_path / "map.zarr"
+    ds = pk.sweep(system, axes, of=of, store=store, workers=1)
+    xr.testing.assert_identical(ds.load(), memory)
+    extra = pk.sweep(system, axes, of=["orbits", "action_angle"], store=store, workers=1)
+    assert extra.phi.equation == "V'(phi) = torque"
+    longer = {**axes, "A": np.linspace(4, 6, 7)}
+    ds = pk.sweep(system, longer, of=[*of, "action_angle"], store=store, workers=1)
+    whole = pk.sweep(system, longer, of=[*of, "action_angle"])
+    # Batches of other sizes round otherwise.
+    xr.testing.assert_allclose(ds.load(), whole, rtol=1e-13)
+    assert [ds[name].equation for name in whole] == [whole[name].equation for name in whole]
 
 
 def test_chunks_are_the_tiles(tmp_path, computed):

@@ -14,6 +14,7 @@ from phasekit.phase.level_curves import LevelCurves
 from phasekit.plot.parts import style
 from phasekit.plot.phase_portrait import curves_of
 from phasekit.systems.potential import Potential
+from phasekit.table.quantities import TABLE
 
 DISK = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.01, r=0.1, omega1=15.0, m=2.0)
 ROTOR = pk.FreeGyroRotor(DISK, 0.02)
@@ -76,6 +77,55 @@ def test_rungs_agree_on_the_same_law(rung):
         assert land.orbit(one, h, "period") == pytest.approx(period, rel=1e-8)
         action = scale * exact.orbit(two, g, "action")
         assert land.orbit(one, h, "action") == pytest.approx(action, rel=1e-8)
+
+
+#: A system of each rung of which one system is drawn, on lines, circles and intervals.
+DRAWN = {
+    "trigonometric": DISK,
+    "line": Potential("x^4/4 - x^2/2 + x/10", "x"),
+    "circle": Potential("-cos(q) + cos(2*q)/2 + sin(3*q)/5", "q", period=2 * np.pi),
+    "short circle": Potential("cos(2*pi*s)/3 + sin(4*pi*s)/9", "s", period=1.0),
+    "interval": Potential("1/x^2 - 1/x", "x", interval=(0.3, 20.0)),
+    "tilted trigonometric": pk.Perturbed(DISK, torque=0.5),
+    "level": pk.Perturbed(DISK),
+    "tilted line": pk.Perturbed(Potential("x^4/4 - x^2/2", "x"), torque=0.05),
+    "tilted circle": pk.Perturbed(Potential("cos(2*pi*s)/3", "s", period=1.0), torque=0.05),
+    "routhian": ROTOR,
+}
+
+
+@pytest.mark.parametrize("name", DRAWN)
+def test_what_is_drawn_is_what_the_table_says(name):
+    system = DRAWN[name]
+    known = curves_of(system).answers
+    points = pk.equilibria(system)
+    points = points.isel({d: np.flatnonzero(np.isfinite(points.phi)) for d in points.phi.dims})
+    points = points.sortby("phi")
+    assert known.phi.size == points.phi.size >= 1
+    for field in ("phi", "kind", "energy"):
+        np.testing.assert_allclose(getattr(known, field), points[field], rtol=1e-13, atol=1e-15)
+    places = np.linspace(0.4, 2.0, 5)
+    np.testing.assert_array_equal(known.potential(places), pk.potential(system, places).potential)
+    if name == "routhian":  # the table knows no orbits at constant momenta
+        return
+    saddles = pk.separatrices(system)
+    saddles = saddles.isel(saddle=np.argsort(-saddles.saddle_energy.values))
+    saddles = saddles.isel(saddle=np.isfinite(saddles.saddle_energy.values))
+    assert known.saddle_phi.size == saddles.sizes["saddle"]
+    for field in ("saddle_phi", "saddle_energy", "loop", "turning_offset"):
+        np.testing.assert_allclose(getattr(known, field), saddles[field], rtol=1e-13, atol=1e-15)
+    for state in ((0.5, 0.5), (1.2, 3.0)):
+        orbit, wanted = known.orbit(*state), pk.orbits(system, *state)
+        shared = [field for field in orbit._fields if field in wanted]
+        assert {"period", "action", "phi_min", "phi_max"} <= set(shared)
+        for field in shared:
+            np.testing.assert_allclose(getattr(orbit, field), wanted[field], rtol=1e-13)
+
+
+def test_each_rung_with_orbits_is_drawn():
+    rungs = TABLE.rungs_of("orbits") & TABLE.rungs_of("separatrices")
+    assert len(rungs) == 4
+    assert rungs <= {system.rung for system in DRAWN.values()}
 
 
 @pytest.mark.parametrize("system", [ROTOR, ROTOR.amended(-0.8)])

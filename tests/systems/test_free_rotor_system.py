@@ -142,3 +142,39 @@ def test_what_it_has_not_is_refused():
         ROTOR.replace(mass=1.0)
     assert pickle.loads(pickle.dumps(ROTOR)) == ROTOR
     assert ROTOR != ROTOR.replace(momentum=0.5)
+
+
+def test_motions_are_those_of_both_degrees_of_freedom():
+    times = np.linspace(0.0, 3.0, 7)
+    momenta = np.array([0.2, 0.6])
+    swept = pk.flow(ROTOR.replace(momentum=momenta), 0.3, 0.5, times)
+    assert swept.motion_phi.dims == ("momentum", "time")
+    assert "V_p'" in swept.motion_phi.equation
+    map_ = pk.sweep(ROTOR, momentum=momenta, state_phi=[0.3], state_dphi=[0.5], time=times,
+                    of="motion")  # fmt: skip
+    np.testing.assert_allclose(
+        map_.motion_phi.squeeze(["state_phi", "state_dphi"]), swept.motion_phi, rtol=1e-12
+    )
+    for p in momenta:
+        omega1 = float(ROTOR.amended(p).omega1(0.3, 0.5))
+        both = ROTOR.simulate(0.3, 0.5, times, omega1=omega1)
+        one = swept.sel(momentum=p)
+        np.testing.assert_allclose(one.motion_phi, both.motion_phi, atol=1e-8)
+        np.testing.assert_allclose(one.motion_dphi, both.motion_dphi, atol=1e-7)
+    assert swept.isel(momentum=1, time=0).phasekit.system() == ROTOR.replace(momentum=0.6)
+    # At the momentum at rest, where none is given.
+    own = pk.flow(ROTOR.replace(momentum=None), 0.3, 0.5, times)
+    rest = ROTOR.amended(ROTOR.angular_momentum(0.0, 0.0))
+    again = pk.flow(ROTOR.replace(momentum=rest.p), 0.3, 0.5, times)
+    np.testing.assert_allclose(own.motion_phi, again.motion_phi, atol=1e-9)
+
+
+def test_events_of_a_motion_at_a_momentum():
+    rotor = ROTOR.replace(momentum=0.6)
+    watched = {"turn": lambda t, phi, dphi: dphi}
+    ds = pk.flow(rotor, 0.3, 0.5, np.linspace(0.0, 3.0, 4), events=watched, rtol=1e-11)
+    assert ds.sizes["event"] >= 1
+    speed = pk.flow(rotor, 0.3, 0.5, ds.event_time.values).motion_dphi
+    np.testing.assert_allclose(speed, 0.0, atol=1e-7)
+    with pytest.raises(pk.ParameterError, match=r"motion is exact; pk.Perturbed\(system\) takes"):
+        pk.flow(pk.Pendulum(length=1.0), 0.3, 0.5, [0.0, 1.0], events=watched)

@@ -1,5 +1,6 @@
 """Perturbed systems: arguments, copies, maps and back, and the torque of a varying omega1."""
 
+import copy
 import pickle
 
 import numpy as np
@@ -7,6 +8,9 @@ import pytest
 import sympy as sp
 
 import phasekit as pk
+from phasekit.laws.perturbed import Rate
+from phasekit.systems.parameter import Parameter
+from phasekit.systems.system import Model
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)
 FULL = pk.Perturbed(
@@ -48,6 +52,29 @@ def test_copies():
     assert FULL.replace(forcing=None).forcing == ()
     with pytest.raises(AttributeError):
         FULL.damping = 1.0
+
+
+class Swing(Model):
+    """A pendulum on a carousel, whose torque is a lambda in the class."""
+
+    declared = (Parameter(name="omega", units="s-1", long_name="angular velocity"),)
+    frame_rate = Rate("omega", lambda v: (0.0, 0.0, -2.0 * v["omega"]))
+    omega = 3.0
+
+    @staticmethod
+    def products(v):
+        return v["omega"] * v["omega"], 9.81, 0 * v["omega"], 1
+
+
+def test_laws_travel_to_worker_processes():
+    for base in (DISK, Swing()):
+        law = pk.Perturbed(base, damping=0.1, forcing=pk.Harmonic(0.5, 2.0)).law
+        again = pickle.loads(pickle.dumps(law))
+        assert again == law
+        assert again.rate is type(base).frame_rate
+        assert copy.deepcopy(law) == law
+    alone = Rate("omega", abs)
+    assert pickle.loads(pickle.dumps(alone)) == alone
 
 
 @pytest.mark.parametrize("of", ["melnikov", "equilibria"])

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.problem import Problem
+from phasekit.systems.system import Model
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -17,16 +18,16 @@ SPREAD = 33
 
 
 def values_between(
-    problem: Problem, parameter: str, span: tuple[float, float]
+    problem: Problem, parameter: str, span: tuple[float, float], system: Model | None
 ) -> FloatArray | None:
     """Values of a parameter in a span, between all critical values that are known.
 
     None where equilibria are not found by algebra.
     """
-    if not solvable(problem):
+    if system is None and not solvable(problem):
         return None
     low, high = span
-    marks = {low, high, *_critical(problem, parameter, span)}
+    marks = {low, high, *_critical(system, parameter, span)}
     ordered = np.array(sorted(value for value in marks if low <= value <= high))
     middles = 0.5 * (ordered[1:] + ordered[:-1])
     spread = low + (high - low) * (np.arange(SPREAD) + 0.5) / SPREAD
@@ -34,20 +35,18 @@ def values_between(
 
 
 def solvable(problem: Problem) -> bool:
-    """Whether all equilibria are found by algebra."""
-    if problem.system is not None:
-        return True
+    """Whether all equilibria of the equations alone are found by algebra."""
     return len(problem.state) == 1 and problem.kind == "symbolic" and _form(problem) is not None
 
 
 def equilibria_at(
-    problem: Problem, parameter: str, values: FloatArray
+    problem: Problem, parameter: str, values: FloatArray, system: Model | None
 ) -> list[tuple[float, float]]:
     """All equilibria at values of a parameter, as (value, state); of an angle in one turn."""
-    if problem.system is not None:
+    if system is not None:
         from phasekit.labelled.phase_space import equilibria
 
-        phi = equilibria(problem.system.replace(**{parameter: values})).phi.transpose(
+        phi = equilibria(system.replace(**{parameter: values})).phi.transpose(
             parameter, "equilibrium"
         )
         pairs = zip(values.tolist(), phi.values, strict=True)
@@ -72,9 +71,8 @@ def _roots(problem: Problem, changes: dict[str, float]) -> list[float]:
     return [float(angle) for angle in np.angle(on_circle)]
 
 
-def _critical(problem: Problem, parameter: str, span: tuple[float, float]) -> list[float]:
+def _critical(system: Model | None, parameter: str, span: tuple[float, float]) -> list[float]:
     """Values of a system's parameter at which equilibria meet: all of them, by exact arithmetic."""
-    system = problem.system
     if system is None or not issubclass(system.rung, Trigonometric):
         return []
     declared = {p.name: p for p in system.declared}

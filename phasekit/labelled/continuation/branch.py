@@ -32,9 +32,14 @@ from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch_points import points_of
 from phasekit.labelled.continuation.onward import onward
-from phasekit.labelled.continuation.special_point import SpecialPoint, special_point
+from phasekit.labelled.continuation.special_point import (
+    NOT_COMPARED,
+    SpecialPoint,
+    special_point,
+)
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, whole
+from phasekit.labels.equality import same_fields
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -315,6 +320,16 @@ class Branch:
         curve, problem = self.known()
         kept = {f.name: getattr(curve, f.name) for f in fields(curve) if f.name != "field"}
         return _again, (problem, kept, self.start, self.tracks, dict(self.record))
+
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same curve of an equal problem, traced and recorded alike."""
+        if type(self) is not type(other):
+            return NotImplemented
+        return same_fields(self, other, NOT_COMPARED)
+
+    def __hash__(self) -> int:
+        """Hash of what is followed, and how far."""
+        return hash((type(self).__name__, self.kind, self.free, self._points.sizes["point"]))
 
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""

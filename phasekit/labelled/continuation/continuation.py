@@ -22,6 +22,7 @@ from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.system import Model
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,7 +56,7 @@ def continuation(
         The state to start from, which is corrected to an equilibrium first; default zeros. Fixed
         points of a map of angles are those of f itself, without whole turns added. Of a
         system also one of its labels: lower_center (the default), lower_saddle, upper_center,
-        upper_saddle.
+        upper_saddle, or, where equilibria are numbered, "0" (the default), "1", ...
     span : (float, float)
         Lowest and highest value of the parameter; it holds the problem's own.
     orbit : xarray.Dataset, optional
@@ -117,7 +118,7 @@ def continuation(
     >>> point.label, point.x.item(), round(point["mu"], 12), branch.stops[1].reason
     ('UZ', -0.5, 0.375, 'half')
     """
-    problem = as_problem(problem, moving=orbit is not None)
+    given, problem = problem, as_problem(problem, moving=orbit is not None)
     options = check_options(options)
     if orbit is not None:
         from phasekit.labelled.continuation.cycle_start import continue_orbit
@@ -137,7 +138,7 @@ def continuation(
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
-    guess = _start(problem, x0)
+    guess = _start(problem, x0, given)
     curve = equilibrium_curve(problem, parameter, (low, high), options)
     if events is not None or stop is not None:
         asked = events_of(problem, events, guess)
@@ -210,10 +211,11 @@ def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:
     return low, high
 
 
-def _start(problem: Problem, x0: Any) -> FloatArray:
+def _start(problem: Problem, x0: Any, given: Any) -> FloatArray:
     n = len(problem.state)
-    if problem.system is not None and (x0 is None or isinstance(x0, str)):
-        return _labelled_start(problem, x0)
+    system = given if isinstance(given, Model) else problem.system
+    if system is not None and problem.time is None and (x0 is None or isinstance(x0, str)):
+        return np.append(_labelled_start(system, x0), np.zeros(n - 1))  # at rest
     if x0 is None:
         return np.zeros(n)
     if isinstance(x0, Mapping):
@@ -229,13 +231,12 @@ def _start(problem: Problem, x0: Any) -> FloatArray:
     return guess
 
 
-def _labelled_start(problem: Problem, x0: str | None) -> FloatArray:
+def _labelled_start(system: Model, x0: str | None) -> float:
     """An equilibrium of a system by its label; the first that exists if there is none."""
     from phasekit.cells.evaluate import evaluate
     from phasekit.table.quantities import ROWS
 
-    assert problem.system is not None
-    ds = evaluate(problem.system, [ROWS["phi"]])
+    ds = evaluate(system, [ROWS["phi"]])
     labels = [str(label) for label in ds.equilibrium.values]
     there = [name for name, phi in zip(labels, ds.phi.values, strict=True) if np.isfinite(phi)]
     if x0 is None and there:
@@ -244,7 +245,7 @@ def _labelled_start(problem: Problem, x0: str | None) -> FloatArray:
         raise unknown("x0: equilibrium", x0, labels)
     if x0 not in there:
         raise bad("x0", x0, f"an equilibrium that exists here: {', '.join(there) or 'none'}")
-    return np.array([float(ds.phi.values[labels.index(x0)])])
+    return float(ds.phi.values[labels.index(x0)])
 
 
 def _refuse_turns(curve: Curve, u: FloatArray) -> None:

@@ -67,10 +67,10 @@ def cycle_point(
 ) -> CyclePoint[Of]:
     """A special point of a branch of periodic orbits."""
     point = found.point
-    x = point.orbit.x[0].copy()
-    x.flags.writeable = False
+    x, multipliers = point.orbit.x[0].copy(), point.multipliers.copy()
+    x.flags.writeable = multipliers.flags.writeable = False
     return CyclePoint(
         found.kind, x, MappingProxyType(parameters_at(problem, cycles, point.orbit)),
         found.interval, point.residual, found.status, found.message,
-        MappingProxyType(dict(found.normal_form)), point.multipliers.copy(), index, found, branch,
+        MappingProxyType(dict(found.normal_form)), multipliers, index, found, branch,
     )  # fmt: skip

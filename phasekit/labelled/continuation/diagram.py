@@ -20,6 +20,7 @@ from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad, reals, whole
 from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.system import Model
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -69,10 +70,10 @@ def diagram(
 
     Notes
     -----
-    The equilibria of a system are computed in closed form between all values of the parameter at
-    which any of them meet (see `branches`), so that no branch is missed. Those of polynomials and
-    Fourier sums are computed algebraically at 33 values spread over the span: an isolated branch is
-    missed only if it lies between two of these.
+    The equilibria of a system with coefficients (A, B, C) are computed in closed form between all
+    values of the parameter at which any of them meet (see `branches`), so that no branch is missed.
+    Those of other systems, of polynomials and of Fourier sums are computed at 33 values spread over
+    the span: an isolated branch is missed only if it lies between two of these.
 
     Examples
     --------
@@ -81,14 +82,14 @@ def diagram(
     >>> [len(branch.special("BP")) for branch in diagram(pitchfork, "l", span=(-1.0, 1.0))]
     [1, 1]
     """
-    problem = as_problem(problem)
+    given, problem = problem, as_problem(problem)
     check_parameter(problem, parameter)
     system = problem.system
     low, high = check_span(span, None if system is None else system.unit_of(parameter))
     depth = whole("depth", depth, "a whole number >= 0", 0)
     branches: list[Branch] = []
     failures: list[ConvergenceError] = []
-    for start, guess in _starts(problem, parameter, x0, (low, high)):
+    for start, guess in _starts(problem, parameter, x0, (low, high), given):
         if branches and _known(branches, start, guess, parameter):
             continue
         try:
@@ -174,7 +175,7 @@ def _known(branches: list[Branch], start: Problem, guess: Any, parameter: str) -
 
 
 def _starts(
-    problem: Problem, parameter: str, x0: Any, span: tuple[float, float]
+    problem: Problem, parameter: str, x0: Any, span: tuple[float, float], given: Any
 ) -> list[tuple[Problem, FloatArray]]:
     """Problems at a value of the parameter, and guesses there."""
     n = len(problem.state)
@@ -188,12 +189,13 @@ def _starts(
         return [(problem, row) for row in rows]
     from phasekit.labelled.continuation.all_equilibria import equilibria_at, values_between
 
-    values = values_between(problem, parameter, span)
+    system = given if isinstance(given, Model) and problem.time is None else problem.system
+    values = values_between(problem, parameter, span, system)
     if values is None:
         return [(problem, np.zeros(n))]
     inside = span[0] <= own <= span[1]
     values = np.concatenate([[own] if inside else [], values])
     return [
-        (problem.replace(**{parameter: at}), np.array([x]))
-        for at, x in equilibria_at(problem, parameter, values)
+        (problem.replace(**{parameter: at}), np.append(x, np.zeros(n - 1)))  # at rest
+        for at, x in equilibria_at(problem, parameter, values, system)
     ]

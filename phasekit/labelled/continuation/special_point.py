@@ -15,10 +15,14 @@ from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.onward import Of, onward
+from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
+
+#: Fields that follow from others: machine code from the problem, a point's branch from its branch.
+NOT_COMPARED = ("field", "clock", "branch")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -231,6 +235,16 @@ class SpecialPoint(Generic[Of]):
             found: Of = onward("point.curve")(self, parameter, span, options=options)
             return found
 
+    def __eq__(self, other: object) -> bool:
+        """Whether it is the same point of an equal branch."""
+        if type(self) is not type(other) or not isinstance(other, SpecialPoint):
+            return NotImplemented
+        return same_fields(self, other, NOT_COMPARED) and bool(self.branch == other.branch)
+
+    def __hash__(self) -> int:
+        """Hash of the kind and the place on the branch."""
+        return hash((self.kind, self.name, self.index, self.branch))
+
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold their branch, of which they are the same point."""
         places = (i for i, one in enumerate(self.branch.special_points) if one is self)
@@ -269,7 +283,8 @@ def special_point(
     for j in range(n):
         if curve.period[j] > 0.0:
             x[j] = wrap(x[j], float(curve.period[j]))
-    x.flags.writeable = False
+    eigenvalues = eigenvalues.copy()
+    x.flags.writeable = eigenvalues.flags.writeable = False
     return SpecialPoint(
         special.kind, x, MappingProxyType(parameters), special.interval, special.residual,
         special.status, special.message, MappingProxyType(dict(special.normal_form)),
