@@ -196,7 +196,8 @@ def _whole(one: Pass, system: Model, states: set[str]) -> Pass:
     if missing is not None:
         refuse(system, TABLE.rungs_of(missing), missing)
     behind = tuple(other.bound(system, states) for other in lines)
-    return replace(one.bound(system, states), behind=behind)
+    bound = one.bound(system, states)
+    return replace(bound, behind=behind) if behind else bound
 
 
 def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:

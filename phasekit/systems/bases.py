@@ -37,6 +37,7 @@ def named_model(argument: str, name: object, homes: Sequence[str] = HOMES) -> ty
     known = MODELS if name in MODELS else models(homes)
     if not isinstance(name, str) or name not in known:
         raise ParameterError(
-            f"{argument}: got a map of the model {describe(name)}, wants one of {', '.join(known)}"
+            f"{argument}: got a map of the model {describe(name)}, wants one of "
+            f"{', '.join(known)}; one of your own is known once its module is imported"
         )
     return known[name]

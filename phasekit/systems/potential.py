@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from phasekit.systems.problem import Problem
 
 #: Names that parameters cannot have, because results have them.
-_TAKEN = {*ROWS, *LABELS, *STATES, "point"}
+_TAKEN = {*LABELS, *STATES, "point"}
 _TAKEN |= {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
 
 
@@ -130,7 +130,7 @@ class Potential(Model):
         for key in given:
             if key == name:
                 raise bad("parameters", key, "names other than the coordinate's")
-            if key in _TAKEN:
+            if key in _TAKEN or key in ROWS:  # rows may have been added
                 raise bad("parameters", key, f"another name, because results have {key!r}")
         declared = tuple(
             Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")

@@ -1,6 +1,7 @@
 """Events: zeros of the user's own functions, at places that closed forms give."""
 
 import pickle
+from dataclasses import replace
 
 import matplotlib
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 
 import phasekit as pk
 from phasekit.bifurcation.continuation.points import event
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch import Branch
 
 CUBIC = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
@@ -263,3 +265,14 @@ def test_fixed_parameters_may_have_any_name():
     few = pk.ContinuationOptions(max_points=3)
     branch = pk.continuation(problem, "p", x0=[0.7], span=(-1, 1), options=few)
     assert branch.to_dataset().special_kind.values.tolist()[0] == "end"
+
+
+def test_kinds_that_were_added_are_no_names_of_events(monkeypatch):
+    kind = replace(KINDS["event"], name="swallowtail", label="SW")
+    problem = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
+    start = {"x0": [-1.3], "span": (-1, 1)}
+    assert pk.continuation(problem, "mu", **start, events={"SW": "x"}).special("SW")
+    monkeypatch.setitem(KINDS, "swallowtail", kind)
+    for name in ("swallowtail", "SW"):
+        with pytest.raises(pk.ParameterError, match="wants a name that is no kind or label"):
+            pk.continuation(problem, "mu", **start, events={name: "x"})

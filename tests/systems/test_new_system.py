@@ -77,6 +77,22 @@ def test_every_function_takes_it(Governor, tmp_path):
     assert pk.open_map(tmp_path / "map.zarr").isel(w=2).phasekit.system().R == 0.5
 
 
+def test_files_of_a_model_that_is_not_imported_say_so(Governor, tmp_path, monkeypatch):
+    hoop = Governor(R=0.5, w=7.0, wind=1.0)
+    branch = pk.continuation(hoop, "w", x0="lower_center", span=(4.0, 12.0))
+    branch.save(tmp_path / "branch.nc")
+    ds = pk.sweep(hoop, w=[6.0, 7.0], of="equilibria")
+    with monkeypatch.context() as elsewhere:
+        elsewhere.delitem(MODELS, "Governor")
+        with pytest.raises(pk.StoreError, match="'Governor', .* once its module is imported"):
+            pk.Branch.load(tmp_path / "branch.nc")
+        given = pk.Branch.load(tmp_path / "branch.nc", problem=branch.problem)
+        with pytest.raises(pk.ParameterError, match="'Governor', .* once its module is imported"):
+            ds.isel(w=0).phasekit.system()
+    assert given == branch == pk.Branch.load(tmp_path / "branch.nc")
+    assert ds.isel(w=0).phasekit.system() == hoop.replace(w=6.0)
+
+
 def test_every_picture_takes_it(Governor):
     hoop = Governor(R=0.5, w=7.0, wind=1.0)
     pk.plot.phase_portrait(hoop)

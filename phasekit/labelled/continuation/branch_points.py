@@ -104,6 +104,11 @@ def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
     )
 
 
+def labels_along(*curves: str) -> list[str]:
+    """Labels of the special points that form one of these curves in two parameters."""
+    return [kind.label for kind in KINDS.values() if kind.curve in curves]
+
+
 def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDArray[np.int8]:
     """Center, saddle or degenerate, by the eigenvalues of a conservative problem."""
     if n == 1:  # f is the force -V', so the eigenvalue is -V''
@@ -112,7 +117,7 @@ def kinds_of(values: npt.NDArray[np.complex128], label: Any, n: int) -> npt.NDAr
         size = np.max(np.abs(values), axis=1)
         real = np.max(np.abs(values.real), axis=1) > 1e-7 * np.where(size > 0.0, size, 1.0)
         kind = np.where(real, EquilibriumKind.SADDLE, EquilibriumKind.CENTER)
-    kind[np.isin(label, ["LP", "BP", "CP"])] = EquilibriumKind.DEGENERATE
+    kind[np.isin(label, labels_along("fold", "branch_point"))] = EquilibriumKind.DEGENERATE
     return kind.astype(np.int8)
 
 
@@ -145,7 +150,9 @@ def _dataset(
         }
         data["kind"] = (dim, kinds_of(values, label, n), flags)
     else:
-        critical = np.isin(label, ["LP", "BP", "H", "NS", "PD", "TR"]) | (curve.kind != EQUILIBRIUM)
+        # Where eigenvalues are zero, or multipliers of size 1, but for rounding.
+        marked = labels_along("fold", "branch_point", "hopf", "period_doubling", "torus")
+        critical = np.isin(label, marked) | (curve.kind != EQUILIBRIUM)
         neutral = curve.discrete and is_conservative(values, discrete=True)
         blur = np.where(critical, 1e-6, 0.0)
         unstable = unstable_of(curve, values, neutral=neutral, blur=blur).astype(np.int64)

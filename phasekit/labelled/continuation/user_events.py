@@ -25,7 +25,11 @@ REASONS = (
 BOTH = ("event", "fold", "branch_point", "pitchfork", "transcritical")
 FLOW = ("hopf", "neutral_saddle", "bogdanov_takens")
 MAP = ("period_doubling", "torus")
-TAKEN = {*KINDS, *(kind.label for kind in KINDS.values()), *REASONS}
+
+
+def is_taken(name: str) -> bool:
+    """Whether a name is that of a kind or label of special points, or of an end."""
+    return name in {*KINDS, *(kind.label for kind in KINDS.values()), *REASONS}
 
 
 def events_of(
@@ -59,7 +63,7 @@ def named(events: Any) -> Iterator[tuple[str, Any]]:
     for name, given in events.items():
         if not isinstance(name, str) or not name.strip() or len(name) > NAME:
             raise bad("events", name, f"names: text of 1 to {NAME} letters")
-        if name in TAKEN:
+        if is_taken(name):
             raise bad("events", name, "a name that is no kind or label of special points")
         yield name, given
 
@@ -95,7 +99,7 @@ def ending(
     for one in given:
         if callable(one):
             name = getattr(one, "__name__", "stop")
-            name = name if name.isidentifier() and name not in TAKEN else "stop"
+            name = name if name.isidentifier() and not is_taken(name) else "stop"
             taken = [event.name for event in events]
             while name in taken:
                 name += "_"
