@@ -187,7 +187,12 @@ def passes_of(
         if row.group not in computed:
             refuse(system, TABLE.rungs_of(row.group), row.group)
     states = {*given, *system.parameters}
-    return tuple(_whole(one, system, states) for one in passes)
+    return tuple(
+        one.bound(system, states)
+        if ROWS.keys().isdisjoint(one.inputs)
+        else _whole(one, system, states)
+        for one in passes
+    )
 
 
 def _whole(one: Pass, system: Model, states: set[str]) -> Pass:
