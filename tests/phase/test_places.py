@@ -309,3 +309,25 @@ def test_maps_stored_without_errors_of_places_are_opened(tmp_path):
         assert "phi_error" not in back
         assert back.identical(old)
         assert back.phasekit.system() == well.replace(mu=[-1.0, 1.0])
+
+
+def test_energies_and_curvatures_of_expanded_polynomials_have_all_digits():
+    """The constant of 8.1e9 is taken out of V, and cancels in what is said of it."""
+    far = sp.expand((X - 300) ** 2 * ((X - 300) ** 2 - 1) + sp.Rational(7, 2))
+    for expression in (far, POLYNOMIALS["far, rounded"] + sp.Float(1e-3), POLYNOMIALS["nine"]):
+        system = pk.Potential(expression, X)
+        points = pk.equilibria(system)
+        assert points.phi.size >= 3
+        for order, name in ((0, "energy"), (2, "curvature")):
+            for place, value in zip(points.phi.values, points[name].values, strict=True):
+                at = {X: sp.Rational(float(place))}
+                floats = {f: sp.Rational(float(f)) for f in expression.atoms(sp.Float)}
+                true = sp.diff(expression.xreplace(floats), X, order).xreplace(at)
+                assert abs(sp.Rational(value) - true) <= abs(true) * sp.Rational(2) ** -52
+        saddles = points.kind.values == SADDLE
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # areas are not known so well
+            heights = pk.separatrices(system).saddle_energy.values
+        np.testing.assert_array_equal(heights, points.energy.values[saddles])
+        tilted = pk.equilibria(pk.Perturbed(system, torque=[0.0, 1e-9]))
+        np.testing.assert_array_equal(tilted.energy.values[0], points.energy.values)
