@@ -331,3 +331,10 @@ def test_energies_and_curvatures_of_expanded_polynomials_have_all_digits():
         np.testing.assert_array_equal(heights, points.energy.values[saddles])
         tilted = pk.equilibria(pk.Perturbed(system, torque=[0.0, 1e-9]))
         np.testing.assert_array_equal(tilted.energy.values[0], points.energy.values)
+
+
+def test_energies_that_no_double_holds_are_infinite():
+    points = pk.equilibria(pk.Potential("x^4/4 - m*x^2/2", "x", {"m": 1e300}))
+    np.testing.assert_allclose(points.phi.values, [-1e150, 0.0, 1e150], rtol=1e-15)
+    np.testing.assert_array_equal(points.energy.values, [-np.inf, 0.0, -np.inf])
+    np.testing.assert_array_equal(points.kind.values, [CENTER, SADDLE, CENTER])
