@@ -52,7 +52,8 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
 
     Those of a `Potential` are numbered from left to right instead, 0 to one less than the most
     that a cell has; there is no ``fold_margin``, which belongs to the coefficients (A, B, C), but
-    ``complete``: whether it is proved that there are no others.
+    ``complete``: whether it is proved that there are no others, and ``phi_error``: how far a place
+    may be from the true one.
 
     Of a `Perturbed` system they are those under its constant torque N, where ``V' = N``, with
     frequencies and exponents as without damping; the drive does not count.

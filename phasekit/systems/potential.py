@@ -79,6 +79,8 @@ class Potential(Model):
     some have merged, where rounding hides V', and for functions of which no bounds are known; what
     was not excluded, and stands for no equilibrium, is named in a RuntimeWarning.
 
+    The variable ``phi_error`` bounds how far a place may be from that of V as written, by bounds of
+    V' there, or by the nearest points at which its sign is known where equilibria all but merge.
     Periods, actions, areas and motions come with estimates of their errors (``period_error`` and so
     on). A period, an action or an area whose error may exceed 1e-8 of it is NaN, and a
     RuntimeWarning says how many and why. The errors hold what rounding of V does next to saddles,

@@ -309,3 +309,54 @@ def test_maps_stored_without_errors_of_places_are_opened(tmp_path):
         assert "phi_error" not in back
         assert back.identical(old)
         assert back.phasekit.system() == well.replace(mu=[-1.0, 1.0])
+
+
+def test_energies_and_curvatures_of_expanded_polynomials_have_all_digits():
+    """The constant of 8.1e9 is taken out of V, and cancels in what is said of it."""
+    far = sp.expand((X - 300) ** 2 * ((X - 300) ** 2 - 1) + sp.Rational(7, 2))
+    for expression in (far, POLYNOMIALS["far, rounded"] + sp.Float(1e-3), POLYNOMIALS["nine"]):
+        system = pk.Potential(expression, X)
+        points = pk.equilibria(system)
+        assert points.phi.size >= 3
+        for order, name in ((0, "energy"), (2, "curvature")):
+            for place, value in zip(points.phi.values, points[name].values, strict=True):
+                at = {X: sp.Rational(float(place))}
+                floats = {f: sp.Rational(float(f)) for f in expression.atoms(sp.Float)}
+                true = sp.diff(expression.xreplace(floats), X, order).xreplace(at)
+                assert abs(sp.Rational(value) - true) <= abs(true) * sp.Rational(2) ** -52
+        saddles = points.kind.values == SADDLE
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # areas are not known so well
+            heights = pk.separatrices(system).saddle_energy.values
+        np.testing.assert_array_equal(heights, points.energy.values[saddles])
+        tilted = pk.equilibria(pk.Perturbed(system, torque=[0.0, 1e-9]))
+        np.testing.assert_array_equal(tilted.energy.values[0], points.energy.values)
+
+
+def test_energies_that_no_double_holds_are_infinite():
+    points = pk.equilibria(pk.Potential("x^4/4 - m*x^2/2", "x", {"m": 1e300}))
+    np.testing.assert_allclose(points.phi.values, [-1e150, 0.0, 1e150], rtol=1e-15)
+    np.testing.assert_array_equal(points.energy.values, [-np.inf, 0.0, -np.inf])
+    np.testing.assert_array_equal(points.kind.values, [CENTER, SADDLE, CENTER])
+
+
+def test_where_a_function_has_no_bounds_its_scatter_is_taken():
+    """The Bessel function of order 1/2 is sqrt(2/(pi x)) sin(x), extreme where tan(x) = 2 x."""
+    with pytest.warns(RuntimeWarning, match="no bounds of besselj"):
+        points = pk.equilibria(pk.Potential("besselj(0.5, x)", "x", interval=(0.3, 8.0)))
+    assert points.phi.size == 3
+    assert not points.complete
+    with mpmath.workdps(40):
+        for place, error in zip(points.phi.values, points.phi_error.values, strict=True):
+            slope = lambda x: mpmath.sin(x) - 2 * x * mpmath.cos(x)  # noqa: E731
+            true = mpmath.findroot(slope, mpmath.mpf(float(place)))
+            assert abs(float(true - mpmath.mpf(float(place)))) <= error < 1e-12
+
+
+def test_an_end_of_the_interval_and_a_constant_have_their_errors():
+    points = pk.equilibria(pk.Potential("(x - 1)^2/2", "x", interval=(0.0, 1.0)))
+    assert points.phi.values.tolist() == [1.0]
+    assert 2.0**-53 <= points.phi_error.item() <= 2.0**-52
+    cells = pk.equilibria(pk.Potential("k*x^2", "x", {"k": [0.0, 1.0, np.nan]}))
+    assert np.isnan(cells.phi_error.values[[0, 2]]).all()
+    assert 0.0 < cells.phi_error.values[1, 0] < 1e-300

@@ -315,7 +315,7 @@ def _sharp(systems: Systems, found: Equilibria, exact: dict[int, list[Fraction]]
     if fine is None and not exact:
         return found
     for field, (value, rest) in zip((energy, curvature), fine or (), strict=False):
-        usable = np.isfinite(value + rest)
+        usable = np.isfinite(value) & np.isfinite(rest)
         field[cell[usable], slot[usable]] = value[usable]
     for row, coefficients in exact.items():
         at = found.phi[row, np.isfinite(found.phi[row])]

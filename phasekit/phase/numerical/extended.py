@@ -72,10 +72,11 @@ def extended(formula: Formula, orders: tuple[int, ...]) -> Extended | None:
 
     from phasekit.laws.derivatives import derivative
 
-    if formula.expression is None:
+    potential = formula.expression
+    if potential is None or any(part.free_symbols for part in potential.atoms(sp.Function)):
         return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
-    potential = exact_numbers(formula.expression)
+    potential = exact_numbers(potential)
     found = [derivative(potential, x, order) if order else potential for order in orders]
     try:
         return Extended(found, (x, *parameters))

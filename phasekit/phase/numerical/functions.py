@@ -287,8 +287,8 @@ def energies(
         own = tuple(np.broadcast_to(np.asarray(p, float), phi.shape)[lost] for p in columns)
         fine = values(Systems(formula, own, lost[0].size), phi[lost], 0)
         if fine is not None:
-            whole = np.add(*fine[0])
-            total[lost] = np.where(np.isfinite(whole), whole, total[lost])
+            high, low = fine[0]
+            total[lost] = np.where(np.isfinite(high) & np.isfinite(low), high, total[lost])
     return total
 
 

@@ -104,7 +104,7 @@ def _searched(places: Places, look: Callable[[Systems, Array], Ends], side: floa
     if formula.period is None:
         limit = x - start if side < 0.0 else stop - x
     other = places.next(side)
-    reach = np.maximum(np.spacing(np.abs(x)), min(stop - start, 1.0) * 1e-30)
+    reach = np.maximum(np.spacing(np.abs(x)), min(stop - start, 1.0) * 1e-20)
     found = np.full(x.shape, np.inf)
     rows = np.arange(x.size)
     while rows.size:

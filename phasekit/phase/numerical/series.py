@@ -311,7 +311,10 @@ def exact_heights(base: Fraction, coefficients: list[Fraction], x: Array) -> tup
             total: Any = Fraction(0)
             for c in reversed(numbers):
                 total = total * Fraction(place) + c
-            return float(total)
+            try:
+                return float(total)
+            except OverflowError:
+                return math.inf if total > 0 else -math.inf
 
         return value
 
