@@ -32,11 +32,7 @@ from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch_points import points_of
 from phasekit.labelled.continuation.onward import onward
-from phasekit.labelled.continuation.special_point import (
-    NOT_COMPARED,
-    SpecialPoint,
-    special_point,
-)
+from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, whole
 from phasekit.labels.equality import same_fields
