@@ -365,6 +365,7 @@ ACCESS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("group", "method", "on"), ACCESS)
 def test_sweeps_equal_the_accessor(group, method, on):
     state = {"phi0": 0.3, "dphi0": 2.0} if on == "orbit" else {}
