@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,9 +11,6 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.numerics import differences
-
-if TYPE_CHECKING:
-    from phasekit.bifurcation.continuation.curve import Curve
 
 Array = npt.NDArray[np.float64]
 
@@ -26,7 +23,7 @@ class Stop:
     message: str
 
 
-def said(curve: Curve, reason: int, which: int, w: Array) -> Stop:
+def said(curve: Any, reason: int, which: int, w: Array) -> Stop:
     """Say why a track ends in the state w."""
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
     where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
@@ -59,7 +56,7 @@ def said(curve: Curve, reason: int, which: int, w: Array) -> Stop:
     return Stop("max_points", f"max_points were computed, the last at {where}; extend() goes on")
 
 
-def _differences(curve: Curve) -> str:
+def _differences(curve: Any) -> str:
     """What else may end a curve whose derivatives are differences, in words."""
     if curve.knows_slopes:
         return ""

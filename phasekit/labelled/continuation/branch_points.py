@@ -178,7 +178,7 @@ def _dataset(
     )  # fmt: skip
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
     unknown = _unknowns(tuple(names))
-    coords: dict[str, Any] = dict(unknown.variables)
+    coords: dict[Any, Any] = dict(unknown.variables)
     for name, value in problem.parameters.items():
         if name not in data:
             coords[name] = ((), value, attrs_of(problem, name))
