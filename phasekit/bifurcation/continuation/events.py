@@ -57,9 +57,8 @@ def brackets(
     tests = Tests(*(getattr(tests, f.name)[keep] for f in fields(tests)))
     seek = _Seek(curve, pairs, detect, neutral)
     found: list[Bracket] = []
-    signs = {name: np.sign(getattr(tests, name)) for name in TESTS}
     sample = functools.cache(functools.partial(seek.known, path, keep, tests))
-    for i in seek.interesting(tests, signs):
+    for i in seek.interesting(tests):
         for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i])))
     for i in np.flatnonzero(np.diff(keep) > 1).tolist():  # on a point left out there may be one
@@ -138,14 +137,20 @@ def nearest_is_complex(curve: Curve, tests: Tests) -> bool:
 class _Seek:
     def __init__(self, curve: Curve, pairs: bool, detect: tuple[str, ...], neutral: bool) -> None:
         self.curve, self.pairs, self.detect, self.neutral = curve, pairs, detect, neutral
+        #: Others are one everywhere.
+        self.names = [
+            name
+            for name in TESTS
+            if not (name == "pair" and not pairs) and not (name == "flip" and not curve.discrete)
+        ]
         self.seen: dict[int, tuple[Sample, Tests]] = {}  # the sample itself keeps its id alive
 
-    def interesting(self, tests: Tests, signs: dict[str, np.ndarray]) -> list[int]:
+    def interesting(self, tests: Tests) -> list[int]:
         """Intervals with a change, and those beside a test function that almost has one."""
         marked: set[int] = set()
         count = len(tests.fold)
-        for name in TESTS:
-            sign = signs[name]
+        for name in self.names:
+            sign = np.sign(getattr(tests, name))
             marked.update(np.flatnonzero(sign[1:] != sign[:-1]).tolist())
             if count < 3:
                 continue
@@ -212,7 +217,7 @@ class _Seek:
     def explore(self, a: Sample, b: Sample, depth: int, *, force: bool) -> Iterator[Bracket]:
         """Brackets between two points; the interval is halved where it holds more than one."""
         one, two = self.tests(a), self.tests(b)
-        changes = {n for n in TESTS if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
+        changes = {n for n in self.names if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
         jump = abs(int(two.unstable) - int(one.unstable))
         simple = len(changes & {"fold", "branch", "flip"})
         crosses = "pair" in changes and any(nearest_is_complex(self.curve, t) for t in (one, two))
@@ -257,9 +262,7 @@ class _Seek:
         """
         touch = None
         inside = functools.cache(lambda s: between(self.curve, a, b, s))
-        for name in TESTS:
-            if (name == "pair" and not self.pairs) or (name == "flip" and not self.curve.discrete):
-                continue
+        for name in self.names:
             test = self.value(name, float(self.tests(a).volume))
             sign = np.sign(test(a))
             low, high = 0.0, 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -183,11 +184,12 @@ def _dataset(
         dim, residual, {"long_name": "largest size of f beside that of its terms"},
     )  # fmt: skip
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
-    coords: dict[str, Any] = {"unknown": np.array(names, dtype=np.dtypes.StringDType())}
+    unknown = _unknowns(tuple(names))
+    coords: dict[Any, Any] = dict(unknown.variables)
     for name, value in problem.parameters.items():
         if name not in data:
             coords[name] = ((), value, attrs_of(problem, name))
-    ds = xr.Dataset(data, coords)
+    ds = xr.Dataset(data, xr.Coordinates(coords, unknown.xindexes))
     if record:
         from phasekit.labelled.continuation.recording import recorded
 
@@ -196,6 +198,12 @@ def _dataset(
         if isinstance(array.data, np.ndarray):
             array.data.flags.writeable = False
     return ds
+
+
+@functools.lru_cache(maxsize=64)
+def _unknowns(names: tuple[str, ...]) -> xr.Coordinates:
+    """The unknowns' names as a coordinate, whose index takes longer to make than all else."""
+    return xr.Coordinates({"unknown": np.array(names, dtype=np.dtypes.StringDType())})
 
 
 def attrs_of(problem: Problem, name: str) -> dict[str, str]:
