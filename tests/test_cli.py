@@ -531,6 +531,7 @@ def test_basins(tmp_path, capsys):
     assert "without damping there are no attractors" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_run_up(tmp_path, capsys):
     argv = ["run-up", "--beta", "1", "--e", "10mm", "--a", "0.1", "--r", "0.1", "--m", "2",
             "--omega1", "0", "--duration", "2"]  # fmt: skip

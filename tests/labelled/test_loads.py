@@ -316,7 +316,6 @@ def test_at_equilibria_of_a_map(what):
         np.testing.assert_array_equal(here.deviation_couple, one.deviation_couple)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("what", ["forces", "rotators"])
 def test_over_separatrices_of_a_map(what):
     method = MAP.phasekit.bearing_forces if what == "forces" else MAP.phasekit.rotators
@@ -338,7 +337,6 @@ def test_over_separatrices_of_a_map(what):
     np.testing.assert_array_equal(peak.isel(side=0).notnull(), MAP.loop > 0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("what", ["forces", "rotators"])
 def test_over_orbits_of_a_map(what):
     method = MAP.phasekit.bearing_forces if what == "forces" else MAP.phasekit.rotators
@@ -365,7 +363,6 @@ ACCESS = [
 ]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("group", "method", "on"), ACCESS)
 def test_sweeps_equal_the_accessor(group, method, on):
     state = {"phi0": 0.3, "dphi0": 2.0} if on == "orbit" else {}

@@ -280,6 +280,7 @@ def test_orbits_of_the_rotor():
         assert np.nanquantile(error, 0.99) < 3e-13
 
 
+@pytest.mark.slow
 def test_orbits_by_energy_of_the_rotor():
     A, B, C, *_ = systems(200)
     points = closed_equilibria.equilibria(A, B, C)
