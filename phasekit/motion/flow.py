@@ -108,13 +108,15 @@ def at_momentum(law: Any, *arrays: npt.ArrayLike, **how: Any) -> Motion:
     law : Routhian
         The law as a function of its parameters.
     *arrays : array_like
-        Its parameters, then angles and angular velocities at t = 0, then times; they broadcast.
+        Its parameters, then angles in rad and angular velocities in 1/s at t = 0, then times in s;
+        they broadcast.
     **how
         As of `flow`.
 
     Returns
     -------
     Motion
+        NaN where a motion did not come to a time, which a RuntimeWarning says.
     """
     count = len(law.names)
     alone = PerturbedRouthian(law, (*law.names, *OWN), law.names, torqued=False)

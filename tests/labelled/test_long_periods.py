@@ -44,6 +44,7 @@ def test_a_family_goes_on_to_the_bound_of_its_period(name):
     assert [stop.reason for stop in family.stops] == ["hopf", "bound"]
     assert float(family.points.period[-1]) == period
     assert float(family.points[parameter][-1]) == pytest.approx(at, rel=1e-10)
+    assert family.points.sizes["point"] > 3
     assert np.all(np.diff(family.points.period) > 0.0)
     assert family.points.mesh_error.max() <= 1e-8  # that of the last point, too
     assert family.points.residual.max() < 1e-9
@@ -88,6 +89,7 @@ def test_an_orbit_of_a_long_period_is_followed_in_two_parameters():
         span=((0.0, 0.4), (1.95, 2.05)), fix="period",
     )  # fmt: skip
     assert [stop.reason for stop in curve.stops] == ["bound", "bound"]
+    assert curve.points.sizes["point"] > 3
     assert np.allclose(curve.points.period, period, rtol=1e-12)
     assert sorted(np.round(curve.points.p3.values[[0, -1]], 12)) == [1.95, 2.05]
     at = int(np.argmax(curve.points.p3.values))

@@ -92,7 +92,7 @@ def _on_ends(
     for end in (0, len(keep) - 1):
         # The path may come to its end in ever smaller steps.
         gap = (path.u[keep] - path.u[keep[end]])[:, : curve.m] / curve.scale[: curve.m]
-        away = np.flatnonzero(largest(gap) > 1e-3)
+        away = np.flatnonzero(largest(gap) > 1e-3)  # in scales of the unknowns
         if not len(away):
             continue
         beside = int(away[0] if end == 0 else away[-1])
