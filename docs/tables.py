@@ -19,7 +19,7 @@ from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Law, Routhian
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS, TABLE, variant
 from phasekit.table.row import LAW, Pass, Quantity
 
@@ -171,7 +171,7 @@ def _systems() -> str:
     )
 
 
-def _system(name: str, cls: type[Model]) -> Iterator[str]:
+def _system(name: str, cls: type[System]) -> Iterator[str]:
     yield f"## {name}"
     yield f"{{py:obj}}`phasekit.{name}`: {first_line(cls)}"
     if cls.declared:
@@ -198,7 +198,7 @@ def _default(parameter: inspect.Parameter | None) -> str:
     return code(repr(parameter.default)) if parameter is not None and given else ""
 
 
-def _law(cls: type[Model]) -> str:
+def _law(cls: type[System]) -> str:
     law = cls.trigonometric()
     symbols = {name: sympy.Symbol(name, real=True) for name in law.parameters}
     shown = {symbol: _symbol(name) for name, symbol in symbols.items()}

@@ -22,11 +22,14 @@ from phasekit.constants import rpm as rpm
 from phasekit.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from phasekit import extend as extend
     from phasekit import plot as plot
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
+    from phasekit.errors import AttractorKind as AttractorKind
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
     from phasekit.errors import EscapeRegime as EscapeRegime
+    from phasekit.errors import FlowEquilibriumKind as FlowEquilibriumKind
     from phasekit.errors import InvalidCellsWarning as InvalidCellsWarning
     from phasekit.errors import Loop as Loop
     from phasekit.errors import OrbitFamily as OrbitFamily
@@ -35,6 +38,7 @@ if TYPE_CHECKING:
     from phasekit.errors import PhasekitError as PhasekitError
     from phasekit.errors import StoreError as StoreError
     from phasekit.errors import Topology as Topology
+    from phasekit.errors import Validity as Validity
     from phasekit.explorer.explore import explore as explore
     from phasekit.labelled.asymptotics import near_center as near_center
     from phasekit.labelled.asymptotics import near_separatrix as near_separatrix
@@ -61,8 +65,11 @@ if TYPE_CHECKING:
     from phasekit.labelled.loads import bearing_forces as bearing_forces
     from phasekit.labelled.loads import fixed_bearing_forces as fixed_bearing_forces
     from phasekit.labelled.loads import rotators as rotators
+    from phasekit.labelled.manifolds import manifolds as manifolds
     from phasekit.labelled.motion import flow as flow
     from phasekit.labelled.motion import separatrix_motion as separatrix_motion
+    from phasekit.labelled.nullclines import nullclines as nullclines
+    from phasekit.labelled.orbit_diagram import orbit_diagram as orbit_diagram
     from phasekit.labelled.orbits import action_angle as action_angle
     from phasekit.labelled.orbits import orbits as orbits
     from phasekit.labelled.orbits import state_of as state_of
@@ -80,8 +87,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.section import poincare_section as poincare_section
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
-    from phasekit.mechanics.coupled_rotation import CoupledRotation as CoupledRotation
-    from phasekit.mechanics.rigid_body import RigidBody as RigidBody
+    from phasekit.mechanics.general.body import RigidBody as RigidBody
+    from phasekit.mechanics.general.rotation import CoupledRotation as CoupledRotation
     from phasekit.systems.analogues import ParticleOnCircle as ParticleOnCircle
     from phasekit.systems.analogues import Pendulum as Pendulum
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
@@ -90,18 +97,24 @@ if TYPE_CHECKING:
     from phasekit.systems.field_analogues import SpinOrbit as SpinOrbit
     from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
     from phasekit.systems.harmonic import Harmonic as Harmonic
+    from phasekit.systems.parameter import parameter as parameter
     from phasekit.systems.perturbed import Perturbed as Perturbed
     from phasekit.systems.potential import Potential as Potential
     from phasekit.systems.problem import Problem as Problem
+    from phasekit.systems.statement import angle as angle
+    from phasekit.systems.statement import coordinate as coordinate
     from phasekit.systems.system import Coefficients as Coefficients
     from phasekit.systems.system import Reduced as Reduced
+    from phasekit.systems.system import System as System
     from phasekit.table.quantities import quantities as quantities
 
 _MODULES = {
     "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),
     "phasekit.errors": (
+        "AttractorKind",
         "ConvergenceError",
         "EquilibriumKind",
+        "FlowEquilibriumKind",
         "InvalidCellsWarning",
         "EscapeRegime",
         "Loop",
@@ -111,6 +124,7 @@ _MODULES = {
         "PhasekitError",
         "StoreError",
         "Topology",
+        "Validity",
     ),
     "phasekit.explorer.explore": ("explore",),
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
@@ -140,7 +154,10 @@ _MODULES = {
     "phasekit.labelled.bifurcation_set": ("bifurcation_set",),
     "phasekit.labelled.loads": ("bearing_forces", "fixed_bearing_forces", "rotators"),
     "phasekit.systems.disk": ("GyroRotorDisk",),
+    "phasekit.labelled.manifolds": ("manifolds",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
+    "phasekit.labelled.nullclines": ("nullclines",),
+    "phasekit.labelled.orbit_diagram": ("orbit_diagram",),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
     "phasekit.labelled.perturbed": (
         "capture",
@@ -161,18 +178,20 @@ _MODULES = {
     "phasekit.labelled.section": ("poincare_section",),
     "phasekit.maps.whole": ("open_map",),
     "phasekit.maps.sweep": ("sweep",),
-    "phasekit.systems.system": ("Coefficients", "Reduced"),
-    "phasekit.mechanics.coupled_rotation": ("CoupledRotation",),
-    "phasekit.mechanics.rigid_body": ("RigidBody",),
+    "phasekit.systems.parameter": ("parameter",),
+    "phasekit.systems.statement": ("angle", "coordinate"),
+    "phasekit.systems.system": ("Coefficients", "Reduced", "System"),
+    "phasekit.mechanics.general.rotation": ("CoupledRotation",),
+    "phasekit.mechanics.general.body": ("RigidBody",),
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
-__all__ = ["__version__", "deg", "plot", "rpm", *_HOME]  # noqa: PLE0604
+__all__ = ["__version__", "deg", "extend", "plot", "rpm", *_HOME]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:
-    if name == "plot":
-        return importlib.import_module("phasekit.plot")
+    if name in ("extend", "plot"):
+        return importlib.import_module(f"phasekit.{name}")
     if name not in _HOME:
         raise AttributeError(_unknown(name), name=name)
     value = getattr(importlib.import_module(_HOME[name]), name)
@@ -182,10 +201,33 @@ def __getattr__(name: str) -> Any:
     return value
 
 
+#: What other programs, and the field, call a function of phasekit.
+_ELSEWHERE = {
+    **dict.fromkeys(
+        ("bifurcation_diagram", "hodograph", "parameter_map", "phase_portrait", "time_history"),
+        "plot.{}",
+    ),
+    **dict.fromkeys(("portrait", "phase_plane"), "plot.phase_portrait"),
+    **dict.fromkeys(
+        ("simulate", "simulation", "integrate", "solve_ivp", "odeint", "trajectory", "motion"),
+        "flow",
+    ),
+    **dict.fromkeys(("limit_cycle", "limit_cycles", "cycle", "cycles"), "periodic_orbit"),
+    **dict.fromkeys(("fixed_points", "fixedpoints", "steady_states", "roots"), "equilibria"),
+    **dict.fromkeys(("continue_", "continuate", "equilibrium_curve", "branch"), "continuation"),
+    **dict.fromkeys(("ODE", "Model", "Map"), "Problem"),
+    **dict.fromkeys(("lyapunov_exponents", "lyapunovs", "lyapunov_spectrum"), "lyapunov"),
+    **dict.fromkeys(("basins_of_attraction", "basin"), "basins"),
+    **dict.fromkeys(("poincare_map", "poincare", "section"), "poincare_section"),
+}
+
+
 def _unknown(name: str) -> str:
     text = f"module 'phasekit' has no attribute {name!r}"
     if name.startswith("__"):  # asked for by machines
         return text
+    if name in _ELSEWHERE:
+        return f"{text}; use 'pk.{_ELSEWHERE[name].format(name)}'"
     import difflib
 
     same = {known.lower().replace("_", ""): known for known in __all__}

@@ -10,7 +10,7 @@ from enum import IntEnum
 
 
 class PhasekitError(Exception):
-    """Base class of everything that phasekit raises on purpose.
+    """Base class of the errors that phasekit raises.
 
     Examples
     --------
@@ -24,7 +24,7 @@ class PhasekitError(Exception):
 
 
 class ParameterError(PhasekitError, ValueError):
-    """An argument is unusable; the message names it, what it got and what it wants.
+    """An argument is invalid; the message names it, says what it got and what it wants.
 
     Examples
     --------
@@ -52,7 +52,7 @@ class ArgumentError(ParameterError, TypeError):
 
 
 class InvalidCellsWarning(ParameterError, UserWarning):
-    """Cells of an array have parameters that are not legal: they are NaN, and -1 in counts.
+    """Cells of an array have invalid parameters: they are NaN, and -1 in counts.
 
     Examples
     --------
@@ -66,7 +66,7 @@ class InvalidCellsWarning(ParameterError, UserWarning):
 
 
 class ConvergenceError(PhasekitError, RuntimeError):
-    """An iteration ended without reaching its tolerance.
+    """An iteration did not reach its tolerance.
 
     Examples
     --------
@@ -109,6 +109,53 @@ class EquilibriumKind(IntEnum):
     CENTER = 1
     SADDLE = 2
     DEGENERATE = 3
+
+
+class FlowEquilibriumKind(IntEnum):
+    """Type of an equilibrium of a flow, or of a fixed point of a map, by its eigenvalues.
+
+    The first codes are those of `EquilibriumKind`. A focus has a complex pair nearest to the border
+    of stability, a node a real eigenvalue. Degenerate are those with an eigenvalue on that border,
+    within its error.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> spring = pk.Problem({"x": "v", "v": "-x - d*v"}, parameters={"d": 0.1})
+    >>> ds = pk.equilibria(spring, box={"x": (-1, 1), "v": (-1, 1)})
+    >>> pk.FlowEquilibriumKind(ds.kind.item()).name
+    'STABLE_FOCUS'
+    """
+
+    NOT_COMPUTED = -1
+    ABSENT = 0
+    CENTER = 1
+    SADDLE = 2
+    DEGENERATE = 3
+    STABLE_NODE = 4
+    UNSTABLE_NODE = 5
+    STABLE_FOCUS = 6
+    UNSTABLE_FOCUS = 7
+
+
+class AttractorKind(IntEnum):
+    """Where the motions of a damped system end.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> pendulum = pk.Perturbed(pk.Coefficients(0.0, 1.0, 0.0), damping=0.1, torque=1.5)
+    >>> ds = pk.attractors(pendulum, phi=[0.0, 2.0], dphi=[0.0, 1.0])
+    >>> [pk.AttractorKind(kind).name for kind in ds.attractor_kind.values]
+    ['ROTATION']
+    """
+
+    UNKNOWN = -1
+    EQUILIBRIUM = 0
+    CYCLE = 1
+    ROTATION = 2
+    TORUS = 3
+    CHAOTIC = 4
 
 
 class Topology(IntEnum):
@@ -171,10 +218,34 @@ class EscapeRegime(IntEnum):
     SPATIAL_DIFFUSION = 3
 
 
-class OrbitKind(IntEnum):
-    """Type of an orbit; an unbounded one leaves the line, or the interval that is looked at.
+class Validity(IntEnum):
+    """Whether a result of first order in damping and drive holds, or else why it is NaN.
 
-    Under a constant torque one that runs turns round for ever and gains energy each turn.
+    NOT_WEAK: a motion loses more in one round than the theory allows. NO_EQUILIBRIUM: the torque is
+    beyond the critical one. FORCED, NOISY: a drive or noise decides, too. ABSENT: there is no such
+    separatrix.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> strong = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), damping=50.0)
+    >>> pk.Validity(pk.retrapping_torque(strong).retrapping_validity.values[0]).name
+    'NO_EQUILIBRIUM'
+    """
+
+    NOT_COMPUTED = -1
+    ABSENT = 0
+    HOLDS = 1
+    NOT_WEAK = 2
+    NO_EQUILIBRIUM = 3
+    FORCED = 4
+    NOISY = 5
+
+
+class OrbitKind(IntEnum):
+    """Type of an orbit. An unbounded orbit leaves the line, or the interval of the potential.
+
+    Under a constant torque a running orbit goes round for ever and gains energy each turn.
 
     Examples
     --------
@@ -193,7 +264,7 @@ class OrbitKind(IntEnum):
 
 
 class OrbitFamily(IntEnum):
-    """Family of orbits: each has orbits of every action between its limits, one of each.
+    """Family of orbits. In each family the action identifies the orbit.
 
     Examples
     --------

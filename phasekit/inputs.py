@@ -6,18 +6,22 @@ Every message says which argument, what it got, what it wants, and what to do ne
 from __future__ import annotations
 
 import decimal
+import difflib
+import functools
+import inspect
 import math
 import numbers
 import warnings
-from collections.abc import Iterable, Sequence
-from typing import Any, TypeAlias
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phasekit.errors import ParameterError
+from phasekit.errors import ArgumentError, ParameterError
 
 FloatArray: TypeAlias = NDArray[np.float64]
+Function = TypeVar("Function", bound=Callable[..., Any])
 
 #: Largest number of elements that a description or a representation writes out.
 SHOWN = 5
@@ -26,6 +30,20 @@ _NUMBERS = (numbers.Real, decimal.Decimal)
 #: Types that are registered as numbers, or count as such, and are none here.
 _NO_NUMBERS = (bool, np.bool_, np.datetime64, np.timedelta64)
 _SEQUENCES = (list, tuple)
+
+
+def is_whole(value: object) -> bool:
+    """Whether it is a whole number; NumPy's durations count as such, and are none here.
+
+    >>> is_whole(np.int8(3)), is_whole(np.timedelta64(3)), is_whole(True)
+    (True, False, False)
+    """
+    return isinstance(value, (int, np.integer)) and not isinstance(value, _NO_NUMBERS)
+
+
+def is_real(value: object) -> bool:
+    """Whether it is a real number of any type, but neither a bool nor a duration."""
+    return isinstance(value, _NUMBERS) and not isinstance(value, _NO_NUMBERS)
 
 
 def describe(value: object) -> str:
@@ -44,9 +62,13 @@ def describe(value: object) -> str:
                 return f"a {type(value).__name__} with dims {dims} and dtype {labelled.dtype}"
             value = labelled.values
     if isinstance(value, np.ndarray) and value.ndim == 0:
-        value = value.item()
+        value = value[()]
+    if isinstance(value, (np.datetime64, np.timedelta64)):  # whose items may be mere numbers
+        return f"the {'date' if isinstance(value, np.datetime64) else 'duration'} {value}"
     if isinstance(value, (*_SEQUENCES, range, np.ndarray)):
         array = _array(value)
+        if array is not None and array.ndim > 0 and array.dtype.kind in "mM":
+            return f"{'dates' if array.dtype.kind == 'M' else 'durations'} of shape {array.shape}"
         if array is not None and array.ndim == 1 and array.size <= SHOWN:
             return _short(tuple(array.tolist()) if isinstance(value, tuple) else array.tolist())
         if array is not None and array.ndim > 0:
@@ -110,11 +132,7 @@ def whole(argument: str, value: Any, wants: str, low: int = 1) -> int:
     """
     if isinstance(value, np.ndarray) and value.ndim == 0:
         value = value[()]
-    if (
-        isinstance(value, (bool, np.bool_, np.timedelta64))
-        or not isinstance(value, (int, np.integer))
-        or not low <= value < 2**63
-    ):
+    if not is_whole(value) or not low <= value < 2**63:
         raise bad(argument, value, wants)
     return int(value)
 
@@ -213,3 +231,56 @@ def _each(argument: str, value: Any, array: NDArray[Any], wants: str) -> FloatAr
         except (TypeError, ValueError):  # a signalling NaN, or a foreign type
             raise bad(argument, value, wants) from None
     return out
+
+
+def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = ()) -> None:
+    """Refuse a call with keywords that mean nothing for the system, or without what it needs.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    signature = inspect.signature(function)
+    kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
+    expected = [n for n, one in signature.parameters.items() if one.kind not in kinds]
+    for name in strange:
+        near = difflib.get_close_matches(name, expected, n=1)
+        hint = f" did you mean {near[0]!r}?" if near else ""
+        raise ArgumentError(
+            f"{function.__name__}() got an unexpected keyword argument {name!r};{hint} its "
+            f"arguments are {', '.join(expected)}"
+        )
+    for name in missing:
+        raise ArgumentError(
+            f"{function.__name__}() missing a required argument: {name!r}; its arguments are "
+            f"{', '.join(expected)}"
+        )
+
+
+def call_checked(function: Function, name: str = "") -> Function:
+    """Make a call with an unknown, missing or surplus argument say what the arguments are.
+
+    A method that is named by what it makes, `name`, does not list its object.
+    """
+    signature = inspect.signature(function)
+    expected = list(signature.parameters)[bool(name) :]
+    kinds = {parameter.kind for parameter in signature.parameters.values()}
+    takes_all = inspect.Parameter.VAR_KEYWORD in kinds
+
+    @functools.wraps(function)
+    def called(*args: Any, **kwargs: Any) -> Any:
+        try:
+            signature.bind(*args, **kwargs)
+        except TypeError as error:
+            strange = [name for name in kwargs if name not in expected and not takes_all]
+            text, hint = str(error), ""
+            if strange:  # rather than what is missing in its place
+                text = f"got an unexpected keyword argument {strange[0]!r}"
+                near = difflib.get_close_matches(strange[0], expected, n=1)
+                hint = f" did you mean {near[0]!r}?" if near else ""
+            listed = ", ".join(expected)
+            message = f"{name or function.__name__}() {text};{hint} its arguments are {listed}"
+            raise ArgumentError(message) from None
+        return function(*args, **kwargs)
+
+    return cast(Function, called)

@@ -7,6 +7,7 @@ import os
 import sys
 import tempfile
 from collections import Counter
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -58,9 +59,14 @@ FAST = "not slow"
 SLOW = (
     "published",
     "properties",
+    "bifurcation/test_centers.py",
+    "bifurcation/test_multiple_hopf.py",
+    "bifurcation/test_multipliers_together.py",
+    "bifurcation/test_zero_along_cycles.py",
     "docs/test_pages.py",
     "labelled/test_curves_of_maps.py",
     "labelled/test_cycle_branch_points.py",
+    "labelled/test_cycle_canards.py",
     "labelled/test_cycle_codim2.py",
     "labelled/test_cycle_curves.py",
     "labelled/test_cycle_events.py",
@@ -70,6 +76,7 @@ SLOW = (
     "labelled/test_loads.py",
     "labelled/test_long_periods.py",
     "labelled/test_quasi_static.py",
+    "labelled/test_response.py",
     "labelled/test_rotor_orbits.py",
     "labelled/test_travel.py",
     "loads/test_functions.py",
@@ -77,6 +84,7 @@ SLOW = (
     "maps/test_interrupts.py",
     "maps/test_store_damage.py",
     "maps/test_store_failures.py",
+    "motion/test_driven_attractors.py",
     "motion/test_extreme_motions.py",
     "motion/test_series.py",
     "motion/test_strobe.py",
@@ -88,6 +96,7 @@ SLOW = (
     "phase/test_phase_space_kernel.py",
     "phase/test_portrait_kernel.py",
     "phase/test_proved_equilibria.py",
+    "phase/test_turning_errors.py",
     "plot/test_layout.py",
 )
 
@@ -101,8 +110,14 @@ def pytest_configure(config):
 
 def pytest_itemcollected(item):
     """Mark what is slow as a whole."""
-    if any(item.path.is_relative_to(Path(__file__).parent / name) for name in SLOW):
+    if is_slow(item.path):
         item.add_marker(pytest.mark.slow)
+
+
+@cache
+def is_slow(path):
+    """Whether a file is slow as a whole: asked once a file, not once for each of its tests."""
+    return any(path.is_relative_to(Path(__file__).parent / name) for name in SLOW)
 
 
 def pytest_terminal_summary(terminalreporter, config):

@@ -10,11 +10,16 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 import phasekit as pk
 from phasekit.bifurcation.continuation.points import curve_tests
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.cells.request import ask
 from phasekit.laws.ladder import Conservative
+from phasekit.maps.options import StoreOptions
+from phasekit.maps.place import place_of
+from phasekit.maps.run import sweep_into
 from phasekit.systems.registry import models
 from phasekit.systems.system import MODELS
 from phasekit.table import quantities
@@ -45,11 +50,14 @@ def registries(monkeypatch):
 
 
 def run(heading):
-    """The names that the example of a section makes."""
-    (block,) = re.findall(r"```python\n(.*?)```", SECTIONS[heading], re.DOTALL)
-    names = {"__name__": "example"}
-    exec(compile(block, f"{GUIDE.name}: {heading}", "exec", dont_inherit=True), names)
-    return names
+    """The names that the examples of a section make, each of which runs alone."""
+    made = {}
+    for block in re.findall(r"```python\n(.*?)```", SECTIONS[heading], re.DOTALL):
+        names = {"__name__": "example"}
+        exec(compile(block, f"{GUIDE.name}: {heading}", "exec", dont_inherit=True), names)
+        made |= names
+    assert made
+    return made
 
 
 def test_every_example_of_the_guide_is_run_here():
@@ -58,7 +66,6 @@ def test_every_example_of_the_guide_is_run_here():
         "A new quantity",
         "A new system",
         "A new perturbation",
-        "A new storage option",
         "A new picture",
         "Your own equations, with damping",
         "A new special point",
@@ -118,7 +125,23 @@ def test_what_cannot_be_added_is_refused_and_changes_nothing(row, passes, messag
 
 
 def test_a_system_is_one_class():
-    satellite = run("A new system")["satellite"]
+    names = run("A new system")
+    satellite, hoop, nerve = (names[name] for name in ("satellite", "hoop", "nerve"))
+
+    def pull(theta):
+        """V'/sin theta of the bead: weight, centrifugal force, spring."""
+        length = np.sqrt(1.25 - np.cos(theta))
+        spring = 0.5 * hoop.k * (1.0 - hoop.free / length)
+        return 9.81 - hoop.spin**2 * np.cos(theta) + spring
+
+    aside = brentq(pull, 0.5, 2.0, xtol=1e-14)
+    places = pk.equilibria(hoop).phi.values
+    np.testing.assert_allclose(places, [-aside, 0.0, aside, np.pi], atol=1e-13)
+    assert names["ds"].isel(spin=2).phasekit.system() == hoop.replace(spin=3.0)
+    # At its Hopf points the trace vanishes: 1 - v^2 = 0.8 eps.
+    edge = np.sqrt(1.0 - 0.8 * nerve.eps)
+    assert names["ignites"]["v"] == pytest.approx(-edge, rel=1e-10)
+    assert names["ceases"]["v"] == pytest.approx(edge, rel=1e-10)
     k, torque = satellite.shape, satellite.magnet
     # It flips where the gravity gradient is as strong as the magnet: 3 n^2 k = torque.
     critical = pk.critical(satellite, "rate").critical_fold.sel(fold="minus").item()
@@ -159,14 +182,12 @@ def test_a_perturbation_is_a_torque():
 
 
 def test_a_storage_option_is_a_field(tmp_path):
-    names = run("A new storage option")
-    disk, beta = names["disk"], names["ds"].beta.values
-    in_memory = pk.sweep(disk, beta=beta, of="equilibria")
-    xr.testing.assert_identical(names["ds"], in_memory)
+    disk = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=300 * pk.rpm)
+    beta = np.linspace(0.1, 1.5, 50)
+    request = ask(disk.replace(beta=beta), quantities.select("equilibria"))
     # What one option made, calls with another go on with, and check.
-    options = names["StoreOptions"](compressor="zstd", workers=1)
     store = tmp_path / "map.zarr"
-    names["sweep_into"](names["place_of"](store), names["request"], options)
+    sweep_into(place_of(store), request, StoreOptions(compressor="zstd", workers=1))
     written = json.loads((store / "phi" / "zarr.json").read_text("utf-8"))
     assert written["codecs"][-2]["configuration"]["cname"] == "zstd"
     longer = np.append(beta, 1.55)
@@ -220,3 +241,9 @@ def test_every_larger_sample_is_named():
     found = {name for text in texts for name in asked.findall(text)} - {"PHASEKIT_BROWSER"}
     assert len(found) > 10
     assert found <= set(re.findall(r"PHASEKIT_\w+", GUIDE.read_text(encoding="utf-8")))
+
+
+def test_the_examples_use_public_names_alone():
+    deep = re.compile(r"^\s*(?:from|import) +(phasekit[\w.]*)", re.MULTILINE)
+    code = "".join(re.findall(r"```python\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL))
+    assert set(deep.findall(code)) == {"phasekit", "phasekit.extend"}

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import tomllib
+from collections.abc import Collection
 from pathlib import Path
 
 import phasekit
@@ -18,14 +20,18 @@ STAIRS = {("phasekit.labelled.pictures", "phasekit.plot")}
 ROOF = "phasekit.__init__"
 
 
-def modules() -> dict[str, Path]:
+@functools.cache
+def modules() -> dict[str, list[ast.AST]]:
+    """All nodes of the tree of each module, parsed once for all tests."""
     return {
-        ".".join(("phasekit", *path.relative_to(ROOT).with_suffix("").parts)): path
+        ".".join(("phasekit", *path.relative_to(ROOT).with_suffix("").parts)): list(
+            ast.walk(ast.parse(path.read_text()))
+        )
         for path in ROOT.rglob("*.py")
     }
 
 
-def known(name: str, all_modules: dict[str, Path]) -> str | None:
+def known(name: str, all_modules: Collection[str]) -> str | None:
     """The module that a dotted name is, or is in."""
     while name:
         for found in (name, f"{name}.__init__"):
@@ -35,18 +41,20 @@ def known(name: str, all_modules: dict[str, Path]) -> str | None:
     return None
 
 
-def named(path: Path, all_modules: dict[str, Path]) -> tuple[set[str], set[str]]:
-    """Modules that a file imports, wherever in it; and those that it names in strings."""
-    tree = ast.parse(path.read_text())
+@functools.cache
+def named(module: str) -> tuple[set[str], set[str]]:
+    """Modules that a module imports, wherever in it; and those that it names in strings."""
+    all_modules = modules()
+    tree = all_modules[module]
     texts = {
         id(node.body[0].value)
-        for node in ast.walk(tree)
+        for node in tree
         if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef))
         and node.body
         and isinstance(node.body[0], ast.Expr)
     }
     imported, quoted = set(), set()
-    for node in ast.walk(tree):
+    for node in tree:
         if isinstance(node, ast.ImportFrom) and node.module:
             for alias in node.names:
                 found = known(f"{node.module}.{alias.name}", all_modules)
@@ -77,12 +85,12 @@ def floor_of(module: str, heights: dict[str, int]) -> int:
 
 
 def test_modules_named_in_strings_obey_the_floors():
-    everything, heights = modules(), floors()
+    heights = floors()
     seen = 0
-    for module, path in everything.items():
+    for module in modules():
         if module == ROOF:
             continue
-        for target in named(path, everything)[1]:
+        for target in named(module)[1]:
             seen += 1
             if (module, target.removesuffix(".__init__")) in STAIRS:
                 continue
@@ -99,14 +107,13 @@ def test_no_module_is_on_no_floor():
 
 def test_there_is_no_import_circle():
     """Imports for types and inside functions count, and so do modules that strings name."""
-    everything = modules()
     arrows = {
         module: {
             target
-            for target in set().union(*named(path, everything))
+            for target in set().union(*named(module))
             if (module, target.removesuffix(".__init__")) not in STAIRS
         }
-        for module, path in everything.items()
+        for module in modules()
         if module != ROOF
     }
     circles = [c for c in strongly_connected(arrows) if len(c) > 1]
@@ -116,8 +123,8 @@ def test_there_is_no_import_circle():
 def test_nothing_knows_a_system_by_the_name_of_its_class():
     """A method belongs to a rung of the ladder of laws; what a system adds, its class says."""
     names, seen = set(models()), 0
-    for module, path in modules().items():
-        for node in ast.walk(ast.parse(path.read_text())):
+    for module, tree in modules().items():
+        for node in tree:
             parts = []
             if isinstance(node, ast.Dict):
                 parts = node.keys
@@ -134,10 +141,10 @@ def test_no_function_asks_which_particular_system_it_got():
     """What a function does follows from the rung of a law and from what is given."""
     homes = {model.__module__ for model in models().values()}  # a system knows its own parts
     names, seen = set(models()), 0
-    for module, path in modules().items():
+    for module, tree in modules().items():
         if module in homes:
             continue
-        for node in ast.walk(ast.parse(path.read_text())):
+        for node in tree:
             if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
                 continue
             if node.func.id in ("isinstance", "issubclass") and len(node.args) == 2:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import matplotlib
 import matplotlib.pyplot as plt
+import numpy as np
 import pytest
 
 import phasekit as pk
@@ -12,6 +13,22 @@ from phasekit.cli import main
 
 matplotlib.use("Agg")
 ROOT = Path(__file__).parents[1]
+TOUR = ROOT / "docs" / "tutorial" / "tour.md"
+
+
+def run(page):
+    """The names that the examples of a page define, typed from top to bottom."""
+    names = {}
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(block, names)
+    plt.close("all")
+    return names
+
+
+def folds_of(disk):
+    return [f"{fold:.1f}" for fold in pk.critical(disk, "beta").critical_fold.values / pk.deg]
 
 
 @pytest.fixture(scope="module")
@@ -20,25 +37,39 @@ def readme():
 
 
 def test_the_calls_run_and_give_what_the_comments_say(readme):
-    (block,) = re.findall(r"```python\n(.*?)```", readme, re.DOTALL)
-    names = {}
-    exec(block, names)
-    plt.close("all")
+    names = run(readme)
+    assert pk.equilibria(names["disk"]).n_equilibria == 4
+    assert pk.separatrices(names["disk"]).figure_eight
+    said = re.search(r"# at ([\d.]+) and ([\d.]+) degrees", readme)
+    assert folds_of(names["disk"]) == list(said.groups())
+    assert [point.kind for point in names["cycles"].special_points].count("fold_of_cycles") == 2
+
+
+@pytest.mark.slow
+def test_the_tour_runs_and_gives_what_its_comments_say():
+    page = TOUR.read_text(encoding="utf-8")
+    names = run(page)
     assert pk.equilibria(names["system"]).n_equilibria == 4
     assert pk.separatrices(names["disk"]).figure_eight
-    folds = pk.critical(names["disk"], "beta").critical_fold.values / pk.deg
-    said = re.search(r"here at ([\d.]+) and ([\d.]+) degrees", block)
-    assert [f"{fold:.1f}" for fold in folds] == list(said.groups())
+    said = re.search(r"here at ([\d.]+) and ([\d.]+) degrees", page)
+    assert folds_of(names["disk"]) == list(said.groups())
     counts = pk.sweep(names["rotor"], momentum=[0.0, 4.0]).n_equilibria.values.tolist()
-    assert counts == [int(x) for x in re.search(r"# (\d), later (\d) steady", block).groups()]
+    assert counts == [int(x) for x in re.search(r"# (\d), later (\d) steady", page).groups()]
+    areas = pk.separatrices(names["well"]).lobe_area.values
+    np.testing.assert_allclose(areas[np.isfinite(areas)], [4 / 3, 4 / 3], rtol=1e-12)
+
+
+def test_the_readme_is_short(readme):
+    assert len(readme.splitlines()) <= 120
 
 
 def test_the_shell_commands_run(readme, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    (recipe,) = re.findall(r"```toml\n(.*?)```", readme, re.DOTALL)
+    (recipe,) = re.findall(r"```toml\n(.*?)```", TOUR.read_text(encoding="utf-8"), re.DOTALL)
     (tmp_path / "map.toml").write_text(recipe)
-    lines = re.findall(r"^phasekit (?:portrait|diagram|sweep) .*$", readme, re.MULTILINE)
-    commands = [line.split()[1:] for joint in lines for line in joint.split(" && ")]
+    lines = re.findall(r"^phasekit (?:portrait|diagram) .*$", readme, re.MULTILINE)
+    commands = [line.split()[1:] for line in lines]
+    commands += [["sweep", "map.toml"], ["info", "map.zarr"]]
     assert [words[0] for words in commands] == ["portrait", "diagram", "sweep", "info"]
     for words in commands:
         assert main(words) == 0

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 #: What `detect=` asks for.
-Group = Literal["fold", "branch_point", "hopf"]
+Group = Literal["fold", "branch_point", "hopf", "neutral_saddle"]
 #: Curves in two parameters: of equilibria, of periodic orbits.
-Curve = Literal["fold", "branch_point", "hopf", "fold_of_cycles", "period_doubling", "torus"]
+Curve = Literal[
+    "fold", "branch_point", "hopf", "fold_of_cycles", "period_doubling", "torus", "event"
+]
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ for _kind in (
         "neutral_saddle", "NS",
         "two real eigenvalues sum to zero: no bifurcation, only next to one",
         "sum of two real eigenvalues", "as of a Hopf point, with k < 0",
-        (), "D", 6, "white", "hopf", "hopf",
+        (), "D", 6, "white", "neutral_saddle", "hopf",
     ),
     PointKind(
         "cusp", "CP", "two folds meet: three equilibria merge into one",
@@ -185,8 +187,8 @@ for _kind in (
         "exact zeros of A, B and C", "A = B = C = 0", (), "o", 6, "white", None, None, EXACT,
     ),
     PointKind(
-        "event", "UZ", "a function that was asked for is zero", "the function itself",
-        "the curve, and the function is zero", (), "v", 8, "YELLOW", None,
+        "event", "UZ", "a function of the user is zero", "the function itself",
+        "the curve, and the function is zero", (), "v", 8, "YELLOW", None, "event",
     ),
     PointKind(
         "end", "EP", "the end of the branch; its message says why", "", "",

@@ -8,6 +8,7 @@ same object serves threads here and blocks of a lazy graph.
 from __future__ import annotations
 
 import functools
+import itertools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -18,13 +19,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells import numbered
 from phasekit.cells.progress import progress_bar
-from phasekit.cells.request import Request, ask
+from phasekit.cells.request import Part, Request, ask
 from phasekit.cells.schema import dataset_attrs, input_attrs, label_coords, own_names
 from phasekit.labels.arguments import FloatArray
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import cut, refuse_too_large, tiles, variable
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS, TABLE
 from phasekit.table.row import Pass, Quantity
 
@@ -33,11 +35,22 @@ from phasekit.table.row import Pass, Quantity
 class Cells:
     """Inputs of some cells as arrays that broadcast, and what was computed from them so far."""
 
-    model: type[Model]
+    model: type[System]
     passes: tuple[Pass, ...]
     inputs: Mapping[str, FloatArray]
     computed: dict[str, Any] = field(default_factory=dict)
     done: set[Pass] = field(default_factory=set)
+    widths: dict[str, int] = field(default_factory=dict)  # of dims whose labels are numbered
+
+    @classmethod
+    def of(
+        cls, model: type[System], passes: Sequence[Pass], inputs: Mapping[str, FloatArray]
+    ) -> Cells:
+        """Return cells of which all passes are computed."""
+        cells = cls(model, tuple(passes), inputs)
+        for one in passes:
+            cells.run(one)
+        return cells
 
     def get(self, name: str) -> Any:
         """Return an input, a coefficient or a quantity as an array."""
@@ -61,11 +74,14 @@ class Cells:
         self.done.add(one)
         arrays = [self.get(name) for name in one.inputs]
         with np.errstate(all="ignore"):  # invalid cells give NaN, and no warning
-            self.computed.update(TABLE.call(one, *arrays))
+            found = TABLE.call(one, *arrays)
+        if not self.model.rung.labels_fixed:
+            found = numbered.measured(one, found, self.widths)
+        self.computed.update(found)
 
 
 def evaluate(
-    system: Model,
+    system: System,
     rows: Sequence[Quantity],
     passes: Sequence[Pass] | None = None,
     **cells: Any,
@@ -90,6 +106,8 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         If the result would not fit into memory.
     """
     if request.grid.lazy:
+        if request.is_open:
+            request = _sized(request, _columns_of_blocks(request))
         return assemble(request, _lazy(request))
     sizes, grid = request.grid.sizes, request.grid
     refuse_too_large(
@@ -101,18 +119,30 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         sizes,
     )
     filled: dict[str, Any] = {}
+    several: list[numbered.Columns] = []
     tasks: list[tuple[Callable[[], None], int]] = []
     for part in request.parts:
         shape = tuple(sizes[dim] for dim in part.dims)
+        columns = _columns(request, part) if request.is_open else None
+        several += [] if columns is None else [columns]
         results = {
-            row.name: np.empty(shape + row.label_shape, dtype=row.dtype) for row in part.rows
+            row.name: np.empty(shape + row.label_shape, dtype=row.dtype)
+            for row in part.rows
+            if columns is None or row not in columns.rows
         }
         filled.update(results)
         arrays = {name: grid.aligned(name, part.dims) for name in part.inputs}
         for tile in tiles(shape):
-            task = functools.partial(fill, type(request.system), part.passes, arrays, results, tile)
+            task = functools.partial(
+                fill, type(request.system), part.passes, arrays, results, tile, columns
+            )
             tasks.append((task, prod(piece.stop - piece.start for piece in tile)))
     run_tasks(tasks, progress)
+    if request.is_open:
+        request = _sized(request, several)
+        widths = numbered.greatest(columns.widths for columns in several)
+        for columns in several:
+            filled.update(columns.joined(widths))
     dims = {row.name: part.dims for part in request.parts for row in part.rows}
     return assemble(
         request,
@@ -123,20 +153,34 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
     )
 
 
+def _columns(request: Request, part: Part) -> numbered.Columns:
+    rows = tuple(filter(numbered.is_numbered, part.rows))
+    return numbered.Columns(rows, {dim: request.grid.sizes[dim] for dim in part.dims})
+
+
+def _sized(request: Request, several: Sequence[numbered.Columns]) -> Request:
+    """Return a request with as many equilibria and saddles as were found, and say what was not."""
+    numbered.warn_of_stretches(request.system, several)
+    widths = numbered.greatest(columns.widths for columns in several)
+    return request.sized(widths)
+
+
 def fill(
-    model: type[Model],
+    model: type[System],
     passes: Sequence[Pass],
     arrays: Mapping[str, FloatArray],
     results: Mapping[str, Any],
     tile: tuple[slice, ...],
+    columns: numbered.Columns | None = None,
 ) -> None:
-    """Compute one tile straight into its part of the results."""
-    cells = Cells(model, tuple(passes), {name: cut(array, tile) for name, array in arrays.items()})
-    for one in passes:
-        cells.run(one)
+    """Compute one tile straight into its part of the results; keep what has open columns."""
+    cells = Cells.of(model, passes, {name: cut(array, tile) for name, array in arrays.items()})
     with np.errstate(over="ignore"):  # where a result is kept in single precision
         for name, result in results.items():
             result[tile] = cells.computed[name]
+    if columns is not None:
+        columns.put(tile, cells.computed, cells.widths)
+        columns.note(cells.widths, numbered.stretches(cells.computed))
 
 
 def run_tasks(tasks: Sequence[tuple[Callable[[], None], int]], progress: bool | None) -> None:
@@ -189,8 +233,66 @@ def _lazy(request: Request) -> dict[str, xr.Variable]:
     return {row.name: out[row.name] for row in request.rows}
 
 
+def columns_of_sample(request: Request, most: int = 256) -> dict[str, int]:
+    """Return how many equilibria and saddles a few cells have, evenly over the grid."""
+    several = []
+    for part in request.parts:
+        if any(map(numbered.is_numbered, part.rows)):
+            each = max(int(most ** (1.0 / max(len(part.dims), 1))), 2)
+            places = [
+                np.unique(np.linspace(0, request.grid.sizes[dim] - 1, each).astype(int))
+                for dim in part.dims
+            ]
+            arrays = {name: request.grid.aligned(name, part.dims) for name in part.inputs}
+            for name, array in arrays.items():
+                own = [p if n > 1 else [0] for p, n in zip(places, array.shape, strict=True)]
+                arrays[name] = array[np.ix_(*own)]
+            several.append(Cells.of(type(request.system), part.passes, arrays).widths)
+    return numbered.greatest(several)
+
+
+def _columns_of_blocks(request: Request) -> list[numbered.Columns]:
+    """Find how many equilibria there are: all blocks are solved now, and no result is kept."""
+    from dask.base import compute as computed
+    from dask.delayed import delayed
+
+    several = []
+    for part in request.parts:
+        columns = _columns(request, part)
+        several.append(columns)
+        if part.rows and not columns.rows:
+            continue
+        given = {name: request.grid.inputs[name] for name in part.inputs}
+        # Under names of their own: a variable with the name of its dim would be read as its index.
+        blocks = xr.Dataset({f"_{name}": x for name, x in given.items()}).unify_chunks()
+        cuts = []
+        for dim in part.dims:
+            ends = np.cumsum((0, *blocks.chunks.get(dim, (request.grid.sizes[dim],))))
+            cuts.append([slice(low, high) for low, high in itertools.pairwise(map(int, ends))])
+        task = delayed(functools.partial(_found_in_block, type(request.system), part))
+        tasks = []
+        for block in itertools.product(*cuts):
+            own = blocks.isel(dict(zip(part.dims, block, strict=True)))
+            tasks.append(task(*(_spread(own[f"_{name}"], part.dims) for name in given)))
+        for found in computed(*tasks):  # type: ignore[no-untyped-call]
+            columns.note(*found)
+    return several
+
+
+def _spread(values: xr.DataArray, dims: Sequence[str]) -> Any:
+    """Return an array with an axis for each dim."""
+    ordered = values.transpose(*(dim for dim in dims if dim in values.dims))
+    return ordered.data.reshape(tuple(values.sizes.get(dim, 1) for dim in dims))
+
+
+def _found_in_block(model: type[System], part: Part, *arrays: FloatArray) -> tuple[Any, Any]:
+    """Return the numbers of columns that a block needs, and what its search left open."""
+    cells = Cells.of(model, part.passes, dict(zip(part.inputs, arrays, strict=True)))
+    return cells.widths, numbered.stretches(cells.computed)
+
+
 def _block(
-    model: type[Model],
+    model: type[System],
     one: Pass,
     names: tuple[str, ...],
     rows: Sequence[Quantity],
@@ -198,11 +300,11 @@ def _block(
 ) -> Any:
     """Compute one block of a lazy graph."""
     shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
-    cells = Cells(model, (one,), dict(zip(names, arrays, strict=True)))
-    cells.run(one)
+    cells = Cells.of(model, (one,), dict(zip(names, arrays, strict=True)))
     results = []
     for row in rows:
-        full = np.broadcast_to(cells.computed[row.name], shape + row.label_shape)
+        values = numbered.resized(cells.computed[row.name], row, row.label_shape)
+        full = np.broadcast_to(values, shape + row.label_shape)
         results.append(np.array(full, dtype=row.dtype))
     return tuple(results) if len(results) > 1 else results[0]
 
@@ -220,9 +322,10 @@ def assemble(request: Request, data: Mapping[str, xr.Variable]) -> xr.Dataset:
     for name, given in request.grid.inputs.items():
         if name not in coords:
             coords[name] = _with_attrs(request.system, name, given)
-    coords.update(own_names(request.system, {**coords, **data}))
+    coordinate = getattr(request.system, "coordinate", "phi")
+    coords.update(own_names(coordinate, {**coords, **data}))
     return xr.Dataset(dict(data), coords=coords, attrs=dataset_attrs(request.system))
 
 
-def _with_attrs(system: Model, name: str, given: xr.Variable) -> xr.Variable:
+def _with_attrs(system: System, name: str, given: xr.Variable) -> xr.Variable:
     return variable(map(str, given.dims), given.data, input_attrs(system, name) or given.attrs)

@@ -1,26 +1,34 @@
-"""Results of systems whose equilibria are numbered: as many as the cell with most of them has."""
+"""Results of systems whose equilibria are numbered: as many as the cell with most of them has.
+
+How many that is shows when all cells are solved. Until then each tile keeps the columns that its
+own cells need; then all are filled up to the greatest number.
+"""
 
 from __future__ import annotations
 
 import functools
 import warnings
-from collections import namedtuple
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import prod
 from typing import Any
 
 import numpy as np
 
-from phasekit.errors import ParameterError
 from phasekit.labels.coordinates import LABELS, Labels
-from phasekit.labels.grid import cut, make_grid, tiles
+from phasekit.labels.grid import refuse_too_large
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedRouthian
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.numerical import NUMERICAL_ROWS
 from phasekit.table.quantities import ROWS, variant
 from phasekit.table.row import Pass, Quantity
+
+#: Dims along which equilibria and saddles are numbered, with the long names of the numbers.
+NUMBERED = {
+    "equilibrium": "equilibrium, by its coordinate",
+    "saddle": "saddle, by its coordinate",
+}
 
 _POINTWISE = (
     "potential",
@@ -29,84 +37,62 @@ _POINTWISE = (
     "energy_integral",
     "phase_velocity",
 )
+#: What stands where a cell has fewer than others, in place of NaN or 0.
 _EMPTY = {"kind": 0, "loop": 0}
+
+Widths = Mapping[str, int]
 
 
 def fitted(
-    system: Model, rows: Sequence[Quantity], passes: Sequence[Pass], count: Pass
+    system: System, rows: Sequence[Quantity], passes: Sequence[Pass], search: Pass
 ) -> tuple[Sequence[Quantity], Sequence[Pass]]:
-    """Return rows and passes with as many numbers on their label dims as `count` finds.
+    """Return rows and passes of a system whose equilibria are numbered, how many is still open.
+
+    Where none of the passes finds the equilibria on which the rows rest, `search` goes along: it
+    says what is not proved.
 
     Raises
     ------
     ParameterError
-        If what is asked for needs an interval, or loaded parameters.
+        If what is asked for needs an interval.
     """
     if any(row.group not in _POINTWISE for row in rows):
         system.law.check_searchable()
-    labels = dict(LABELS)
-    if any(dim in ("equilibrium", "saddle") for row in rows for dim in row.dims):
-        equilibria, saddles = _most(system, count)
-        labels["equilibrium"] = (range(equilibria), "equilibrium, by its coordinate")
-        labels["saddle"] = (range(saddles), "saddle, by its coordinate")
-    elif any(row.group in ("orbits", "motion") for row in rows) and system.law.may_be_incomplete:
-        _most(system, count)  # says what is not proved, on which orbits and motion rest as well
+    restful = {row.group for row in rows} & {"orbits", "motion"}
+    resting = restful and system.law.may_be_incomplete
+    lines = [line for one in passes for line in (one, *one.behind)]
+    if (resting or any(map(is_numbered, rows))) and not any(map(_finds, lines)):
+        passes = [*passes, search]
     searched = (Conservative, PerturbedConservative)
     if issubclass(system.rung, searched) and not issubclass(system.rung, PerturbedRouthian):
         groups = dict.fromkeys(row.group for row in rows)
         rows = [*rows, *(row for group in groups for row in NUMERICAL_ROWS.get(group, ()))]
-    found = [_worded(row, system, labels) for row in rows]
-    shapes = {row.name: row.label_shape for row in found}
-    numbered = {row.group for row in found if set(row.dims) & {"equilibrium", "saddle"}}
-    return found, [
-        replace(one, function=functools.partial(_padded, one, shapes, repr(system)))
-        if numbered.intersection(one.groups)
-        else replace(one, function=functools.partial(_told, one, repr(system)))
-        if set(one.groups) & {"orbits", "motion"}
-        else one
-        for one in passes
-    ]
+    labels = _labels({})
+    return [_worded(row, system, labels) for row in rows], [_telling(p, system) for p in passes]
 
 
-def worded(system: Model, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+def is_numbered(row: Quantity) -> bool:
+    """Whether a row has as many entries as a cell has equilibria or saddles."""
+    return not NUMBERED.keys().isdisjoint(row.dims)
+
+
+def sized(rows: Iterable[Quantity], widths: Widths) -> tuple[Quantity, ...]:
+    """Return rows with so many numbers on their dims."""
+    labels = _labels(widths)
+    return tuple(replace(row, labels=labels) if is_numbered(row) else row for row in rows)
+
+
+def _labels(widths: Widths) -> dict[str, Labels]:
+    numbers = {dim: (range(widths.get(dim, 0)), text) for dim, text in NUMBERED.items()}
+    return {**LABELS, **numbers}
+
+
+def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
     """Return rows without label dims with the words that the system's results have."""
     return [_worded(row, system, dict(row.labels or LABELS)) for row in rows]
 
 
-def _most(system: Model, count: Pass) -> tuple[int, int]:
-    """Greatest numbers of equilibria and saddles over all cells of the parameters."""
-    grid = make_grid(system.parameters)
-    if grid.lazy:
-        raise ParameterError(
-            "parameters: got chunked arrays, wants loaded ones (.load()), because the number "
-            "of equilibria is not known before they are found"
-        )
-    dims = tuple(grid.sizes)
-    arrays = [grid.aligned(name, dims) for name in count.inputs]
-    shape = tuple(grid.sizes.values())
-    found = [
-        count.resolved(*(cut(array, tile) for array in arrays))
-        for tile in tiles(shape, 4096)
-        if prod(shape)
-    ]
-    gaps = np.concatenate([open_ for *_, open_ in found])
-    if len(gaps):
-        low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0]), :2]
-        stretches = int(gaps[:, 2].sum())
-        among = "" if stretches == 1 else f", the widest of {stretches} such stretches"
-        of = f", in {len(gaps)} of {prod(shape)} systems" if shape else ""
-        missing = system.law.unbounded_function
-        because = f", because no bounds of {missing} are known" if missing else ""
-        warnings.warn(
-            f"equilibria of {system!r}: it is not proved that there are no others between "
-            f"{low:.6g} and {high:.6g}{among}{of}{because}; there `complete` is False",
-            RuntimeWarning,
-            stacklevel=2,
-        )
-    return max(n for n, *_ in found), max(n for _, n, _ in found)
-
-
-def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity:
+def _worded(row: Quantity, system: System, labels: dict[str, Labels]) -> Quantity:
     words: dict[str, Any] = {"labels": labels, **variant(row, system.rung)}
     words |= system.law.words(row.name, row.units, row.long_name)
     if row.name == "n_equilibria":
@@ -114,10 +100,152 @@ def _worded(row: Quantity, system: Model, labels: dict[str, Labels]) -> Quantity
     return replace(row, **words)
 
 
+def _finds(one: Pass) -> bool:
+    return "equilibria" in one.groups
+
+
+# ------------------------------------------------------------------------------ columns
+
+
+def measured(one: Pass, found: dict[str, Any], widths: dict[str, int]) -> dict[str, Any]:
+    """Return what a pass found with one column at least, and note how many it found.
+
+    Functions that start from these, and reduce over them, need not care for cells without any.
+    """
+    finds = not any(name in ROWS and is_numbered(ROWS[name]) for name in one.inputs)
+    for name in found:
+        row = ROWS.get(name)
+        if row is None or not is_numbered(row):
+            continue
+        tail = found[name].shape[found[name].ndim - len(row.dims) :]
+        if finds:
+            for dim, n in zip(row.dims, tail, strict=True):
+                if dim in NUMBERED:
+                    widths[dim] = max(widths.get(dim, 0), n)
+        found[name] = resized(found[name], row, tuple(max(n, 1) for n in tail))
+    return found
+
+
+def resized(values: Any, row: Quantity, tail: tuple[int, ...]) -> Any:
+    """Return values of a row with label axes of these lengths: cut, or filled with nothing."""
+    values = np.asarray(values)
+    first = values.ndim - len(tail)
+    if values.shape[first:] == tail:
+        return values
+    values = values[(..., *map(slice, tail))]
+    more = [(0, n - m) for n, m in zip(tail, values.shape[first:], strict=True)]
+    empty = _EMPTY.get(row.name, np.nan if values.dtype.kind == "f" else 0)
+    return np.pad(values, [(0, 0)] * first + more, constant_values=empty)
+
+
+@dataclass
+class Columns:
+    """What was found of the numbered rows of a part, tile by tile, each as wide as it is."""
+
+    rows: tuple[Quantity, ...]
+    sizes: dict[str, int]
+    widths: dict[str, int] = field(default_factory=dict)
+    pieces: list[tuple[tuple[slice, ...], dict[str, Any]]] = field(default_factory=list)
+    stretches: list[Any] = field(default_factory=list)
+    searched: bool = False
+
+    def put(self, tile: tuple[slice, ...], computed: Mapping[str, Any], widths: Widths) -> None:
+        """Keep the columns of a tile, if all have room in memory with as many as are needed."""
+        with np.errstate(over="ignore"):  # where a result is kept in single precision
+            kept = {row.name: computed[row.name].astype(row.dtype) for row in self.rows}
+        self.pieces.append((tile, kept))
+        if any(n > self.widths.get(dim, 0) for dim, n in widths.items()):
+            rows, cells = sized(self.rows, widths), prod(self.sizes.values())
+            refuse_too_large({row.name: cells * row.cell_bytes for row in rows}, self.sizes)
+
+    def note(self, widths: Widths, stretches: Any) -> None:
+        """Note how many columns cells need, and what their search for equilibria left open."""
+        if stretches is not None:
+            self.searched = True
+            self.stretches.append(stretches)
+        self.widths.update(greatest([self.widths, widths]))
+
+    def joined(self, widths: Widths) -> dict[str, Any]:
+        """Return the results with so many columns."""
+        found = {}
+        shape = tuple(self.sizes.values())
+        for row in sized(self.rows, widths):
+            result = np.empty(shape + row.label_shape, row.dtype)
+            for tile, kept in self.pieces:
+                result[tile] = resized(kept.pop(row.name), row, row.label_shape)
+            found[row.name] = result
+        return found
+
+
+def greatest(several: Iterable[Widths]) -> dict[str, int]:
+    """Return the greatest numbers of columns by dims."""
+    found: dict[str, int] = {}
+    for widths in several:
+        for dim, n in widths.items():
+            found[dim] = max(found.get(dim, 0), n)
+    return found
+
+
+# ------------------------------------------------------------------------------ what is said
+
+
+def stretches(computed: Mapping[str, Any]) -> Any:
+    """Return stretches that a search left open, a row a system: low, high of the widest, number.
+
+    None where no equilibria were looked for.
+    """
+    if "gaps" not in computed or "n_gaps" not in computed:
+        return None
+    gaps, number = np.reshape(computed["gaps"], (-1, 2)), np.reshape(computed["n_gaps"], -1)
+    return np.column_stack([gaps, number])[number > 0]
+
+
+def unproved(several: Iterable[Any]) -> tuple[float, ...]:
+    """Sum stretches up: low and high of the widest, how many stretches, in how many systems."""
+    gaps = np.concatenate([np.empty((0, 3)), *several])
+    if not len(gaps):
+        return ()
+    low, high = gaps[np.argmax(gaps[:, 1] - gaps[:, 0]), :2]
+    return float(low), float(high), int(gaps[:, 2].sum()), len(gaps)
+
+
+def warn_of_stretches(system: System, several: Iterable[Columns]) -> None:
+    """Say where it is not proved that there are no more equilibria."""
+    columns = next((one for one in several if one.searched), None)
+    if columns is not None:
+        warn_unproved(system, unproved(columns.stretches), tuple(columns.sizes.values()))
+
+
+def warn_unproved(system: System, found: Sequence[float], shape: Sequence[int]) -> None:
+    """Say what `unproved` found in systems of this shape."""
+    if not found:
+        return
+    low, high, number, systems = found
+    among = "" if number == 1 else f", the widest of {number} such stretches"
+    of = f", in {systems} of {prod(shape)} systems" if shape else ""
+    missing = system.law.unbounded_function
+    because = f", because no bounds of {missing} are known" if missing else ""
+    warnings.warn(
+        f"equilibria of {system!r}: it is not proved that there are no others between "
+        f"{low:.6g} and {high:.6g}{among}{of}{because}; there `complete` is False",
+        RuntimeWarning,
+        stacklevel=2,
+    )
+
+
+def _telling(one: Pass, system: System) -> Pass:
+    """Return a pass that says how many results it, or one behind it, could not compute."""
+    behind = tuple(_telling(line, system) for line in one.behind)
+    if {"orbits", "motion", "separatrices"}.isdisjoint(one.groups):
+        return replace(one, behind=behind) if behind else one
+    return replace(one, function=functools.partial(_told, one, repr(system)), behind=behind)
+
+
 def _told(one: Pass, text: str, *arrays: Any) -> Any:
     """Call a pass, and say how many results it could not compute, and why."""
     result = one.resolved(*arrays)
-    _tell_unknown(result._asdict(), text)
+    for part in result if len(one.groups) > 1 else (result,):
+        _tell_unknown(part._asdict(), text)
     return result
 
 
@@ -139,29 +267,3 @@ def _tell_unknown(fields: Mapping[str, Any], text: str) -> None:
                     RuntimeWarning,
                     stacklevel=2,
                 )
-
-
-def _padded(one: Pass, shapes: dict[str, tuple[int, ...]], text: str, *arrays: Any) -> Any:
-    """Call a pass and fill its label axes up to the lengths that the whole map has.
-
-    What it could not compute is said, as of orbits.
-    """
-    result = one.resolved(*arrays)
-    filled = []
-    group: Any
-    for title, group in zip(one.groups, result if len(one.groups) > 1 else (result,), strict=True):
-        if not isinstance(group, tuple):  # the only row of its group
-            (name,) = (row.name for row in ROWS.values() if row.group == title)
-            group = namedtuple("Row", [name])(group)
-        fields = {}
-        _tell_unknown(group._asdict(), text)
-        for name, values in group._asdict().items():
-            tail = shapes.get(name, ())
-            first = values.ndim - len(tail)
-            missing = [n - m for n, m in zip(tail, values.shape[first:], strict=True)]
-            if any(missing):
-                width = [(0, 0)] * first + [(0, n) for n in missing]
-                values = np.pad(values, width, constant_values=_EMPTY.get(name, np.nan))
-            fields[name] = values
-        filled.append(type(group)(**fields))
-    return tuple(filled) if len(filled) > 1 else filled[0]

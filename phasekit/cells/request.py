@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from phasekit.cells import numbered
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad
 from phasekit.labels.coordinates import STATES
@@ -22,7 +23,7 @@ from phasekit.laws.perturbed import (
     TiltedTrigonometric,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import Model, stands_on
+from phasekit.systems.system import System, stands_on
 from phasekit.table.quantities import ROWS, TABLE
 from phasekit.table.row import Pass, Quantity, depth
 
@@ -41,15 +42,26 @@ class Part:
 class Request:
     """Quantities of a system on a grid of cells, and what they need."""
 
-    system: Model
+    system: System
     grid: Grid
     rows: tuple[Quantity, ...]
     needs: Mapping[Pass, Sequence[str]]  # the inputs on which each pass depends, in the end
     parts: tuple[Part, ...]
 
+    @property
+    def is_open(self) -> bool:
+        """Whether equilibria are numbered, so that the length of their dims is yet to be found."""
+        rung = self.system.rung
+        return not rung.labels_fixed and TABLE.offers(rung, "equilibria")
+
+    def sized(self, widths: Mapping[str, int]) -> Request:
+        """Return it with so many equilibria and saddles."""
+        parts = (replace(part, rows=numbered.sized(part.rows, widths)) for part in self.parts)
+        return replace(self, rows=numbered.sized(self.rows, widths), parts=tuple(parts))
+
 
 def ask(
-    system: Model,
+    system: System,
     rows: Sequence[Quantity],
     passes: Sequence[Pass] | None = None,
     *,
@@ -62,7 +74,7 @@ def ask(
 
     Parameters
     ----------
-    system : Model
+    system : System
         Its array parameters span the cells.
     rows : sequence of Quantity
         What to compute.
@@ -113,10 +125,11 @@ def ask(
     return Request(system, grid, tuple(rows), needs, tuple(parts))
 
 
-def needs_of(system: Model, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ...]]:
+def needs_of(system: System, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ...]]:
     """Return the parameters and states on which passes depend, in the end."""
     derived = system.rung.derived
     own = system.formula_inputs() if derived else ()
+    own_names = system.parameters  # of any name, where these are the user's
     needs = {}
     for one in passes:
         found: dict[str, None] = {}
@@ -125,7 +138,7 @@ def needs_of(system: Model, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ...
             name = left.pop()
             if name in derived:
                 found.update(dict.fromkeys(own))
-            elif name in ROWS:
+            elif name in ROWS and name not in own_names:
                 left.extend(reversed(TABLE.pass_of(ROWS[name].group, passes).inputs))
             else:
                 found[name] = None
@@ -133,7 +146,7 @@ def needs_of(system: Model, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ...
     return needs
 
 
-def _missing(system: Model, one: Pass, name: str) -> ParameterError:
+def _missing(system: System, one: Pass, name: str) -> ParameterError:
     way = ", which has no such parameter"
     if name in [parameter.name for parameter in system.declared]:
         way = f"; use system.replace({name}=...)"
@@ -149,7 +162,7 @@ def _taken(grid: Grid, rows: Sequence[Quantity], names: set[str], dims: set[str]
     for name in sorted(names & dims):
         counted = ", ".join(sorted(row.name for row in rows if name in row.dims))
         return ParameterError(
-            f"of: got {name!r} beside {counted}, whose dim has that name; compute them apart"
+            f"of: got {name!r} beside {counted}, whose dim has that name; compute them separately"
         )
     dim = next(dim for dim in grid.sizes if dim in names | dims)
     return ParameterError(
@@ -162,13 +175,13 @@ def _taken(grid: Grid, rows: Sequence[Quantity], names: set[str], dims: set[str]
 
 
 def passes_of(
-    system: Model, rows: Iterable[Quantity], given: Iterable[str] = ()
+    system: System, rows: Iterable[Quantity], given: Iterable[str] = ()
 ) -> tuple[Pass, ...]:
     """Return the passes that compute rows of the table for a system.
 
     Parameters
     ----------
-    system : Model
+    system : System
         The system.
     rows : iterable of Quantity
         What to compute.
@@ -195,7 +208,7 @@ def passes_of(
     )
 
 
-def _whole(one: Pass, system: Model, states: set[str]) -> Pass:
+def _whole(one: Pass, system: System, states: set[str]) -> Pass:
     """Return a line for one system with those that it starts from."""
     lines, missing = TABLE.behind(one, system.rung)
     if missing is not None:
@@ -205,10 +218,10 @@ def _whole(one: Pass, system: Model, states: set[str]) -> Pass:
     return replace(bound, behind=behind) if behind else bound
 
 
-def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
+def refuse(system: System, rungs: set[type[Law]], what: str) -> None:
     """Raise a `ParameterError` that says on which of some rungs a system should stand."""
     plain = {one for one in rungs if not issubclass(one, PerturbedConservative)}
-    own = getattr(system, "system", system).rung  # that of what is perturbed
+    own = (getattr(system, "system", None) or system).rung  # that of what is perturbed
     near = {one for one in plain if issubclass(own, one)}
     tilted = TiltedTrigonometric if issubclass(own, Trigonometric) else TiltedConservative
 
@@ -220,18 +233,8 @@ def refuse(system: Model, rungs: set[type[Law]], what: str) -> None:
     stands_on(system, rung, what, tilted=tilted in rungs)
 
 
-def inputs_of(system: Model, rows: Iterable[Quantity]) -> tuple[Quantity, ...]:
-    """The rows that others are computed from, where labels are numbered: these go along."""
-    rows = tuple(rows)
-    if system.rung.labels_fixed or not all(TABLE.offers(system.rung, row.group) for row in rows):
-        return ()
-    names = (name for one in TABLE.plan(rows, system.rung) for name in one.inputs)
-    found = {ROWS[name]: None for name in names if name in ROWS and ROWS[name] not in rows}
-    return (*found, *inputs_of(system, (*rows, *found))) if found else ()
-
-
 def fitted(
-    system: Model, rows: Sequence[Quantity], passes: Sequence[Pass]
+    system: System, rows: Sequence[Quantity], passes: Sequence[Pass]
 ) -> tuple[Sequence[Quantity], Sequence[Pass]]:
     """Return rows and passes with the labels and words that the system's results have.
 
@@ -241,25 +244,28 @@ def fitted(
         If nothing is left of what was asked for, or the system lacks what it needs.
     """
     kept = [row for row in rows if issubclass(system.rung, row.of)]
+    if not rows:
+        raise bad("system", system, "a system in a potential, for maps", system.answered_by)
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if system.rung.labels_fixed:
         return worded(system, kept), passes
-    from phasekit.cells import numbered  # loads scipy, which named labels do not need
-
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
     labelled |= any(row.group == "equilibria" for row in kept)
     if issubclass(system.rung, TiltedConservative):
         labelled |= any(row.group in ("orbits", "action_angle") for row in kept)
     if issubclass(system.rung, PerturbedConservative) and not labelled:
         return numbered.worded(system, kept), passes  # no equilibrium is looked for
-    counts = [one for one in TABLE.passes if one.groups == ("labels",)]
-    count = max((o for o in counts if issubclass(system.rung, o.of)), key=lambda o: depth(o.of))
-    return numbered.fitted(system, kept, passes, count.bound(system, set(system.parameters)))
+    if not TABLE.offers(system.rung, "equilibria"):  # states of their own, and no labels
+        return kept, passes
+    (search,) = passes_of(system, [ROWS["phi"]])
+    return numbered.fitted(system, kept, passes, search)
 
 
-def worded(system: Model, rows: Sequence[Quantity]) -> Sequence[Quantity]:
-    """Return rows of a system with fixed labels, with what its law alone says of them."""
+def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+    """Return rows with what a system's law alone says of them."""
+    if not system.rung.labels_fixed:
+        return numbered.worded(system, rows)
     if system.rung.words is Law.words:
         return rows
     words: list[Any] = [system.law.words(row.name, row.units, row.long_name) for row in rows]

@@ -15,12 +15,12 @@ import xarray as xr
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 
 
-def dataset_attrs(system: Model) -> dict[str, str]:
+def dataset_attrs(system: System) -> dict[str, str]:
     """Return the attributes of a Dataset: model, schema and versions."""
     return {
         MODEL: type(system).__name__,
@@ -41,7 +41,7 @@ def label_coords(rows: Iterable[Quantity]) -> dict[str, xr.Variable]:
     return coords
 
 
-def input_attrs(system: Model, name: str) -> dict[str, str]:
+def input_attrs(system: System, name: str) -> dict[str, str]:
     """Return long_name and units of a parameter's or state's coordinate."""
     for parameter in system.declared:
         if parameter.name == name:
@@ -58,12 +58,11 @@ _PLACES = (
 )
 
 
-def own_names(system: Model, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
-    """Return places under the name that a system's coordinate has, where that is not phi.
+def own_names(coordinate: str, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
+    """Return places under the name that the coordinate has, where that is not phi.
 
     The same numbers, as coordinates: ``x`` beside ``phi``, ``motion_dx`` beside ``motion_dphi``.
     """
-    coordinate = getattr(system, "coordinate", "phi")
     if coordinate == "phi":
         return {}
     named = {

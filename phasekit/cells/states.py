@@ -15,9 +15,10 @@ import xarray as xr
 from phasekit.cells.evaluate import evaluate
 from phasekit.cells.request import refuse
 from phasekit.errors import ParameterError
+from phasekit.inputs import is_whole
 from phasekit.labels.arguments import Value, bad, numeric, one_of
 from phasekit.labels.coordinates import AXES, LABELS
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass, Quantity, depth
 
@@ -75,12 +76,12 @@ def at_states(
     )
 
 
-def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
+def pass_from(system: System, group: str, start: str, **options: Any) -> Noted:
     """Return the pass that computes a group from a state of another kind, and from options.
 
     Parameters
     ----------
-    system : Model
+    system : System
         The system.
     group : str
         What to compute.
@@ -112,7 +113,7 @@ def pass_from(system: Model, group: str, start: str, **options: Any) -> Noted:
     return one.bound(system, set(), chosen), notes
 
 
-def _option(system: Model, name: str, value: Any) -> int | None:
+def _option(system: System, name: str, value: Any) -> int | None:
     """Return an option as the number that array functions take; None where nothing is said."""
     if name == "side":
         return one_of(name, value, SIDES)
@@ -120,7 +121,7 @@ def _option(system: Model, name: str, value: Any) -> int | None:
         return None
     if system.rung.labels_fixed:
         return one_of(name, value, {"center": CENTERS, "saddle": SADDLES}[name])
-    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value < 0:
+    if not is_whole(value) or value < 0:
         dim = {"center": "equilibrium", "saddle": "saddle"}[name]
         wants = f"a {name}'s number on the dim {dim}, 0 or more, for a {type(system).__name__}"
         raise bad(name, value, wants)

@@ -19,14 +19,14 @@ from phasekit.errors import InvalidCellsWarning, PhasekitError
 from phasekit.version import __version__
 
 COMMANDS = {
-    "demo": "map a real rotor, draw it, store it",
+    "demo": "map a rotor; draw and store the map",
     "portrait": "draw the phase portrait of one system",
-    "basins": "draw where the motions of a damped system end",
-    "run-up": "run a disk up, and draw the forces of its bearings",
+    "basins": "draw the basins of attraction of a damped system",
+    "run-up": "run a disk up and draw its bearing forces",
     "diagram": "draw the equilibria against one parameter",
-    "explore": "write a page with which a system is looked at by hand, and open it",
-    "sweep": "make a map from a TOML file, or go on with it",
-    "info": "say what a stored map is and how complete",
+    "explore": "write the interactive page of a system and open it",
+    "sweep": "compute the map that a TOML file describes, or resume it",
+    "info": "describe a stored map and its progress",
 }
 
 

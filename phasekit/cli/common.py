@@ -18,7 +18,7 @@ from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
 from phasekit.labels.units import UNITS
 from phasekit.systems.registry import models
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 PICTURES = (".pdf", ".png", ".svg")
 
 
-def model_called(name: Any) -> type[Model]:
+def model_called(name: Any) -> type[System]:
     """Return the model of a name."""
     known = models()
     if not isinstance(name, str) or name not in known:
@@ -41,7 +41,7 @@ def read_model(
     description: str,
     argv: Sequence[str],
     more: Callable[[Parser], None],
-) -> tuple[Any, type[Model], Mapping[str, str]]:
+) -> tuple[Any, type[System], Mapping[str, str]]:
     """Parse a command whose options are those of a model.
 
     Returns
@@ -74,7 +74,7 @@ def read_model(
     return options, model, {name: text for name, text in given.items() if text is not None}
 
 
-def build(model: type[Model], given: Mapping[str, str]) -> tuple[Model, list[str]]:
+def build(model: type[System], given: Mapping[str, str]) -> tuple[System, list[str]]:
     """Return the system, and the names of the parameters that are ranges."""
     units = {parameter.name: parameter.units for parameter in model.declared}
     expected = inspect.signature(model).parameters.values()
@@ -189,8 +189,8 @@ def say_invalid(ds: xr.Dataset) -> None:
     invalid = sum(int((counts[tile].values == -1).sum()) for tile in tiles(counts.shape, 1 << 24))
     if invalid:
         say(
-            f"{invalid} of {counts.size} cells are empty, for their parameters are not legal; "
-            "a number without unit is in SI units and radians: write degrees as 40deg"
+            f"{invalid} of {counts.size} cells are empty because their parameters are invalid; "
+            f"numbers without a unit are in SI units and radians: write degrees as 40deg"
         )
 
 

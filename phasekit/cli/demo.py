@@ -32,8 +32,8 @@ def run(argv: Sequence[str]) -> None:
     """Make the map, the picture and the store."""
     parser = Parser(
         prog="phasekit demo",
-        description="Map the equilibria and separatrices of a real rotor over the angle of its "
-        "disk and the distance of its axes; print a summary, write a picture and the map.",
+        description="Map the equilibria and separatrices of a rotor over the angle of its disk "
+        "and the distance of its axes. Prints a summary, and writes a picture and the map.",
     )
     parser.add_argument("--out", default="phasekit-demo", help="folder to write to (%(default)s)")
     parser.add_argument(
@@ -66,9 +66,9 @@ def run(argv: Sequence[str]) -> None:
         f"""
 next, try
   {me} explore --beta 40deg --a 24mm {rotor}
-      move this rotor by sliders, on a page in the browser
+      explore this rotor with sliders, in the browser
   {me} portrait --beta 84deg --a 12mm {rotor} --angles deg --out {shlex.quote(str(one))}
-      draw cell (d) by itself
+      draw cell (d) alone
   {me} info {shown} --units beta=deg,a=mm,e=mm,r=mm,omega1=rpm
       see what the stored map holds; pk.open_map({str(store)!r}) opens it in Python"""
     )

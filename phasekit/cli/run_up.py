@@ -1,4 +1,4 @@
-"""``phasekit run-up``: run a disk up, and draw the forces of its bearings."""
+"""``phasekit run-up``: run a disk up and draw its bearing forces."""
 
 from __future__ import annotations
 

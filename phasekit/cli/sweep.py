@@ -35,7 +35,7 @@ from phasekit.cli.values import between, number
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
 from phasekit.labels.coordinates import STATES
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 KEYS = (
     "model", "store", "of", "chunks", "workers", "scheduler", "dtype", "parameters", "axes",
@@ -58,9 +58,9 @@ def run(argv: Sequence[str]) -> None:
     parser.add_argument("--workers", type=int, help="number of processes (as many as cores)")
     parser.add_argument("--scheduler", help="address of a dask scheduler, tcp://host:8786")
     parser.add_argument(
-        "--estimate", action="store_true", help="say how large and how long, and do nothing"
+        "--estimate", action="store_true", help="print the expected size and time, and stop"
     )
-    parser.add_argument("--force", action="store_true", help="begin even if the disk is too small")
+    parser.add_argument("--force", action="store_true", help="start even if the disk is too small")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing map")
     options = parser.parse_args(argv)
     recipe = read_recipe(common.path_called("FILE.toml", options.file))
@@ -91,7 +91,7 @@ def run(argv: Sequence[str]) -> None:
     _sweep(recipe, system, axes, options)
 
 
-def _sweep(recipe: Mapping[str, Any], system: Model, axes: dict[str, Any], options: Any) -> None:
+def _sweep(recipe: Mapping[str, Any], system: System, axes: dict[str, Any], options: Any) -> None:
     from phasekit import sweep
     from phasekit.maps.sweep import plan_sweep
 
@@ -161,7 +161,7 @@ def read_recipe(path: Path) -> dict[str, Any]:
     return recipe
 
 
-def read_system(recipe: Mapping[str, Any]) -> tuple[Model, dict[str, Any]]:
+def read_system(recipe: Mapping[str, Any]) -> tuple[System, dict[str, Any]]:
     """Return the system of a recipe and its axes, in their order."""
     model = common.model_called(recipe.get("model", "GyroRotorDisk"))
     declared = {parameter.name: parameter.units for parameter in model.declared}

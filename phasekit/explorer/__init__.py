@@ -1,1 +1,1 @@
-"""The explorer: one page with which a system is looked at by hand."""
+"""The explorer: one interactive page of a system."""

@@ -18,7 +18,7 @@ HEIGHT = 900
 
 
 def explore(system: Any) -> Explorer:
-    """Make a page with which a system is looked at by hand.
+    """Build an interactive page of a system.
 
     Phase portrait, potential well, bifurcation diagram and parameter map with the fold curve, with
     a slider for every parameter. A click in the portrait starts an orbit, a click in the map moves
@@ -103,7 +103,7 @@ class Explorer:
         ParameterError
             If the name is not that of a page.
         StoreError
-            If the folder does not exist.
+            If the folder does not exist, or the file cannot be written.
         """
         try:
             target = Path(path)
@@ -113,7 +113,12 @@ class Explorer:
             raise bad("path", path, "the name of a file that ends in .html")
         if not target.parent.is_dir():
             raise StoreError(f"path: the folder {target.parent} does not exist; make it first")
-        target.write_text(self.html, encoding="utf-8")
+        try:
+            target.write_text(self.html, encoding="utf-8")
+        except OSError as error:
+            raise StoreError(
+                f"path: {target} cannot be written: {error.strerror or error}"
+            ) from error
         return target
 
     def __repr__(self) -> str:

@@ -8,13 +8,13 @@ from typing import Any
 from phasekit.explorer.law import is_machine
 from phasekit.laws.ladder import is_turn
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 #: How far a slider goes beyond the value that it starts at, as a multiple of it.
 FACTOR = 2.5
 
 
-def facts_of(system: Model, values: dict[str, float]) -> dict[str, Any]:
+def facts_of(system: System, values: dict[str, float]) -> dict[str, Any]:
     """Return the facts as what JSON can hold.
 
     Examples
@@ -37,7 +37,7 @@ def facts_of(system: Model, values: dict[str, float]) -> dict[str, Any]:
     }
 
 
-def _parameter(parameter: Parameter, values: dict[str, float], system: Model) -> dict[str, Any]:
+def _parameter(parameter: Parameter, values: dict[str, float], system: System) -> dict[str, Any]:
     value = values.get(parameter.name)
     like = [
         abs(values[p.name]) for p in system.declared
@@ -75,7 +75,7 @@ def slider(parameter: Parameter, value: float | None, size: float) -> tuple[floa
     return float(min(low, value if value is not None else low)), float(max(high, value or low))
 
 
-def _python(system: Model) -> dict[str, Any]:
+def _python(system: System) -> dict[str, Any]:
     """Return what stands before and after the parameters where Python makes the system."""
     kind = type(system)
     public = kind.__module__.startswith("phasekit.")

@@ -8,11 +8,11 @@ from phasekit.explorer import javascript
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics import disk_states
 from phasekit.phase.numerical.formula import Shape
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.loads import BORNE
 
 
-def law_of(system: Model) -> str:
+def law_of(system: System) -> str:
     r"""Write a system's law as a JavaScript object.
 
     Of a trigonometric system its coefficients of the parameters, of any other potential V, V' and
@@ -28,12 +28,12 @@ def law_of(system: Model) -> str:
     return _trigonometric(system, law) if isinstance(law, Trigonometric) else _potential(law)
 
 
-def is_machine(system: Model) -> bool:
+def is_machine(system: System) -> bool:
     """Whether a system has all that the forces at its bearings need."""
     return set(BORNE) <= {parameter.name for parameter in system.declared}
 
 
-def _trigonometric(system: Model, law: Trigonometric) -> str:
+def _trigonometric(system: System, law: Trigonometric) -> str:
     import sympy as sp
 
     names: dict[Any, str] = {}

@@ -11,7 +11,7 @@ from typing import Any
 
 from phasekit.explorer.facts import facts_of
 from phasekit.explorer.law import law_of
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 #: In the order in which they stand in the one script.
 SCRIPTS = (
@@ -20,7 +20,7 @@ SCRIPTS = (
 )  # fmt: skip
 
 
-def page(system: Model, parameters: dict[str, float]) -> str:
+def page(system: System, parameters: dict[str, float]) -> str:
     """Return the page of one system as HTML.
 
     Nothing that a user wrote becomes markup or script: names, formulas and values stand in a

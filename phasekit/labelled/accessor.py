@@ -19,7 +19,7 @@ from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
 from phasekit.systems.identity import MODEL, model_name
 from phasekit.systems.registry import model_named
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,12 +47,12 @@ class PhasekitAccessor:
             return f"a Dataset without the attribute {MODEL!r}: not a map that phasekit made"
         return "\n".join([f"map of {ds.attrs[MODEL]}", *described(ds), completeness(ds)])
 
-    def system(self) -> Model:
+    def system(self) -> System:
         """Rebuild the system of this map, or of the selected cells.
 
         Returns
         -------
-        Model
+        System
             The model that made the map; with scalars where single cells are selected, and with
             arrays along the axes that are left.
 

@@ -39,8 +39,8 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     Notes
     -----
     ``w - eps (5 V'''^2/(24 w^5) - V''''/(8 w^3))`` with ``w = sqrt(V'')`` and eps the energy: the
-    expansion of [LandauLifshitz1976] section 28, for [Veljovic2015] (12). `orbits` gives the
-    period without approximation.
+    expansion of [LandauLifshitz1976] section 28, for [Veljovic2015] (12) and any `Potential`.
+    `orbits` gives the period without approximation.
 
     Examples
     --------

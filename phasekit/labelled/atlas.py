@@ -19,7 +19,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.perturbed import PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import Model, as_system, stands_on
+from phasekit.systems.system import System, as_system, stands_on
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import FROM_MOTION
 
@@ -100,7 +100,7 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     return _dataset(system, parameter, curves, meetings)
 
 
-def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
+def single(system: Any, *names: Any) -> tuple[System, dict[str, float]]:
     """Return a system and its parameters, all numbers, that enter the coefficients.
 
     Where `names` are lam and psi, the reduced form of a system that has no such parameters.
@@ -129,7 +129,7 @@ def single(system: Any, *names: Any) -> tuple[Model, dict[str, float]]:
     return system, values
 
 
-def limits(system: Model, parameter: str, argument: str, span: Any) -> tuple[float, float]:
+def limits(system: System, parameter: str, argument: str, span: Any) -> tuple[float, float]:
     """Return the two ends of a span in rising order.
 
     Raises
@@ -146,7 +146,7 @@ def limits(system: Model, parameter: str, argument: str, span: Any) -> tuple[flo
 
 
 def _dataset(
-    system: Model, parameter: str, curves: list[Curve], meetings: list[Meeting]
+    system: System, parameter: str, curves: list[Curve], meetings: list[Meeting]
 ) -> xr.Dataset:
     dims = ("branch", "point")
     names = ("phi", "label", "kind", "energy", "curvature")

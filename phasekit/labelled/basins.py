@@ -11,6 +11,7 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.labelled.driven import perturbed_of
+from phasekit.labelled.motion import checked_tolerances
 from phasekit.labels.arguments import (
     FloatArray,
     NumberLike,
@@ -24,6 +25,7 @@ from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
 from phasekit.motion import attractors as search
 from phasekit.motion import basins as shares
+from phasekit.motion.flow import RTOL
 from phasekit.motion.lost import tell_open
 from phasekit.motion.shares import damping_time
 from phasekit.motion.strobe import check_period, common_period
@@ -39,9 +41,14 @@ STARTS = 16
 
 @state_arguments
 def attractors(
-    perturbed: Any, *, phi: NumberLike, dphi: NumberLike, period: float | None = None
+    perturbed: Any,
+    *,
+    phi: NumberLike,
+    dphi: NumberLike,
+    period: float | None = None,
+    rtol: float | None = None,
 ) -> xr.Dataset:
-    """Attractors to which the motions from a grid of states come, seen once a period.
+    """Attractors of the motions from a grid of states.
 
     Parameters
     ----------
@@ -52,14 +59,18 @@ def attractors(
     period : float, optional
         Time from state to state in s; default: the common period of all that varies, of a system
         without such a quarter of the period of small oscillations, without these 1/damping.
+    rtol : float, optional
+        Error of a step that is allowed, relative to the state; default 1e-10.
 
     Returns
     -------
     xarray.Dataset
         On (``attractor``, ``crossing``): ``attractor_phi``, ``attractor_dphi``, the states of a
         periodic orbit, or the first of a motion that does not repeat itself; on ``attractor``:
-        ``attractor_period``, after so many periods it repeats itself (0: it does not),
-        ``attractor_multiplier``, < 1, and ``attractor_rotation``, the turns in a period.
+        ``attractor_kind`` (`AttractorKind`), ``attractor_period``, after so many periods it repeats
+        itself (0: it does not),
+        ``attractor_multiplier``, <= 1, ``attractor_exponent`` in s^-1 with
+        ``attractor_exponent_error``, and ``attractor_rotation``, the turns in a period.
 
     Raises
     ------
@@ -73,12 +84,16 @@ def attractors(
 
     Notes
     -----
-    Motions are followed until they repeat themselves; Newton's method then finds the fixed point
-    of the q-th power of the Poincare map, q up to 16, and its multipliers, all of a modulus
-    below 1, whether it attracts ([GuckenheimerHolmes1983] section 1.5). What has come to none after
-    4,300 periods, or more where damping is weak, counts as an attractor that does not repeat
-    itself: chaotic, or a rotation in step with nothing. An attractor to which none of the states
-    comes is not found.
+    Of a driven system motions are followed until they repeat themselves; Newton's method then
+    finds the fixed point of the q-th power of the Poincare map, and its multipliers, all of a
+    modulus below 1, whether it attracts ([GuckenheimerHolmes1983] section 1.5). What has come to
+    none after 4,300 periods, or more where damping is weak, is chaotic where its largest exponent
+    is positive by three times its error, and a torus where that is zero within it and its states
+    fill a closed curve; otherwise it is unknown, which a warning says.
+
+    Of a system that does not vary the attractors are the rests of the wells, however slowly motions
+    come to them, and at most one rotation: the fixed point of the map from a speed at an angle to
+    that one turn later. An attractor to which none of the states comes is not found.
 
     Examples
     --------
@@ -90,7 +105,7 @@ def attractors(
     >>> ds.attractor_phi.values.round(6).ravel().tolist()
     [-0.779055, 1.210091]
     """
-    system, found, _ = _searched(perturbed, phi, dphi, period)
+    system, found, _ = _searched(perturbed, phi, dphi, period, rtol)
     tell_open("attractor_phi", found.open)
     return _dataset(system, _attractor_rows(found.result()), {"period": found.leg})
 
@@ -103,6 +118,7 @@ def basins(
     dphi: NumberLike,
     period: float | None = None,
     periods: int = shares.LEGS,
+    rtol: float | None = None,
 ) -> xr.Dataset:
     """Basins of the attractors over a grid of states, and their shares.
 
@@ -116,13 +132,17 @@ def basins(
         As in `attractors`.
     periods : int, default 10000
         Periods after which a motion that came to no attractor is undecided.
+    rtol : float, optional
+        As in `attractors`.
 
     Returns
     -------
     xarray.Dataset
         ``basin`` on (``state_phi``, ``state_dphi``): the number of the attractor, -1 where a
-        motion is undecided, -2 where it runs to infinity; ``basin_time`` in s until the motion is
-        near its attractor; on ``attractor``: ``basin_fraction`` and ``basin_fraction_error``;
+        motion is undecided, -2 where it runs to infinity; ``basin_decided``, whether the errors of
+        the steps stayed smaller than a cell until the motion was caught: elsewhere it is that of a
+        state next to the one given; ``basin_time`` in s until the motion is caught;
+        on ``attractor``: ``basin_fraction`` and ``basin_fraction_error``;
         ``boundary_fraction``, the share of the cells beside another basin; and what `attractors`
         gives.
 
@@ -140,9 +160,12 @@ def basins(
     Notes
     -----
     A motion belongs to an attractor when it comes as near as states on a ring around it were seen
-    to be caught, or, of an attractor that does not repeat itself, when it has been in forty of its
+    to be caught; of a system that does not vary, when its energy is below the barriers of the well,
+    or its speed above that of a turn that ends faster than it began; or, of an
+    attractor that does not repeat itself, when it has been in forty of its
     boxes in succession [DatserisWagemakers2022]. The error of a share p of n states is that of a
-    sample, ``sqrt(p (1 - p)/n)``, and the share of the undecided on top.
+    sample, ``sqrt(p (1 - p)/n)``, and the share of the undecided on top; it is NaN of an attractor
+    of unknown kind, which may be a part of another.
 
     Examples
     --------
@@ -154,7 +177,7 @@ def basins(
     ([-1.156, 1.255], 1.0)
     """
     periods = whole("periods", periods, "a number of periods, >= 1", 1)
-    system, found, grid = _searched(perturbed, phi, dphi, period)
+    system, found, grid = _searched(perturbed, phi, dphi, period, rtol)
     with said(f"following {grid[0].size * grid[1].size:,} motions to their attractors"):
         result = shares.basins(found, *grid, legs=periods)
     tell_open("attractor_phi", found.open)
@@ -166,10 +189,12 @@ def basins(
     coords = dict(zip(dims, grid, strict=True))
     ds = _dataset(system, data, {"period": found.leg}, coords)
     if result.boundary_fraction > shares.COARSE:
+        sure = not any(found.open.values()) and np.isfinite(result.basin_fraction_error).all()
+        held = "; their fractions hold as those of a sample" if sure else ""
         warnings.warn(
             f"basin: {result.boundary_fraction:.0%} of the cells lie beside another basin: a grid "
-            f"of {len(grid[0])} x {len(grid[1])} states is too coarse to show the basins; their "
-            "fractions hold as those of a sample",
+            f"of {len(grid[0])} x {len(grid[1])} states is too coarse to show the basins"
+            f"{held}",
             RuntimeWarning,
             stacklevel=4,
         )
@@ -177,7 +202,7 @@ def basins(
 
 
 def _searched(
-    perturbed: Any, phi: NumberLike, dphi: NumberLike, period: float | None
+    perturbed: Any, phi: NumberLike, dphi: NumberLike, period: float | None, rtol: float | None
 ) -> tuple[Perturbed, search.Search, tuple[FloatArray, FloatArray]]:
     """The attractors of one system, and the grid."""
     system = perturbed_of(perturbed)
@@ -187,6 +212,7 @@ def _searched(
     )
     _, parameters = single(system)
     law = system.law
+    rtol = checked_tolerances(rtol, None).get("rtol", RTOL)
     if not (parameters["damping"] > 0.0 or parameters["quadratic"] > 0.0):
         raise bad(
             "damping", parameters["damping"], "a system with damping > 0 or quadratic > 0",
@@ -206,7 +232,7 @@ def _searched(
              for axis in grid]  # fmt: skip
     states = np.stack(np.meshgrid(*every, indexing="ij"), axis=-1).reshape(-1, 2)
     with said(f"looking for attractors from {len(states)} states"):
-        found = search.find(law, values, leg, states)
+        found = search.find(law, values, leg, states, rtol)
     return system, found, grid
 
 

@@ -15,7 +15,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.atlas import limits, single
 from phasekit.labels.arguments import unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.row import FROM_MOTION
 
 #: What each kind of curve is.
@@ -114,7 +114,7 @@ def bifurcation_set(
     return _dataset(system, plane, pieces, cusps)
 
 
-def _dataset(system: Model, plane: Plane, pieces: list[Piece], cusps: list[Cusp]) -> xr.Dataset:
+def _dataset(system: System, plane: Plane, pieces: list[Piece], cusps: list[Cusp]) -> xr.Dataset:
     x, y = plane.names
     about = {name: input_attrs(system, name) for name in plane.names}
     values = {name: np.full(1, value) for name, value in plane.values.items()}

@@ -19,7 +19,7 @@ from phasekit.labels.arguments import (
     unknown,
 )
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Pass
 
@@ -90,7 +90,7 @@ def critical(system: Any, parameter: str) -> xr.Dataset:
     return ds
 
 
-def _of(system: Model, parameter: str) -> Callable[..., Any]:
+def _of(system: System, parameter: str) -> Callable[..., Any]:
     law = system.trigonometric()
     return lambda **values: fold_values(law, parameter, values)
 

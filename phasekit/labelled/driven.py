@@ -11,9 +11,9 @@ import xarray as xr
 
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states
+from phasekit.inputs import refuse_call
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
 from phasekit.labels.arguments import (
-    NumberLike,
     bad,
     number,
     numeric,
@@ -21,6 +21,7 @@ from phasekit.labels.arguments import (
     whole,
 )
 from phasekit.labels.coordinates import LABELS
+from phasekit.laws.equations import equations_of
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
 from phasekit.systems.perturbed import Perturbed
@@ -47,22 +48,24 @@ def perturbed_of(system: Any) -> Perturbed:
 
 @state_arguments
 def stroboscopic(
-    perturbed: Any,
-    phi0: NumberLike,
-    dphi0: NumberLike,
+    system: Any,
+    phi0: Any = None,
+    dphi0: Any = None,
     *,
     n: int,
+    x0: Any = None,
     skip: int = 0,
     period: float | None = None,
     rtol: float | None = None,
     atol: float | None = None,
+    **states: Any,
 ) -> xr.Dataset:
     """States of motions once a period of the drive.
 
     Parameters
     ----------
-    perturbed : Perturbed
-        A system with damping and drive.
+    system : Perturbed, or forced Problem
+        A system with damping and drive, or any flow with a period.
     phi0, dphi0 : float, 1-D array_like or xarray.DataArray
         States at t = 0: angles in rad, angular velocities in s^-1.
     n : int
@@ -71,14 +74,19 @@ def stroboscopic(
         Periods before the first of them; 0: the first is the state at t = 0.
     period : float, optional
         Time from state to state in s; default: the common period of all that varies.
+    x0 : mapping, sequence or xarray.DataArray, optional
+        States at t = 0 of a `Problem`, as in `flow`.
     rtol, atol : float, optional
         As in `flow`.
+    **states
+        The states of a `Problem` by name, in place of `x0`.
 
     Returns
     -------
     xarray.Dataset
         On the dim ``crossing``: ``section_time`` in s, ``section_phi`` in rad in (-pi, pi], and
-        ``section_dphi`` in s^-1; ``rotation_number``, the turns in a period (NaN on a line).
+        ``section_dphi`` in s^-1; ``rotation_number``, the turns in a period (NaN on a line). Of a
+        `Problem` ``section_`` and the name of each state.
 
     Raises
     ------
@@ -100,7 +108,6 @@ def stroboscopic(
     >>> pk.stroboscopic(driven, 1.0, 0.0, n=2, skip=200).section_phi.values.round(8)
     array([1.21009082, 1.21009082])
     """
-    system = perturbed_of(perturbed)
     n = whole("n", n, "a number of states, >= 1", 1)
     skip = whole("skip", skip, "a number of periods, >= 0", 0)
     if period is not None:
@@ -108,15 +115,27 @@ def stroboscopic(
         period = number("period", period, wants, "s")
         if not period > 0.0:
             raise bad("period", period, wants)
+    found = as_system(system)
+    if (law := equations_of(found)) is not None:
+        from phasekit.labelled.flows import sections_of
+
+        given = (phi0, dphi0) if x0 is None and dphi0 is not None else phi0
+        start, tolerances = given if x0 is None else x0, checked_tolerances(rtol, atol)
+        return sections_of(found, law, start, states, n, skip, period, tolerances)
+    needed = {"phi0": phi0, "dphi0": dphi0}
+    refuse_call(stroboscopic, states, [name for name, value in needed.items() if value is None])
+    if x0 is not None:
+        raise bad("x0", x0, "nothing for a system whose state is phi0, dphi0")
+    perturbed = perturbed_of(found)
     options = {"n": n, "skip": skip, "period": period, **checked_tolerances(rtol, atol)}
     names = ("section_time", "section_phi", "section_dphi", "rotation_number")
     labels = {**LABELS, "crossing": (range(skip, skip + n), "number of the period")}
     rows = [replace(ROWS[name], labels=labels) for name in names]
-    function = functools.partial(_sections, system.law, **options)
-    one = Pass(function, (*system.parameters, *STATE), ("stroboscopic",), PerturbedConservative)
-    states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
+    function = functools.partial(_sections, perturbed.law, **options)
+    one = Pass(function, (*perturbed.parameters, *STATE), ("stroboscopic",), PerturbedConservative)
+    at = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
     with said(f"following motions for {skip + n:,} periods"):
-        return at_states(system, rows, states, (one,))
+        return at_states(perturbed, rows, at, (one,))
 
 
 def _sections(law: PerturbedConservative, *arrays: Any, **options: Any) -> Any:
@@ -127,27 +146,42 @@ def _sections(law: PerturbedConservative, *arrays: Any, **options: Any) -> Any:
 
 @state_arguments
 def lyapunov(
-    perturbed: Any,
-    phi0: NumberLike,
-    dphi0: NumberLike,
+    system: Any,
+    phi0: Any = None,
+    dphi0: Any = None,
     *,
-    time: NumberLike,
+    x0: Any = None,
+    duration: Any = None,
+    n: Any = None,
+    count: int | None = None,
+    time: Any = None,
     rtol: float | None = None,
     atol: float | None = None,
+    **states: Any,
 ) -> xr.Dataset:
-    """Lyapunov exponents of motions: how fast neighbours part, or come together.
+    """Lyapunov exponents of motions: rates at which neighbouring motions separate.
 
     Parameters
     ----------
-    perturbed : Perturbed
-        A system with damping and drive.
+    system : Perturbed, Problem, or system that states rates or a step
+        A system with damping and drive, any flow, or a map.
     phi0, dphi0 : float, 1-D array_like or xarray.DataArray
         States at t = 0: angles in rad, angular velocities in s^-1.
-    time : float, 1-D array_like or xarray.DataArray
+    x0 : mapping, sequence or xarray.DataArray, optional
+        States at t = 0 of a `Problem`, as in `flow`; ``lyapunov(problem, x0)`` does as well.
+    duration : float, 1-D array_like or xarray.DataArray
         Time over which tangent vectors grow, in s, > 0; its first tenth is not counted. A bare
         array makes the dim ``time``, on which the convergence shows.
+    n : int, 1-D array_like or xarray.DataArray
+        Of a map the number of iterations in place of a duration, at least 100.
+    count : int, optional
+        Of a `Problem` how many exponents, the largest first; by default all.
+    time : float, 1-D array_like or xarray.DataArray, optional
+        The same as `duration`.
     rtol, atol : float, optional
         As in `flow`.
+    **states
+        The states of a `Problem` by name, in place of `x0`.
 
     Returns
     -------
@@ -155,7 +189,8 @@ def lyapunov(
         On ``exponent``: ``lyapunov_exponent`` in s^-1, the largest first, and its
         ``lyapunov_error``. ``lyapunov_sum``, which is -damping where there is no quadratic
         damping, as a check (of a `FreeGyroRotor` the mean of -damping M22/M, M the inertia at the
-        momentum).
+        momentum). Of a `Problem` also ``lyapunov_dimension``; the sum is the mean of the divergence
+        of f, and NaN unless all exponents are computed.
 
     Raises
     ------
@@ -166,27 +201,52 @@ def lyapunov(
     -----
     Tangent vectors move by the variational equation along with the motion, made orthonormal again
     and again [BenettinGalganiGiorgilliStrelcyn1980]. The error is estimated from the spread and
-    the trend of the growth over parts of the time; it falls as the time grows.
+    the trend of the growth over parts of the time; it falls as the time grows. The dimension is
+    ``k + (l_1 + ... + l_k)/|l_(k+1)|`` of the exponents l, with the greatest k whose sum is not
+    negative.
 
     Examples
     --------
     >>> import phasekit as pk
     >>> well = pk.Potential("x^4/4 - x^2/2", "x")
     >>> driven = pk.Perturbed(well, damping=0.25, forcing=pk.Harmonic(0.4, 1.0))
-    >>> ds = pk.lyapunov(driven, 0.1, 0.0, time=2000.0)
+    >>> ds = pk.lyapunov(driven, 0.1, 0.0, duration=2000.0)
     >>> bool(ds.lyapunov_exponent[0] > 0.1), abs(ds.lyapunov_sum.item() + 0.25) < 1e-8
     (True, True)
+    >>> henon = pk.Problem(
+    ...     {"x": "1 - a*x^2 + y", "y": "b*x"}, parameters={"a": 1.4, "b": 0.3}, map=True
+    ... )
+    >>> round(pk.lyapunov(henon, [0.1, 0.1], n=100_000).lyapunov_sum.item(), 9)  # ln 0.3
+    -1.203972804
     """
-    system = perturbed_of(perturbed)
+    found = as_system(system)
+    law = equations_of(found)
+    if duration is not None and time is not None:
+        raise bad("time", time, "None beside duration")
+    length = time if duration is None else duration
+    called = "duration" if time is None else "time"
+    if law is not None:
+        given = (phi0, dphi0) if x0 is None and dphi0 is not None else phi0
+        start = given if x0 is None else x0
+        from phasekit.labelled.flows import exponents_of
+
+        tolerances = checked_tolerances(rtol, atol)
+        return exponents_of(found, law, start, states, (called, length), n, count, tolerances)
+    needed = {"phi0": phi0, "dphi0": dphi0, called: length}
+    refuse_call(lyapunov, states, [name for name, value in needed.items() if value is None])
+    for name, value in {"x0": x0, "n": n, "count": count}.items():
+        if value is not None:
+            raise bad(name, value, "nothing for a system whose state is phi0, dphi0")
+    perturbed = perturbed_of(found)
     wants = "times in s, > 0"
-    if np.any(np.asarray(numeric("time", time, "s", wants)) <= 0.0):
-        raise bad("time", time, wants)
+    if np.any(np.asarray(numeric(called, length, "s", wants)) <= 0.0):
+        raise bad(called, length, wants)
     rows = select("lyapunov")
-    (one,) = passes_of(system, rows)
+    (one,) = passes_of(perturbed, rows)
     tolerances = checked_tolerances(rtol, atol)
     one = replace(one, function=functools.partial(one.resolved, **tolerances))
-    states = {
-        "phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "time": ("time", time)
+    at = {
+        "phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), called: ("time", length)
     }  # fmt: skip
-    with said("following motions and what lies beside them"):
-        return at_states(system, rows, states, (one,))
+    with said("following motions and their tangent vectors"):
+        return at_states(perturbed, rows, at, (one,))

@@ -16,13 +16,13 @@ from phasekit.motion.method import unit_of
 from phasekit.motion.prescribed import span
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.driven_rotor import event_of
-from phasekit.systems.system import Model, single
+from phasekit.systems.system import System, single
 
 ARGUMENTS = ("t", "phi", "dphi")
 
 
 def with_events(
-    ds: xr.Dataset, system: Model, events: Any, tolerances: Mapping[str, Any]
+    ds: xr.Dataset, system: System, events: Any, tolerances: Mapping[str, Any]
 ) -> xr.Dataset:
     """Add the events on one motion, and end it where they say so.
 

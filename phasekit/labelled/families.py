@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from phasekit.cells.states import at_states
-from phasekit.errors import EquilibriumKind, ParameterError, Topology
+from phasekit.errors import ParameterError
 from phasekit.labelled.numerical_families import families_of_any
 from phasekit.labels.arguments import (
-    FloatArray,
     call_checked,
     number,
     whole,
@@ -21,25 +20,15 @@ from phasekit.labels.arguments import (
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import TiltedConservative, TiltedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.perturbation.tilted_families import TiltedFamilies
-from phasekit.perturbation.tilted_families import families as tilted_families
-from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
-from phasekit.phase.exact.separatrices import phase_space
-from phasekit.systems.system import Model, as_system
+from phasekit.phase.families import (
+    Families,
+    TorquedFamilies,
+    families,
+    families_under_torque,
+)
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Pass
-
-#: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
-CLUSTER = 4
-
-
-class Families(NamedTuple):
-    """Orbits of each family; the last axis is the family."""
-
-    energy_level: FloatArray
-    period: FloatArray
-    frequency: FloatArray
-    action: FloatArray
 
 
 @call_checked
@@ -106,7 +95,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
                 f"{name}: got the dim 'level', which the result has; rename it with "
                 ".rename(level=...)"
             )
-    names = TiltedFamilies._fields if tilted else Families._fields
+    names = TorquedFamilies._fields if tilted else Families._fields
     rows = [replace(ROWS[name], group="orbit_families", dims=("family",)) for name in names]
     one = Pass(functools.partial(families, top), ("A", "B", "C", "level"), ("orbit_families",))
     if tilted:
@@ -118,7 +107,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     return ds.transpose(..., "family", "level")
 
 
-def with_families(system: Any, what: str) -> Model:
+def with_families(system: Any, what: str) -> System:
     """Return a system whose orbits are in families from one separatrix to the next.
 
     Raises
@@ -130,55 +119,3 @@ def with_families(system: Any, what: str) -> Model:
     if issubclass(found.rung, (TiltedTrigonometric, TiltedConservative)):
         return found
     return as_system(found, rung=Conservative, what=what)
-
-
-def families_under_torque(
-    energy_max: float | None, law: TiltedTrigonometric, *inputs: FloatArray
-) -> TiltedFamilies:
-    """The same families where a torque may act; what rotates there has no period."""
-    *parameters, level = np.broadcast_arrays(*inputs)
-    values = law.values(*parameters)
-    A, B, C = law.coefficients(values)
-    still = families(energy_max, A, B, C, level)
-    errors = (np.where(np.isnan(x), np.nan, 0.0) for x in (still.period, still.action))
-    fields = [np.array(x) for x in (*still, *errors)]
-    tilted = np.broadcast_to(values["torque"] != 0.0, level.shape)
-    if tilted.any():
-        found = tilted_families(law, *(x[tilted] for x in (*parameters, level)))
-        for field, values_ in zip(fields, found, strict=True):
-            field[tilted] = values_
-    return TiltedFamilies(*fields)
-
-
-def families(
-    energy_max: float | None, A: FloatArray, B: FloatArray, C: FloatArray, level: FloatArray
-) -> Families:
-    """Orbits at levels between 0 and 1 of the families lower_well, upper_well, outer, rotation."""
-    points, loops = phase_space(A, B, C)
-    _, low, _, high = np.moveaxis(points.energy, -1, 0)  # center, saddle, center, saddle
-    *rise, step, whole = np.moveaxis(energy_rises(A, B, C), -1, 0)
-    above = whole if energy_max is None else energy_max - high
-    up, down = level**CLUSTER, (1.0 - level) ** CLUSTER
-    near, far = 2.0 ** (CLUSTER - 1) * up, 2.0 ** (CLUSTER - 1) * down
-    under = level < 0.5  # of an outer orbit: nearer to the lower saddle
-    gaps = (-rise[0] * down, -rise[1] * down, step * np.where(under, near, -far), above * up)
-    eight = loops.topology == Topology.FIGURE_EIGHT
-    present = (rise[0] > 0.0, rise[1] > 0.0, eight & (step > 0.0), above > 0.0)
-    first = np.where(points.kind[..., 1] == EquilibriumKind.SADDLE, 0, 1)  # where the wells end
-    saddles = (first, first, np.where(under, 0, 1), 1)
-    # To the right of the lower saddle: the center that comes before the upper saddle.
-    way = (points.phi - points.phi[..., 1:2]) % (2.0 * np.pi)
-    right = np.where(way[..., 0] < way[..., 3], 1, 0)
-    sides = (right, 1 - right, 1, 1)
-    gap, saddle, side, there = (
-        np.stack(np.broadcast_arrays(*parts, level), axis=-1)[..., :-1]
-        for parts in (gaps, saddles, sides, present)
-    )
-    gap = np.where(there, gap, np.nan)
-    a, b, c = (np.asarray(x)[..., None] for x in (A, B, C))
-    found = orbits_at_gap(a, b, c, gap, saddle.astype(int), side.astype(int))
-    base = np.where(saddle == 1, high[..., None], low[..., None])
-    absent = np.isnan(found.period)
-    return Families(
-        np.where(absent, np.nan, base + gap), found.period, found.frequency, found.action
-    )

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import ParameterError
+from phasekit.errors import Loop, ParameterError
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad, pair, unknown, whole
 from phasekit.labels.grid import LABEL_DTYPE, refuse_too_large, variable
-from phasekit.systems.system import Model, as_system
+from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.functions import number_of_equilibria as number
+from phasekit.phase.numerical.functions import topology
+from phasekit.systems.system import System, as_system
 
-_PARTS = 33
+#: Places at which an event is looked for at once: where those next to it take long, few.
+_PARTS, _FEW = 33, 9
+#: Of a potential: width of the path on which a fold is the only event, and that of rounding, in
+#: which marks come and go.
+_ONE, _ROUNDING = 1e-8, 1e-14
 
 
 def figure_eights(
@@ -33,7 +41,8 @@ def figure_eights(
         Parameter -> (first, last value), a straight way, or a function of the places on the path,
         an array from 0 to 1.
     n : int, default 401
-        Number of places. Two events between neighboring places that cancel are not seen.
+        Number of places. Two events between neighboring places that cancel are not seen. Of a
+        `Potential`, what happens within 1e-8 of the path beside a fold counts as this fold.
 
     Returns
     -------
@@ -70,18 +79,18 @@ def figure_eights(
     s = np.linspace(0.0, 1.0, n)
     ds = separatrices(_at(system, ways, s))
     marks = _marks(system, ways, s)
-    invalid = np.flatnonzero(marks[:, 2] < 0)
-    if invalid.size:
+    invalid = [i for i, mark in enumerate(marks) if mark.number < 0]
+    if invalid:
         place = s[invalid[:1]]
         got = ", ".join(f"{name} = {way(place)[0]:.6g}" for name, way in ways.items())
         raise ParameterError(f"path: got {got}, wants values that {type(system).__name__} can have")
-    found: list[tuple[float, tuple[Any, ...], tuple[Any, ...]]] = []
-    for i in np.flatnonzero(np.any(marks[1:] != marks[:-1], axis=1)):
+    found: list[Event] = []
+    for i in _events(marks):
         found.extend(_narrow(system, ways, float(s[i]), float(s[i + 1])))
     return _with_events(ds, ways, s, _merged(found))
 
 
-def _ways(system: Model, path: Any) -> dict[str, Callable[[FloatArray], FloatArray]]:
+def _ways(system: System, path: Any) -> dict[str, Callable[[FloatArray], FloatArray]]:
     if not isinstance(path, Mapping) or not path:
         raise bad("path", path, "a mapping: parameter -> (first, last), or a function of 0 to 1")
     names = [parameter.name for parameter in system.declared]
@@ -110,8 +119,8 @@ def _straight(first: float, last: float, s: FloatArray) -> FloatArray:
 
 
 def _at(
-    system: Model, ways: Mapping[str, Callable[[FloatArray], FloatArray]], s: FloatArray
-) -> Model:
+    system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], s: FloatArray
+) -> System:
     changes = {name: xr.DataArray(way(s), dims="path") for name, way in ways.items()}
     for name, values in changes.items():
         if not np.isfinite(values.values).all():
@@ -119,62 +128,134 @@ def _at(
     return system.replace(**changes)
 
 
+class Mark(NamedTuple):
+    """What changes at an event: topology, number of equilibria, loops of the saddles."""
+
+    topology: int
+    eight: bool
+    number: int
+    loops: tuple[int, ...]
+    places: tuple[float, ...] = ()
+    period: float | None = None
+
+    def differs(self, other: Mark) -> bool:
+        """Whether something has happened between two neighboring places of the path."""
+        if self[:3] != other[:3] or len(self.loops) != len(other.loops):
+            return True
+        if self.period is None or not self.loops:
+            return self.loops != other.loops
+        # On a circle a saddle that passes the cut goes from one end of the row to the other.
+        ways = np.subtract.outer(self.places, other.places) / self.period
+        apart = np.abs(ways - np.round(ways))
+        n = len(self.loops)
+        rows = np.arange(n)
+        shift = int(np.argmin([apart[rows, (rows + k) % n].sum() for k in range(n)]))
+        return self.loops != tuple(other.loops[(i + shift) % n] for i in range(n))
+
+
 def _marks(
-    system: Model, ways: Mapping[str, Callable[[FloatArray], FloatArray]], s: FloatArray
-) -> Any:
-    """What changes at an event: topology, number of equilibria, which saddle is the lower one."""
+    system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], s: FloatArray
+) -> list[Mark]:
     at = _at(system, ways, s)
-    ds = separatrices(at)
-    count = equilibria(at).n_equilibria.values
-    columns = [ds.topology.values, ds.figure_eight.values, count]
-    if system.rung.labels_fixed:
-        A, B, C = (np.broadcast_to(np.asarray(x), s.shape) for x in at.coefficients())
-        side = np.where(A > 0.0, np.sign(B), 2.0 * np.sign(C))
-        columns.append(np.where(ds.figure_eight.values, side, 0.0))
-    else:  # saddles keep their numbers
-        columns.extend(np.moveaxis(ds.loop.transpose("path", "saddle").values, 1, 0))
-    return np.stack([np.asarray(column, dtype=float) for column in columns], axis=1)
+    if isinstance(at.law, Formula):  # areas, which take longest, change nothing
+        points, found = topology(at.law, *_values(at, s))
+        columns: Any = found.topology, found.figure_eight, points.n_equilibria
+        loops, places = found.loop, found.saddle_phi
+    else:
+        ds = separatrices(at)
+        columns = ds.topology.values, ds.figure_eight.values, equilibria(at).n_equilibria.values
+        if system.rung.labels_fixed:
+            A, B, C = (np.broadcast_to(np.asarray(x), s.shape) for x in at.coefficients())
+            side = np.where(A > 0.0, np.sign(B), 2.0 * np.sign(C))
+            eights = np.where(ds.figure_eight.values, side, 0.0)
+            return [Mark(a, b, c, (d,)) for a, b, c, d in zip(*columns, eights, strict=True)]
+        loops = ds.loop.transpose("path", "saddle").values
+        places = ds.saddle_phi.transpose("path", "saddle").values
+    period = getattr(system, "period", None)
+    there = loops != Loop.ABSENT
+    return [
+        Mark(a, b, c, tuple(loop[own]), tuple(place[own]), period)
+        for a, b, c, loop, place, own in zip(*columns, loops, places, there, strict=True)
+    ]
+
+
+#: Where something happens, and what is found before and after.
+Event: TypeAlias = tuple[float, Mark, Mark]
+
+
+def _events(marks: Sequence[Mark]) -> list[int]:
+    """The places after which something happens."""
+    return [i for i, pair in enumerate(itertools.pairwise(marks)) if pair[0].differs(pair[1])]
 
 
 def _narrow(
-    system: Model, ways: Mapping[str, Callable[[FloatArray], FloatArray]], low: float, high: float
-) -> list[tuple[float, tuple[Any, ...], tuple[Any, ...]]]:
+    system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], low: float, high: float
+) -> list[Event]:
     """Events between two places, each to rounding: (place, mark before, mark after)."""
-    if high - low <= 4.0 * np.spacing(high):
+    least = 4.0 * np.spacing(high) if system.rung.labels_fixed else _ROUNDING
+    if high - low <= least:
         marks = _marks(system, ways, np.array([low, high]))
-        return [(0.5 * (low + high), tuple(marks[0]), tuple(marks[1]))]
-    s = np.linspace(low, high, _PARTS)
+        return [(0.5 * (low + high), marks[0], marks[1])]
+    s = np.linspace(low, high, _PARTS if system.rung.labels_fixed else _FEW)
     marks = _marks(system, ways, s)
-    found = []
-    for i in np.flatnonzero(np.any(marks[1:] != marks[:-1], axis=1)):
+    found: list[Event] = []
+    if (
+        high - low < _ONE
+        and marks[0].number != marks[-1].number
+        and isinstance(system.law, Formula)
+    ):
+        place = _count_changes(system, ways, low, high)
+        return [(place, marks[0], marks[-1])]
+    for i in _events(marks):
         found.extend(_narrow(system, ways, float(s[i]), float(s[i + 1])))
     return found
 
 
+def _count_changes(
+    system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], low: float, high: float
+) -> float:
+    """Where the number of equilibria changes between two places, to rounding."""
+    while high - low > _ROUNDING:
+        s = np.linspace(low, high, _FEW)
+        at = _at(system, ways, s)
+        law: Any = at.law
+        count = number(law, *_values(at, s))
+        i = int(np.flatnonzero(count[1:] != count[0])[0])
+        low, high = float(s[i]), float(s[i + 1])
+    return 0.5 * (low + high)
+
+
+def _values(system: System, s: FloatArray) -> list[FloatArray]:
+    """Values of the parameters of a formula, one a place."""
+    given = system.parameters
+    own = [system.in_domain(name, np.asarray(given[name])) for name in system.formula_inputs()]
+    return list(np.broadcast_arrays(s, *own)[1:])
+
+
 def _merged(
-    found: list[tuple[float, tuple[Any, ...], tuple[Any, ...]]],
-) -> list[tuple[float, tuple[Any, ...], tuple[Any, ...]]]:
+    found: list[Event],
+) -> list[Event]:
     """Events at one place as one: from the first mark to the last."""
-    kept: list[tuple[float, tuple[Any, ...], tuple[Any, ...]]] = []
+    kept: list[Event] = []
     for place, before, after in sorted(found, key=lambda one: one[0]):
         if kept and place - kept[-1][0] < 1e-12:
             kept[-1] = (kept[-1][0], kept[-1][1], after)
         else:
             kept.append((place, before, after))
-    return [one for one in kept if one[1] != one[2]]
+    return [one for one in kept if one[1].differs(one[2])]
 
 
 def _with_events(
     ds: xr.Dataset,
     ways: Mapping[str, Callable[[FloatArray], FloatArray]],
     s: FloatArray,
-    found: list[tuple[float, tuple[Any, ...], tuple[Any, ...]]],
+    found: list[Event],
 ) -> xr.Dataset:
     place = np.array([one[0] for one in found])
     kinds, changes = [], []
     for _, before, after in found:
-        kinds.append("fold" if before[2] != after[2] else "heteroclinic")
-        eight = bool(before[1]), bool(after[1])
+        kinds.append("fold" if before.number != after.number else "heteroclinic")
+        eight = bool(before.eight), bool(after.eight)
         changes.append(
             {(False, True): "birth", (True, False): "death", (True, True): "exchange"}.get(
                 eight, "none"

@@ -10,18 +10,22 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.request import ask
+from phasekit.errors import StoreError
 from phasekit.labelled.accessor import PhasekitAccessor
 from phasekit.labelled.described import described
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import human
+from phasekit.maps import files
 from phasekit.maps.estimate import Estimate
 from phasekit.maps.job import Job
+from phasekit.maps.keys import SEAL
 from phasekit.maps.left import Left
 from phasekit.maps.marks import marks_of
+from phasekit.maps.netcdf import has_digest
 from phasekit.maps.place import Place, place_of
 from phasekit.maps.plan import Plan
 from phasekit.maps.stored_arrays import read_plan
-from phasekit.maps.unfinished import COMPUTED
+from phasekit.maps.unfinished import COMPUTED, read_far
 from phasekit.maps.whole import open_map
 from phasekit.systems.identity import SCHEMA
 
@@ -36,6 +40,7 @@ class MapInfo:
     done: dict[str, tuple[int, int]]  # tiles that are done and all tiles, by part
     size: int | None  # bytes on the disk
     left: Estimate | None  # None where nothing is left
+    checked: bool = False  # whether a map that was written in one go has checksums
     units: Mapping[str, str] = field(default_factory=dict)  # in which inputs are shown
 
     @property
@@ -45,15 +50,27 @@ class MapInfo:
 
     @property
     def verdict(self) -> str:
-        """What is known of a map in which no damage was found."""
-        if any(variable.encoding.get("fletcher32") for variable in self.ds.variables.values()):
-            return "verified: the arrays are as they were written"
+        """What is known of a map in which no damage was found.
+
+        Raises
+        ------
+        StoreError
+            If it was written in one go without checksums, so that nothing is known.
+        """
         without = "all files can be read; they have no checksums"
-        if self.plan is None or not any(part.checked for part in self.plan.parts):
+        if self.plan is None:
+            if not self.checked:
+                raise StoreError(
+                    f"store: {self.name} cannot be verified: {without}; compute it again with this "
+                    "version of phasekit"
+                )
+            return "verified: the arrays are as they were written"
+        if not any(part.checked for part in self.plan.parts):
             return f"verified: {without}"
         some = [name for part in self.plan.parts if not part.checked for name in part.quantities]
         tiles = sum(self.done[part.name][0] for part in self.plan.parts if part.checked)
         more = f"; of {', '.join(some)} {without}" if some else ""
+        more += "" if self.plan.root else "; zarr.json, of earlier versions, has no checksum"
         return f"verified: {tiles:,} tiles are as they were written{more}"
 
     def __str__(self) -> str:
@@ -96,14 +113,20 @@ def map_info(store: Any, *, verify: bool = False) -> MapInfo:
         size = place.size() if not place.is_netcdf else None
         if place.path is not None and place.path.is_file():
             size = place.path.stat().st_size
-            return MapInfo(place.name, ds, None, {}, size, None)
+            return MapInfo(place.name, ds, None, {}, size, None, has_digest(place.path))
         source = place.open(read_only=True)
         plan = read_plan(source)
         if plan is None:
-            return MapInfo(place.name, ds, None, {}, size, None)
+            sealed = files.read(source, SEAL) is not None
+            return MapInfo(place.name, ds, None, {}, size, None, sealed)
         done, left = {}, []
         values = {name: ds[name].variable for name in (*plan.arrays, *plan.scalars)}
+        finished = read_far(source, plan) is not None
         for part in plan.parts:
+            if finished:
+                tiles = prod(part.grid(plan.sizes))
+                done[part.name] = tiles, tiles
+                continue
             one = Left(plan, part, marks_of(source, plan, part, values))
             tiles = prod(one.grid)
             done[part.name] = tiles - len(one), tiles

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from phasekit.cells.request import passes_of
@@ -19,7 +20,7 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import NumberLike, bad, numeric, one_of, state_arguments
 from phasekit.labels.conversion import in_si
 from phasekit.systems.disk import GyroRotorDisk
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import System, as_system
 from phasekit.table.loads import DISK
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
@@ -216,7 +217,7 @@ def fixed_bearing_forces(
 
 def _states(
     disk: Any, phi: Any, dphi: Any, ddphi: Any, domega1: Any
-) -> tuple[Model, dict[str, tuple[str, Any]]]:
+) -> tuple[System, dict[str, tuple[str, Any]]]:
     """The disk, and its states by argument; a motion also tells how the support moves."""
     system = as_system(disk)
     if not is_disk(system):
@@ -247,7 +248,7 @@ def _states(
     return system, states
 
 
-def is_disk(system: Model) -> bool:
+def is_disk(system: System) -> bool:
     """Whether a system has all that a machine with a disk has."""
     return set(DISK) <= {parameter.name for parameter in system.declared}
 
@@ -257,7 +258,7 @@ def _is_zero(value: Any) -> bool:
 
 
 def _at(
-    system: Model,
+    system: System,
     rows: tuple[Quantity, ...],
     states: Mapping[str, tuple[str, Any]],
     **keywords: Any,
@@ -279,7 +280,7 @@ def _in_carrier(row: Quantity) -> Quantity:
 
 def on_map(
     ds: xr.Dataset,
-    system: Model,
+    system: System,
     what: str,
     on: str,
     phi0: NumberLike | None,
@@ -311,11 +312,32 @@ def on_map(
     found = found.rename({row.name: row.name.removeprefix(prefix) for row in rows})
     kept = {dim: str(ds[dim].values) for dim in SELECTED if dim in ds.coords and not ds[dim].ndim}
     kept = {dim: label for dim, label in kept.items() if dim in found.dims}
-    found = found.sel(kept)
+    found = _with_labels(found, ds, {"phi0": phi0, "dphi0": dphi0}).sel(kept)
     return found.sel({dim: ds[dim].values for dim in SELECTED if dim in found.dims and dim in ds})
 
 
-def chunked_as(system: Model, ds: xr.Dataset) -> Model:
+def _with_labels(found: xr.Dataset, ds: xr.Dataset, given: Mapping[str, Any]) -> xr.Dataset:
+    """Return loads with the labels of a map on dims that its states share.
+
+    States that have none there follow the order of the map's, if they are as many.
+    """
+    for dim in SELECTED:
+        if dim not in found.dims or dim not in ds.coords:
+            continue
+        labels = np.atleast_1d(ds[dim].values)
+        if dim not in found.coords and ds[dim].ndim and labels.size == found.sizes[dim]:
+            found = found.assign_coords({dim: ds[dim]})
+        elif dim not in found.coords or not set(labels) <= set(found[dim].values):
+            name = next(name for name, value in given.items() if dim in getattr(value, "dims", ()))
+            listed = ", ".join(map(str, labels))
+            raise bad(
+                name, given[name], f"the map's labels along {dim}, {listed}",
+                f"give them by .assign_coords({dim}=[...]), or call the dim otherwise",
+            )  # fmt: skip
+    return found
+
+
+def chunked_as(system: System, ds: xr.Dataset) -> System:
     """The system with its arrays chunked as the variables of a Dataset are, if they are."""
     chunks = ds.chunksizes
     lazy = {}

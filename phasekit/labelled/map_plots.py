@@ -10,7 +10,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.pictures import picture
 from phasekit.systems.identity import model_name
 from phasekit.systems.registry import model_named
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 
 class MapPlots:
@@ -217,11 +217,11 @@ class MapPlots:
         """
         return picture("bearing_load_map")(self._ds, variable, **options)
 
-    def _cell_or_motion(self) -> Model | xr.Dataset:
+    def _cell_or_motion(self) -> System | xr.Dataset:
         along = {"motion_phi", "hodograph_u", "force"} & set(self._ds.data_vars)
         return self._ds if along and "time" in self._ds.dims else self._cell()
 
-    def _cell(self) -> Model:
+    def _cell(self) -> System:
         system = model_named("ds", model_name(self._ds)).from_dataset(self._ds)
         axes = [name for name, value in system.parameters.items() if not isinstance(value, float)]
         if axes:

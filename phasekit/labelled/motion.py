@@ -14,6 +14,7 @@ import xarray as xr
 
 from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states, pass_from
+from phasekit.inputs import refuse_call
 from phasekit.labelled.orbits import noted
 from phasekit.labels.arguments import (
     NumberLike,
@@ -22,26 +23,30 @@ from phasekit.labels.arguments import (
     number,
     state_arguments,
 )
+from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Conservative
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.numerics.waits import said
 from phasekit.systems.perturbed import Perturbed
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import select
 
 
 @state_arguments
 def flow(
     system: Any,
-    phi0: NumberLike,
-    dphi0: NumberLike,
-    t: NumberLike,
+    phi0: Any = None,
+    dphi0: Any = None,
+    t: Any = None,
     *,
+    x0: Any = None,
     rtol: float | None = None,
     atol: float | None = None,
     events: Any = None,
+    method: str | None = None,
+    **states: Any,
 ) -> xr.Dataset:
-    """States after times, exact for any time; with damping and drive integrated.
+    """Motion from a state: exact for any time, integrated with damping and drive.
 
     Parameters
     ----------
@@ -51,7 +56,11 @@ def flow(
     phi0, dphi0 : float, 1-D array_like or xarray.DataArray
         States at t = 0: angles in rad, angular velocities in s^-1.
     t : float, 1-D array_like or xarray.DataArray
-        Times in s, of either sign and in any order. A bare array makes the dim ``time``.
+        Times in s, of either sign and in any order. A bare array makes the dim ``time``. Of a map
+        counts of iterations.
+    x0 : mapping, sequence or xarray.DataArray, optional
+        States at t = 0 of a `Problem`, or of a system that states rates or a step: by name, or in
+        their order; ``flow(problem, x0, t)`` does as well. Each may be an array, as `phi0` may.
     rtol, atol : float, optional
         Of a motion that is integrated: the error of a step that is allowed, relative (default
         1e-10) and absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is
@@ -63,7 +72,12 @@ def flow(
         or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. A function
         that comes to 1e-8 of its values around and turns back touches zero and counts, unless it
         has a direction; zeros that lie closer together than a quarter of a step may be missed. A
-        stretch on which one vanishes counts once, with a RuntimeWarning.
+        stretch on which one vanishes counts once, with a RuntimeWarning. Of a `Problem` they are
+        formulas of its states, parameters and time, or functions of (t, x).
+    method : {"dop853", "radau"}, optional
+        Of a `Problem`; by default Radau's where the motion is stiff, and DOP853 otherwise.
+    **states
+        The states of a `Problem` by name, one argument each, in place of `x0`.
 
     Returns
     -------
@@ -71,7 +85,8 @@ def flow(
         ``motion_phi`` in rad, continuous in time (a rotation runs past pi), and ``motion_dphi``
         in s^-1. NaN where a motion with damping and drive could not be followed to a time, which
         a RuntimeWarning says. With events also ``event_name``, ``event_time``, ``event_phi`` and
-        ``event_dphi`` on the dim ``event``; after one that ends the motion it is NaN.
+        ``event_dphi`` on the dim ``event``; after one that ends the motion it is NaN. Of a
+        `Problem` ``motion_`` and ``event_`` and the name of each state.
 
     Raises
     ------
@@ -102,9 +117,31 @@ def flow(
     >>> disk = pk.GyroRotorDisk(beta=18 * pk.deg, e=0.001153, a=0.002, r=0.2, omega1=24 * pk.rpm)
     >>> pk.flow(disk, [0.1, 0.2, 0.3], 0.0, np.linspace(0.0, 60.0, 601)).motion_phi.dims
     ('point', 'time')
+
+    Equations of one's own, for three values of a parameter:
+
+    >>> brusselator = pk.Problem(
+    ...     {"x": "a + x^2*y - (b + 1)*x", "y": "b*x - x^2*y"}, parameters={"a": 1, "b": [1, 2, 3]}
+    ... )
+    >>> pk.flow(brusselator, [1.0, 1.0], np.linspace(0.0, 20.0, 201)).motion_x.dims
+    ('b', 'time')
     """
-    states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
     system = as_system(system)
+    if (law := equations_of(system)) is not None:
+        two = [phi0, dphi0] if t is not None and dphi0 is not None else phi0
+        x0, t = (two if x0 is None else x0), (dphi0 if t is None else t)
+        from phasekit.labelled.flows import motions_of
+
+        tolerances = checked_tolerances(rtol, atol)
+        return motions_of(
+            system, law, x0, states, t, tolerances=tolerances, method=method, events=events
+        )
+    for name, value in {"x0": x0, "method": method}.items():
+        if value is not None:
+            raise bad(name, value, "nothing for a system whose state is phi0, dphi0")
+    needed = {"phi0": phi0, "dphi0": dphi0, "t": t}
+    refuse_call(flow, states, [name for name, value in needed.items() if value is None])
+    given = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "t": ("time", t)}
     if issubclass(system.rung, Conservative):
         for name, value in (("rtol", rtol), ("atol", atol), ("events", events)):
             if value is not None:
@@ -117,17 +154,17 @@ def flow(
         (one,) = passes_of(system, select("motion"))
         one = replace(one, function=functools.partial(one.resolved, **tolerances))
         with said("following damped and driven motions"):
-            ds = at_states(system, select("motion"), states, (one,))
+            ds = at_states(system, select("motion"), given, (one,))
         if events is None:
             return ds
         from phasekit.labelled.events import with_events
 
         moved = system if issubclass(system.rung, PerturbedConservative) else Perturbed(system)
         return with_events(ds, moved, events, tolerances)
-    return at_states(system, select("motion"), states)
+    return at_states(system, select("motion"), given)
 
 
-def refuse_noise(system: Model) -> None:
+def refuse_noise(system: System) -> None:
     """Refuse a system with noise, which is not integrated.
 
     Raises

@@ -17,7 +17,7 @@ from phasekit.labels.arguments import FloatArray, bad
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.formula import Formula
-from phasekit.systems.system import Model, single
+from phasekit.systems.system import System, single
 from phasekit.table.quantities import ROWS
 
 #: Energies approach a separatrix as this power of the level: periods grow with their logarithm.
@@ -79,7 +79,7 @@ class _Family:
         )
 
 
-def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Dataset:
+def families_of_any(system: System, n: int, energy_max: float | None) -> xr.Dataset:
     """Orbits of each family of one system, which has a law of any potential."""
     single(system)
     whole, (system, base) = system, _reduced(system)
@@ -88,7 +88,7 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
     phi, energy = points.phi.values, points.energy.values
     centers = [int(k) for k in np.flatnonzero(points.kind.values == EquilibriumKind.CENTER)]
     if not centers:
-        raise bad("system", system, "a system with a center, for without one nothing oscillates")
+        raise bad("system", system, "a system with a center; without one nothing oscillates")
     drop = fall_per_turn(system)
     # Under a torque what bounds a well may be a saddle of the next turn.
     marks = (energy[:, None] + drop * np.array([-1.0, 0.0, 1.0])) if drop else energy[:, None]
@@ -100,12 +100,12 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
         energy_max = 2.0 * top - bottom
         if not top > bottom:
             raise ParameterError(
-                "energy_max: got nothing, wants the energy up to which orbits are taken, for no "
+                "energy_max: got nothing, wants the largest energy of the orbits, because no "
                 "saddle bounds them"
             )
     found = _families(system, points, marks, centers, float(energy_max))
     if not found:
-        raise bad("energy_max", base + energy_max, "an energy below which orbits come back")
+        raise bad("energy_max", base + energy_max, "an energy below which orbits are closed")
     level = (np.arange(n) + 0.5) / n
     deepest = [
         min(f.wells) if drop else min(f.wells or centers, key=lambda k: energy[k]) for f in found
@@ -132,7 +132,7 @@ def families_of_any(system: Model, n: int, energy_max: float | None) -> xr.Datas
     return xr.Dataset(variables, coords, dataset_attrs(whole))
 
 
-def _reduced(system: Model) -> tuple[Model, float]:
+def _reduced(system: System) -> tuple[System, float]:
     """A system without the constant part of its potential, and that part."""
     law = system.law
     formula = getattr(law, "base", law)
@@ -149,7 +149,7 @@ def _reduced(system: Model) -> tuple[Model, float]:
 
 
 def _orbits(
-    system: Model,
+    system: System,
     families: list[_Family],
     starts: FloatArray,
     rises: list[FloatArray],
@@ -185,14 +185,14 @@ def _orbits(
     return found, attrs
 
 
-def fall_per_turn(system: Model) -> float:
+def fall_per_turn(system: System) -> float:
     """What the potential of a system falls by in a turn under a torque; 0 on a line."""
     period = getattr(getattr(system, "system", None), "period", None)
     return float(system.parameters.get("torque", 0.0)) * period if period else 0.0
 
 
 def _families(
-    system: Model,
+    system: System,
     points: xr.Dataset,
     heights: FloatArray,
     centers: list[int],
@@ -242,7 +242,7 @@ class _Walls:
     same: float
 
     @classmethod
-    def of(cls, system: Model, points: xr.Dataset, same: float) -> _Walls:
+    def of(cls, system: System, points: xr.Dataset, same: float) -> _Walls:
         """The saddles of a system; energies that differ by less than `same` are one.
 
         None where equilibria are degenerate, for of these only some count as saddles.

@@ -83,11 +83,15 @@ def orbits(
         almost no action. An orbit of a `Potential` that leaves the line, or its interval, is
         unbounded; its period is infinite.
         Results of a `Potential` have estimates of their errors, ``period_error`` and
-        ``action_error``.
+        ``action_error``, and bounds of those of the turning points, ``phi_min_error`` and
+        ``phi_max_error``: infinite where rounding hides where, or whether, the orbit turns.
+        Closed forms have none: their turning points are right to a few units in the last place,
+        next to separatrices as well.
+        States whose energies no doubles hold are not_computed.
 
         Under a constant torque, ``pk.Perturbed(system, torque=...)``, the energy is
         ``phi'^2/2 + V - torque phi`` of the unwrapped angle. Librations are quadratures, with
-        estimates of their errors; an orbit that is running turned back once, at its only turning
+        errors as of a `Potential`; an orbit that is running turned back once, at its only turning
         point, and gains ``gain_per_turn`` from each turn to the next: it has no period and no
         action, both are NaN, and its other end is infinite. A `Potential` on a circle has such
         orbits as well; on a line the torque is a part of the potential, and what runs is unbounded.

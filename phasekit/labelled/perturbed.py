@@ -30,7 +30,7 @@ from phasekit.table.row import Quantity
 
 @call_checked
 def melnikov(perturbed: Any) -> xr.Dataset:
-    """Melnikov's function on the separatrices: when damping and drive make motion irregular.
+    """Melnikov's function on the separatrices: thresholds of irregular motion.
 
     Parameters
     ----------
@@ -40,17 +40,19 @@ def melnikov(perturbed: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On (``saddle``, ``side``): ``melnikov_mean`` in s^-2, the energy that the loop gains on
-        average; ``melnikov_amplitude`` in s^-2 and ``melnikov_phase`` in rad of
+        On (``saddle``, ``side``): ``melnikov_mean`` in s^-2, the mean energy gained along the
+        loop; ``melnikov_amplitude`` in s^-2 and ``melnikov_phase`` in rad of
         ``M(t0) = mean + amplitude cos(nu t0 + phase)``; ``chaos_threshold``, the amplitude of the
-        forcing from which on stable and unstable manifold intersect transversally, at the given
-        damping (NaN without, infinite where the loop does not respond); ``turnstile_area`` in
-        s^-1, what crosses in one period to first order without damping.
+        forcing above which stable and unstable manifolds intersect, at the given damping (NaN
+        without damping, infinite where the loop does not respond); ``turnstile_area`` in s^-1,
+        the flux across the separatrix in one period, to first order without damping;
+        ``threshold_validity``, a code of `Validity`. Where the code is not HOLDS, the results are
+        NaN and the code is the reason.
 
-        With several harmonics of different frequencies the amplitude is the greatest value over
-        all times against the mean, the phase NaN, and the threshold that of the first harmonic of
-        the forcing, the others growing in proportion; of frequencies without a common period the
-        turnstile is NaN. Without forcing the threshold is that of the first modulated parameter.
+        With several frequencies the amplitude is the largest deviation from the mean over all
+        times, and the phase is NaN. The threshold is that of the first harmonic of the forcing,
+        with the others in proportion. Frequencies without a common period have no turnstile area:
+        it is NaN. Without forcing the threshold is that of the first modulated parameter.
 
     Raises
     ------
@@ -130,7 +132,7 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
 
 @call_checked
 def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
-    """Into which well a motion falls that is slowly led to a separatrix.
+    """Probability of capture in each well, for a motion that slowly reaches a separatrix.
 
     Parameters
     ----------
@@ -146,10 +148,12 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
     xarray.Dataset
         On ``region`` (left, right, none): ``capture_flux`` in s^-2 and ``capture_probability``,
         which sums to 1. Left and right are the lobes of the lower saddle; in a system with one
-        well it is the side from which the rotation came that stays empty. "none": it is not
-        captured, never comes to the separatrix, or stays round both wells because they shrink too
-        fast. NaN where there is no such separatrix, and from rotation over wells of which left
-        and right are not all: three or more that saddles of several energies part.
+        well the side from which the rotation came stays empty. "none": the motion is not captured,
+        never reaches the separatrix, or stays round both wells because they shrink too fast.
+        NaN where there is no such separatrix, and from rotation over three or more wells with
+        saddles of several energies. ``capture_error`` estimates the error of the probabilities,
+        and ``capture_validity`` is a code of `Validity`: where it is not HOLDS, the results are
+        NaN and the code is the reason.
 
     Raises
     ------
@@ -158,14 +162,14 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
 
     Notes
     -----
-    Each region takes phase at the rate ``damping S + dS/dt`` of its area S; the probability is the
-    ratio of the fluxes if both are positive ([Neishtadt1975]). From rotation it is the phase that
-    the cell takes over that which the rotation loses: with the area S of the cell and its width
-    w = 2 pi, ``2/(1 + 2 |torque| w/(damping S + dS/dt))`` ([GoldreichPeale1966], with drift), 1
-    where it would be more, 0 where the cell shrinks faster than damping fills it; then the lobes
-    share it by their own fluxes. Of a parameter that drifts it is that for motions which come to
-    the separatrix at the value that the system has. First order in damping and drift, for motions
-    whose actions are spread; right at the separatrix the error is of the order rate log(rate).
+    A region of area S gains phase space at the rate ``damping S + dS/dt``. The probability is the
+    ratio of these fluxes if both are positive ([Neishtadt1975]). From rotation it is the flux into
+    the cell over the flux that the rotation loses: with the area S of the cell and its width
+    w = 2 pi, ``2/(1 + 2 |torque| w/(damping S + dS/dt))`` ([GoldreichPeale1966], with drift). It
+    is 1 where this exceeds 1, and 0 where the cell shrinks faster than damping fills it. The lobes
+    share it by their own fluxes. A drifting parameter has its present value when the motion
+    reaches the separatrix. The results are of first order in damping and drift, for motions whose
+    actions are spread; the error is of the order rate log(rate).
 
     Examples
     --------
@@ -180,7 +184,7 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
 
 @call_checked
 def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
-    """Rates at which noise leads out of a well, over each saddle at its ends.
+    """Rates of thermal escape from a well, over each saddle at its ends.
 
     Parameters
     ----------
@@ -230,7 +234,7 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
 
 @call_checked
 def critical_torque(system: Any) -> xr.Dataset:
-    """Least and greatest constant torque under which an equilibrium exists.
+    """Smallest and largest constant torque for which an equilibrium exists.
 
     Parameters
     ----------
@@ -266,7 +270,7 @@ def critical_torque(system: Any) -> xr.Dataset:
 
 @call_checked
 def retrapping_torque(perturbed: Any) -> xr.Dataset:
-    """Least constant torque that keeps a rotation going, at small damping.
+    """Smallest constant torque that sustains a rotation, at small damping.
 
     Parameters
     ----------
@@ -276,7 +280,9 @@ def retrapping_torque(perturbed: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``retrapping_torque`` in s^-2 on ``direction`` (minus, plus), signed.
+        ``retrapping_torque`` in s^-2 on ``direction`` (minus, plus), signed, and
+        ``retrapping_validity``, a code of `Validity`. Where the code is not HOLDS, the torque is
+        NaN and the code is the reason.
 
     Raises
     ------
@@ -304,7 +310,7 @@ def retrapping_torque(perturbed: Any) -> xr.Dataset:
 def resonances(
     perturbed: Any, *, n: int | Sequence[int], m: int = 1, family: str = "lower_well"
 ) -> xr.Dataset:
-    """Resonances of the orbits with the drive: their actions, widths and overlap.
+    """Resonances between orbits and drive: their actions, widths and overlap.
 
     Parameters
     ----------

@@ -14,13 +14,14 @@ from phasekit.labels.arguments import (
     bad,
     call_checked,
 )
+from phasekit.laws.equations import equations_of
 from phasekit.systems.parameter import warn_of_invalid
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import as_system
 from phasekit.table.quantities import select
 
 
 @call_checked
-def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
+def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
     """All equilibria, their kinds, energies and frequencies, as branches.
 
     Parameters
@@ -28,7 +29,10 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     system : system or Problem
         Any system; or equations ``x' = f(x)``.
     box : mapping of str to (float, float), optional
-        Of a `Problem`: where to look, by state. States that are angles may be left out: one turn.
+        Of a `Problem`: where to look, by state; by default its window. States that are angles may
+        be left out: one turn.
+    n : int, optional
+        Of a map: fixed points of the n-th iterate, the orbits of all periods that divide n.
 
     Returns
     -------
@@ -58,10 +62,11 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     Of a `Perturbed` system they are those under its constant torque N, where ``V' = N``, with
     frequencies and exponents as without damping; the drive does not count.
 
-    Those of a `Problem` in a box are ``x`` on (``equilibrium``, ``state``), with ``eigenvalue``,
-    ``n_unstable`` and ``complete``: interval arithmetic on the formulas proves that there are no
-    others [MooreKearfottCloud2009]. Where it does not, ``complete`` is False and a warning says
-    what is open; so it is where f is code, of which nothing can be proved.
+    Those of a `Problem` in a box, and the fixed points of a map, are ``x`` on (``equilibrium``,
+    ``state``), with ``kind`` (`FlowEquilibriumKind`), ``eigenvalue``, ``n_unstable`` and
+    ``complete``; array parameters span cells in front. Interval arithmetic on the formulas
+    proves that there are no others [MooreKearfottCloud2009]. Where it does not, ``complete`` is
+    False and a warning says what is open; so it is where f is code, of which nothing can be proved.
 
     Examples
     --------
@@ -78,12 +83,14 @@ def equilibria(system: Any, *, box: Any = None) -> xr.Dataset:
     >>> pk.EquilibriumKind(eq.kind.sel(equilibrium="lower_saddle").item()).name
     'SADDLE'
     """
-    if not isinstance(system, (Model, tuple)):  # only then: continuation takes long to load
+    found = as_system(system)
+    if equations_of(found) is not None:
+        # Only then: continuation takes long to load.
         from phasekit.labelled.in_box import equilibria_in_box
-        from phasekit.systems.problem import Problem
 
-        if isinstance(system, Problem):
-            return equilibria_in_box(system, box)
+        return equilibria_in_box(found, box, n)
+    if n is not None:
+        raise bad("n", n, "None: only maps are iterated")
     if box is not None:
         raise bad("box", box, "None: all equilibria of a system are found, wherever they are")
     return _of_system("equilibria", system)

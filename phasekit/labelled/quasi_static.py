@@ -27,7 +27,7 @@ from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
 from phasekit.labels.grid import variable
 from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.potential import potential
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS
 
 
@@ -38,7 +38,7 @@ def quasi_static(
     phi0: float | None = None,
     **path_by_name: Any,
 ) -> xr.Dataset:
-    """Follow one center while parameters change slowly; where a fold ends it, it jumps.
+    """Follow one center while parameters change slowly, with its jumps at folds.
 
     A hysteresis loop of a magnet, or the slow run-up of a disk.
 
@@ -63,7 +63,7 @@ def quasi_static(
         since the step before. On ``jump``: ``jump_step``, the parameters at the fold
         (``jump_omega1``, ...), ``jump_phi_from`` and ``jump_phi_to`` in rad, and ``jump_loss``,
         the energy in s^-2 that is lost by coming to rest in the other well. Where there is no force
-        the center is lost for good: NaN from there on, with a RuntimeWarning.
+        the center disappears for good: NaN from there on, with a RuntimeWarning.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def quasi_static(
     there = len(sheets)
     if there < size:
         warnings.warn(
-            f"path: there is no force before step {there}, where the center is lost",
+            f"path: there is no force before step {there}, where the center disappears",
             RuntimeWarning,
             stacklevel=2,
         )
@@ -140,7 +140,7 @@ def _values(path: Mapping[str, Any] | None, by_name: Mapping[str, Any]) -> dict[
     return values
 
 
-def _steps(system: Model, values: Mapping[str, Any]) -> dict[str, FloatArray]:
+def _steps(system: System, values: Mapping[str, Any]) -> dict[str, FloatArray]:
     """The parameters of a path as arrays of one length; numbers stand still."""
     declared = {p.name: p for p in system.declared if p.name in system.formula_inputs()}
     kept: dict[str, Any] = {}
@@ -172,7 +172,7 @@ class _Lost:
 class _Track:
     """Steps of a system along a path."""
 
-    system: Model
+    system: System
     fixed: dict[str, float]
     moved: dict[str, FloatArray]
     A: FloatArray
@@ -242,7 +242,7 @@ def _wrapped(angle: float) -> float:
 
 
 def _dataset(
-    system: Model,
+    system: System,
     steps: dict[str, FloatArray],
     track: _Track,
     sheets: Any,
@@ -277,7 +277,7 @@ def _dataset(
 
 
 def _jumps(
-    system: Model, track: _Track, jumps: list[_Lost], steps: dict[str, FloatArray]
+    system: System, track: _Track, jumps: list[_Lost], steps: dict[str, FloatArray]
 ) -> dict[str, xr.Variable]:
     at = {
         name: np.array([{**track.fixed, **one.at}[name] for one in jumps]) for name in track.fixed

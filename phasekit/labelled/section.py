@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.labelled.flows import states_of
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
 from phasekit.labels.arguments import (
     FloatArray,
@@ -18,14 +19,15 @@ from phasekit.labels.arguments import (
 )
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
-from phasekit.laws.ladder import Routhian
+from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.ladder import Map, Routhian
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import pointwise
+from phasekit.motion.flows import pointwise as pointwise_of
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue
 from phasekit.systems.perturbed import Perturbed
-from phasekit.systems.problem import Problem
 from phasekit.systems.system import as_system, single
 from phasekit.table.quantities import ROWS
 
@@ -43,7 +45,7 @@ def poincare_section(
     atol: float | None = None,
     **arguments: Any,
 ) -> xr.Dataset:
-    """States in which one motion passes a value of its coordinate, from time 0 on.
+    """States at which a motion crosses a section, from time 0 on.
 
     Parameters
     ----------
@@ -94,7 +96,9 @@ def poincare_section(
     array([0.724, 0.527, 0.384])...
     """
     wants = "a time in s, > 0"
-    if isinstance(system, Problem) and system.map:
+    found: Any = as_system(system)
+    law = equations_of(found)
+    if isinstance(law, Map):
         raise bad("system", system, "a flow x' = f(x): a map has no sections")
     duration = number("duration", duration, wants, "s")
     if not duration > 0.0:
@@ -104,9 +108,7 @@ def poincare_section(
     if direction > 1:
         raise bad("direction", direction, senses)
     tolerances = checked_tolerances(rtol, atol)
-    own = isinstance(system, Problem)
-    found: Any = system if own else as_system(system)
-    if not own and issubclass(found.rung, Routhian):
+    if issubclass(found.rung, Routhian):
         arguments |= {"direction": direction, **tolerances}
         ds: xr.Dataset = found.poincare(
             phi0, _needed(dphi0), duration, section=section, **arguments
@@ -114,8 +116,8 @@ def poincare_section(
         return ds
     if arguments:
         raise bad(*next(iter(arguments.items())), "nothing, except of a FreeGyroRotor")
-    if own:
-        return _of_problem(found, phi0, duration, section, direction, tolerances)
+    if law is not None:
+        return _of_equations(found, law, phi0, duration, section, direction, tolerances)
     return _of_system(found, phi0, dphi0, duration, section, direction, tolerances)
 
 
@@ -170,31 +172,35 @@ def _numbers(found: Section) -> xr.Variable:
     return variable(("crossing",), np.arange(found.time.size), {"long_name": LABELS["crossing"][1]})
 
 
-def _of_problem(
-    problem: Problem,
+def _of_equations(
+    system: Any,
+    law: Equations,
     x0: Any,
     duration: float,
     section: Any,
     direction: int,
     tolerances: dict[str, Any],
 ) -> xr.Dataset:
-    wants = f"one of the states {', '.join(problem.state)} with a value: ('{problem.state[0]}', 0.)"
-    if not isinstance(section, tuple) or len(section) != 2 or section[0] not in problem.state:
+    wants = f"one of the states {', '.join(law.states)} with a value: ('{law.states[0]}', 0.)"
+    if not isinstance(section, tuple) or len(section) != 2 or section[0] not in law.states:
         raise bad("section", section, wants)
     level = number("section", section[1], wants)
-    start: FloatArray = np.asarray(x0, dtype=float)
-    if start.shape != (len(problem.state),) or not np.isfinite(start).all():
-        raise bad("phi0", x0, f"a finite number for each of {', '.join(problem.state)}")
+    given = [value for _, value in states_of(law, x0, {}).values()]
+    start: FloatArray = np.array([number("x0", value) for value in given])
+    _, values = single(system)
     found = passages(
-        InitialValue(lambda t, x: problem(x), list(start), **tolerances, unit=np.inf),
-        duration, problem.state.index(section[0]), level,
-        period=problem.periods.get(section[0]), direction=direction,
+        InitialValue(pointwise_of(law, values), list(start), **tolerances, unit=np.inf),
+        duration, law.states.index(section[0]), level,
+        period=law.periods.get(section[0]), direction=direction,
     )  # fmt: skip
     equation = f"{section[0]} = {level!r}"
     attrs = {"long_name": "time of the crossing", "units": "1", "equation": equation}
     data = {"section_time": variable(("crossing",), found.time, attrs)}
-    for name, values in zip(problem.state, found.state, strict=True):
-        attrs = {"long_name": f"{name} in the section", "units": "1", "equation": equation}
-        data[f"section_{name}"] = variable(("crossing",), values, attrs)
-    coords = {name: variable((), value) for name, value in problem.parameters.items()}
-    return xr.Dataset(data, {**coords, "crossing": _numbers(found)})
+    for name, column in zip(law.states, found.state, strict=True):
+        attrs = {
+            "long_name": f"{name} in the section", "units": law.units.get(name, "1"),
+            "equation": equation,
+        }  # fmt: skip
+        data[f"section_{name}"] = variable(("crossing",), column, attrs)
+    coords = {name: variable((), values[name], input_attrs(system, name)) for name in law.names}
+    return xr.Dataset(data, {**coords, "crossing": _numbers(found)}, dataset_attrs(system))

@@ -1,7 +1,7 @@
 """What an argument may be, and the messages for what it may not.
 
-Every message says which argument, what it got, what it wants, and what to do next. Model
-parameters and states share `numeric`; a parameter's own domain is checked where it is declared
+Every message says which argument, what it got, what it wants, and what to do next. Parameters
+and states share `numeric`; a parameter's own domain is checked where it is declared
 (`phasekit.systems.system`).
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import functools
 import inspect
+import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias, TypeVar, Union, cast
 
@@ -17,12 +18,24 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from phasekit.errors import ArgumentError, ParameterError
-from phasekit.inputs import SHOWN, FloatArray, bad, describe, flag, one_of, reals, whole
+from phasekit.errors import ParameterError
+from phasekit.inputs import (
+    SHOWN,
+    FloatArray,
+    bad,
+    call_checked,
+    describe,
+    flag,
+    one_of,
+    reals,
+    whole,
+)  # fmt: skip
 from phasekit.labels.units import factor, si_unit
 
-__all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "describe", "flag", "numeric"]
+__all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "call_checked", "describe"]
 __all__ += [
+    "flag",
+    "numeric",
     "named",
     "number",
     "one_of",
@@ -241,32 +254,6 @@ def brief(value: Value) -> str:
     return f"<{'lazy ' if value.chunks is not None else ''}DataArray ({sizes})>"
 
 
-def call_checked(function: Function) -> Function:
-    """Make a call with an unknown, missing or surplus argument say what the arguments are."""
-    signature = inspect.signature(function)
-    expected = list(signature.parameters)
-    kinds = {parameter.kind for parameter in signature.parameters.values()}
-    takes_all = inspect.Parameter.VAR_KEYWORD in kinds
-
-    @functools.wraps(function)
-    def called(*args: Any, **kwargs: Any) -> Any:
-        try:
-            signature.bind(*args, **kwargs)
-        except TypeError as error:
-            strange = [name for name in kwargs if name not in expected and not takes_all]
-            text, hint = str(error), ""
-            if strange:  # rather than what is missing in its place
-                text = f"got an unexpected keyword argument {strange[0]!r}"
-                near = difflib.get_close_matches(strange[0], expected, n=1)
-                hint = f" did you mean {near[0]!r}?" if near else ""
-            listed = ", ".join(expected)
-            message = f"{function.__name__}() {text};{hint} its arguments are {listed}"
-            raise ArgumentError(message) from None
-        return function(*args, **kwargs)
-
-    return cast(Function, called)
-
-
 def state_arguments(function: Function) -> Function:
     """Let a function take the parts of a state by any name that they have anywhere.
 
@@ -275,6 +262,7 @@ def state_arguments(function: Function) -> Function:
     its rates. The first argument is the system, or an accessor.
     """
     function = call_checked(function)
+    first = next(iter(inspect.signature(function).parameters))
     own = {name.rstrip("0"): name for name in inspect.signature(function).parameters}
     own = {stem: name for stem, name in own.items() if stem in ("phi", "dphi", "ddphi")}
     other = {
@@ -286,7 +274,13 @@ def state_arguments(function: Function) -> Function:
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:
-        names = dict(other)
+        if "perturbed" in kwargs and not args and first == "system":
+            text = f"{function.__name__}(perturbed=...) is now {function.__name__}(system=...)"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+            args = (kwargs.pop("perturbed"),)
+        # A system with states of its own takes them by their names.
+        own_states = () if not args else getattr(args[0], "state", getattr(args[0], "states", ()))
+        names = {name: to for name, to in other.items() if name not in own_states}
         coordinate = getattr(args[0], "coordinate", None) if args else None
         if isinstance(coordinate, str):
             spelled = {stem.replace("phi", coordinate): name for stem, name in own.items()}

@@ -41,7 +41,7 @@ STATES: dict[str, tuple[str, str]] = {
     "state_dphi": ("s-1", "angular velocity of the state"),
     "state_ddphi": ("s-2", "angular acceleration of the state"),
     "domega1": ("s-2", "angular acceleration of the support"),
-    "rho_b1": ("m", "place of the bearing B1 on the fixed shaft, from O1"),
+    "rho_b1": ("m", "position of the bearing B1 on the fixed shaft, from O1"),
     "state_energy": ("s-2", "energy of the state"),
     "state_gap": ("s-2", "energy of the state above the saddle"),
     "state_excess": ("s-2", "energy of the state above the center"),
@@ -51,7 +51,7 @@ STATES: dict[str, tuple[str, str]] = {
     "time": ("s", "time"),
     "box_phi": ("rad", "half of the width in angle of the box of states around rest at 0"),
     "box_dphi": ("s-1", "half of the height in angular velocity of the box of states"),
-    "level": ("1", "place of the orbit in its family, by energy from 0 to 1"),
+    "level": ("1", "position of the orbit in its family, by energy from 0 to 1"),
 }
 
 #: States whose bare arrays make an axis, where those of the others pair on the dim `point`.

@@ -10,6 +10,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+#: Real numbers that may have come back from a file as the others.
+_NUMBERS = (float, np.floating)
+
 
 def equal(left: Any, right: Any, without: Container[str] = ()) -> bool:
     """Whether two values are the same: NaN equals NaN, some fields of dataclasses do not count.
@@ -25,6 +28,8 @@ def equal(left: Any, right: Any, without: Container[str] = ()) -> bool:
         return left.keys() == right.keys() and all(
             equal(value, right[name], without) for name, value in left.items()
         )
+    if isinstance(left, _NUMBERS) and isinstance(right, _NUMBERS):  # of numpy or of Python
+        return bool(left == right or (left != left and right != right))
     if type(left) is not type(right):
         return False
     if is_dataclass(left):

@@ -211,7 +211,7 @@ def tiles(shape: Sequence[int], cells: int = TILE_CELLS) -> Iterator[tuple[slice
     steps, room = [], max(cells, 1)
     for size in reversed(shape):
         parts = -(-size // max(min(size, room), 1))
-        step = -(-size // max(parts, 1))
+        step = max(-(-size // max(parts, 1)), 1)  # of nothing there are no tiles
         steps.append(step)
         room //= step
     cuts = [

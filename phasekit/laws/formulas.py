@@ -12,10 +12,12 @@ import difflib
 import functools
 import keyword
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import is_real
 from phasekit.laws.grammar import FormulaError, parse
 
 if TYPE_CHECKING:
@@ -23,6 +25,14 @@ if TYPE_CHECKING:
 
 #: Longest formula, in letters, and longest name.
 LENGTH, NAME = 50_000, 100
+
+
+def keyword_hint(name: object) -> str:
+    """What to write in place of a name that is a keyword of Python; empty for any other name."""
+    if not isinstance(name, str) or not keyword.iskeyword(name):
+        return ""
+    other = "lam" if name == "lambda" else f"{name}_"
+    return f"{name} is a keyword of Python: use {other}"
 
 
 def is_name(name: object) -> bool:
@@ -51,7 +61,12 @@ def symbols_of(names: Iterable[str]) -> dict[str, sympy.Symbol]:
 
 
 def read_formula(
-    text: str, symbols: Mapping[str, sympy.Symbol], argument: str = "f", declare: str = ""
+    text: str,
+    symbols: Mapping[str, sympy.Symbol],
+    argument: str = "f",
+    declare: str = "",
+    *,
+    exact: bool = False,
 ) -> sympy.Expr:
     """Read a formula.
 
@@ -63,12 +78,16 @@ def read_formula(
     ----------
     text : str
         The formula.
-    symbols : mapping of str to sympy.Symbol
-        The names in it that are symbols; a constant of the same name is hidden.
+    symbols : mapping of str to sympy.Symbol, sympy.Expr or sympy.Lambda
+        The names in it that are symbols, or that stand for a formula or a function of symbols; a
+        constant of the same name is hidden.
     argument : str
         What messages call the formula.
     declare : str, optional
         What messages say of names that are not known.
+    exact : bool
+        Take doubles as the fractions that they are, so that nothing is rounded before code is
+        written; else sympy rounds what it makes of them.
 
     Raises
     ------
@@ -81,7 +100,7 @@ def read_formula(
     >>> read_formula("mu*x - x^3/3", {"x": x, "mu": mu})
     mu*x - x**3/3
     """
-    from phasekit.laws.nodes import CONSTANTS, FUNCTIONS, Nodes, values
+    from phasekit.laws.nodes import CONSTANTS, FUNCTIONS, Nodes, exact_numbers, values
 
     if len(text) > LENGTH:
         raise ParameterError(
@@ -89,6 +108,8 @@ def read_formula(
         )
 
     def unknown(name: str, called: bool) -> ParameterError:
+        if reserved := keyword_hint(name):
+            return ParameterError(f"{argument}: got the name {name!r} in {_cut(text)}; {reserved}")
         valid = list(FUNCTIONS) if called else [*symbols, *CONSTANTS]
         near = [one for one in valid if one.lower() == name.lower()]
         near = near or difflib.get_close_matches(name[:NAME], valid, n=1, cutoff=0.5)
@@ -105,13 +126,13 @@ def read_formula(
         return ParameterError(f"{argument}: got {got}{hint}{declare and '; ' + declare}")
 
     try:
-        found = parse(text, Nodes(unknown, symbols))
+        found = parse(text, Nodes(unknown, symbols, exact))
         values([found])
+        found = exact_numbers(found) if exact else found  # gamma functions of fractions are doubles
         return _known(found, symbols, argument)
     except FormulaError as error:
         raise ParameterError(
-            f"{argument}: got {_cut(text)}, wants a formula that sympy reads, such as "
-            f"'x^4/4 - x^2/2': {error}"
+            f"{argument}: got {_cut(text)}, wants a formula such as 'x^4/4 - x^2/2': {error}"
         ) from None
     except ParameterError:
         raise
@@ -123,7 +144,12 @@ def read_formula(
 
 
 def take_formula(
-    expression: Any, symbols: Mapping[str, sympy.Symbol], argument: str = "f", declare: str = ""
+    expression: Any,
+    symbols: Mapping[str, sympy.Symbol],
+    argument: str = "f",
+    declare: str = "",
+    *,
+    exact: bool = False,
 ) -> sympy.Expr:
     """Take a formula: a string, a number or a sympy expression, whose symbols go by their names.
 
@@ -134,19 +160,22 @@ def take_formula(
     """
     import sympy
 
-    from phasekit.laws.nodes import bounded
+    from phasekit.laws.nodes import bounded, fraction
 
+    double = fraction if exact else sympy.Float
     if isinstance(expression, str):
-        return read_formula(expression, symbols, argument, declare)
+        return read_formula(expression, symbols, argument, declare, exact=exact)
     if not isinstance(expression, sympy.Basic):
-        return _number(expression, argument)
+        return _number(expression, argument, double)
     if not isinstance(expression, sympy.Expr):
         raise ParameterError(
             f"{argument}: got a sympy {type(expression).__name__}, wants an expression of one value"
         )
-    replaced: dict[Any, Any] = {x: sympy.Float(float(x)) for x in expression.atoms(sympy.Float)}
+    replaced: dict[Any, Any] = {x: double(float(x)) for x in expression.atoms(sympy.Float)}
     for symbol in expression.free_symbols:
         name = str(getattr(symbol, "name", symbol))
+        if symbol == symbols.get(name):
+            continue  # what is not replaced is not made anew
         if name in symbols:
             replaced[symbol] = symbols[name]
         else:
@@ -166,8 +195,10 @@ def take_formula(
         ) from None
 
 
-def write_formula(expression: Any) -> str:
+def write_formula(expression: Any, *, exact: bool = False) -> str:
     """Write an expression so that reading it gives the same, every digit of its numbers.
+
+    With `exact`, fractions of doubles as these, for `read_formula` with `exact`.
 
     Examples
     --------
@@ -175,7 +206,7 @@ def write_formula(expression: Any) -> str:
     >>> write_formula(sympy.Float(0.1) * sympy.Symbol("x") * sympy.E)
     '0.1*exp(1)*x'
     """
-    return str(_printer().doprint(expression))
+    return str(_printers()[exact].doprint(expression))
 
 
 def short_formula(expression: Any) -> str:
@@ -185,25 +216,82 @@ def short_formula(expression: Any) -> str:
 
 
 @functools.cache
-def _printer() -> Any:
+def _printers() -> tuple[Any, Any]:
+    from sympy.printing.precedence import PRECEDENCE
     from sympy.printing.str import StrPrinter
 
-    class Exact(StrPrinter):  # type: ignore[misc]
+    class Plain(StrPrinter):  # type: ignore[misc]
         def _print_Float(self, number: Any) -> str:
             return repr(float(number))
 
         def _print_Exp1(self, constant: Any) -> str:
             return "exp(1)"  # E may be a symbol
 
-    return Exact()
+    class Exact(Plain):
+        def _print_Rational(self, number: Any) -> str:
+            size, below = _fraction_text(abs(number))
+            return ("-" if number < 0 else "") + size + below
+
+        _print_Integer = _print_Rational
+
+        def _print_Mul(self, product: Any) -> str:
+            number, rest = product.as_coeff_Mul()
+            size, below = _fraction_text(abs(number)) if number.is_Rational else ("", "")
+            plain = not size.strip("0123456789") and not below.strip("/0123456789")
+            if plain or any(factor.is_Number for factor in product.args[1:]):
+                return str(super()._print_Mul(product))
+            factors = rest.is_Mul
+            text = self._print(rest) if factors else self.parenthesize(rest, PRECEDENCE["Mul"])
+            text = text[1:] if text.startswith("1/") else f"*{text}"
+            text = text[1:] if size == "1" and text[0] == "*" else size + text
+            return ("-" if number < 0 else "") + text + below
+
+        def parenthesize(self, item: Any, level: int, strict: bool = False) -> str:
+            if item.is_Rational and item >= 0 and set(text := self._print(item)).isdisjoint("/( "):
+                return str(text)
+            return str(super().parenthesize(item, level, strict))
+
+    return Plain(), Exact()
 
 
-def _number(value: Any, argument: str) -> Any:
+def _fraction_text(number: Any) -> tuple[str, str]:
+    """A fraction >= 0 as text of a factor and a divisor: of doubles, where these are shorter."""
+    from phasekit.laws.nodes import BITS, shifts
+
+    above, below = int(number.p), int(number.q)
+    odd = below // (below & -below)
+    wanted, usable = (above & -above).bit_length() - 1 if odd >= 2**53 else 0, shifts(number)
+    shift = Fraction(2) ** max(min(wanted, usable.stop - 1), usable.start)
+    factor = _doubles_text(Fraction(above * odd, below) / shift)
+    divisor = _doubles_text(odd / shift)
+    found = (factor, f"/{divisor}" if divisor != "1" else "")
+    plain = (str(above), f"/{below}" if below != 1 else "")
+    # Whole numbers beyond all doubles are not read.
+    long = max(above, below).bit_length() > BITS
+    return found if long or len("".join(found)) < len("".join(plain)) else plain
+
+
+def _doubles_text(number: Fraction) -> str:
+    """A fraction without odd divisors as a whole number or the sum of doubles that it is."""
+    if number.denominator == 1 and number.numerator < 10**15:
+        return str(number)
+    doubles = []
+    while number:
+        double = float(number)
+        if not double:  # below all doubles
+            break
+        doubles.append(double)
+        number -= Fraction(double)
+    text = " + ".join(map(repr, doubles)).replace("+ -", "- ")
+    return f"({text})" if len(doubles) > 1 else text
+
+
+def _number(value: Any, argument: str, double: Callable[[float], Any]) -> Any:
     import numbers
 
     import sympy
 
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+    if not is_real(value):
         raise ParameterError(
             f"{argument}: got {value!r:.80}, wants a formula as a string or a sympy expression"
         )
@@ -212,10 +300,12 @@ def _number(value: Any, argument: str) -> Any:
     except OverflowError:
         finite = False
     if not finite:
-        raise ParameterError(f"{argument}: got a number that no double holds, wants a formula")
+        raise ParameterError(
+            f"{argument}: got a number outside the range of doubles, wants a formula"
+        )
     number: Any = value
     whole = isinstance(value, numbers.Integral)
-    return sympy.Integer(int(number)) if whole else sympy.Float(float(number))
+    return sympy.Integer(int(number)) if whole else double(float(number))
 
 
 def _known(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:
@@ -224,7 +314,9 @@ def _known(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:
 
     from phasekit.laws.nodes import CONSTANTS, FUNCTIONS, foreign
 
-    strange = foreign(found, symbols.values())
+    # A name may stand for a formula of the symbols, or for a function.
+    own = {symbol for value in symbols.values() for symbol in value.free_symbols}
+    strange = foreign(found, own)
     if strange is not None:
         raise ParameterError(
             f"{argument}: got {_cut(str(strange))}, of the kind {type(strange).__name__}, wants "

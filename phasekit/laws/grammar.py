@@ -62,12 +62,19 @@ class _Token(NamedTuple):
 
 
 def _tokens(text: str) -> list[_Token]:
-    tokens, place, end = [], 0, len(text.rstrip())
+    tokens: list[_Token] = []
+    place, end = 0, len(text.rstrip())
     while place < end:
         match = _TOKEN.match(text, place)
         if match is None:
             rest = text[place:].lstrip()
-            raise FormulaError(f"{rest[:1]!r} at character {text.index(rest, place) + 1}")
+            at = text.index(rest, place) + 1
+            attribute = re.match(r"\.([^\W\d]\w*)", rest)
+            if attribute and tokens and tokens[-1].kind == "name":
+                got = f"{tokens[-1].text}.{attribute[1]}"
+                write = f"write {attribute[1]}" + "(...)" * rest[attribute.end() :].startswith("(")
+                raise FormulaError(f"{got} at character {tokens[-1].place + 1}; {write}")
+            raise FormulaError(f"{rest[:1]!r} at character {at}")
         kind = str(match.lastgroup)
         tokens.append(_Token(kind, match[kind], match.start(kind)))
         place = match.end()

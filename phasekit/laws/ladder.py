@@ -46,11 +46,19 @@ class Law:
         return {}
 
 
-class Autonomous(Law):
-    """A law without time in it: ``x' = f(x; p)``."""
+class Flow(Law):
+    """Rates of any number of states: ``x' = f(t, x; p)``."""
+
+    called: ClassVar[str] = "a flow x' = f(t, x; p)"
 
 
-class Routhian(Autonomous):
+class Map(Law):
+    """A map ``x -> f(x; p)``."""
+
+    called: ClassVar[str] = "a map"
+
+
+class Routhian(Flow):
     """One degree of freedom left by constant momenta, with an inertia M: M(x) x'^2/2 + V(x)."""
 
     called: ClassVar[str] = "a system at constant momenta"
@@ -77,7 +85,7 @@ class Routhian(Autonomous):
         raise NotImplementedError
 
 
-class Conservative(Autonomous):
+class Conservative(Flow):
     """One degree of freedom in a potential: ``x'' = -V'(x; p)``."""
 
     called: ClassVar[str] = "a system in a potential"

@@ -17,6 +17,10 @@ from phasekit.laws.grammar import FormulaError
 
 #: Largest exponent that is a number, and most bits of a number: those of the range of doubles.
 POWER, BITS = 1000, 1024
+#: Most bits of a number that exact arithmetic makes of doubles, each of which has 53 of its own.
+EXACT = 16 * BITS
+#: Bits beyond which a number is not multiplied into a sum.
+WIDE = 16
 _LEAST = 2.3e-308  # doubles with all digits are larger
 #: Most arguments of Max and Min, levels of functions with branches, and nodes of a formula.
 ARGUMENTS, LEVELS, NODES = 16, 8, 100_000
@@ -92,24 +96,28 @@ _LEAVES = {sp.true, sp.false, sp.I, *_NOT_FINITE, *CONSTANTS.values()}
 class Nodes:
     """Makes the nodes of formulas in some symbols; each is checked before it is used."""
 
-    def __init__(self, unknown: Callable[[str, bool], Exception], symbols: Any) -> None:
-        self.unknown, self.symbols = unknown, symbols
+    def __init__(
+        self, unknown: Callable[[str, bool], Exception], symbols: Any, exact: bool = False
+    ) -> None:
+        self.unknown, self.symbols, self.exact = unknown, symbols, exact
         self.levels: dict[Any, int] = {}  # of branched functions inside each other
 
     def number(self, text: str) -> Any:
-        """A whole number exactly, any other as a double."""
+        """A whole number exactly, any other as a double, or as the fraction that this is."""
         if text.lstrip("-").isdigit():
             if len(text) > 320:
                 raise FormulaError(f"a number of {len(text)} digits")
             return checked(sp.Integer(int(text)))
         value = float(text)
         if not math.isfinite(value) or (not value and _nonzero(text)):
-            raise FormulaError(f"the number {text[:40]}, which no double holds")
-        return sp.Float(value)
+            raise FormulaError(f"the number {text[:40]}, which is outside the range of doubles")
+        return fraction(value) if self.exact else sp.Float(value)
 
     def name(self, name: str) -> Any:
         """A symbol, or else a constant."""
         if name in self.symbols:
+            if isinstance(self.symbols[name], sp.Lambda):
+                raise FormulaError(f"{name}, a function, without its arguments; write {name}(...)")
             return self.symbols[name]
         if name in ("True", "False"):
             return sp.true if name == "True" else sp.false
@@ -119,6 +127,13 @@ class Nodes:
 
     def call(self, name: str, arguments: Sequence[Any]) -> Any:
         """A function of its arguments."""
+        own = self.symbols.get(name)
+        if isinstance(own, sp.Lambda):
+            values(arguments)
+            if len(arguments) != len(own.variables):
+                takes = len(own.variables)
+                raise FormulaError(f"{name} with {len(arguments)} arguments; it takes {takes}")
+            return checked(own(*arguments))
         if name in self.symbols:
             raise FormulaError(
                 f"{name}(...) although {name} is a symbol; for a product write {name}*(...), for "
@@ -166,15 +181,21 @@ class Nodes:
         values(terms)
         # Sums of fractions multiply their denominators.
         fractions = (term.as_coeff_Mul()[0] for term in terms)
-        _bounded_bits(f.q.bit_length() for f in fractions if f.is_Rational and f.q > 1)
+        _bounded_bits(_odd(f.q).bit_length() for f in fractions if f.is_Rational and f.q > 1)
         return checked(sp.Add(*terms))
 
     def multiply(self, factors: Sequence[Any]) -> Any:
         """A product, made at once."""
         values(factors)
-        numbers = (factor.as_coeff_Mul()[0] for factor in factors)
-        _bounded_bits(_bits(number) for number in numbers if number not in (1, -1))
-        return checked(sp.Mul(*factors))
+        numbers = [factor.as_coeff_Mul()[0] for factor in factors]
+        _bounded_bits((_bits(number) for number in numbers if number not in (1, -1)), EXACT)
+        product = sp.Mul(*factors)
+        if self.exact and product.is_Add:
+            number, rest = sp.Mul(*numbers), sp.Mul(*(f.as_coeff_Mul()[1] for f in factors))
+            if rest.is_Add and wide(number):
+                # As it is written: its terms would have numbers that no double is.
+                product = sp.Mul(checked(number), rest, evaluate=False)
+        return checked(product)
 
     def power(self, base: Any, exponent: Any) -> Any:
         """A power whose exponent, if it is a number, is bounded."""
@@ -185,8 +206,10 @@ class Nodes:
             size = abs(float(_approximate(exponent)))
             if size > POWER:
                 raise FormulaError(f"the exponent {_short(exponent)}, beyond {POWER}")
-            if _bits(base.as_coeff_Mul()[0]) * size > BITS + POWER:
-                raise FormulaError(f"a power of {_short(base)} that no double holds")
+            number = base.as_coeff_Mul()[0]
+            if number.is_Rational and number.p and abs(_exponent(number)) * size > BITS + POWER:
+                raise FormulaError(f"a power of {_short(base)} outside the range of doubles")
+            _bounded_bits((int(_bits(number) * size),), EXACT)
             if base.is_zero and exponent.is_negative:
                 raise FormulaError("a division by zero")
         return checked(sp.Pow(base, exponent))
@@ -308,26 +331,59 @@ def _near(name: str, arguments: Sequence[Any]) -> list[Any]:
 
 def _approximate(constant: Any) -> Any:
     """The value of a constant formula; it must fit in a double."""
-    if constant.is_Rational:
-        _bounded_bits((_bits(constant),), BITS)
-        return constant
-    value = constant if constant.is_Float else constant.evalf(17)
-    if value.is_Rational:
-        return value
-    if not value.is_Float:
+    value = constant if constant.is_Number else constant.evalf(17)
+    if not (value.is_Rational or value.is_Float):
         raise FormulaError(
             f"the constant {_short(constant)}, which is not real, where a real function belongs"
         )
+    _bounded_bits((_bits(value),), EXACT)
     try:
-        number = float(value)
+        number = int(value.p) / int(value.q) if value.is_Rational else float(value)
         held = math.isfinite(number)
         # Next to 0 doubles have few digits or none: a term would change, or be gone.
-        held &= abs(number) > _LEAST or abs(sp.Float(number) - value) <= 1e-15 * abs(value)
+        held &= abs(number) > _LEAST or abs(sp.Rational(number) - value) <= 1e-15 * abs(value)
     except OverflowError:
         held = False
     if not held:
-        raise FormulaError(f"the constant {_short(constant)}, which no double holds")
+        got = f"the constant {_short(constant)}"
+        raise FormulaError(f"{got}, which is outside the range of doubles")
+    if value.is_Rational and not shifts(value):
+        raise FormulaError("numbers with too many digits to compute with exactly")
     return value
+
+
+def shifts(number: Any) -> range:
+    """Which n keep a fraction times d, and d, sums of doubles; d is its odd divisor over 2^n."""
+    above, below = abs(int(number.p)) or 1, int(number.q)
+    twos, halves = ((n & -n).bit_length() - 1 for n in (above, below))
+    odd = below.bit_length() - halves
+    least = max(odd, above.bit_length() - halves + 1) - BITS + 1
+    return range(least, BITS + 51 + min(0, twos - halves))
+
+
+def fraction(value: float) -> Any:
+    """The fraction that a double is."""
+    return sp.Rational(*value.as_integer_ratio())
+
+
+def exact_numbers(expression: Any) -> Any:
+    """An expression with the fractions that its doubles are: sympy rounds what it makes of them."""
+    return expression.xreplace({f: fraction(float(f)) for f in expression.atoms(sp.Float)})
+
+
+def wide(number: Any) -> bool:
+    """Whether a fraction has too many digits to be multiplied into sums."""
+    return _bits(number) > WIDE
+
+
+def _odd(whole: int) -> int:
+    """A whole number > 0 without its factors 2, which exact arithmetic does not multiply."""
+    return int(whole) // (int(whole) & -int(whole))
+
+
+def _exponent(number: Any) -> int:
+    """The logarithm of a fraction to the base 2, within one."""
+    return int(abs(number.p).bit_length() - number.q.bit_length())
 
 
 def _bits(number: Any) -> int:
@@ -344,7 +400,7 @@ def _bounded_bits(sizes: Iterable[int], most: int = 4 * BITS) -> None:
 def _short(node: Any) -> str:
     if isinstance(node, tuple):
         return "a pair"
-    if node.is_Integer and abs(node.p).bit_length() > 200:
-        return f"a number of {abs(node.p).bit_length()} bits"
+    if node.is_Rational and _bits(node) > 200:
+        return f"a number of {_bits(node)} bits"
     text = str(node)
     return text if len(text) <= 60 else f"{text[:57]}..."

@@ -301,7 +301,10 @@ class PerturbedTrigonometric(PerturbedConservative):
 class TiltedTrigonometric(PerturbedTrigonometric):
     """The same under a constant torque alone, which keeps an energy."""
 
-    called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
+    called: ClassVar[str] = (
+        "a system with coefficients (A, B, C) under a constant torque alone, "
+        "pk.Perturbed(system, torque=)"
+    )
 
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
         """What is said of a quantity: the torque has a part in the energy."""

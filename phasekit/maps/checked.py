@@ -17,22 +17,29 @@ from phasekit.errors import StoreError
 from phasekit.labels.coordinates import LABELS
 from phasekit.maps import files
 from phasekit.maps.damage import AGAIN, damage, place
-from phasekit.maps.marks import Chunk, Index, Mark
+from phasekit.maps.keys import DOCUMENT, GROUP
+from phasekit.maps.marks import Index, Mark
+from phasekit.maps.packed import Packed
 from phasekit.maps.plan import Plan
-from phasekit.maps.plan_file import GROUP
+from phasekit.maps.plan_file import DEFINITION, WHOLE, root_digests
 
 
-class Recording(WrapperStore[Any]):
-    """A store that remembers size and checksum of each file that is written."""
+class Holding(WrapperStore[Any]):
+    """A store that holds what zarr writes, so that it can go to its place all at once."""
 
     def __init__(self, store: Any) -> None:
         super().__init__(store)
-        self.written: dict[str, Chunk] = {}
+        self.inner = store
+        self.held: dict[str, Any] = {}
 
     async def set(self, key: str, value: Any) -> None:
-        """Write, and remember."""
-        await super().set(key, value)
-        self.written[key] = Chunk.of(value.as_numpy_array())
+        """Hold it."""
+        self.held[key] = value
+
+    def take(self) -> dict[str, Any]:
+        """Return what is held, and hold it no more."""
+        held, self.held = self.held, {}
+        return held
 
 
 class Checked(WrapperStore[Any]):
@@ -46,11 +53,23 @@ class Checked(WrapperStore[Any]):
         Files that it knows as they were before a change are given as they were.
     name : str
         What messages call the store.
+    verify : bool
+        Whether the versions of libraries that it names are compared as well.
+    packed : Packed, optional
+        The documents in one piece: nothing is asked then but chunks.
     """
 
-    def __init__(self, store: Any, plan: Plan, name: str) -> None:
+    def __init__(
+        self,
+        store: Any,
+        plan: Plan,
+        name: str,
+        *,
+        verify: bool = False,
+        packed: Packed | None = None,
+    ) -> None:
         super().__init__(store)
-        self.plan, self.name = plan, name
+        self.plan, self.name, self.verify, self.packed = plan, name, verify, packed
         self.parts = plan.quantities
         self.marks: dict[str, Mapping[Index, Mark]] = {}  # by part
         self.kept = dict(self._documents())
@@ -64,9 +83,7 @@ class Checked(WrapperStore[Any]):
     async def get(self, key: str, prototype: Any = None, byte_range: Any = None) -> Any:
         """Return what is stored, if it is what was written."""
         if prototype is None:
-            from zarr.core.buffer import default_buffer_prototype
-
-            prototype = default_buffer_prototype()
+            prototype = files.default_buffer()
         if key in self.kept:
             kept = self.kept[key]
             return None if kept is None else prototype.buffer.from_bytes(kept)
@@ -79,14 +96,30 @@ class Checked(WrapperStore[Any]):
         """Read what is known beforehand, here: what zarr's tasks raise is told twice."""
         yield from self.plan.before.items()
         expected = self.plan.documents
-        for key, data in files.read_all(self._store, expected.keys() - self.plan.before.keys()):
-            wrong = "is gone" if data is None else "is not what it was when it was written"
-            if data is None or hashlib.sha256(data).hexdigest() != expected[key]:
-                raise StoreError(
-                    f"store: {self.name} is damaged: {key} {wrong}; put the file back, choose "
-                    "another name, or pass overwrite=True"
-                )
-            yield key, data
+        for key, data in self._read(expected.keys() - self.plan.before.keys()):
+            right = data is not None and hashlib.sha256(data).hexdigest() == expected[key]
+            yield key, self._right(key, data, right)
+        if self.plan.root and DOCUMENT not in self.plan.before:
+            data = dict(self._read([DOCUMENT]))[DOCUMENT]
+            found = {} if data is None else root_digests(data)
+            which = WHOLE if self.verify else DEFINITION
+            right = found.get(which) == self.plan.root[which]
+            yield DOCUMENT, self._right(DOCUMENT, data, right)
+
+    def _read(self, keys: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
+        if self.packed is None:
+            return files.read_all(self._store, keys)
+        return ((key, self.packed.documents[key]) for key in keys)
+
+    def _right(self, key: str, data: bytes | None, right: bool) -> bytes | None:
+        """Return a document, or raise where it is not what was written."""
+        if right:
+            return data
+        wrong = "is gone" if data is None else "has changed since it was written"
+        raise StoreError(
+            f"store: {self.name} is damaged: {key} {wrong}; restore the file, choose another "
+            f"name, or pass overwrite=True"
+        )
 
     def _chunk(self, key: str) -> tuple[str, Index] | None:
         """Return the quantity and the tile of a chunk's file."""
@@ -120,8 +153,14 @@ class Checked(WrapperStore[Any]):
 
     def list_dir(self, prefix: str) -> AsyncIterator[str]:
         """List what belongs to the map."""
+        if self.packed is not None and not prefix.strip("/"):
+            return self._packed_names()
         listed = super().list_dir(prefix)
         return listed if prefix.strip("/") or not self.plan.documents else self._own(listed)
+
+    async def _packed_names(self) -> AsyncIterator[str]:
+        for name in sorted({key.split("/")[0] for key in self.kept} - {GROUP}):
+            yield name
 
     async def _own(self, listed: AsyncIterator[str]) -> AsyncIterator[str]:
         async for name in listed:

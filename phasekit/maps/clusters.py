@@ -5,13 +5,22 @@ from __future__ import annotations
 import concurrent.futures
 import contextlib
 import gc
-from collections.abc import Generator, Iterable, Iterator
+import math
+import time
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Any
 
 from phasekit.errors import StoreError
 from phasekit.labels.arguments import bad
 from phasekit.maps.tile import Tile, compute
+
+#: Seconds that a task takes, if its tiles are small, and how many of them it takes at most. A task
+#: that is cancelled goes on to its end.
+TASK, MOST = 0.5, 512
+
+#: Seconds between two looks at how many workers there are.
+LOOK = 2.0
 
 
 @contextlib.contextmanager
@@ -46,26 +55,44 @@ def connected(client: Any) -> Iterator[Any]:
         made.close()
 
 
+def compute_several(tiles: Sequence[Tile]) -> float:
+    """Compute tiles one after the other; return the seconds that it took."""
+    began = time.perf_counter()
+    for tile in tiles:
+        compute(tile)
+    return time.perf_counter() - began
+
+
 def on_cluster(tiles: Iterable[Tile], client: Any) -> Generator[Tile, None, None]:
-    """Compute tiles on the workers of a dask cluster, which gives those of a lost one to others."""
+    """Compute tiles on the workers of a dask cluster, which gives those of a lost one to others.
+
+    A task takes the scheduler some milliseconds, whatever it does: small tiles go several a task.
+    """
     import distributed
 
     source = iter(tiles)
-    running: dict[str, tuple[Any, Tile]] = {}
-    finished: Any = distributed.as_completed(loop=client.loop)  # type: ignore[no-untyped-call]
+    running: dict[str, tuple[Any, list[Tile]]] = {}
+    finished: Any = distributed.as_completed(loop=client.loop, with_results=True)  # type: ignore[no-untyped-call]
+    several, enough, looked = 1, 0, -math.inf
 
     def feed() -> None:
-        enough = 2 * max(sum(client.nthreads().values()), 1)
-        for tile in islice(source, max(enough - len(running), 0)):
-            future = client.submit(compute, tile, pure=False)
-            running[future.key] = future, tile
+        nonlocal enough, looked
+        if time.monotonic() - looked > LOOK:  # clusters grow and shrink
+            enough, looked = 2 * max(sum(client.nthreads().values()), 1), time.monotonic()
+        while len(running) < enough and (batch := list(islice(source, several))):
+            future = client.submit(compute_several, batch, pure=False)
+            running[future.key] = future, batch
             finished.add(future)
 
     try:
         feed()
-        for future in finished:
-            future.result()
-            yield running.pop(future.key)[1]
+        for future, seconds in finished:
+            if isinstance(seconds, BaseException):  # the task was cancelled
+                raise seconds
+            batch = running.pop(future.key)[1]
+            each = max(seconds, 1e-9) / len(batch)
+            several = min(max(int(TASK / each), 1), 4 * len(batch), MOST)
+            yield from batch
             feed()
     except StoreError:  # of a tile
         raise

@@ -18,7 +18,7 @@ from phasekit.maps.marks import Chunk, Index, Mark, Marks, key_of, sound
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.stored_arrays import codec
 
-AGAIN = "make the sweep's call again, which computes these tiles anew"
+AGAIN = "repeat the call of sweep, which computes these tiles again"
 
 #: Bytes of the header of what blosc compressed, whose last number is the length of all.
 _BLOSC = 16
@@ -58,6 +58,8 @@ async def _undecodable(found: Any, prototype: Any) -> str | None:
     spec: Any = SimpleNamespace(prototype=prototype)
     try:
         await codec().decode([(found, spec)])
+    except MemoryError:  # says nothing of the data
+        raise
     except Exception:  # whatever the codec makes of it
         return "cannot be decoded"
     return None
@@ -111,10 +113,7 @@ def at_a_glance(store: Any, part: StoredPart, known: Mapping[Index, Mark]) -> li
 
 def in_full(store: Any, part: StoredPart, known: Mapping[Index, Mark]) -> list[Damage]:
     """Return the finished tiles whose files are not what was written; all are read."""
-    from zarr.core.buffer import default_buffer_prototype
-    from zarr.core.sync import sync
-
-    prototype = default_buffer_prototype()
+    prototype = files.default_buffer()
     wanted = (
         (index, row.name, f"{row.name}/{key_of((*index, *(0,) * len(row.dims)))}", mark)
         for index, mark in known.items()
@@ -131,7 +130,7 @@ def in_full(store: Any, part: StoredPart, known: Mapping[Index, Mark]) -> list[D
 
     damaged: dict[Index, Damage] = {}
     while several := list(islice(wanted, AT_ONCE)):
-        for one in sync(look_at(several)):
+        for one in files.run(look_at(several)):
             if one is not None:
                 damaged.setdefault(one.index, one)
     return list(damaged.values())

@@ -13,7 +13,7 @@ from phasekit.labels.grid import cut, human
 from phasekit.maps.left import Left
 from phasekit.maps.place import Place
 from phasekit.maps.stored_arrays import codecs
-from phasekit.maps.tile import Tile, compute_cells, release_buffers
+from phasekit.maps.tile import Tile, columns_for, compute_cells, release_buffers
 from phasekit.table.row import Quantity
 
 #: Cells of the first sample, more than are ever computed without compiling the kernels. Those that
@@ -82,31 +82,30 @@ def _sample(chosen: Sequence[Tile]) -> tuple[float, float]:
     seconds = 0.0
     with one_thread():
         _timed(chosen[0], SAMPLE_CELLS)  # loads or compiles the kernels
-        took, results = _timed(chosen[0], SAMPLE_CELLS)
-        first = chosen[0].rows[0]
-        taken = results[first.name].size // prod(first.label_shape)
+        took, _, taken = _timed(chosen[0], SAMPLE_CELLS)
         room = int(taken * SAMPLE_SECONDS / max(took, 1e-9))
         for tile in chosen:
-            took, results = _timed(tile, min(max(room, LEAST_CELLS), MOST_CELLS))
+            took, results, taken = _timed(tile, min(max(room, LEAST_CELLS), MOST_CELLS))
             seconds += took
             for row in tile.rows:
                 size, took = _written(row, results[row.name])
                 bytes_written += size
                 seconds += took
                 raw += results[row.name].nbytes
-            cells += results[first.name].size // prod(first.label_shape)
+            cells += taken
     release_buffers()
     return bytes_written / max(raw, 1), seconds / max(cells, 1)
 
 
-def _timed(tile: Tile, most: int) -> tuple[float, dict[str, Any]]:
-    """Compute some cells in the middle of a tile; return the seconds and the results."""
+def _timed(tile: Tile, most: int) -> tuple[float, dict[str, Any], int]:
+    """Compute some cells in the middle of a tile; return the seconds, the results, how many."""
     box = _middle(tile.shape, most)
     shape = tuple(part.stop - part.start for part in box)
     inputs = {name: cut(array, box) for name, array in tile.inputs.items()}
     start = time.perf_counter()
-    results = compute_cells(tile.model, tile.passes, tile.rows, inputs, shape)
-    return time.perf_counter() - start, results
+    found = columns_for(tile, shape)
+    results = compute_cells(tile.model, tile.passes, tile.rows, inputs, shape, found)
+    return time.perf_counter() - start, results, prod(shape)
 
 
 def _middle(shape: tuple[int, ...], most: int) -> tuple[slice, ...]:
@@ -129,7 +128,7 @@ def _written(row: Quantity, result: Any) -> tuple[int, float]:
     array = zarr.create_array(
         MemoryStore(kept),
         shape=result.shape,
-        chunks=result.shape,
+        chunks=tuple(max(n, 1) for n in result.shape),
         dtype=row.dtype,
         compressors=codecs(),
         config={"write_empty_chunks": True},

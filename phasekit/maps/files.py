@@ -6,11 +6,36 @@ at once (the marks of tiles), and for files whose bytes are looked at (checksums
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Coroutine, Iterable, Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, cast
+
+T = TypeVar("T")
+
+#: Files that are asked for at once where each is a request to another machine.
+AT_ONCE = 64
+
+
+def run(work: Coroutine[Any, Any, T]) -> T:
+    """Run a coroutine in zarr's event loop, to which its stores may be bound."""
+    try:
+        from zarr.core.sync import sync
+    except ImportError:  # zarr does not publish the name
+        from phasekit.maps.courier import run_in_zarr
+
+        return run_in_zarr(work)
+    return sync(work)
+
+
+def default_buffer() -> Any:
+    """Return what zarr reads into."""
+    from zarr.buffer import default_buffer_prototype
+
+    return default_buffer_prototype()
 
 
 def read(store: Any, key: str) -> bytes | None:
@@ -19,17 +44,12 @@ def read(store: Any, key: str) -> bytes | None:
 
 
 def read_all(store: Any, keys: Iterable[str]) -> Iterator[tuple[str, bytes | None]]:
-    """Return what is stored under keys, one after the other; None where nothing is."""
-    root = _root(store)
+    """Return what is stored under keys, in their order; None where nothing is."""
+    root = folder_of(store)
     if root is None:
-        from zarr.core.buffer import default_buffer_prototype
-        from zarr.core.sync import sync
-
-        prototype = default_buffer_prototype()
-        sync(store._ensure_open())  # which zip files need
-        for key in keys:
-            found = sync(store.get(key, prototype))
-            yield key, None if found is None else found.to_bytes()
+        wanted = iter(keys)
+        while several := list(islice(wanted, AT_ONCE)):
+            yield from zip(several, run(_get_all(store, several)), strict=True)
         return
     for key in keys:
         data = None
@@ -38,17 +58,40 @@ def read_all(store: Any, keys: Iterable[str]) -> Iterator[tuple[str, bytes | Non
         yield key, data
 
 
+async def _get(store: Any, key: str) -> bytes | None:
+    found = await store.get(key, default_buffer())
+    return None if found is None else bytes(found.to_bytes())
+
+
+async def _get_all(store: Any, keys: Sequence[str]) -> list[bytes | None]:
+    await _opened(store)
+    return await asyncio.gather(*(_get(store, key) for key in keys))
+
+
+async def _opened(store: Any) -> None:
+    """Open a store that is not yet open, where zarr has stores of which that matters."""
+    if hasattr(store, "_ensure_open"):
+        await store._ensure_open()
+
+
+async def _ready_to_list(store: Any) -> None:
+    """Open a store, and let fsspec forget what it listed: other machines may have written since."""
+    await _opened(store)
+    system = getattr(getattr(store, "_store", store), "fs", None)
+    if system is not None:
+        system.invalidate_cache()
+
+
 def sizes(store: Any, folder: str) -> dict[str, int | None]:
     """Return the files in a folder of the store, with their bytes where that costs nothing."""
-    root = _root(store)
+    root = folder_of(store)
     if root is None:
-        from zarr.core.sync import sync
 
         async def names() -> list[str]:
-            await store._ensure_open()
+            await _ready_to_list(store)
             return [name async for name in store.list_dir(folder)]
 
-        return dict.fromkeys(sync(names()))
+        return dict.fromkeys(run(names()))
     found: dict[str, int | None] = {}
     with (
         contextlib.suppress(FileNotFoundError, NotADirectoryError),
@@ -63,15 +106,14 @@ def sizes(store: Any, folder: str) -> dict[str, int | None]:
 
 def every_key(store: Any) -> list[str]:
     """Return the keys of all that lies in a store, links and empty folders of a disk as well."""
-    root = _root(store)
+    root = folder_of(store)
     if root is None:
-        from zarr.core.sync import sync
 
         async def keys() -> list[str]:
-            await store._ensure_open()
+            await _ready_to_list(store)
             return [key async for key in store.list()]
 
-        return sync(keys())
+        return run(keys())
     return [entry.relative_to(root).as_posix() for entry in walk(root)]
 
 
@@ -91,35 +133,52 @@ def walk(folder: Path) -> Iterator[Path]:
 
 def put(store: Any, documents: Mapping[str, bytes | None]) -> None:
     """Write files, each in one piece, where they are not there already; remove those of None."""
-    from zarr.core.buffer import default_buffer_prototype
-    from zarr.core.sync import sync
-
-    buffer = default_buffer_prototype().buffer
+    buffer = default_buffer().buffer
     for key, document in documents.items():
         there = read(store, key)
         if document is None:
             if there is not None:
-                sync(store.delete(key))
+                run(store.delete(key))
         elif there != document:
-            sync(store.set(key, buffer.from_bytes(document)))
+            run(store.set(key, buffer.from_bytes(document)))
+
+
+def write_all(
+    store: Any, buffers: Mapping[str, Any], *, besides: str | None = None
+) -> bytes | None:
+    """Write buffers of zarr under their keys, all at once, and read the file `besides` meanwhile.
+
+    What is read is returned. After an error nothing is being written any more.
+    """
+
+    async def write() -> bytes | None:
+        jobs = [store.set(key, value) for key, value in buffers.items()]
+        if besides is not None:
+            jobs.append(_get(store, besides))
+        done = await asyncio.gather(*jobs, return_exceptions=True)
+        for one in done:
+            if isinstance(one, BaseException):
+                raise one
+        return cast(bytes | None, done[-1] if besides is not None else None)
+
+    return run(write())
 
 
 def remove(store: Any, keys: Iterable[str]) -> None:
-    """Remove files, where they are there, and folders that have taken their places."""
-    from zarr.core.sync import sync
+    """Remove files, all at once, where they are there, and folders in their places."""
 
-    for key in keys:
-        sync(store.delete(key))
+    async def delete() -> None:
+        await asyncio.gather(*(store.delete(key) for key in keys))
+
+    run(delete())
 
 
 def remove_folder(store: Any, folder: str) -> None:
     """Remove a folder of the store with all that is in it."""
-    from zarr.core.sync import sync
-
-    sync(store.delete_dir(folder))
+    run(store.delete_dir(folder))
 
 
-def _root(store: Any) -> Path | None:
+def folder_of(store: Any) -> Path | None:
     """Return the folder of a store on a disk."""
     from zarr.storage import LocalStore
 

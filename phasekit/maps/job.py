@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import prod
 
 import xarray as xr
 
+from phasekit.cells.evaluate import columns_of_sample
+from phasekit.cells.numbered import NUMBERED, greatest
 from phasekit.cells.request import Request
 from phasekit.errors import ParameterError, StoreError
 from phasekit.maps.damage import Damage, at_a_glance, in_full, lost_tiles
 from phasekit.maps.estimate import SAMPLES, Estimate, estimate
+from phasekit.maps.keys import unfit
 from phasekit.maps.left import Left
 from phasekit.maps.marks import Marks, marks_of
 from phasekit.maps.options import StoreOptions
+from phasekit.maps.packed import read_packed
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan, continued, new_plan, with_parts
@@ -30,7 +34,7 @@ from phasekit.maps.stored_arrays import (
 )
 from phasekit.maps.tile import Tile
 from phasekit.maps.unfinished import opened
-from phasekit.systems.identity import MODEL, model_name
+from phasekit.systems.identity import MODEL, SCHEMA, model_name, versions
 
 
 @dataclass(frozen=True)
@@ -94,9 +98,18 @@ def plan_job(
         if old is not None and old.parts:
             with opened(place.open(read_only=True), old, place.name) as (ds, group):
                 refuse_damaged(ds, group, old, place.name)
+                _refuse_other(ds, old, request, place.name)
     name = place.name
     base = new_plan(request) if old is None else continued(old, request, name, options.chunks)
+    if request.is_open:
+        base, request = _with_columns(place, old, base, request)
     plan = replace(with_parts(base, request, options, name), ready=True)
+    if wrong := unfit(sorted(plan.names)):
+        raise StoreError(
+            f"store: {name} would have arrays called {', '.join(wrong)}, wants names that are "
+            "names of files on every system, no two of them equal but for case: rename the dims "
+            "of the axes"
+        )
     asked = {row.name for row in request.rows}
     left, damaged, parts = [], [], []
     for part in plan.parts:
@@ -109,8 +122,56 @@ def plan_job(
                 part = replace(part, complete=False)
                 left.append(replace(one, part=part))
         parts.append(part)
-    plan = replace(plan, parts=tuple(parts))
+    plan = replace(plan, parts=tuple(parts), packed="")
+    if old is not None and old.packed and plan == replace(old, packed=""):
+        # A plan without it, which is written otherwise, comes before anything is changed.
+        store = place.open(read_only=True)
+        if not verify or read_packed(store, old) is not None:
+            plan = replace(plan, packed=old.packed)
     return Job(place, request, old, plan, tuple(left), tuple(damaged))
+
+
+def _with_columns(
+    place: Place, old: Plan | None, base: Plan, request: Request
+) -> tuple[Plan, Request]:
+    """Return a plan and a request with as many equilibria and saddles as are known by now.
+
+    Tiles may have been found to need more than the arrays had; of a new map a few cells are tried.
+    """
+    asked = {row.name for row in request.rows}
+    widths: list[Mapping[str, int]] = [part.columns or {} for part in base.parts]
+    for part in base.parts if old is not None else ():
+        if not asked.isdisjoint(part.quantities):
+            with _readable(place):
+                store = place.open(read_only=True)
+                marks = marks_of(store, base, part, request.grid.inputs, old)
+            widths += [mark.columns for mark in marks.uneven.values()]
+    needed = {dim for row in request.rows for dim in row.dims if dim in NUMBERED}
+    if not needed <= greatest(widths).keys():
+        widths.append(columns_of_sample(request))
+    columns = {**dict.fromkeys(NUMBERED, 0), **greatest(widths)}
+    parts = tuple(part.with_columns(columns) for part in base.parts)
+    for part, was in zip(parts, base.parts, strict=True):
+        if part != was and asked.isdisjoint(part.quantities):
+            raise StoreError(
+                f"store: {place.name} has room for fewer equilibria than the call finds, which "
+                f"does not name {', '.join(part.quantities)}; name all quantities of the map in of="
+            )
+    return replace(base, parts=parts), request.sized(columns)
+
+
+def _refuse_other(ds: xr.Dataset, old: Plan, request: Request, name: str) -> None:
+    """Raise a `StoreError` where a map is one of another system, beside its parameters."""
+    others = {MODEL, SCHEMA, *versions()}
+    stored = {k: v for k, v in ds.attrs.items() if k.startswith("phasekit_") and k not in others}
+    wanted = dict(request.system.definition)
+    if old.model == type(request.system).__name__ and stored != wanted:
+        different = sorted(k for k in stored.keys() | wanted if stored.get(k) != wanted.get(k))
+        told = (f"{k} is {stored.get(k)!r}, in the call {wanted.get(k)!r}" for k in different)
+        raise StoreError(
+            f"store: {name} holds a different map from the one requested: {'; '.join(told)}; "
+            f"repeat the original call, choose another name, or pass overwrite=True"
+        )
 
 
 def _marks(

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.cells.request import Request, needs_of, passes_of
+from phasekit.cells.request import Request, fitted, needs_of, passes_of
 from phasekit.errors import StoreError
 from phasekit.labels.grid import cut
 from phasekit.maps.marks import Index, Inputs, Marks
@@ -19,6 +19,7 @@ from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan
 from phasekit.maps.tile import Tile
+from phasekit.table.row import Pass
 
 #: Bytes that a file takes at least.
 FILE_BYTES = 4096
@@ -92,8 +93,13 @@ class Left:
     ) -> Iterator[Tile]:
         """Return tiles with what is needed to compute them; by default all that are left."""
         part, grid = self.part, request.grid
-        passes = passes_of(request.system, part.rows)
-        names = {name for needs in needs_of(request.system, passes).values() for name in needs}
+        rows = part.rows
+        passes: Sequence[Pass] = passes_of(request.system, rows)
+        if request.is_open:
+            passes = fitted(request.system, rows, passes)[1]
+        names = {
+            name for needs in needs_of(request.system, tuple(passes)).values() for name in needs
+        }
         missing = sorted(names - grid.inputs.keys())
         if missing:
             raise StoreError(
@@ -102,7 +108,7 @@ class Left:
             )
         arrays = {name: grid.aligned(name, part.dims) for name in sorted(names)}
         made_of = Inputs(self.plan, part, grid.inputs)
-        marked = self.marks.others | self.marks.shorter.keys()
+        marked = self.marks.others | self.marks.shorter.keys() | self.marks.uneven.keys()
         for index in self.indices() if indices is None else indices:
             region = part.region(index, self.sizes)
             yield Tile(
@@ -114,9 +120,12 @@ class Left:
                 index in marked,
                 region,
                 type(request.system),
-                passes,
-                part.rows,
+                tuple(passes),
+                rows,
                 {name: np.array(cut(array, region)) for name, array in arrays.items()},
+                part.chunks,
+                part.columns or {},
+                self.marks.uneven.get(index),
             )
 
 

@@ -11,7 +11,7 @@ import functools
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,9 +19,9 @@ import xarray as xr
 from google_crc32c import value as crc32c
 
 from phasekit.maps import files
+from phasekit.maps.keys import GROUP
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.plan import Plan
-from phasekit.maps.plan_file import GROUP
 
 #: Bytes of the checksum at the end of what zarr's codec crc32c wrote.
 TAIL = 4
@@ -51,13 +51,18 @@ class Mark:
 
     inputs: str  # digest
     chunks: Mapping[str, Chunk | None]  # None where zarr writes nothing, for all is its fill value
+    columns: Mapping[str, int] = field(default_factory=dict)  # that its chunks have
+    unproved: tuple[float, ...] = ()  # where more equilibria may be: as `numbered.unproved` says
 
     def text(self) -> str:
         """Write it as a line."""
         chunks = {
             name: chunk and [chunk.size, chunk.checksum] for name, chunk in self.chunks.items()
         }
-        return json.dumps({"inputs": self.inputs, "chunks": chunks}, separators=(",", ":"))
+        stored: dict[str, Any] = {"inputs": self.inputs, "chunks": chunks}
+        stored |= {"columns": dict(self.columns)} if self.columns else {}
+        stored |= {"unproved": list(self.unproved)} if self.unproved else {}
+        return json.dumps(stored, separators=(",", ":"))
 
 
 def sound(data: Any) -> bool:
@@ -82,7 +87,8 @@ def read_marks(store: Any, part: StoredPart) -> dict[Index, Mark]:
             mark = None if data is None else _mark_of(data, part)
         except (ValueError, TypeError, KeyError, AttributeError):
             continue
-        if mark is not None and len(index) == len(part.dims):
+        own = key == f"{folder}/{key_of(index)}" and min(index, default=0) >= 0
+        if mark is not None and own and len(index) == len(part.dims):
             found[index] = mark
     return found
 
@@ -94,7 +100,10 @@ def _mark_of(data: bytes, part: StoredPart) -> Mark | None:
         return Mark("", {}) if data[:-TAIL] == b"\1" else None
     stored = json.loads(data[_HEAD:-TAIL])
     chunks = ((name, stored["chunks"][name]) for name in part.quantities)
-    return Mark(stored["inputs"], {name: chunk and Chunk(*chunk) for name, chunk in chunks})
+    columns = {dim: int(n) for dim, n in stored.get("columns", {}).items()}
+    unproved = tuple(map(float, stored.get("unproved", ())))
+    read = {name: chunk and Chunk(*chunk) for name, chunk in chunks}
+    return Mark(stored["inputs"], read, columns, unproved)
 
 
 class Inputs:
@@ -134,6 +143,8 @@ class Marks:
     #: Tiles at the end of a map that has been made longer, and the sizes that it had.
     shorter: dict[Index, tuple[Mark, Mapping[str, int]]]
     others: frozenset[Index]
+    #: Tiles whose chunks have other numbers of columns than the arrays.
+    uneven: dict[Index, Mark] = field(default_factory=dict)
 
     def known(self) -> dict[Index, Mark]:
         """Return what is recorded of each tile that is done, or was when the map was shorter."""
@@ -158,17 +169,23 @@ def marks_of(
     done: dict[Index, Mark] = {}
     shorter: dict[Index, tuple[Mark, Mapping[str, int]]] = {}
     others = []
+    uneven: dict[Index, Mark] = {}
     for index, mark in read_marks(store, part).items():
+        even = mark.columns == (part.columns or {})
         if mark.inputs == _expected(inputs, index, plan.sizes, old):
-            done[index] = mark
+            (done if even else uneven)[index] = mark
             continue
         for sizes in reversed(plan.earlier):
-            if part.checked and mark.inputs == _expected(inputs, index, {**plan.sizes, **sizes}):
+            if (
+                even
+                and part.checked
+                and mark.inputs == _expected(inputs, index, {**plan.sizes, **sizes})
+            ):
                 shorter[index] = mark, {**plan.sizes, **sizes}
                 break
         else:
             others.append(index)
-    return Marks(done, shorter, frozenset(others))
+    return Marks(done, shorter, frozenset(others), uneven)
 
 
 def _expected(

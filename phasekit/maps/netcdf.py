@@ -13,9 +13,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from xarray.backends import H5NetCDFStore
-from xarray.backends.h5netcdf_ import H5NetCDFArrayWrapper
-from xarray.core.indexing import LazilyIndexedArray
 
 from phasekit.errors import StoreError
 
@@ -61,6 +58,14 @@ def digest(file: Any) -> str:
     return found.hexdigest()
 
 
+def has_digest(path: Path) -> bool:
+    """Whether a file has a digest; its arrays have checksums then."""
+    import h5netcdf
+
+    with h5netcdf.File(path, "r") as file:
+        return GROUP in file.groups and DIGEST in file[GROUP].attrs
+
+
 def _attributes(found: Any, owner: Any) -> None:
     for name, value in sorted(owner.attrs.items()):
         found.update(repr(name).encode())
@@ -77,44 +82,53 @@ def _is_numeric(dtype: np.dtype[Any]) -> bool:
     return dtype.kind in "biuf"
 
 
-class _Array(H5NetCDFArrayWrapper):
-    """An array of a file; a checksum that is wrong raises a `StoreError` when it is read."""
+def _refuse_others(path: Path) -> None:
+    """Raise a `StoreError` where values of a file would be read from others, which it names."""
+    import h5py
 
-    def _getitem(self, key: Any) -> Any:
-        try:
-            return super()._getitem(key)  # type: ignore[no-untyped-call]
-        except OSError as error:
-            raise StoreError(
-                f"store: {self.datastore.path} is damaged: {self.variable_name} cannot be read: "
-                f"{error}; put the file back, or make it anew"
-            ) from error
+    def look(name: str, link: Any) -> str | None:
+        if isinstance(link, h5py.ExternalLink):
+            return name
+        if isinstance(link, h5py.HardLink):
+            found = file[name]
+            if isinstance(found, h5py.Dataset) and (found.external or found.is_virtual):
+                return name
+        return None
 
-
-class _Store(H5NetCDFStore):
-    """A file whose arrays say what is wrong with it."""
-
-    path: Path
-    written: int  # so that dask tells a file from one that stood there before
-
-    def open_store_variable(self, name: str, var: Any) -> xr.Variable:
-        variable = super().open_store_variable(name, var)  # type: ignore[no-untyped-call]
-        data = LazilyIndexedArray(_Array(name, self))  # type: ignore[no-untyped-call]
-        return xr.Variable(variable.dims, data, variable.attrs, variable.encoding)
+    with h5py.File(path, "r") as file:
+        other = file.visititems_links(look)
+    if other is not None:
+        raise StoreError(
+            f"store: {path} is refused: the values of {other} are in another file, wants them here"
+        )
 
 
 def open_netcdf(path: Path, chunks: Any = None) -> xr.Dataset:
     """Open a file; its digest is compared if it has one, checksums of arrays when they are read."""
     need_h5netcdf()
-    store = _Store.open(os.path.abspath(path))
+    _refuse_others(path)
+    try:
+        from phasekit.maps.netcdf_store import Store
+    except ImportError:  # a name is gone: HDF5 says in its own words which array is damaged
+        import h5netcdf
+
+        with h5netcdf.File(path, "r", decode_vlen_strings=True) as file:
+            _refuse_damaged(file, path)
+        return xr.open_dataset(path, engine="h5netcdf", chunks=chunks)
+    store = Store.open(os.path.abspath(path))
     store.path, store.written = path, path.stat().st_mtime_ns
     try:
-        file = store.ds
-        if GROUP in file.groups and file[GROUP].attrs.get(DIGEST) != digest(file):
-            raise StoreError(
-                f"store: {path} is damaged: its attributes, scalars or texts are not what they "
-                "were when it was written; put the file back, or make it anew"
-            )
+        _refuse_damaged(store.ds, path)
         return xr.open_dataset(store, chunks=chunks)
     except BaseException:
         store.close()
         raise
+
+
+def _refuse_damaged(file: Any, path: Path) -> None:
+    """Raise a `StoreError` where a file's digest is not that of what it holds."""
+    if GROUP in file.groups and file[GROUP].attrs.get(DIGEST) != digest(file):
+        raise StoreError(
+            f"store: {path} is damaged: its attributes, scalars or texts have changed since it "
+            f"was written; restore the file, or compute it again"
+        )

@@ -10,7 +10,9 @@ import numpy as np
 
 from phasekit.cells.request import Request
 from phasekit.errors import ParameterError
+from phasekit.inputs import is_whole
 from phasekit.labels.arguments import bad, unknown, whole
+from phasekit.table.numerical import NUMERICAL_ROWS
 from phasekit.table.row import Quantity
 
 
@@ -44,11 +46,17 @@ class StoreOptions:
         ------
         ParameterError
         """
-        dtypes = check_dtypes(dtype, request.rows)
+        rows = request.rows
+        if request.is_open:  # bounds of errors, which go along, keep all digits
+            rows = tuple(row for row in rows if row.name not in BOUNDS)
+        dtypes = check_dtypes(dtype, rows)
         tiles = check_chunks(chunks, request.grid.sizes)
         number = check_workers(workers, client)
         return cls(tiles, dtypes, number, client, overwrite, force)
 
+
+#: What results in any potential say besides.
+BOUNDS = {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
 
 #: What numbers can be stored as.
 FLOATS = ("float32", "float64")
@@ -92,7 +100,7 @@ def check_chunks(chunks: Any, sizes: Mapping[str, int]) -> dict[str, int]:
     for dim, size in given.items():
         if dim not in sizes:
             raise unknown("chunks: dim", dim, sizes)
-        if isinstance(size, (bool, np.bool_)) or not isinstance(size, (int, np.integer)):
+        if not is_whole(size):
             raise bad("chunks", size if isinstance(chunks, Mapping) else chunks, wants)
         if size != -1 and size < 1:
             raise bad("chunks", size, wants)
@@ -116,7 +124,7 @@ def without_store(option: str, value: Any) -> ParameterError:
     return bad(
         option,
         value,
-        "None, for what is not put into a Zarr store tile by tile: maps without a store, "
-        "in a .nc file, or of a Potential",
+        "None, for what is not put into a Zarr store tile by tile: maps without a store, or in a "
+        ".nc file",
         "give store='map.zarr', or leave it out",
     )

@@ -6,9 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import prod
 
+from phasekit.cells.numbered import NUMBERED, sized
 from phasekit.cells.request import Part
 from phasekit.errors import ParameterError
 from phasekit.labels.grid import SHARE, available_memory, human
+from phasekit.table.numerical import NUMERICAL_ROWS
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 
@@ -25,6 +27,12 @@ MANY_TILES = 1 << 10
 TOO_SMALL = 16
 
 
+def rows_of(*, is_open: bool) -> Mapping[str, Quantity]:
+    """Return the rows that maps may hold, by name; where equilibria are numbered, more of them."""
+    more = (row for rows in NUMERICAL_ROWS.values() for row in rows)
+    return {**ROWS, **{row.name: row for row in more}} if is_open else ROWS
+
+
 @dataclass(frozen=True)
 class StoredPart:
     """A part as a store has it: its name there, its tiles, and how its quantities are kept."""
@@ -36,6 +44,8 @@ class StoredPart:
     complete: bool = False
     #: Parameters and states from which it is computed; None in stores that have no checksums.
     inputs: tuple[str, ...] | None = None
+    #: How many equilibria and saddles the arrays hold, where these are numbered; else None.
+    columns: dict[str, int] | None = None
 
     @property
     def checked(self) -> bool:
@@ -45,7 +55,18 @@ class StoredPart:
     @property
     def rows(self) -> tuple[Quantity, ...]:
         """The rows of the table, with the dtypes that are stored."""
-        return tuple(replace(ROWS[name], dtype=dtype) for name, dtype in self.quantities.items())
+        known = rows_of(is_open=self.columns is not None)
+        rows = tuple(replace(known[name], dtype=dtype) for name, dtype in self.quantities.items())
+        return rows if self.columns is None else sized(rows, self.columns)
+
+    def chunk_of(self, row: Quantity) -> tuple[int, ...]:
+        """Return the lengths of a quantity's chunks."""
+        return self.chunks + tuple(max(n, 1) for n in row.label_shape)
+
+    def with_columns(self, columns: Mapping[str, int]) -> StoredPart:
+        """Return it with arrays for so many equilibria and saddles."""
+        own = None if self.columns is None else {dim: columns[dim] for dim in self.columns}
+        return self if own == self.columns else replace(self, columns=own, complete=False)
 
     @property
     def cell_bytes(self) -> int:
@@ -69,7 +90,12 @@ class StoredPart:
 
 
 def new_part(
-    name: str, part: Part, sizes: Mapping[str, int], chunks: Mapping[str, int]
+    name: str,
+    part: Part,
+    sizes: Mapping[str, int],
+    chunks: Mapping[str, int],
+    *,
+    is_open: bool = False,
 ) -> StoredPart:
     """Cut the dims that the call leaves open into tiles that are about as long in each.
 
@@ -88,7 +114,7 @@ def new_part(
         )
     cells = min(
         MOST_CELLS,
-        MOST_BYTES // sum(row.cell_bytes for row in part.rows),
+        MOST_BYTES // max(sum(row.cell_bytes for row in part.rows), 1),
         max(FEWEST_CELLS, whole // FEWEST_TILES),
     )
     found = {
@@ -102,7 +128,20 @@ def new_part(
         found[dim] = -(-sizes[dim] // pieces)
         room = max(room // found[dim], 1)
     chunks_of = tuple(found[dim] for dim in part.dims)
-    stored = StoredPart(name, part.dims, chunks_of, quantities, inputs=tuple(sorted(part.inputs)))
+    columns = {
+        dim: n
+        for row in part.rows
+        for dim, n in zip(row.dims, row.label_shape, strict=True)
+        if dim in NUMBERED
+    }
+    stored = StoredPart(
+        name,
+        part.dims,
+        chunks_of,
+        quantities,
+        inputs=tuple(sorted(part.inputs)),
+        columns=columns if is_open else None,
+    )
     _refuse_large_tiles(stored)
     return stored
 
@@ -130,7 +169,8 @@ def cut_again(
         return part
     if not chunks.keys().isdisjoint(part.dims):
         return part
-    fresh = new_part(part.name, Part(part.dims, (), part.rows, tuple(names)), sizes, {})
+    own = Part(part.dims, (), part.rows, tuple(names))
+    fresh = new_part(part.name, own, sizes, {}, is_open=part.columns is not None)
     return fresh if tiles > TOO_SMALL * prod(fresh.grid(sizes)) else part
 
 

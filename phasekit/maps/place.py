@@ -10,6 +10,7 @@ import contextlib
 import os
 import re
 import shutil
+import stat
 import uuid
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -21,11 +22,16 @@ from urllib.request import url2pathname
 from phasekit.errors import StoreError
 from phasekit.labels.arguments import bad
 from phasekit.maps import files
+from phasekit.maps.keys import GROUP
+from phasekit.maps.replacing import put_back, sweep
 
 if TYPE_CHECKING:
     from zarr.abc.store import Store
 
 ZARR, NETCDF = ".zarr", ".nc"
+
+#: What s3fs is told: one request for a file, where it would ask for the size first.
+_OPTIONS = dict.fromkeys(("s3", "s3a"), {"max_concurrency": 1})
 
 #: Files that zarr writes before it renames them; one stays behind where its writer was killed.
 _PARTIAL = re.compile(r"\.[0-9a-f]{32}\.partial$")
@@ -64,7 +70,8 @@ class Place:
                 )
             return store.with_read_only(True) if read_only and not store.read_only else store
         try:
-            return FsspecStore.from_url(self.url, read_only=read_only)
+            options = _OPTIONS.get(urlsplit(self.url).scheme)
+            return FsspecStore.from_url(self.url, options, read_only=read_only)
         except (ImportError, ValueError) as error:
             raise StoreError(
                 f"store: {self.name} cannot be reached: {error}; URLs need fsspec and the package "
@@ -140,6 +147,7 @@ class Place:
 
         The lock is the system's and ends with the process, however that ends.
         """
+        self._refuse_links()
         if self.path is None:
             yield
             return
@@ -152,8 +160,29 @@ class Place:
             try:
                 yield
             finally:
-                if made and self.path.is_dir() and not any(self.path.iterdir()):
-                    self.path.rmdir()
+                with contextlib.suppress(OSError):  # what ended the work is said, not this
+                    if made and self.path.is_dir() and not any(self.path.iterdir()):
+                        self.path.rmdir()
+
+    def _refuse_links(self) -> None:
+        """Raise a `StoreError` where a folder of the store is a link: nothing is written elsewhere.
+
+        Links to files stay: they are replaced, and what they lead to is not touched.
+        """
+        root = self.path or (None if self.store is None else files.folder_of(self.store))
+        for folder in () if root is None else (root, root / GROUP):
+            with (
+                contextlib.suppress(FileNotFoundError, NotADirectoryError),
+                os.scandir(folder) as entries,
+            ):
+                for entry in entries:
+                    if _leads_elsewhere(entry):
+                        here = Path(entry.path).relative_to(root or "").as_posix()
+                        raise StoreError(
+                            f"store: {self.name} holds a link, {here}, wants a folder there: what "
+                            "is written would come to lie elsewhere; put the files that it leads "
+                            "to in its place"
+                        )
 
     def clear(self, instead: Mapping[str, bytes]) -> None:
         """Remove the map that is there; what says that it is a map goes last.
@@ -168,7 +197,7 @@ class Place:
 
             store = self.open(read_only=False)
             with contextlib.suppress(FileNotFoundError):
-                group = zarr.open_group(store, mode="r+", zarr_format=3)
+                group = zarr.open_group(store, mode="r+", zarr_format=3, use_consolidated=False)
                 files.put(store, instead)
                 for name in sorted(group, key=instead.__contains__):
                     del group[name]
@@ -199,9 +228,18 @@ class Place:
         """Remove what killed processes left half written."""
         if self.path is None:
             return
+        sweep(self.path)
         for entry in files.walk(self.path):
             if _PARTIAL.search(entry.name):
                 entry.unlink(missing_ok=True)
+
+
+def _leads_elsewhere(entry: os.DirEntry[str]) -> bool:
+    """Whether it is a link, but one to a file, or what is one on Windows."""
+    if entry.is_symlink():
+        return not entry.is_file()
+    tag = getattr(entry.stat(follow_symlinks=False), "st_reparse_tag", 0)
+    return tag != 0 and tag == getattr(stat, "IO_REPARSE_TAG_MOUNT_POINT", None)
 
 
 def place_of(store: Any) -> Place:
@@ -223,16 +261,19 @@ def place_of(store: Any) -> Place:
         raise bad("store", text, "a path that ends in .zarr or .nc, without null bytes")
     if "://" in text or "::" in text:
         parts = urlsplit(text)
-        if parts.scheme != "file":
+        if parts.scheme not in ("file", "local"):
             return Place(text, url=text, key=text)
         if parts.netloc not in ("", "localhost"):
             raise bad("store", text, "file:///path, with three slashes: a file of this machine")
         text = url2pathname(parts.path)
     try:
         path = Path(text).expanduser()
-        path.exists()
+        if not path.exists():
+            put_back(path.absolute(), "store")
     except RuntimeError as error:  # no such user
         raise bad("store", text, f"a path that can exist: {error}") from None
+    except StoreError:
+        raise
     except OSError as error:  # a name that is too long, or a folder that may not be looked into
         raise StoreError(f"store: {text:.80} cannot be reached: {error.strerror}") from error
     return Place(str(path), path=path.absolute(), key=str(path.absolute()))

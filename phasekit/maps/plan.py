@@ -42,8 +42,19 @@ class Plan:
     earlier: tuple[dict[str, int], ...] = ()  # sizes of which tiles at the end may be left
     #: SHA-256 of each file that describes the arrays or holds a coordinate.
     documents: dict[str, str] = field(default_factory=dict)
+    #: Digests of the store's own document, whole and without versions; none in earlier stores.
+    root: dict[str, str] = field(default_factory=dict)
     #: Where the arrays are being changed: these files as they were, None for those that were not.
     before: dict[str, bytes | None] = field(default_factory=dict, compare=False)
+    coming: frozenset[str] = field(default=frozenset(), compare=False)  # arrays they may be of
+    packed: str = ""  # digest of the file by which a finished map opens, if it has one
+    coordinate: str = "phi"  # the name under which readers find places as well
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of the map's arrays."""
+        dims = (dim for part in self.parts for row in part.rows for dim in row.dims)
+        return frozenset([*self.quantities, *self.arrays, *self.scalars, *dims])
 
     @property
     def quantities(self) -> dict[str, StoredPart]:
@@ -54,7 +65,9 @@ class Plan:
     def generation(self) -> str:
         """A digest of all that decides what is in the arrays: that of another map is another."""
         parts = [
-            [part.name, part.dims, part.chunks, part.quantities, part.inputs] for part in self.parts
+            [part.name, part.dims, part.chunks, part.quantities, part.inputs, *own]
+            for part in self.parts
+            for own in [[] if part.columns is None else [part.columns]]
         ]
         made_of = [self.model, self.scalars, self.arrays, self.sizes, parts]
         return hashlib.sha256(json.dumps(made_of, sort_keys=True).encode()).hexdigest()
@@ -69,7 +82,14 @@ def new_plan(request: Request) -> Plan:
         for name, x in {**request.grid.coords, **inputs}.items()
         if x.dims
     }
-    return Plan(type(request.system).__name__, scalars, arrays, dict(request.grid.sizes), ())
+    return Plan(
+        type(request.system).__name__,
+        scalars,
+        arrays,
+        dict(request.grid.sizes),
+        (),
+        coordinate=getattr(request.system, "coordinate", "phi") if request.is_open else "phi",
+    )
 
 
 def fingerprint(values: xr.Variable) -> str:
@@ -99,8 +119,8 @@ def continued(stored: Plan, request: Request, name: str, chunks: Mapping[str, in
     found = list(_differences(stored, wanted, request))
     if found:
         raise StoreError(
-            f"store: {name} holds another map than the call asks for: {'; '.join(found)}; make "
-            "the call as it was, choose another name, or pass overwrite=True"
+            f"store: {name} holds a different map from the one requested: {'; '.join(found)}; "
+            f"repeat the original call, choose another name, or pass overwrite=True"
         )
     sizes = {**stored.sizes, **{dim: wanted.sizes[dim] for dim in wanted.sizes}}
     grown = [dim for dim in stored.sizes if sizes[dim] != stored.sizes[dim]]
@@ -132,6 +152,7 @@ def continued(stored: Plan, request: Request, name: str, chunks: Mapping[str, in
         ready=True,
         earlier=stored.earlier if not grown else (*stored.earlier, stored.sizes),
         before={},
+        coming=frozenset(),
     )
 
 
@@ -223,5 +244,13 @@ def with_parts(plan: Plan, request: Request, options: StoreOptions, name: str) -
         if rows:
             taken = {stored.name for stored in parts}
             free = next(n for n in map("part{}".format, itertools.count()) if n not in taken)
-            parts.append(new_part(free, replace(part, rows=rows), plan.sizes, chunks))
+            parts.append(
+                new_part(
+                    free,
+                    replace(part, rows=rows),
+                    plan.sizes,
+                    chunks,
+                    is_open=request.is_open,
+                )
+            )
     return replace(plan, parts=tuple(parts))

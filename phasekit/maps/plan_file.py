@@ -8,21 +8,29 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from phasekit.cells.numbered import NUMBERED
 from phasekit.errors import ParameterError
-from phasekit.maps.parts import StoredPart
+from phasekit.labels.coordinates import LABELS
+from phasekit.maps.keys import DOCUMENT, GROUP, is_document, is_name, is_part, unfit
+from phasekit.maps.parts import StoredPart, rows_of
 from phasekit.maps.plan import LAYOUT, Plan
-from phasekit.table.quantities import ROWS
+from phasekit.systems.identity import SCHEMA, versions
 
-#: The group that holds the plan, and the marks of tiles that are done; its file and attribute.
-GROUP = "sweep"
-PLAN_KEY = f"{GROUP}/zarr.json"
+#: The file that holds the plan, and the attribute in it.
+PLAN_KEY = f"{GROUP}/{DOCUMENT}"
 PLAN = "plan"
+
+#: Names of the digests of the store's own document.
+WHOLE, DEFINITION = "whole", "definition"
 
 #: What stands in place of a plan while a map is removed.
 CLEARED = Plan("", {}, {}, {}, ())
+
+#: Dtypes in which results of others may be stored; equilibria that are numbered may be many.
+_KINDS = {"float64": ("float32", "float64"), "int8": ("int8", "int16")}
 
 _DAMAGED = "its plan, sweep/zarr.json, is damaged"
 
@@ -48,6 +56,7 @@ def _to_json(plan: Plan) -> dict[str, Any]:
             "complete": part.complete,
         }
         | ({"inputs": list(part.inputs)} if part.inputs is not None else {})
+        | ({"columns": part.columns} if part.columns is not None else {})
         for part in plan.parts
     ]
     stored = {
@@ -64,7 +73,10 @@ def _to_json(plan: Plan) -> dict[str, Any]:
             key: None if data is None else base64.b64encode(data).decode()
             for key, data in plan.before.items()
         },
-    }
+        "coming": sorted(plan.coming),
+        "root": plan.root,
+    } | ({"packed": plan.packed} if plan.packed else {})
+    stored |= {"coordinate": plan.coordinate} if plan.coordinate != "phi" else {}
     return {**stored, "sha256": _digest(stored)}
 
 
@@ -72,6 +84,23 @@ def _digest(stored: Mapping[str, Any]) -> str:
     fixed = {name: stored[name] for name in stored.keys() - {"ready", "sha256"}}
     fixed["parts"] = [{**part, "complete": None} for part in stored["parts"]]
     return hashlib.sha256(json.dumps(fixed, sort_keys=True).encode()).hexdigest()
+
+
+def root_digests(data: bytes) -> dict[str, str]:
+    """Return the digests of the store's own document: of all, and of all but versions.
+
+    The versions of libraries may be others where a map is continued, that of the schema is looked
+    at by itself; what it is a map of may not.
+    """
+    try:
+        root = json.loads(data)
+        for name in (SCHEMA, *versions()):
+            root["attributes"].pop(name, None)
+        definition = json.dumps(root, sort_keys=True)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        definition = "damaged"
+    made = {WHOLE: data, DEFINITION: definition.encode()}
+    return {name: hashlib.sha256(part).hexdigest() for name, part in made.items()}
 
 
 def plan_from(data: bytes) -> Plan:
@@ -89,12 +118,12 @@ def plan_from(data: bytes) -> Plan:
         raise ParameterError(f"{_DAMAGED}: {type(error).__name__}: {error}") from error
     if type(layout) is not int or layout not in (1, LAYOUT):
         raise ParameterError(
-            f"got a store of layout {layout!r}, wants {LAYOUT}; it was made by "
-            "another version of phasekit: make it anew or use that version"
+            f"got a store of layout {layout!r}, wants {LAYOUT}; it was made by another version of "
+            f"phasekit: compute it again or use that version"
         )
     try:
         if layout > 1 and stored["sha256"] != _digest(stored):
-            raise ParameterError(f"{_DAMAGED}: it is not what it was when it was written")
+            raise ParameterError(f"{_DAMAGED}: it has changed since it was written")
         plan = _read(stored)
         _check(plan)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
@@ -113,6 +142,7 @@ def _read(stored: Mapping[str, Any]) -> Plan:
             dict(part["quantities"]),
             part["complete"],
             tuple(part["inputs"]) if "inputs" in part else None,
+            dict(part["columns"]) if "columns" in part else None,
         )
         for part in stored["parts"]
     )
@@ -129,8 +159,18 @@ def _read(stored: Mapping[str, Any]) -> Plan:
         stored["ready"],
         tuple(map(dict, stored.get("earlier", ()))),
         dict(stored.get("documents", {})),
+        dict(stored.get("root", {})),
         before,
+        # Earlier versions did not say which arrays were being made.
+        frozenset(stored.get("coming", _named(before))),
+        stored.get("packed", ""),
+        stored.get("coordinate", "phi"),
     )
+
+
+def _named(keys: Iterable[str]) -> set[str]:
+    """Return the names of arrays in keys."""
+    return {key.split("/")[0] for key in keys} - {GROUP, DOCUMENT}
 
 
 def _check(plan: Plan) -> None:
@@ -151,12 +191,28 @@ def _check(plan: Plan) -> None:
         wants(type(array["dims"]) is list and set(array["dims"]) <= plan.sizes.keys(), "arrays")
     wants(len({part.name for part in plan.parts}) == len(plan.parts), "parts")
     for part in plan.parts:
-        wants(type(part.name) is str, "the name of a part")
+        wants(is_part(part.name), "the name of a part")
         wants(type(part.complete) is bool, f"complete of {part.name}")
         wants(set(part.dims) <= plan.sizes.keys(), f"dims of {part.name}")
         wants(len(part.chunks) == len(set(part.dims)) == len(part.dims), f"dims of {part.name}")
         wants(all(type(n) is int and 0 < n <= 2**63 for n in part.chunks), f"chunks of {part.name}")
+        known_rows = rows_of(is_open=part.columns is not None)
         for name, dtype in part.quantities.items():
-            wants(name in ROWS, f"the quantity {name!r}")
-            kinds = ("float32", "float64") if ROWS[name].dtype == "float64" else (ROWS[name].dtype,)
+            wants(name in known_rows, f"the quantity {name!r}")
+            kinds = _KINDS.get(known_rows[name].dtype, (known_rows[name].dtype,))
             wants(dtype in kinds, f"the dtype of {name}")
+        own = {dim for row in part.rows for dim in row.dims if dim in NUMBERED}
+        columns = dict.fromkeys(own, 0) if part.columns is None else part.columns
+        wants(columns.keys() == own, f"columns of {part.name}")
+        numbers = columns.values()
+        wants(all(type(n) is int and 0 <= n < 2**31 for n in numbers), f"columns of {part.name}")
+    known = plan.names | plan.coming
+    wants(not unfit(known), "the name of an array")
+    # Labels may be there of quantities that are being cut anew.
+    keys = {*plan.documents, *plan.before}
+    wants(all(is_document(key, known | LABELS.keys()) for key in keys), "the path of a document")
+    digests = [*plan.documents.values(), *plan.root.values()]
+    wants(all(type(digest) is str for digest in digests), "documents")
+    wants(type(plan.packed) is str, "packed")
+    wants(is_name(plan.coordinate), "coordinate")
+    wants(plan.root.keys() in (set(), {WHOLE, DEFINITION}), "root")

@@ -2,6 +2,8 @@
 
 The order of what is written makes an interrupted sweep one that can go on: the plan before the
 arrays, the data of a tile before its mark, the marks before the plan says that a part is complete.
+The file by which a finished map opens is written before the plan that names it, and tiles change
+only under a plan that names none.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
+from phasekit.cells.numbered import warn_unproved
 from phasekit.cells.progress import progress_bar
 from phasekit.cells.request import Request
 from phasekit.errors import StoreError
@@ -22,11 +25,13 @@ from phasekit.maps.damage import describe
 from phasekit.maps.estimate import SAMPLE_CELLS, refuse_too_large_for
 from phasekit.maps.interrupts import noted
 from phasekit.maps.job import Job, plan_job
+from phasekit.maps.marks import read_marks
 from phasekit.maps.options import StoreOptions
 from phasekit.maps.place import Place
 from phasekit.maps.plan_file import CLEARED, PLAN_KEY, plan_bytes
-from phasekit.maps.stored_arrays import prepare, read_plan, write_plan
+from phasekit.maps.stored_arrays import NO_MEMORY, prepare, read_plan, write_plan
 from phasekit.maps.tile import Tile, finish_writing, is_marked, release_buffers
+from phasekit.maps.unfinished import write_packed
 
 #: Seconds of work for which worker processes are not worth their start.
 FEW_SECONDS = 4.0
@@ -51,26 +56,50 @@ def sweep_into(
         if options.overwrite or _to_do(place, request, options):
             raise StoreError(refused)
         return  # complete, so that nothing is to be written
-    with place.locked():
+    with _written(place), place.locked():
         job = plan_job(place, request, options, verify=True)
         _say_damaged(job)
-        tally = Tally(job)
-        with contextlib.ExitStack() as stack:
-            stack.enter_context(_told(tally))
-            client, workers = options.client, options.workers
-            if client is not None:
-                client = stack.enter_context(connected(client))
-            most = _most(job, workers, client)
-            early = most > 1 and (workers is not None or job.cells > MANY_CELLS)
-            staff = stack.enter_context(run.hired(most)) if early else None
-            processes = _weigh(job, most, workers, options.force, early)
-            with _written(place):
-                if job.old is None:
-                    place.clear({PLAN_KEY: plan_bytes(CLEARED)})
-                if job.plan != job.old:
-                    prepare(place, job.old, job.plan, request, options.compressor)
-                _compute(tally, staff or processes, client, progress)
-                _finish(job)
+        _carry_out(job, options, progress)
+        while request.is_open and job.count:  # tiles may need more columns than the arrays have
+            job = plan_job(place, request, replace(options, overwrite=False))
+            _carry_out(job, options, progress)
+        _finish(job)
+        if request.is_open:
+            _say_unproved(job)
+
+
+def _say_unproved(job: Job) -> None:
+    """Say where in a map it is not proved that there are no more equilibria."""
+    asked = {row.name for row in job.request.rows}
+    for part in job.plan.parts:
+        if not asked.isdisjoint(part.quantities):
+            marks = read_marks(job.place.open(read_only=True), part).values()
+            found = [mark.unproved for mark in marks if mark.unproved]
+            if found:
+                low, high = max((one[:2] for one in found), key=lambda ends: ends[1] - ends[0])
+                number, systems = (int(sum(one[i] for one in found)) for i in (2, 3))
+                shape = [job.plan.sizes[dim] for dim in part.dims]
+                warn_unproved(job.request.system, (low, high, number, systems), shape)
+                return
+
+
+def _carry_out(job: Job, options: StoreOptions, progress: bool | None) -> None:
+    """Make the arrays those of the plan, and compute the tiles that are left."""
+    tally = Tally(job)
+    with contextlib.ExitStack() as stack:
+        stack.enter_context(_told(tally))
+        client, workers = options.client, options.workers
+        if client is not None:
+            client = stack.enter_context(connected(client))
+        most = _most(job, workers, client)
+        early = most > 1 and (workers is not None or job.cells > MANY_CELLS)
+        staff = stack.enter_context(run.hired(most)) if early else None
+        processes = _weigh(job, most, workers, options.force, early)
+        if job.old is None:
+            job.place.clear({PLAN_KEY: plan_bytes(CLEARED)})
+        if job.plan != job.old:
+            prepare(job.place, job.old, job.plan, job.request, options.compressor)
+        _compute(tally, staff or processes, client, progress)
 
 
 def _most(job: Job, workers: int | None, client: Any) -> int:
@@ -154,7 +183,7 @@ def _told(tally: Tally) -> Iterator[None]:
                 tally.job.place.sweep_leftovers()
         total = tally.job.total
         raise KeyboardInterrupt(
-            f"{total - tally.left} of {total} tiles are done; the same call goes on"
+            f"{total - tally.left} of {total} tiles are done; the same call resumes the map"
         ) from None
 
 
@@ -182,7 +211,7 @@ def _compute(tally: Tally, processes: int | run.Staff, client: Any, progress: bo
         tally.settle()
         raise StoreError(
             f"store: {job.place.name}: {error}; {tally.left} of {job.count} tiles "
-            "are left; what is done is kept, and the same call goes on from there"
+            "are left; what is done is kept, and the same call resumes the map from there"
         ) from error
 
 
@@ -192,16 +221,20 @@ def _finish(job: Job) -> None:
     plan = read_plan(job.place.open(read_only=True))
     if plan is None or plan.generation != job.plan.generation:
         raise StoreError(
-            f"store: {job.place.name} was removed or replaced while the map was being made; make "
-            "the call again"
+            f"store: {job.place.name} was removed or replaced while the map was being computed; "
+            f"repeat the call"
         )
     parts = tuple(
         replace(part, complete=part.complete or part.name in complete) for part in plan.parts
     )
     earlier = () if all(part.complete for part in parts) else plan.earlier
-    if (parts, earlier) != (plan.parts, plan.earlier):
+    done = replace(plan, parts=parts, earlier=earlier)
+    if done != plan:
         job.place.sweep_leftovers()
-        write_plan(job.place, replace(plan, parts=parts, earlier=earlier))
+    if not done.packed:
+        done = replace(done, packed=write_packed(job.place, done))
+    if done != plan:
+        write_plan(job.place, done)
 
 
 def _to_do(place: Place, request: Request, options: StoreOptions) -> bool:
@@ -215,8 +248,8 @@ def _to_do(place: Place, request: Request, options: StoreOptions) -> bool:
 def _say_damaged(job: Job) -> None:
     if job.damaged:
         warnings.warn(
-            f"store: {job.place.name} is damaged: {describe(job.damaged, job.plan.sizes)}; what "
-            "is damaged is computed anew",
+            f"store: {job.place.name} is damaged: {describe(job.damaged, job.plan.sizes)}; the "
+            f"damaged tiles are computed again",
             stacklevel=4,
         )
 
@@ -229,3 +262,8 @@ def _written(place: Place) -> Iterator[None]:
         if isinstance(error, StoreError):
             raise
         raise StoreError(f"store: {place.name} cannot be written: {error}") from error
+    except MemoryError as error:
+        raise StoreError(
+            f"store: {place.name} was not finished: {NO_MEMORY}; what is done is kept, and the "
+            f"same call resumes the map from there"
+        ) from error

@@ -18,23 +18,27 @@ import xarray as xr
 
 from phasekit.cells.evaluate import assemble
 from phasekit.cells.request import Request, worded
-from phasekit.cells.schema import label_coords
+from phasekit.cells.schema import label_coords, own_names
 from phasekit.errors import ParameterError, PhasekitError, StoreError
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE
 from phasekit.maps import files
+from phasekit.maps.keys import DOCUMENT, GROUP
 from phasekit.maps.marks import key_of, marks_of
 from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan, fingerprint
-from phasekit.maps.plan_file import GROUP, PLAN_KEY, plan_bytes, plan_from
+from phasekit.maps.plan_file import PLAN_KEY, plan_bytes, plan_from, root_digests
 from phasekit.systems.registry import models
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
 
 #: Names of files in a Zarr v3 store: metadata, chunks, and what a killed process left.
 _OWN = re.compile(r"zarr\.json|c?(\.?\d+)*|part\d+|.*\.[0-9a-f]{32}\.partial")
+
+#: What is said of a `MemoryError`.
+NO_MEMORY = "no memory is left; end other programs, or take smaller tiles by chunks="
 
 #: The attribute in which xarray names coordinates that are no axes.
 _NAMED = "coordinates"
@@ -44,8 +48,11 @@ def zarr_group(store: Any) -> Any:
     """Return the group of a store."""
     import zarr
 
-    # Format 2 has codecs that unpickle what they read; phasekit writes none of it.
-    return zarr.open_group(store, mode="r" if store.read_only else "r+", zarr_format=3)
+    # Format 2 has codecs that unpickle what they read; phasekit writes none of it, nor does it
+    # gather metadata in the root, where any path could have some.
+    return zarr.open_group(
+        store, mode="r" if store.read_only else "r+", zarr_format=3, use_consolidated=False
+    )
 
 
 def read_plan(store: Any) -> Plan | None:
@@ -77,6 +84,10 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
     """
     store = place.open(read_only=False)
     ds = assemble(request, {})
+    if request.is_open:  # of quantities as well that the call does not name
+        ds = ds.assign_coords(label_coords(row for part in plan.parts for row in part.rows))
+    # Other names of what is there are given by who opens it.
+    ds = ds.drop_vars(own_names(plan.coordinate, request.grid.inputs))
     kept: dict[str, StoredPart] = {}
     before: dict[str, bytes | None] = {}
     known: dict[str, str] = {}
@@ -99,7 +110,15 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
             parts = tuple(kept.values())
             write_plan(
                 place,
-                replace(old, parts=parts, ready=False, before=before, documents=known),
+                replace(
+                    old,
+                    parts=parts,
+                    ready=False,
+                    before=before,
+                    documents=known,
+                    packed="",
+                    coming=old.coming | plan.names,
+                ),
             )
         _forget_marks(store, old, plan)
         for part in plan.parts:
@@ -108,8 +127,9 @@ def prepare(place: Place, old: Plan | None, plan: Plan, request: Request, compre
                     files.remove_folder(store, folder)
     files.put(store, {**before, **documents})
     digests = {key: hashlib.sha256(data).hexdigest() for key, data in documents.items()}
-    del digests["zarr.json"]  # names versions of libraries, which change
-    write_plan(place, replace(plan, documents={**known, **digests}, before={}))
+    del digests[DOCUMENT]  # names versions of libraries, which change
+    root = root_digests(documents[DOCUMENT])
+    write_plan(place, replace(plan, documents={**known, **digests}, root=root, before={}))
 
 
 def _same_tiles(part: StoredPart, plan: Plan) -> bool:
@@ -118,7 +138,7 @@ def _same_tiles(part: StoredPart, plan: Plan) -> bool:
 
 
 def _documents(
-    ds: xr.Dataset, plan: Plan, root: Mapping[str, Any], compressor: str, system: Model
+    ds: xr.Dataset, plan: Plan, root: Mapping[str, Any], compressor: str, system: System
 ) -> dict[str, bytes]:
     """Return what describes the arrays of a plan, and its coordinates, as they will be stored.
 
@@ -134,7 +154,9 @@ def _documents(
         {n: c.astype(LABEL_DTYPE) for n, c in ds.coords.items() if c.dtype.kind == "U"}
     )
     for variable in ds.variables.values():
-        variable.encoding = {"chunks": variable.shape} if variable.shape else {}
+        variable.encoding = (
+            {"chunks": tuple(max(n, 1) for n in variable.shape)} if variable.shape else {}
+        )
     ds.to_zarr(store, mode="w", zarr_format=3, consolidated=False)
     group: Any = zarr.open_group(store, mode="r+", zarr_format=3)
     # What a call does not name, earlier ones did: their coordinates, and versions of libraries.
@@ -155,8 +177,8 @@ def refuse_damaged(ds: xr.Dataset, group: Any, plan: Plan, name: str) -> None:
     missing = {*plan.quantities, *plan.arrays, *plan.scalars} - ds.variables.keys()
     if missing:
         raise StoreError(
-            f"store: {name} cannot be read: {', '.join(sorted(missing))} is not there; put it "
-            "back, choose another name, or pass overwrite=True"
+            f"store: {name} cannot be read: {', '.join(sorted(missing))} is not there; restore "
+            f"it, choose another name, or pass overwrite=True"
         )
     for scalar, value in plan.scalars.items():
         variable = ds[scalar].variable
@@ -174,15 +196,15 @@ def refuse_damaged(ds: xr.Dataset, group: Any, plan: Plan, name: str) -> None:
             array = group[row.name]
             shape = tuple(plan.sizes[dim] for dim in part.dims) + row.label_shape
             if (array.shape, array.dtype, array.chunks, ds[row.name].dims) != (
-                shape, np.dtype(row.dtype), part.chunks + row.label_shape, part.dims + row.dims
+                shape, np.dtype(row.dtype), part.chunk_of(row), part.dims + row.dims
             ):  # fmt: skip
                 raise _damaged(name, row.name)
 
 
 def _damaged(name: str, what: str) -> StoreError:
     return StoreError(
-        f"store: {name} is damaged: {what} is not what it was when it was written; put its files "
-        "back, choose another name, or pass overwrite=True"
+        f"store: {name} is damaged: {what} has changed since it was written; restore its files, "
+        f"choose another name, or pass overwrite=True"
     )
 
 
@@ -216,6 +238,8 @@ def _is_own(key: Sequence[str], names: Set[str]) -> bool:
 
 def reason(error: Exception) -> str:
     """Say what keeps a store from being read."""
+    if isinstance(error, MemoryError):
+        return NO_MEMORY
     return str(error) if isinstance(error, PhasekitError) else f"{type(error).__name__}: {error}"
 
 
@@ -260,7 +284,7 @@ def _create(
     group.create_array(
         row.name,
         shape=shape,
-        chunks=part.chunks + row.label_shape,
+        chunks=part.chunk_of(row),
         dtype=row.dtype,
         fill_value=fill_value(row),
         compressors=codecs(compressor) if part.checked else [codec(compressor)],

@@ -10,7 +10,7 @@ from typing import Any
 import xarray as xr
 
 from phasekit.cells.evaluate import compute
-from phasekit.cells.request import Request, ask, inputs_of, needs_of, passes_of
+from phasekit.cells.request import Request, ask, needs_of, passes_of
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
@@ -19,7 +19,7 @@ from phasekit.maps.job import Job, plan_job
 from phasekit.maps.options import StoreOptions, check_dtypes, without_store
 from phasekit.maps.whole import WholeTarget, open_map, target_of
 from phasekit.systems.parameter import warn_of_invalid
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
 
@@ -96,7 +96,7 @@ def sweep(
         If an axis or a quantity is unknown or unusable, or the map would not fit into memory.
     StoreError
         If `store` holds something else and overwrite is not set, it cannot be written, the disk
-        is too small, or a tile fails. Tiles that are done are kept: the same call goes on.
+        is too small, or a tile fails. Tiles that are done are kept: the same call resumes the map.
 
     Examples
     --------
@@ -116,7 +116,7 @@ def sweep(
     place = None if store is None else target_of(store)
     system = as_system(system)
     rows = select(of, system.rung if of is OFFERED else None)
-    if place is not None and not place.is_netcdf and system.rung.labels_fixed:
+    if place is not None and not place.is_netcdf:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
         request = _asked(system, axes, axes_by_name, rows, loaded=True)
@@ -132,20 +132,26 @@ def sweep(
         if value is not None:
             raise without_store(name, value)
     target = None if place is None else WholeTarget(place, overwrite=overwrite)
-    more = () if system.rung.labels_fixed else inputs_of(system, rows)
     if dtype is not None:
         dtypes = check_dtypes(dtype, rows)
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
-    request = _asked(system, axes, axes_by_name, (*rows, *more))
+    request = _asked(system, axes, axes_by_name, rows)
     warn_of_invalid(request.system.declared, request.system.parameters)
-    ds = compute(request, progress)
-    if more:
-        own = {dim for row in rows for dim in row.dims}
-        unasked = {row.name for row in more} | {dim for row in more for dim in row.dims} - own
-        ds = ds.drop_vars(sorted(unasked))
+    ds = _computed(request, progress)
     if target is not None:
         target.write(ds)
     return ds
+
+
+def _computed(request: Request, progress: bool | None) -> xr.Dataset:
+    """Compute a map in memory, of which others may have taken some meanwhile."""
+    try:
+        return compute(request, progress)
+    except MemoryError as error:
+        raise ParameterError(
+            "axes: got more than the memory that is left, wants fewer cells; take coarser axes, "
+            "name fewer quantities in of=, or put a sweep into a store (store='map.zarr')"
+        ) from error
 
 
 def plan_sweep(
@@ -165,7 +171,7 @@ def plan_sweep(
 
 
 def _asked(
-    system: Model,
+    system: System,
     axes: Mapping[str, Any] | None,
     by_name: Mapping[str, Any],
     rows: tuple[Quantity, ...],
@@ -188,11 +194,11 @@ def _asked(
 
 
 def _swept(
-    system: Model,
+    system: System,
     axes: Mapping[str, Any] | None,
     by_name: Mapping[str, Any],
     rows: tuple[Quantity, ...],
-) -> tuple[Model, dict[str, Value], dict[str, str]]:
+) -> tuple[System, dict[str, Value], dict[str, str]]:
     """Return the system along its axes, the states, and what the call calls each of them."""
     if axes is not None and not isinstance(axes, Mapping):
         raise bad("axes", axes, "a mapping of parameter names to values, {'beta': [...], ...}")
@@ -236,7 +242,7 @@ def _swept(
     return swept, states, called
 
 
-def _state_called(key: Any, system: Model) -> str:
+def _state_called(key: Any, system: System) -> str:
     """Return the state that an argument of the labelled functions is, which may have its name."""
     stem = str(key).rstrip("0")
     coordinate = getattr(system, "coordinate", None)
@@ -245,15 +251,15 @@ def _state_called(key: Any, system: Model) -> str:
     return "time" if stem == "t" else f"state_{stem}"
 
 
-def _valid(system: Model, rows: tuple[Quantity, ...]) -> list[str]:
+def _valid(system: System, rows: tuple[Quantity, ...]) -> list[str]:
     """The parameters and states along which rows can be swept."""
-    needs = needs_of(system, passes_of(system, (*rows, *inputs_of(system, rows))))
+    needs = needs_of(system, passes_of(system, rows))
     needed = {name for names in needs.values() for name in names}
     declared = [parameter.name for parameter in system.declared]
     return declared + [name for name in STATES if name in needed]
 
 
-def _unknown_axis(system: Model, name: Any, rows: tuple[Quantity, ...]) -> ParameterError:
+def _unknown_axis(system: System, name: Any, rows: tuple[Quantity, ...]) -> ParameterError:
     valid = _valid(system, rows)
     if name in ("lam", "psi", "A", "B", "C"):
         other = "system.reduced()" if name in ("lam", "psi") else "system.coefficients()"

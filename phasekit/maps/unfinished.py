@@ -4,20 +4,29 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from math import prod
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 from xarray.backends import BackendArray
-from xarray.core import indexing
 
+from phasekit.cells.schema import own_names
 from phasekit.errors import StoreError
+from phasekit.labels.grid import refuse_too_large
+from phasekit.maps import files
 from phasekit.maps.damage import Damage, at_a_glance, in_full, lost_tiles, refuse
+from phasekit.maps.keys import PACKED
 from phasekit.maps.marks import Marks, marks_of, read_marks
+from phasekit.maps.packed import Packed, digest_of, may_be_packed, packed_bytes, read_packed
 from phasekit.maps.parts import StoredPart
+from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan
 from phasekit.maps.stored_arrays import refuse_damaged, zarr_group
 from phasekit.systems.identity import MODEL
+
+if TYPE_CHECKING:
+    from xarray.core import indexing
 
 COMPUTED = "computed"
 _ATTRS = {"long_name": "whether all quantities of the cell are computed", "units": "1"}
@@ -31,10 +40,18 @@ def opened(source: Any, plan: Plan, name: str) -> Iterator[tuple[xr.Dataset, Any
         yield ds, zarr_group(store)
 
 
-def _open(source: Any, plan: Plan, name: str, chunks: Any) -> tuple[xr.Dataset, Any]:
+def _open(
+    source: Any,
+    plan: Plan,
+    name: str,
+    chunks: Any,
+    *,
+    verify: bool = False,
+    packed: Packed | None = None,
+) -> tuple[xr.Dataset, Any]:
     from phasekit.maps.checked import Checked  # here: it loads zarr
 
-    store: Any = Checked(source, plan, name)
+    store: Any = Checked(source, plan, name, verify=verify, packed=packed)
     ds = xr.open_zarr(store, consolidated=False, chunks=chunks, zarr_format=3)
     inputs = [input for input in (*plan.arrays, *plan.scalars) if input in ds.data_vars]
     return ds.set_coords(inputs), store
@@ -52,10 +69,11 @@ def open_stored(
     """
     if not plan.parts or not (plan.ready or plan.before):
         raise StoreError(
-            f"store: {name} cannot be opened: its arrays are being made, or that was interrupted; "
-            "wait, or make the sweep's call again"
+            f"store: {name} cannot be opened: its arrays are being created, or their creation was "
+            f"interrupted; wait, or repeat the call of sweep"
         )
-    ds, store = _open(source, plan, name, chunks)
+    packed = None if verify else read_far(source, plan)
+    ds, store = _open(source, plan, name, chunks, verify=verify, packed=packed)
     refuse_damaged(ds, zarr_group(store), plan, name)
     if ds.attrs.get(MODEL) != plan.model:
         raise StoreError(
@@ -63,8 +81,13 @@ def open_stored(
             f"plan {plan.model!r}"
         )
     ds = ds.drop_vars([other for other in ds.data_vars if other not in plan.quantities])
-    values = {coord: ds[coord].variable for coord in (*plan.arrays, *plan.scalars)}
-    marks = {part.name: marks_of(source, plan, part, values) for part in plan.parts}
+    ds = ds.assign_coords(
+        own_names(plan.coordinate, {str(n): one for n, one in ds.variables.items()})
+    )
+    if packed is not None:  # files are looked at when they are read: to list them takes long
+        store.marks = packed.marks
+        return ds
+    marks = _all_marks(source, plan, ds)
     damaged: list[Damage] = []
     for part in plan.parts:
         known = marks[part.name].known()
@@ -75,12 +98,13 @@ def open_stored(
         damaged += [*lost_tiles(part, marks[part.name], plan.sizes), *found]
     refuse(name, damaged, plan.sizes)
     store.marks = {part: one.known() for part, one in marks.items()}
+    if verify and plan.packed and may_be_packed(plan):
+        _refuse_packed(source, plan, name, packed_bytes(plan, store.kept, store.marks))
     if all(part.complete for part in plan.parts):
         return ds
     dims = tuple(dim for dim in plan.sizes if any(dim in part.dims for part in plan.parts))
     done = [_done(part, marks[part.name], plan.sizes) for part in plan.parts if not part.complete]
-    data = indexing.LazilyIndexedArray(_Computed(dims, plan.sizes, done))
-    computed = xr.Variable(dims, data, _ATTRS)
+    computed = xr.Variable(dims, _lazy(_Computed(dims, plan.sizes, done)), _ATTRS)
     if chunks is not None:
         if isinstance(chunks, Mapping):  # what it does not name is cut as it is stored
             tiles = {
@@ -89,6 +113,43 @@ def open_stored(
             chunks = {dim: chunks.get(dim, tiles[dim]) for dim in dims}
         computed = computed.chunk(chunks)
     return ds.assign({COMPUTED: computed})
+
+
+def read_far(source: Any, plan: Plan) -> Packed | None:
+    """Return what opens a finished map at once; None on a disk, where all files are looked at."""
+    return None if files.folder_of(source) is not None else read_packed(source, plan)
+
+
+def write_packed(place: Place, plan: Plan) -> str:
+    """Write the file by which a finished map opens; return its digest, or "" where none can be."""
+    if not may_be_packed(plan):
+        return ""
+    source = place.open(read_only=True)
+    ds, store = _open(source, plan, place.name, None)
+    with ds:
+        marks = {part: one.done for part, one in _all_marks(source, plan, ds).items()}
+        data = packed_bytes(plan, store.kept, marks)
+    if data is None:
+        return ""
+    files.put(place.open(read_only=False), {PACKED: data})
+    return digest_of(data)
+
+
+def _all_marks(source: Any, plan: Plan, ds: xr.Dataset) -> dict[str, Marks]:
+    """Return the marks of the parts of a map that is open."""
+    values = {coord: ds[coord].variable for coord in (*plan.arrays, *plan.scalars)}
+    return {part.name: marks_of(source, plan, part, values) for part in plan.parts}
+
+
+def _refuse_packed(source: Any, plan: Plan, name: str, expected: bytes | None) -> None:
+    """Raise a `StoreError` where the file by which a map opens is not what the others say."""
+    data = files.read(source, PACKED)
+    if data is None or data != expected or digest_of(data) != plan.packed:
+        wrong = "is gone" if data is None else "has changed since it was written"
+        raise StoreError(
+            f"store: {name} is damaged: {PACKED} {wrong}; repeat the call of sweep, which writes "
+            "it again"
+        )
 
 
 class _Tiles(NamedTuple):
@@ -113,6 +174,25 @@ def _done(
     return part, found
 
 
+def _lazy(array: _Computed) -> Any:
+    """Return it as xarray takes what is made when it is asked for.
+
+    That has no published name: without it, all is made at once, if it fits into memory.
+    """
+    try:
+        from xarray.core.indexing import (  # noqa: F401  # the others, for what reads it
+            IndexingSupport,
+            LazilyIndexedArray,
+            explicit_indexing_adapter,
+        )
+    except ImportError:
+        refuse_too_large(
+            {COMPUTED: prod(array.shape)}, dict(zip(array.dims, array.shape, strict=True))
+        )
+        return array.cells((slice(None),) * len(array.shape))
+    return LazilyIndexedArray(array)
+
+
 class _Computed(BackendArray):
     """The cells whose tiles are done in every part, made when they are asked for."""
 
@@ -128,11 +208,14 @@ class _Computed(BackendArray):
         self.done = done
 
     def __getitem__(self, key: indexing.ExplicitIndexer) -> Any:
+        from xarray.core import indexing
+
         return indexing.explicit_indexing_adapter(
-            key, self.shape, indexing.IndexingSupport.OUTER, self._cells
+            key, self.shape, indexing.IndexingSupport.OUTER, self.cells
         )
 
-    def _cells(self, key: tuple[Any, ...]) -> Any:
+    def cells(self, key: tuple[Any, ...]) -> Any:
+        """Return whether cells are computed, by slices, numbers or arrays of numbers."""
         cells = dict(
             zip(
                 self.dims,

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import tempfile
 from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
@@ -18,7 +17,7 @@ from phasekit.cells.schema import restore
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import bad, flag
 from phasekit.labels.grid import tiles
-from phasekit.maps import netcdf
+from phasekit.maps import netcdf, replacing
 from phasekit.maps.place import NETCDF, ZARR, Place, place_of
 from phasekit.maps.stored_arrays import read_plan, reason, refuse_strange, zarr_group
 from phasekit.maps.unfinished import open_stored
@@ -60,22 +59,24 @@ class WholeTarget:
 
     def write(self, ds: xr.Dataset) -> None:
         """Write a Dataset in one go; the name appears only when it is complete."""
-        folder = self.path.parent
         try:
-            with tempfile.TemporaryDirectory(prefix=f".{self.path.name}.", dir=folder) as scratch:
-                fresh = Path(scratch) / self.path.name
+            replacing.sweep(self.path)
+            with replacing.scratch(self.path) as folder:
+                fresh = folder / self.path.name
                 if self.path.suffix == ZARR:
+                    from phasekit.maps.seal import write_seal  # here: it loads zarr
+
                     ds.to_zarr(fresh, mode="w-", zarr_format=3, consolidated=False)
+                    write_seal(fresh)
                 else:
                     netcdf.write(ds, fresh)
                 self._refuse_existing()  # it may have appeared while the map was computed
-                if self.path.is_dir():
-                    self.path.rename(Path(scratch) / "replaced")
-                fresh.replace(self.path)
-        except OSError as error:
+                replacing.put(fresh, self.path)
+        except (OSError, MemoryError) as error:
             if isinstance(error, StoreError):
                 raise
-            raise StoreError(f"store: {self.path} was not written: {error}") from error
+            why = error if isinstance(error, OSError) else reason(error)
+            raise StoreError(f"store: {self.path} was not written: {why}") from error
 
 
 def target_of(store: Any) -> Place:
@@ -89,7 +90,7 @@ def target_of(store: Any) -> Place:
 def open_map(
     store: str | PathLike[str] | Any, *, chunks: Any = None, verify: bool = False
 ) -> xr.Dataset:
-    """Open a stored map as it was when it was written, dtypes and attributes included.
+    """Open a stored map, with its dtypes and attributes.
 
     Coordinates and metadata are compared with what was written, of netCDF files all but arrays of
     numbers, and of each finished tile of a Zarr store the presence and size of its files; values
@@ -156,6 +157,12 @@ def open_map(
 
 def _whole(source: Any, name: str, chunks: Any) -> xr.Dataset:
     """Open a store that was written in one go."""
+    from phasekit.maps.seal import sealed  # here: it loads zarr
+
+    store = sealed(source, name)
+    if store is not None:
+        store.refuse_documents()
+        source = store
     ds: xr.Dataset = xr.open_zarr(source, consolidated=False, chunks=chunks, zarr_format=3)
     group = zarr_group(source)
     encodings = (group[name].metadata.chunk_key_encoding for name in ds.data_vars)
@@ -166,8 +173,8 @@ def _whole(source: Any, name: str, chunks: Any) -> xr.Dataset:
         )
     if not ds.variables:
         raise StoreError(
-            f"store: {name} cannot be opened: its arrays are being made, or that was interrupted; "
-            "wait, or make the sweep's call again"
+            f"store: {name} cannot be opened: its arrays are being created, or their creation was "
+            f"interrupted; wait, or repeat the call of sweep"
         )
     return ds
 

@@ -14,6 +14,7 @@ import signal
 import sys
 import threading
 import types
+import warnings
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -29,6 +30,8 @@ def work(pipe: Connection) -> None:
         multiprocessing.set_start_method("fork", force=True)
     parent = multiprocessing.parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    # The process that started this one has said so already.
+    warnings.filterwarnings("ignore", "numba has no place for its cache", RuntimeWarning)
     # Tiles are plain arrays: labels, a third of the time to start, are loaded if they are needed.
     sys.modules.setdefault("xarray", Later("xarray"))
     # Loaded while the parent is not ready.

@@ -112,18 +112,6 @@ def steady_at(machines: TwoDegrees, p: npt.ArrayLike, torque: npt.ArrayLike = 0.
     return Steady(phi, kinds, energy, curvature, frequency, exponents, counts)
 
 
-def most(
-    *inputs: npt.ArrayLike, momentum: npt.ArrayLike | None = None
-) -> tuple[int, int, FloatArray]:
-    """Greatest numbers of equilibria and saddles of any machine; arguments as those of `steady`.
-
-    The third, stretches in which some may be missed, is empty: none is.
-    """
-    found = steady(*inputs, momentum=momentum)
-    saddles = (found.kind == EquilibriumKind.SADDLE).sum(axis=-1)
-    return int(found.n_equilibria.max(initial=0)), int(saddles.max(initial=0)), np.empty((0, 2))
-
-
 def support_speed(
     beta: npt.ArrayLike,
     e: npt.ArrayLike,

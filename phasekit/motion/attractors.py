@@ -2,100 +2,78 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.flow import motions
-from phasekit.motion.lost import EXHAUSTED, MOST
+from phasekit.errors import AttractorKind
+from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
+from phasekit.motion.attractor import (
+    LONGEST,
+    PATIENCE,
+    ROUNDS,
+    SETTLED,
+    TOO_LONG,
+    TOO_WEAK,
+    Attractor,
+    Attractors,
+    Search,
+)
+from phasekit.motion.autonomous import AutonomousSearch
+from phasekit.motion.flow import RTOL, motions
 from phasekit.motion.method import circle, unit_of
-from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
+from phasekit.motion.overdamped import OverdampedSearch, is_overdamped
+from phasekit.motion.strobe import Targets, common_period, lyapunov, strobe
+
+__all__ = ["TOO_LONG", "TOO_WEAK", "Attractors", "DrivenSearch", "Search", "find"]
 
 Array = npt.NDArray[np.float64]
 
-#: Longest orbit that counts as periodic, in legs.
-LONGEST = 16
-#: Legs after which motions are looked at, one round after another.
-ROUNDS = (60, 240, 1000, 3000)
 #: Motions that are followed further where many have come to nothing that repeats itself.
 MOST_OPEN = 24
-#: Log of the contraction of areas after which motions count as settled, and most legs until then.
-SETTLED, PATIENCE = 30.0, 100_000
 #: Change within an orbit, of the size of the box, that Newton's method takes up.
 NEAR = 1e-4
 #: Two attractors that are closer than this part of the size of the box are one.
 SAME = 1e-6
 #: Boxes along each axis for attractors that are no periodic orbits, and states that fill them.
 BOXES, FILLING, VISITS = 100, 4000, 40
-#: States around a point of an attractor that are followed to see how far it catches.
-RING = 32
-#: Legs for which they are followed.
-LONGEST_RING = 20_000
+#: Longest period that is looked for of motions that do not repeat themselves soon.
+MOST_LEGS = 512
+#: Errors of an exponent by which it must differ from zero, parts of a turn between states on a
+#: closed curve, and how often a run along it is made three times as long.
+SURE, GAP, ROUNDS_OF_FILLING = 3.0, 0.2, 3
 #: Why it is not seen where a motion ends.
-TOO_WEAK = f"are damped so weakly that they did not settle within {PATIENCE} periods or less"
-TOO_LONG = f"take more than {MOST} steps"
-
-
-class Attractors(NamedTuple):
-    """The group "attractors", rows in the order of the first point's coordinate."""
-
-    attractor_phi: Array
-    """Of shape (attractors, points), NaN beyond the last."""
-    attractor_dphi: Array
-    attractor_period: npt.NDArray[np.int64]
-    """Legs after which it repeats itself; 0: it does not."""
-    attractor_multiplier: Array
-    """Greatest modulus of its multipliers over that period; NaN where there is none."""
-    rotation_number: Array
-    """Turns in a leg."""
+CREEPS = "creep towards what they do not reach"
+IN_DOUBT = (
+    "neither repeat themselves, nor fill a closed curve, nor have an exponent that is surely "
+    "positive: what counts as an attractor of its own may be a part of another"
+)
+#: States around a point of an attractor that are followed to see how far it catches, and legs for
+#: which they are.
+RING = 32
+PARTS_OF_RING = (np.arange(RING) % 4 == 0, np.arange(RING) % 4 != 0)
+LONGEST_RING = 20_000
 
 
 @dataclass
-class Search:
-    """A search for the attractors of one system."""
+class DrivenSearch(Search):
+    """A search for the attractors of one system, seen once a leg."""
 
-    law: PerturbedConservative
-    values: Mapping[str, Array]
-    leg: float
-    scale: float
-    """By which rates are measured against coordinates."""
-    size: float
-    """Of the box from which motions start."""
-    orbits: list[Array] = field(default_factory=list)
-    """Periodic ones, of shape (period, 2)."""
-    multipliers: list[float] = field(default_factory=list)
-    windings: list[float] = field(default_factory=list)
-    others: list[Array] = field(default_factory=list)
-    """States on those that are not periodic, of shape (states, 2)."""
-    drifts: list[float] = field(default_factory=list)
     radii: dict[int, float] = field(default_factory=dict)
     """How far around periodic ones states were seen to come to them, by place."""
-    open: Counter[str] = field(default_factory=Counter)
-    """Motions of which it was not seen where they end, by the reason."""
 
     @property
-    def period(self) -> float:
-        """Of the coordinate, 0 on a line."""
-        return circle(self.law)
+    def orbits(self) -> list[Attractor]:
+        """Periodic ones."""
+        return [one for one in self.found if one.period]
 
-    def apart(self, x: Array, y: Array) -> Array:
-        """Distances of states."""
-        off = x - y
-        phi = off[..., 0]
-        if self.period:
-            phi = phi - self.period * np.round(phi / self.period)
-        return np.asarray(np.hypot(phi, off[..., 1] / self.scale))
-
-    def run(self, states: Array, kept: int, skip: int) -> Strobed:
-        """Follow motions."""
-        found = strobe(self.law, self.values, states, self.leg, kept, skip)
-        self.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
-        return found
+    @property
+    def others(self) -> list[Attractor]:
+        """Those that are not."""
+        return [one for one in self.found if not one.period]
 
     def look(self, states: Array) -> None:
         """Find the attractors to which motions from states come."""
@@ -147,18 +125,20 @@ class Search:
     def _is_caught(self, state: Array) -> bool:
         """Whether a state is so near a periodic attractor that it comes to it."""
         return any(
-            self.apart(orbit, state).min() < self._radius(number)
-            for number, orbit in enumerate(self.orbits)
+            self.apart(one.points, state).min() < self._radius(number)
+            for number, one in enumerate(self.orbits)
         )
 
     def _is_known(self, state: Array) -> bool:
         return any(
-            self.apart(orbit, state).min() < 1e-3 * self.size * (1.0 - multiplier)
-            for orbit, multiplier in zip(self.orbits, self.multipliers, strict=True)
+            self.apart(one.points, state).min() < 1e-3 * self.size * (1.0 - one.multiplier)
+            for one in self.orbits
         )
 
     def _take(self, orbit: Array) -> bool:
         """Keep the attracting periodic orbit near which a motion is; whether there is one."""
+        if not self.repeats:
+            return False
         half = len(orbit) // 2
         for q in range(1, LONGEST + 1):
             if self.apart(orbit[half:], orbit[half - q : len(orbit) - q]).max() < NEAR * self.size:
@@ -192,10 +172,13 @@ class Search:
         multiplier = float(np.abs(np.linalg.eigvals(slope)).max())
         if not (multiplier < 1.0 - 1e-9 or self._is_rest(points, slope)):
             return False
-        if not any(self.apart(known, state).min() < SAME * self.size for known in self.orbits):
-            self.orbits.append(points)
-            self.multipliers.append(multiplier)
-            self.windings.append(float(turns) / q + 0.0)
+        if not any(self.apart(o.points, state).min() < SAME * self.size for o in self.orbits):
+            still = common_period(self.law, self.values) is None
+            kind = AttractorKind.EQUILIBRIUM if still else AttractorKind.CYCLE
+            exponent = float(np.log(multiplier)) / (q * self.leg) if multiplier > 0.0 else -np.inf
+            turned = float(turns) / q + 0.0
+            self.found.append(Attractor(kind, points, turned, exponent, multiplier=multiplier))
+            self.found.sort(key=lambda one: not one.period)
         return True
 
     def _is_rest(self, points: Array, slope: Array) -> bool:
@@ -221,69 +204,85 @@ class Search:
             return
         if self.apart(found, found[-1]).max() < SAME * self.size:
             return  # at rest where nothing attracts: on a saddle
-        for other in self.others:
-            near = [self.apart(other, one).min() < 2.0 * self.size / BOXES for one in found[-50:]]
-            if np.mean(near) > 0.9:
-                return
-        self.others.append(found)
-        turned = (found[-1, 0] - found[0, 0]) / self.period if self.period else 0.0
-        self.drifts.append(turned / (FILLING - 1))
+        if self._is_on_other(found) or self._takes_long_to_repeat(found):
+            return
+        one = self._classified(found)
+        if one is not None and not self._is_on_other(one.points):
+            self.found.append(one)
 
-    def result(self) -> Attractors:
-        """What was found: periodic orbits first."""
-        wide = max([len(orbit) for orbit in self.orbits] + [LONGEST] * bool(self.others) + [1])
-        rows = len(self.orbits) + len(self.others)
-        phi, dphi = np.full((rows, wide), np.nan), np.full((rows, wide), np.nan)
-        for row, points in enumerate((*self.orbits, *self.others)):
-            own = points[:wide]
-            phi[row, : len(own)], dphi[row, : len(own)] = self.wrapped(own[:, 0]), own[:, 1]
-        periods = [len(orbit) for orbit in self.orbits] + [0] * len(self.others)
-        multipliers = [*self.multipliers, *[np.nan] * len(self.others)]
-        numbers = [*self.windings, *self.drifts]
-        return Attractors(
-            phi, dphi, np.array(periods, np.int64), np.array(multipliers), np.array(numbers)
-        )
+    def _is_on_other(self, found: Array) -> bool:
+        """Whether a motion runs along an attractor that is known and no periodic orbit."""
+        for other in self.others:
+            points = other.points
+            near = [self.apart(points, one).min() < 2.0 * self.size / BOXES for one in found[-50:]]
+            if np.mean(near) > 0.9:
+                return True
+        return False
+
+    def _takes_long_to_repeat(self, found: Array) -> bool:
+        """Keep an attracting orbit of a period longer than is looked for at first."""
+        if not self.repeats:
+            return False
+        off = self.apart(found[-1 - MOST_LEGS : -LONGEST - 1], found[-1])[::-1]
+        for i in np.flatnonzero(off < NEAR * self.size)[:3]:
+            if self._refined(found[-1], LONGEST + 1 + int(i)):
+                return True
+        return False
+
+    def _classified(self, found: Array) -> Attractor | None:
+        """What a motion that does not repeat itself runs along; None where it is under way."""
+        exponent, error = self._exponent(found[0])
+        turned = float(found[-1, 0] - found[0, 0]) / self.period if self.period else 0.0
+        turns = turned / (len(found) - 1)
+        least = 1.0 / (FILLING * self.leg)
+        if exponent > SURE * error + least:
+            return Attractor(AttractorKind.CHAOTIC, found, turns, exponent, error)
+        if exponent < -SURE * error - least:
+            self.open[CREEPS] += 1
+            return None
+        if np.isfinite(exponent):
+            for _ in range(ROUNDS_OF_FILLING):
+                if self._is_closed(found, turns):
+                    return Attractor(AttractorKind.TORUS, found, turns, exponent, error)
+                more = self.run(found[-1][None], 2 * len(found), 1).states[0]
+                if not np.isfinite(more).all():
+                    return None
+                found = np.concatenate([found, more])
+                turned = float(found[-1, 0] - found[0, 0]) / self.period if self.period else 0.0
+                turns = turned / (len(found) - 1)
+        self.open[IN_DOUBT] += 1
+        return Attractor(AttractorKind.UNKNOWN, found, turns, exponent, error)
+
+    def _exponent(self, state: Array) -> tuple[float, float]:
+        """Largest Lyapunov exponent of a motion, and its error."""
+        parameters = [self.values[name] for name in self.law.names]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", RuntimeWarning)  # NaN is told as doubt
+            found = lyapunov(self.law, *parameters, *state, FILLING * self.leg)
+        return float(found.lyapunov_exponent[..., 0]), float(found.lyapunov_error[..., 0])
+
+    def _is_closed(self, found: Array, turns: float) -> bool:
+        """Whether states fill a closed curve, on which they go round a circle or their middle."""
+        if abs(turns) > 0.5 / FILLING:
+            angle = 2.0 * np.pi * found[:, 0] / self.period
+        else:
+            off = (found - found.mean(axis=0)) / np.array([1.0, self.scale])
+            angle = np.arctan2(off[:, 1], off[:, 0])
+        angle = np.sort(np.mod(angle, 2.0 * np.pi))
+        gaps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
+        return bool(gaps.max() < GAP)
 
     def order(self) -> None:
-        """Number the attractors by what they are, not by when they were found.
-
-        Periodic ones come first, by period and least angle, at which they begin; then the others,
-        by their turns and mean angle.
-        """
+        """Number the attractors by what they are, not by when they were found."""
+        super().order()
         self.radii.clear()  # they go by place
-
-        def first(orbit: Array) -> tuple[float, float]:
-            phi, dphi = self.wrapped(orbit[0, 0]), orbit[0, 1] / self.scale
-            return round(float(phi) / self.size, 9), round(float(dphi) / self.size, 9)
-
-        def begun(orbit: Array) -> Array:
-            turned = [np.roll(orbit, -i, axis=0) for i in range(len(orbit))]
-            return min(turned, key=first)
-
-        orbits = [begun(orbit) for orbit in self.orbits]
-        rows = zip(orbits, self.multipliers, self.windings, strict=True)
-        kept = sorted(rows, key=lambda one: (len(one[0]), *first(one[0])))
-        self.orbits, self.multipliers, self.windings = ([one[i] for one in kept] for i in range(3))  # type: ignore[assignment]
-
-        def place(one: tuple[Array, float]) -> tuple[float, float]:
-            return round(one[1], 3), float(self.wrapped(one[0][:, 0]).mean())
-
-        rest = sorted(zip(self.others, self.drifts, strict=True), key=place)
-        self.others, self.drifts = [one for one, _ in rest], [drift for _, drift in rest]
-
-    def wrapped(self, phi: Array) -> Array:
-        """Angles in the half-open turn round 0."""
-        if not self.period:
-            return np.asarray(phi)
-        half = 0.5 * self.period
-        return np.asarray(half - np.mod(half - phi, self.period))
 
     def targets(self) -> Targets:
         """Where motions have come to an attractor."""
         rows = []
-        for number, orbit in enumerate(self.orbits):
+        for number, one in enumerate(self.orbits):
             radius = self._radius(number)
-            rows += [[*point, radius, number] for point in orbit]
+            rows += [[*point, radius, number] for point in one.points]
         points = np.array(rows).reshape(-1, 4)
         box, boxes = np.array([0.0, 1.0, 0.0, 1.0]), np.zeros((0, 0), np.int16)
         if self.others:
@@ -297,8 +296,8 @@ class Search:
         return self.radii[number]
 
     def _seen_radius(self, number: int) -> float:
-        orbit, multiplier = self.orbits[number], self.multipliers[number]
-        rest = [o for i, o in enumerate(self.orbits) if i != number] + self.others
+        orbit, multiplier = self.orbits[number].points, self.orbits[number].multiplier
+        rest = [one.points for one in self.found if one is not self.orbits[number]]
         far = min([self.apart(orbit[:, None], o).min() for o in rest] + [self.size])
         radius = min(0.4 * far, 0.05 * self.size)
         angles = 2.0 * np.pi * np.arange(RING) / RING
@@ -310,21 +309,29 @@ class Search:
         else:
             tries = [(radius, LONGEST_RING // part) for part in (100, 10, 1)]
         for radius, legs in tries:
-            states = (orbit[:, None] + radius * ring).reshape(-1, 2)
-            ends = self.run(states, 1, legs).states[:, 0]
-            if np.all(self.apart(ends[:, None], orbit).min(axis=1) < 0.5 * radius):
+            # A few tell soon of a ring that is not caught.
+            if all(
+                self._is_caught_from(orbit, radius * ring[part], radius, legs)
+                for part in PARTS_OF_RING
+            ):
                 return float(radius)
         return 0.0
 
+    def _is_caught_from(self, orbit: Array, around: Array, radius: float, legs: int) -> bool:
+        """Whether motions from states around an orbit come to half the distance."""
+        ends = self.run((orbit[:, None] + around).reshape(-1, 2), 1, legs).states[:, 0]
+        return bool(np.all(self.apart(ends[:, None], orbit).min(axis=1) < 0.5 * radius))
+
     def _boxes(self) -> tuple[Array, npt.NDArray[np.int16]]:
-        every = np.concatenate(self.others)
+        every = np.concatenate([one.points for one in self.others])
         low, high = every.min(axis=0), every.max(axis=0)
         room = 0.05 * (high - low)
         low, high = low - room, high + room
         if self.period:
             low[0], high[0] = -0.5 * self.period, 0.5 * self.period
         boxes = np.full((BOXES, BOXES), -1, np.int16)
-        for row, states in enumerate(self.others):
+        for row, one in enumerate(self.others):
+            states = one.points
             own = np.stack([self.wrapped(states[:, 0]), states[:, 1]], axis=-1)
             i, j = ((own - low) / (high - low) * BOXES).astype(int).T.clip(0, BOXES - 1)
             boxes[i, j] = len(self.orbits) + row
@@ -336,6 +343,7 @@ def find(
     values: Mapping[str, Array],
     leg: float,
     states: Array,
+    rtol: float = RTOL,
 ) -> Search:
     """Return the attractors to which motions from states come, seen once a leg.
 
@@ -347,12 +355,26 @@ def find(
         Time of a leg: a period of the law.
     states : array, shape (n, 2)
         Where motions start; they also say how coordinates and rates are measured.
+    rtol : float
+        Error of a step that is allowed.
     """
     width, fastest = _extent(law, values, leg, states)
-    search = Search(law, values, leg, 2.0 * fastest / width, width)
+    calm = not _varies(law, values) and min(values["damping"], values["quadratic"]) >= 0.0
+    how = law, values, leg, 2.0 * fastest / width, width, rtol
+    search: Search = AutonomousSearch(*how) if calm else DrivenSearch(*how)
+    if not calm and search.repeats and is_overdamped(law, values, leg, states):
+        search = OverdampedSearch(*how)
     search.look(states)
     search.order()
     return search
+
+
+def _varies(law: PerturbedConservative, values: Mapping[str, Array]) -> bool:
+    """Whether anything in the law varies with time."""
+    names = [forcing_names(i)[0] for i in range(law.harmonics)]
+    names += [modulation_names(name)[0] for name in law.modulated]
+    varies = any(float(values[name]) != 0.0 for name in names)
+    return varies or bool(law.drifting) or law.prescribed is not None
 
 
 def _extent(

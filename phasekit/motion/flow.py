@@ -18,7 +18,7 @@ from phasekit.laws.perturbed import (
 )
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.motion.lost import ARRIVED, MOST, judged, tell
-from phasekit.motion.method import cells_of, kinds, limits_of, run, some, unit_of
+from phasekit.motion.method import both_ways, cells_of, kinds, limits_of, run, some, unit_of
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import order_of, rates_of
 from phasekit.motion.stiff import follow, stiff_cells
@@ -72,32 +72,56 @@ def flow(
     Motion
         NaN where a motion did not come to a time, which a RuntimeWarning says.
     """
-    *values, phi, dphi, t = (np.asarray(array, dtype=float) for array in arrays)
-    shape = np.broadcast_shapes(*(array.shape for array in (*values, phi, dphi, t)))
-    inner = _time_axes((*values, phi, dphi), t, len(shape))
-    outer = tuple(axis for axis in range(len(shape)) if axis not in inner)
-    cells = tuple(shape[axis] for axis in outer)
+    laid = Laid.out(len(law.names), arrays)
+    named = law.values(*laid.values)
+    found = _motions(law, named, laid.states, laid.times, rtol, atol, threads)
+    return Motion(*laid.back(found))
 
-    def flat(array: Array) -> Array:
-        full = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
-        if full.size == 1:
-            return full.reshape(())
-        return np.broadcast_to(full.squeeze(inner), cells).reshape(-1)
 
-    named = law.values(*map(flat, values))
-    count = int(np.prod(cells, dtype=int))
-    states = np.stack([np.broadcast_to(flat(x), (count,)) for x in (phi, dphi)], axis=-1)
-    full = t.reshape((1,) * (len(shape) - t.ndim) + t.shape)
-    times = np.transpose(full, (*outer, *inner))
-    alone = all(full.shape[axis] == 1 for axis in outer)
-    width = int(np.prod([shape[axis] for axis in inner], dtype=int))
-    if not alone:
-        times = np.broadcast_to(times, (*cells, *(shape[axis] for axis in inner)))
-    times = times.reshape(-1, width)
-    found = _motions(law, named, states, times, rtol, atol, threads)
-    order = np.argsort((*outer, *inner))
-    results = found.reshape(*cells, *(shape[axis] for axis in inner), 2)
-    return Motion(*(results[..., i].transpose(order) for i in range(2)))
+class Laid(NamedTuple):
+    """Motions in a row, and the way back to the shape of the arrays that they are given by."""
+
+    values: list[Array]
+    """Parameters: of a motion each, or scalars."""
+    states: Array
+    """Of shape (cells, states)."""
+    times: Array
+    """Of shape (cells, times), or (1, times)."""
+    shape: tuple[int, ...]
+    order: npt.NDArray[np.intp]
+
+    @classmethod
+    def out(cls, parameters: int, arrays: tuple[npt.ArrayLike, ...]) -> Laid:
+        """Lay out so many parameters, then states at t = 0, then times; they broadcast."""
+        *given, t = (np.asarray(array, dtype=float) for array in arrays)
+        shape = np.broadcast_shapes(*(array.shape for array in (*given, t)))
+        inner = _time_axes(tuple(given), t, len(shape))
+        outer = tuple(axis for axis in range(len(shape)) if axis not in inner)
+        cells = tuple(shape[axis] for axis in outer)
+
+        def flat(array: Array) -> Array:
+            full = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
+            if full.size == 1:
+                return full.reshape(())
+            return np.broadcast_to(full.squeeze(inner), cells).reshape(-1)
+
+        row = [flat(array) for array in given]
+        count = int(np.prod(cells, dtype=int))
+        states = np.stack([np.broadcast_to(x, (count,)) for x in row[parameters:]], axis=-1)
+        full = t.reshape((1,) * (len(shape) - t.ndim) + t.shape)
+        times = np.transpose(full, (*outer, *inner))
+        alone = all(full.shape[axis] == 1 for axis in outer)
+        width = int(np.prod([shape[axis] for axis in inner], dtype=int))
+        whole = (*cells, *(shape[axis] for axis in inner))
+        if not alone:
+            times = np.broadcast_to(times, whole)
+        order = np.argsort((*outer, *inner))
+        return cls(row[:parameters], states, times.reshape(-1, width), whole, order)
+
+    def back(self, found: Array) -> list[Array]:
+        """States of shape (cells, times, states) as arrays of the given shape."""
+        results = found.reshape(*self.shape, found.shape[-1])
+        return [results[..., i].transpose(self.order) for i in range(found.shape[-1])]
 
 
 def at_momentum(law: Any, *arrays: npt.ArrayLike, **how: Any) -> Motion:
@@ -258,26 +282,14 @@ def motions(
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     table = table_of(law.prescribed, *span(times))
-    result = np.full((count, times.shape[1], states.shape[1]), np.nan)
-    status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    for sense in (1.0, -1.0):
-        ahead = sense * times > 0.0
-        if sense < 0.0 and not ahead.any():
-            continue
-        later = np.where(ahead, times, 0.0)
-        order = np.argsort(sense * later, axis=1)
-        rising = np.array(np.take_along_axis(later, order, axis=1))
-        out = np.empty(result.shape)
-        reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
-        if count and times.shape[1]:
-            limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
-            shared, cells = (table, limits, 0.0, code.kink), (rising, np.array(states))
-            run(kernel, code, shared, cells, parameters, (out, reached, taken), reached, threads)
-        back = np.argsort(order, axis=1)[..., None]
-        out = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
-        wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]
-        result = np.where(wanted, out, result)
-        status, steps = np.maximum(status, reached), steps + taken
+    limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
+    shared = table, limits, 0.0, code.kink
+
+    def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
+        cells = rising, np.array(states)
+        run(kernel, code, shared, cells, parameters, groups, groups[1], threads)
+
+    result, status, steps = both_ways(times, count, states.shape[1], integrate)
     judged(status, parameters)
     return Cells(result, status, steps)
 

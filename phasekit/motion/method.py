@@ -60,6 +60,34 @@ def run(
         group[lost] = part
 
 
+def both_ways(
+    times: Array, count: int, width: int, integrate: Callable[[Array, tuple[Any, ...]], None]
+) -> tuple[Array, npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """States of so many entries, status and steps of motions, ahead of t = 0 and before it.
+
+    `integrate` takes times of one sense in order, and fills states, status and steps.
+    """
+    result = np.full((count, times.shape[1], width), np.nan)
+    status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    for sense in (1.0, -1.0):
+        ahead = sense * times > 0.0
+        if sense < 0.0 and not ahead.any():
+            continue
+        later = np.where(ahead, times, 0.0)
+        order = np.argsort(sense * later, axis=1)
+        rising = np.array(np.take_along_axis(later, order, axis=1))
+        out = np.empty(result.shape)
+        reached, taken = np.zeros(count, np.int64), np.zeros(count, np.int64)
+        if count and times.shape[1]:
+            integrate(rising, (out, reached, taken))
+        back = np.argsort(order, axis=1)[..., None]
+        out = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
+        wanted = (ahead | (sense > 0.0) & (times == 0.0))[..., None]
+        result = np.where(wanted, out, result)
+        status, steps = np.maximum(status, reached), steps + taken
+    return result, status, steps
+
+
 def some(array: Array, which: Any) -> Array:
     """Entries of cells, of what may be the same in all."""
     return array[which] if array.ndim and len(array) > 1 else array
@@ -84,11 +112,15 @@ def limits_of(
     *,
     alone: bool = False,
     keep: bool = False,
+    beside: float = 1.0,
 ) -> Array:
-    """What bounds the steps of the kernels, in all lanes; whether to take and keep each alone."""
+    """What bounds the steps of the kernels, in all lanes; whether to take and keep each alone.
+
+    Errors of tangent vectors may be `beside` times as great.
+    """
     from phasekit.numerics.lanes import LANES
 
-    rows = rtol, atol, unit_of(law), float(most), float(alone), float(keep)
+    rows = rtol, atol, unit_of(law), float(most), float(alone), float(keep), beside
     return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
 
 

@@ -23,6 +23,8 @@ Index = npt.NDArray[np.int64]
 
 #: Greatest denominator of a ratio of frequencies that counts as commensurate.
 DENOMINATOR = 64
+#: Relative error of a step of a tangent vector of which the length alone matters.
+LOOSE = 1e-4
 #: Parts of the time of an exponent, and those at first that are not counted.
 PARTS, SKIPPED = 20, 2
 
@@ -61,16 +63,21 @@ class Strobed(NamedTuple):
     """States of motions after equal times."""
 
     states: Array
-    """Of shape (cells, kept, 2)."""
+    """Of shape (cells, kept, 2), or with a tangent vector (cells, kept, 4)."""
     code: Index
     """Attractor at which a motion came; -1: at none."""
     taken: Index
     """Legs until then."""
+    growth: Array
+    """How great an error became to which every leg adds one, where that is measured; else 0."""
     status: Index
 
 
+NO_SPANS, NO_BANDS = np.zeros((0, 3)), np.zeros((0, 2, 2))
+
+
 class Targets(NamedTuple):
-    """Where motions end: near points, or in boxes of a grid."""
+    """Where motions end: near points, within borders, or in boxes of a grid."""
 
     points: Array
     """Rows: coordinate, rate, radius, attractor."""
@@ -82,6 +89,10 @@ class Targets(NamedTuple):
     """Attractor of each box, -1 for none."""
     visits: int
     """Boxes of one attractor in succession after which a motion belongs to it."""
+    spans: Array = NO_SPANS
+    """Rows: coordinate from, to, attractor; of each the borders:"""
+    bands: Array = NO_BANDS
+    """Least and greatest rates at equal distances, of shape (spans, points, 2)."""
 
 
 NO_TARGETS = Targets(
@@ -99,6 +110,7 @@ def strobe(
     *,
     targets: Targets = NO_TARGETS,
     most_legs: int | None = None,
+    enough: float = np.inf,
     rtol: float = RTOL,
     atol: float = ATOL,
     threads: int | None = None,
@@ -110,8 +122,8 @@ def strobe(
     ----------
     law, values
         The law, and values of its parameters in the cells.
-    states : array, shape (cells, 2)
-        States at t = 0.
+    states : array, shape (cells, 2) or (cells, 4)
+        States at t = 0; with a tangent vector, as long as the error, its growth is measured.
     legs : array_like, shape (cells,) or ()
         Time of a leg; NaN: there is no motion. Where it is the period of the law, time begins anew
         after each.
@@ -121,13 +133,16 @@ def strobe(
         Where motions end early.
     most_legs : int, optional
         Legs of a motion; default: as many as the states that are kept need.
+    enough : float
+        Growth at which a motion ends, whose state is then the first that is kept.
     series : bool
         Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
         series would take too many.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
 
-    code, parameters = rates_of(law, values, order=order_of(rtol) if series else 0)
+    tangents = states.shape[1] // 2 - 1
+    code, parameters = rates_of(law, values, tangents, order_of(rtol) if series else 0)
     count = len(states)
     parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
     legs = np.array(np.broadcast_to(np.asarray(legs, float), (count,)))
@@ -138,18 +153,22 @@ def strobe(
     states, legs = np.where(never[:, None], np.nan, states), np.where(never, 1.0, legs)
     end = float(np.max(legs, initial=0.0)) * many
     table = table_of(law.prescribed, 0.0, end)
-    out = np.full((count, kept, 2), np.nan)
+    out = np.full((count, kept, states.shape[1]), np.nan)
     if skip == 0 and kept:
         out[:, 0] = states
     found = np.full(count, -1, np.int64)
     taken, status = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    growth = np.zeros(count)
     if count and many:
-        shared: Any = (table, limits_of(law, rtol, atol), code.kink, skip, many, circle(law))
+        limits = limits_of(law, rtol, atol, beside=max(LOOSE / rtol, 1.0) if tangents else 1.0)
+        shared: Any = table, limits, code.kink, skip, many, circle(law)
         shared += targets.scale, targets.points, targets.box, targets.boxes, targets.visits
-        cells, groups = (legs, again, np.array(states)), (out, found, taken, status)
+        shared += enough, targets.spans, targets.bands
+        cells = legs, again, np.array(states)
+        groups = out, found, taken, growth, status
         run(kernel, code, shared, cells, parameters, groups, status, threads)
         judged(status, parameters)
-    return Strobed(out, found, taken, status)
+    return Strobed(out, found, taken, growth, status)
 
 
 class Exponents(NamedTuple):

@@ -12,6 +12,7 @@ must not depend on how a loop was vectorised.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar, cast
 
 import numpy as np
@@ -21,18 +22,19 @@ from numba.extending import overload
 
 from phasekit.numerics import compiling as compiling  # says so to who waits for it
 from phasekit.numerics import linked
+from phasekit.numerics.cache import kept
 
 Array = npt.NDArray[np.float64]
 Outputs = tuple[npt.NDArray[Any], ...]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 #: No second entry for callers in C, which takes a tenth of the time to compile: nobody calls it.
-OPTIONS: Any = {"error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: Any = {"error_model": "numpy", **linked.understood({"no_cfunc_wrapper": True})}
 
 
 def kernel(function: Function) -> Function:
     """Compile on first use, cache on disk, release the GIL."""
-    return cast(Function, njit(cache=True, nogil=True, **OPTIONS)(function))
+    return cast(Function, kept(partial(njit, nogil=True, **OPTIONS), function))
 
 
 def inline(function: Function) -> Function:

@@ -1,12 +1,13 @@
-"""Who waits while kernels are compiled is told so."""
+"""Who waits while kernels are compiled is told so.
+
+numba tells of it by names that it does not publish; where they are gone, nothing is said.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
-from typing import Any
-
-from numba.core import event
+from typing import Any, cast
 
 from phasekit.numerics import waits
 
@@ -14,7 +15,7 @@ from phasekit.numerics import waits
 PAUSE = 0.5
 
 
-class _Compiling(event.Listener):
+class _Compiling:
     """Says that kernels are compiled, if that takes long."""
 
     def __init__(self) -> None:
@@ -43,7 +44,7 @@ class _Compiling(event.Listener):
 
     def tell(self) -> None:
         self.told = True
-        waits.tell("compiling once for this machine, which takes some seconds")
+        waits.tell("compiling once for this machine, which takes up to half a minute")
 
 
 def _is_ours(started: Any) -> bool:
@@ -51,5 +52,16 @@ def _is_ours(started: Any) -> bool:
     return str(getattr(function, "__module__", "")).startswith("phasekit.")
 
 
-_COMPILING = _Compiling()
-event.register("numba:compile", _COMPILING)  # type: ignore[no-untyped-call]
+def _listening() -> _Compiling:
+    """Have numba tell of what it compiles, if it does."""
+    try:
+        from numba.core.event import Listener, register
+
+        listener: Any = type("_Listening", (_Compiling, Listener), {})()
+        register("numba:compile", listener)  # type: ignore[no-untyped-call]
+    except Exception:  # whatever numba makes of names that are not what they were
+        return _Compiling()
+    return cast(_Compiling, listener)
+
+
+_COMPILING = _listening()

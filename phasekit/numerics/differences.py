@@ -21,6 +21,10 @@ STEP = 2.0**-10  # of fourth-order differences: their error is STEP^4 and roundi
 FINE = 2.0**-22  # of those that show whether STEP is too wide to see what f does
 SHORTER = 0.125
 TRIES = 8
+BENT = 2.0**-8  # of the bend of f over a step beside its rise, from where shorter ones are tried
+NEAR = 16.0  # steps within which an edge of the domain is near
+CLOSE = 1e-4  # of slopes over two steps that are the same
+EDGES = 12  # times that steps are made shorter next to an edge of the domain
 EPSILON = 2.0**-52
 KNOWN = 1e-10  # relative error that rounding alone does not exceed
 MIXED = 2.0**-12  # of mixed second differences
@@ -29,7 +33,7 @@ MIXED = 2.0**-12  # of mixed second differences
 @inline
 def spare_size(n: int, m: int) -> int:
     """Length of what `jet` and `bend` need for themselves."""
-    return m + 10 * n
+    return m + 11 * n
 
 
 @routine
@@ -55,20 +59,81 @@ def coarse(x: float, scale: float) -> float:
 @routine
 def across(
     function: Any, n: int, w: Array, x: int, j: int, step: float, par: Array, active: Any,
-    value: int, slope: int, bend_: int,
+    value: int, slope: int, bend_: int, both: int,
 ) -> None:  # fmt: skip
-    """The central difference over a step along an unknown; the sum of both sides is added on."""
+    """The central difference over a step along an unknown; the sum of both sides is added on.
+
+    Where f has no value on one side, next to the edge of its domain, steps are shorter.
+    """
     middle = w[x + j]
-    for side in range(2):
-        k = 1.0 - 2.0 * side
-        w[x + j] = middle + k * step
-        plain(function, n, w, x, par, active, value)
-        for i in range(n):
-            w[slope + i] = k * w[value + i] + (w[slope + i] if side == 1 else 0.0)
-            w[bend_ + i] += w[value + i]
+    left = EDGES
+    while True:
+        finite = True
+        for side in range(2):
+            k = 1.0 - 2.0 * side
+            w[x + j] = middle + k * step
+            plain(function, n, w, x, par, active, value)
+            for i in range(n):
+                w[slope + i] = k * w[value + i] + (w[slope + i] if side == 1 else 0.0)
+                w[both + i] = w[value + i] + (w[both + i] if side == 1 else 0.0)
+                finite = finite and np.isfinite(w[value + i])
+        if finite and (left == EDGES or left == 0):
+            break
+        # Once there are values, the edge shall be far beside the step.
+        left = min(left - 1, 1) if finite else left - 1
+        shorter = step / (64.0 if finite else 16.0)
+        if left < 0 or shorter <= 4.0 * EPSILON * abs(middle):
+            break
+        step = shorter
     for i in range(n):
         w[slope + i] /= 2.0 * step
+        w[bend_ + i] += w[both + i]
     w[x + j] = middle
+
+
+@routine
+def ends(
+    function: Any, n: int, w: Array, x: int, j: int, reach: float, par: Array, active: Any,
+    value: int,
+) -> bool:  # fmt: skip
+    """Whether f has no value within a reach along an unknown."""
+    middle = w[x + j]
+    finite = True
+    for side in range(2):
+        w[x + j] = middle + (1.0 - 2.0 * side) * reach
+        plain(function, n, w, x, par, active, value)
+        for i in range(n):
+            finite = finite and np.isfinite(w[value + i])
+    w[x + j] = middle
+    return not finite
+
+
+@routine
+def shorter(
+    function: Any, n: int, w: Array, x: int, j: int, step: float, par: Array, active: Any,
+    value: int, slope: int, bend_: int, both: int, fine: int, out: int,
+) -> None:  # fmt: skip
+    """The slope of a function that bends within a step, over one that is short enough."""
+    last = np.inf
+    for _ in range(EDGES):
+        if step / 16.0 <= 4.0 * EPSILON * abs(w[x + j]):
+            return
+        gap = 0.0
+        for i in range(n):
+            w[both + i] = abs(w[slope + i]) + abs(w[bend_ + i]) / step
+        size = w[both : both + n].copy()
+        step /= 16.0
+        for i in range(n):
+            w[bend_ + i] = -2.0 * w[out + i]
+        across(function, n, w, x, j, step, par, active, value, fine, bend_, both)
+        for i in range(n):
+            off = abs(w[fine + i] - w[slope + i])
+            gap = max(gap, off / size[i] if size[i] > 0.0 else off)
+        if not (CLOSE < gap < 0.5 * last):
+            return  # it is the same, or but rounding
+        last = gap
+        for i in range(n):
+            w[slope + i] = w[fine + i]
 
 
 def _jet(
@@ -82,7 +147,7 @@ def _jet(
     x, value = spare, spare + m
     near, far, fine, wide = value + n, value + 2 * n, value + 3 * n, value + 4 * n
     bend_, least = value + 5 * n, value + 6 * n
-    noise, largest, terms = value + 7 * n, value + 8 * n, value + 9 * n
+    noise, largest, terms, both = value + 7 * n, value + 8 * n, value + 9 * n, value + 10 * n
     for i in range(m):
         w[x + i] = w[u + i]
     plain(first, n, w, x, par, active, out)
@@ -92,8 +157,8 @@ def _jet(
         w[noise + i] = w[largest + i] = w[terms + i] = 0.0
     for j in range(m if mode == SHARP else 0):
         size = 2.0 ** np.floor(np.log2(max(abs(w[u + j]), w[scale + j])))
-        across(first, n, w, x, j, FINE * size, par, active, value, fine, bend_)
-        across(first, n, w, x, j, 2.0 * FINE * size, par, active, value, wide, bend_)
+        across(first, n, w, x, j, FINE * size, par, active, value, fine, bend_, both)
+        across(first, n, w, x, j, 2.0 * FINE * size, par, active, value, wide, bend_, both)
         for i in range(n):
             gap = FINE * size * abs(w[fine + i] - w[wide + i])
             w[noise + i] = max(w[noise + i], min(gap, w[largest + i]))
@@ -105,21 +170,29 @@ def _jet(
         place = out + n + j
         if mode == PLAIN:
             step = COARSE * coarse(w[u + j], w[scale + j])
-            across(first, n, w, x, j, step, par, active, value, near, bend_)
+            for i in range(n):
+                w[bend_ + i] = -2.0 * w[out + i]
+            across(first, n, w, x, j, step, par, active, value, near, bend_, both)
+            bent = False
+            for i in range(n):
+                bent = bent or abs(w[bend_ + i]) > BENT * abs(2.0 * step * w[near + i])
+            # Next to an edge of the domain, not where f itself turns within a step.
+            if bent and ends(first, n, w, x, j, NEAR * step, par, active, value):
+                shorter(first, n, w, x, j, step, par, active, value, near, bend_, both, fine, out)
             for i in range(n):
                 w[place + i * m] = w[near + i]
             continue
-        across(first, n, w, x, j, FINE * size, par, active, value, fine, bend_)
-        across(first, n, w, x, j, 2.0 * FINE * size, par, active, value, wide, bend_)
+        across(first, n, w, x, j, FINE * size, par, active, value, fine, bend_, both)
+        across(first, n, w, x, j, 2.0 * FINE * size, par, active, value, wide, bend_, both)
         for i in range(n):
             w[least + i] = np.inf
             w[place + i * m] = w[fine + i]
         step = STEP * size
         for _ in range(TRIES):
-            across(first, n, w, x, j, 2.0 * step, par, active, value, far, bend_)
+            across(first, n, w, x, j, 2.0 * step, par, active, value, far, bend_, both)
             for i in range(n):
                 w[bend_ + i] = -2.0 * w[out + i]
-            across(first, n, w, x, j, step, par, active, value, near, bend_)
+            across(first, n, w, x, j, step, par, active, value, near, bend_, both)
             done = True
             for i in range(n):
                 gap = abs(w[near + i] - w[far + i])

@@ -6,6 +6,9 @@ function takes its intermediate code in, and optimises the whole again. It does 
 set of options that a caller is compiled with, and hands on to routines that they be inlined where
 one of their callers is. So here a function is compiled once for each signature, as far as it is
 linked; the kernel in which it ends up optimises all of it together.
+
+That takes names which numba does not publish. Where one is gone, ``overload`` does: compilation
+takes longer, results have the same bits.
 """
 
 from __future__ import annotations
@@ -13,45 +16,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba import njit, types
-from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import Compiler
-from numba.core.typing.templates import AbstractTemplate, infer_global
+from numba import njit
+from numba.extending import overload
 
 
-class _LinkedLibrary(JITCodeLibrary):
-    """Intermediate code that is neither optimised nor turned into machine code."""
+def understood(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the options of compilation that numba has; what it does not document only saves time.
 
-    def _optimize_final_module(self) -> None:
-        pass
-
-    def _finalize_final_module(self) -> None:
-        self._finalize_dynamic_globals()  # type: ignore[no-untyped-call]
-        self._finalized = True
-
-    def get_pointer_to_function(self, name: str) -> int:
-        """There is no machine code to call."""
-        self._ensure_finalized()  # type: ignore[no-untyped-call]
-        return 0
-
-    @property
-    def codegen(self) -> Any:
-        """What is asked to keep the environment of a function: this."""
-        return self
-
-    def set_env(self, name: str, environment: Any) -> None:
-        """Nothing: an environment holds Python objects, of which kernels know none."""
+    Others would be refused when a kernel is compiled.
+    """
+    try:
+        from numba.core.cpu import CPUTargetOptions
+    except ImportError:
+        return options
+    return {name: value for name, value in options.items() if hasattr(CPUTargetOptions, name)}
 
 
-class LinkedCompiler(Compiler):
-    """numba's compiler, up to the code that is linked."""
+try:
+    from phasekit.numerics.intermediate import LinkedCompiler, register
 
-    def __init__(self, typing: Any, target: Any, library: Any, *others: Any) -> None:
-        library = library or _LinkedLibrary(target.codegen(), "linked")  # type: ignore[no-untyped-call]
-        super().__init__(typing, target, library, *others)  # type: ignore[no-untyped-call]
-
-
-OPTIONS: Any = {"pipeline_class": LinkedCompiler, "no_cpython_wrapper": True}
+    _register: Any = register
+except ImportError:
+    OPTIONS: Any = {}
+    _register = None
+else:
+    OPTIONS = {"pipeline_class": LinkedCompiler, **understood({"no_cpython_wrapper": True})}
 
 
 def link(
@@ -61,16 +50,8 @@ def link(
 
     With ``literal``, anew for each integer that is written out where it is called.
     """
-    compiled = njit(**OPTIONS, **options)(body)
-
-    class Template(AbstractTemplate):
-        key = function
-        prefer_literal = literal
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            return types.Dispatcher(compiled).get_call_type(self.context, args, kws)
-
-        def get_impl_key(self, signature: Any) -> Any:
-            return compiled.get_overload(signature.args)
-
-    infer_global(function, types.Function(Template))  # type: ignore[no-untyped-call]
+    known: Any = understood(options)
+    if _register is not None:
+        _register(function, njit(**OPTIONS, **known)(body), literal=literal)
+        return
+    overload(function, jit_options=known, strict=False, prefer_literal=literal)(lambda *args: body)

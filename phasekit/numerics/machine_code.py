@@ -19,8 +19,9 @@ from phasekit.errors import ParameterError
 _DOUBLE = ir.DoubleType()
 _KEPT: list[Any] = []  # machine code lives as long as the process
 
+LONGEST_POWER = 64  # of those that are products
 #: Functions of one argument that come from the C library.
-_LIBRARY = {
+LIBRARY = {
     "sin": "sin",
     "cos": "cos",
     "tan": "tan",
@@ -41,9 +42,10 @@ _LIBRARY = {
     "loggamma": "lgamma",
 }
 #: Functions that have machine code, and those whose derivatives have it as well.
-COMPILED = {*_LIBRARY, "atan2", "Abs", "sign", "Heaviside", "Max", "Min", "Piecewise"}
+COMPILED = {*LIBRARY, "atan2", "Abs", "sign", "Heaviside", "Max", "Min", "Piecewise"}
 DIFFERENTIABLE = COMPILED - {"gamma", "loggamma"}
-_COMPARISONS = {
+#: What conditions compare by.
+COMPARISONS = {
     sympy.StrictLessThan: "<",
     sympy.LessThan: "<=",
     sympy.StrictGreaterThan: ">",
@@ -78,8 +80,7 @@ def compile_expressions(
         If an expression holds a function that has no machine code.
     """
     pointer = _DOUBLE.as_pointer()
-    module = ir.Module(name="phasekit")
-    module.triple = llvm.get_process_triple()
+    module = new_module()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [pointer] * 4), name="fill")
     builder = ir.IRBuilder(function.append_basic_block())
     kind = Writer if writer_class is None else writer_class
@@ -92,11 +93,19 @@ def compile_expressions(
         list(expressions.values()), symbols=sympy.numbered_symbols("_c"), list=True
     )
     for symbol, expression in shared:
-        writer.values[symbol] = writer.write(expression)
+        truth = isinstance(expression, (*COMPARISONS, sympy.And, sympy.Or, sympy.Not))
+        writer.values[symbol] = (writer.condition if truth else writer.write)(expression)
     for i, result in zip(expressions, results, strict=True):
         writer.store(writer.write(result), i)
     builder.ret_void()
     return machine_code(str(module), host=writer.host)
+
+
+def new_module() -> ir.Module:
+    """A module of this machine."""
+    module = ir.Module(name="phasekit")
+    module.triple = llvm.get_process_triple()
+    return module
 
 
 @functools.cache
@@ -109,8 +118,11 @@ def _target() -> Any:
     return llvm.Target.from_triple(llvm.get_process_triple())
 
 
-def machine_code(text: str, *, host: bool) -> int:
-    """Compile a module as text; return the address of its function ``fill``."""
+def machine_code(text: str, *, host: bool, effort: int = 2) -> int:
+    """Compile a module as text; return the address of its function ``fill``.
+
+    Without effort the time grows with the length as it is, and values are kept in memory.
+    """
     target = _target()
     module = llvm.parse_assembly(text)
     module.verify()
@@ -118,7 +130,7 @@ def machine_code(text: str, *, host: bool) -> int:
     if host:
         features = llvm.get_host_cpu_features()
         options = {"cpu": llvm.get_host_cpu_name(), "features": features.flatten()}
-    engine = llvm.create_mcjit_compiler(module, target.create_target_machine(opt=2, **options))
+    engine = llvm.create_mcjit_compiler(module, target.create_target_machine(opt=effort, **options))
     engine.finalize_object()
     _KEPT.append(engine)
     return int(engine.get_function_address("fill"))
@@ -214,8 +226,8 @@ class Writer:
         if e.is_Pow:
             return self._power(self.write(e.base), e)
         name = type(e).__name__
-        if name in _LIBRARY:
-            return self.library(_LIBRARY[name], self.write(e.args[0]))
+        if name in LIBRARY:
+            return self.library(LIBRARY[name], self.write(e.args[0]))
         if name == "atan2":
             return self.library("atan2", *(self.write(x) for x in e.args))
         if name == "Abs":
@@ -239,27 +251,30 @@ class Writer:
         if name == "Piecewise":
             value = self.constant(math.nan)
             for part, condition in reversed(e.args):
-                value = b.select(self._condition(condition), self.write(part), value)
+                value = b.select(self.condition(condition), self.write(part), value)
             return value
         raise ParameterError(
             f"f: got the function {name} in {e}, wants elementary functions; "
             "a Python or numba-compiled f may hold any"
         )
 
-    def _condition(self, c: Any) -> Any:
+    def condition(self, c: Any) -> Any:
+        """The truth of a condition."""
+        if c.is_Symbol:  # several functions share it
+            return self.values[c]
         if c in (sympy.true, sympy.false):
             return self.known(bool(c))
-        if type(c) in _COMPARISONS:
+        if type(c) in COMPARISONS:
             left, right = self.write(c.lhs), self.write(c.rhs)
-            return self.builder.fcmp_ordered(_COMPARISONS[type(c)], left, right)
+            return self.builder.fcmp_ordered(COMPARISONS[type(c)], left, right)
         if isinstance(c, (sympy.And, sympy.Or)):
-            value = self._condition(c.args[0])
+            value = self.condition(c.args[0])
             for other in c.args[1:]:
                 join = self.builder.and_ if isinstance(c, sympy.And) else self.builder.or_
-                value = join(value, self._condition(other))
+                value = join(value, self.condition(other))
             return value
         if isinstance(c, sympy.Not):
-            return self.builder.not_(self._condition(c.args[0]))
+            return self.builder.not_(self.condition(c.args[0]))
         raise ParameterError(f"f: got the condition {c}, wants comparisons")
 
     def _product(self, e: Any) -> Any:
@@ -285,10 +300,10 @@ class Writer:
 
     def _power(self, base: Any, e: Any) -> Any:
         b, exponent = self.builder, e.exp
-        if exponent.is_Integer and 0 < abs(int(exponent)) <= 64:
+        if exponent.is_Integer and 0 < abs(int(exponent)) <= LONGEST_POWER:
             value = self._repeated(base, abs(int(exponent)))
             return value if exponent > 0 else b.fdiv(self.constant(1.0), value)
-        if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) <= 64:
+        if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) <= LONGEST_POWER:
             root = self.library("sqrt", base)
             value = self._repeated(root, abs(int(exponent.p)))
             return value if exponent > 0 else b.fdiv(self.constant(1.0), value)

@@ -16,23 +16,35 @@ import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
-from numba.np.linalg import F_INT_nbtype, F_INT_nptype
 
 from phasekit.numerics.compile import OPTIONS, Array, Function, routine
 from phasekit.numerics.linked import link
 
-OWN = 32  # unknowns of systems up to which elimination as written here is faster than LAPACK
 
-#: LAPACK's elimination, as numba finds it. What `numpy.linalg.solve` puts round it for the compiler
-#: keeps no factors, whose sign is wanted too, and took a third of a kernel's time to compile.
-_pointers: Any = [types.CPointer(kind) for kind in (types.float64, F_INT_nbtype)]  # type: ignore[no-untyped-call]
-_gesv: Any = types.ExternalFunction(
-    "numba_xgesv",
-    types.intc(
-        types.char, types.intp, types.intp, _pointers[0], types.intp,
-        _pointers[1], _pointers[0], types.intp,
-    ),
-)  # fmt: skip
+def _numbas_lapack() -> tuple[Any, Any]:
+    """LAPACK's elimination as numba finds it, and the type of its integers; None without.
+
+    What `numpy.linalg.solve` puts round it for the compiler keeps no factors, whose sign is wanted
+    too, and took a third of a kernel's time to compile. numba does not publish these names.
+    """
+    try:
+        from numba._helperlib import c_helpers  # type: ignore[attr-defined]
+        from numba.np.linalg import F_INT_nbtype, F_INT_nptype
+    except ImportError:
+        return None, None
+    if "xgesv" not in c_helpers:
+        return None, None
+    reals: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
+    integers: Any = types.CPointer(F_INT_nbtype)  # type: ignore[no-untyped-call]
+    signature = types.intc(
+        types.char, types.intp, types.intp, reals, types.intp, integers, reals, types.intp
+    )
+    return types.ExternalFunction("numba_xgesv", signature), F_INT_nptype
+
+
+_gesv, _INTEGER = _numbas_lapack()
+#: Unknowns of systems up to which elimination as written here is faster than LAPACK.
+OWN = 32 if _gesv is not None else 1 << 30
 _DOUBLE = ord("d")
 
 
@@ -76,7 +88,6 @@ def call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
     function(w[x:], p, w[z:], w[out:])
 
 
-@routine
 def _eliminate(w: Array, a: int, b: int, n: int) -> float:
     for i in range(n * n):
         if not np.isfinite(w[a + i]):
@@ -86,7 +97,7 @@ def _eliminate(w: Array, a: int, b: int, n: int) -> float:
             value = w[a + i * n + j]
             w[a + i * n + j] = w[a + j * n + i]
             w[a + j * n + i] = value
-    matrix, right, swapped = w[a : a + n * n], np.empty(2 * n), np.empty(n, F_INT_nptype)
+    matrix, right, swapped = w[a : a + n * n], np.empty(2 * n), np.empty(n, _INTEGER)
     for i in range(n):
         right[i] = w[b + 2 * i]
         right[n + i] = w[b + 2 * i + 1]
@@ -101,9 +112,16 @@ def _eliminate(w: Array, a: int, b: int, n: int) -> float:
     return sign
 
 
+def _not_needed(w: Array, a: int, b: int, n: int) -> float:
+    return 0.0  # below `OWN` unknowns, which all systems then are
+
+
+_large = routine(_not_needed if _gesv is None else _eliminate)
+
+
 def _solve(w: Array, a: int, b: int, n: int) -> float:
     if n > OWN:
-        return _eliminate(w, a, b, n)
+        return _large(w, a, b, n)
     sign = 1.0
     for j in range(n):
         pivot = j

@@ -1,4 +1,4 @@
-"""What is said to somebody who waits: nothing for two seconds, then why."""
+"""What is said to somebody who waits: nothing for two seconds, then why, and how far it is."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from typing import Any
 
 #: Seconds that nobody is told about.
 PATIENCE = 2.0
+#: Seconds between two lines on one wait.
+AGAIN = 10.0
 
 
 def in_notebook() -> bool:
@@ -46,11 +48,40 @@ def later(seconds: float, action: Any, *arguments: Any) -> threading.Timer:
 
 
 _saying = False
+_stage = ""  # how far it is
+
+
+def stage(text: str) -> None:
+    """Note how far it is; it is said with what is going on, if that takes long."""
+    global _stage
+    _stage = text
+
+
+class _Wait:
+    """Says what is going on, and again whenever it is further some seconds later."""
+
+    def __init__(self, what: str) -> None:
+        self.what, self.last, self.over = what, "", False
+        self.timer = later(PATIENCE, self.tell)
+
+    def tell(self) -> None:
+        text = f"{self.what}: {_stage}" if _stage else self.what
+        if text != self.last:
+            tell(text)
+        self.last = text
+        if not self.over:
+            self.timer = later(AGAIN, self.tell)
+
+    def cancel(self) -> None:
+        self.over = True
+        self.timer.cancel()
 
 
 @contextlib.contextmanager
 def said(what: str) -> Iterator[None]:
     """Say what is going on, if it takes long; where several are nested, the outermost speaks.
+
+    A line follows every ten seconds while `stage` tells of something new.
 
     Examples
     --------
@@ -62,7 +93,8 @@ def said(what: str) -> Iterator[None]:
     if _saying or not watched():
         yield
         return
-    timer = later(PATIENCE, tell, what)
+    stage("")
+    timer = _Wait(what)
     _saying = True
     try:
         yield

@@ -12,12 +12,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import Loop
+from phasekit.errors import Loop, Validity
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
+from phasekit.perturbation.validity import error, greatest, rates, validity
+from phasekit.phase.exact.inflections import extremes
 from phasekit.phase.exact.separatrices import separatrices
-from phasekit.phase.numerical import functions
+from phasekit.phase.numerical import functions, torqued
 
 Array = npt.NDArray[np.float64]
 
@@ -31,6 +33,8 @@ class Capture(NamedTuple):
 
     capture_flux: Array
     capture_probability: Array
+    capture_error: Array
+    capture_validity: npt.NDArray[np.int8]
 
 
 def energy_size(points: Any) -> Array:
@@ -53,7 +57,25 @@ def capture(
     winding = loss[..., 1, :] + np.where(joined, loss[..., 0, :], 0.0)  # a turn is both arcs
     push = winding[..., 0] - winding[..., 1]
     push = np.where(np.abs(push) > LEVEL * np.abs(winding).max(axis=-1), push, 0.0)
-    return regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), push if rotation else None)
+    found = regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), push if rotation else None)
+    ends = extremes(*law.coefficients(values))
+    held = (values["torque"] >= ends[..., 0]) & (values["torque"] <= ends[..., 1])
+    rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
+    return weak(found, law, values, rate, held, greatest(loops.saddle_exponent, -1))
+
+
+def weak(
+    found: tuple[Array, Array], law: PerturbedConservative, values: dict[str, Any], rate: Array,
+    held: Any, exponent: Any,
+) -> Capture:  # fmt: skip
+    """Odds where damping and drive are weak and nothing else decides; NaN elsewhere."""
+    flux, probability = found
+    rate = np.where(np.isnan(probability).any(axis=-1), np.nan, rate)
+    code = validity(law, values, rate, held, exponent=exponent, forced=True, noisy=True)
+    good = (code == Validity.HOLDS)[..., None]
+    doubt = np.where(good[..., 0], error(rate), np.nan)
+    flux, probability = (np.where(good, x, np.nan) for x in (flux, probability))
+    return Capture(flux, probability, doubt, code)
 
 
 def capture_numerical(
@@ -66,13 +88,18 @@ def capture_numerical(
     loss = -quadrature.melnikov(law, *parameters).melnikov_mean
     circle = formula.period is not None
     push = values["torque"] if rotation else None
-    return of_loops(loops, loss, energy_size(points), push, circle=circle)
+    found = of_loops(loops, loss, energy_size(points), push, circle=circle)
+    held: Any = True
+    if np.any(values["torque"] != 0.0):
+        held = torqued.equilibria(law, *parameters).n_equilibria > 0
+    rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
+    return weak(found, law, values, rate, held, greatest(loops.saddle_exponent, -1))
 
 
 def of_loops(
     loops: Any, loss: Array, size: Array, push: Array | None, *, circle: bool = True
-) -> Capture:
-    """Capture by the separatrices of numbered saddles, and what they lose on each side.
+) -> tuple[Array, Array]:
+    """Fluxes and probabilities by the losses of numbered saddles on each side.
 
     Energies are of a size that rounding is measured by; of a push see `regions`.
     """
@@ -110,7 +137,7 @@ def _total(loss: Array, saddles: Any) -> Array:
     return np.asarray(np.where(saddles[..., None], loss, 0.0).sum(axis=-2))
 
 
-def regions(lobes: Array, winding: Array, single: Any, push: Array | None) -> Capture:
+def regions(lobes: Array, winding: Array, single: Any, push: Array | None) -> tuple[Array, Array]:
     """Fluxes and probabilities from the losses of the lobes and of both winding branches.
 
     A push forward brakes what comes from rotation backward; without any it comes forward. None: it
@@ -120,7 +147,7 @@ def regions(lobes: Array, winding: Array, single: Any, push: Array | None) -> Ca
         flux = np.concatenate([lobes, np.zeros((*lobes.shape[:-1], 1))], axis=-1)
         flux[np.isnan(lobes).any(axis=-1)] = np.nan
         flux[..., 2] -= np.minimum(lobes.sum(axis=-1), 0.0)
-        return Capture(flux, _shares(lobes))
+        return flux, _shares(lobes)
     with np.errstate(all="ignore"):
         forward = np.broadcast_to(~(push > 0.0), winding.shape[:-1])
         arriving = np.where(forward, winding[..., 1], winding[..., 0])
@@ -135,7 +162,7 @@ def regions(lobes: Array, winding: Array, single: Any, push: Array | None) -> Ca
     none = 1.0 - share * held
     probability = np.concatenate([parts * share[..., None], none[..., None]], axis=-1)
     flux = probability * np.maximum(arriving, 0.0)[..., None]
-    return Capture(flux, probability)
+    return flux, probability
 
 
 def _shares(lobes: Array) -> Array:

@@ -10,6 +10,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erfc
 
+from phasekit.numerics.contract import contract
+
 Array = npt.NDArray[np.float64]
 
 NODES, WEIGHTS = (np.asarray(x) for x in np.polynomial.legendre.leggauss(16))
@@ -47,7 +49,7 @@ def depopulation(D: npt.ArrayLike) -> Array:
     theta, weight = panels(QUARTER)
     with np.errstate(all="ignore"):
         steep = np.asarray(D, float)[..., None] / (4.0 * np.cos(theta) ** 2)
-        return np.asarray(np.exp(2.0 / np.pi * (np.log(-np.expm1(-steep)) @ weight)))
+        return np.asarray(np.exp(2.0 / np.pi * contract(np.log(-np.expm1(-steep)), weight)))
 
 
 def two_rims(D: npt.ArrayLike, apart: npt.ArrayLike) -> tuple[Array, Array]:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.contract import contract
 from phasekit.perturbation.depopulation import NODES, WEIGHTS, panels
-from phasekit.perturbation.tilted import Saddle, saddle_at
 from phasekit.phase.exact.potential import gradient
+from phasekit.phase.exact.under_torque import Saddle, saddle_at
 
 Array = npt.NDArray[np.float64]
 
@@ -21,6 +22,7 @@ UPWARDS = np.concatenate([[0.0], 0.5 ** np.arange(12, 0, -1), 1.0 - 0.5 ** np.ar
 #: Panels of an orbit.
 ROUND = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 4)
 HALVINGS = 40
+TURN = 2.0 * np.pi
 #: Cells at a time, for memory.
 CELLS = 128
 
@@ -37,7 +39,7 @@ def configuration(
     for side in (start, end):
         phi = at[:, None] + (side - at)[:, None] * x
         level = np.exp((depth(phi) - rise[:, None]) / kT[:, None])
-        total = total + np.abs(side - at) * (level @ weight)
+        total = total + np.abs(side - at) * contract(level, weight)
     return np.asarray(total)
 
 
@@ -51,7 +53,7 @@ def spatial_exponent(saddle: Saddle, left: Array, right: Array, kT: Array) -> Ar
     total = np.zeros(kT.shape)
     for way, length in ((-1.0, left), (1.0, right)):
         level = np.exp(-saddle.spread().depth(way * length[..., None] * x) / kT[..., None])
-        total = total + length * (level @ weight)
+        total = total + length * contract(level, weight)
     with np.errstate(all="ignore"):
         return np.asarray(np.sqrt(2.0 * np.pi * kT) / total)
 
@@ -82,13 +84,15 @@ def passage(action: Callable[[Any, Array], Array], height: Array, damping: Array
         S = action(part, x)
         flow = S * np.exp(-cold * x)
         by_panel = flow.reshape(len(part), -1, 16)
-        sums = (by_panel @ WEIGHTS) * half
+        sums = contract(by_panel, WEIGHTS) * half
         before = np.cumsum(sums, axis=1) - sums
-        inner = (before[..., None] + half[:, None] * (by_panel @ within.T)).reshape(len(part), -1)
+        inner = (before[..., None] + half[:, None] * contract(by_panel, within)).reshape(
+            len(part), -1
+        )
         with np.errstate(all="ignore"):
             top = (flow + cold * inner) * np.exp(cold * (x - 1.0)) / S
             scale = height[part] / (damping[part] * kT[part])
-        out[part] = scale * (top @ weight)
+        out[part] = scale * contract(top, weight)
     return out
 
 
@@ -123,9 +127,20 @@ def action_in_well(
     theta = middle[..., None] + half[..., None] * np.sin(tau)
     square = seen.spread().depth(theta) - lost[..., None]
     speed = np.sqrt(np.maximum(2.0 * square, 0.0))
-    return np.asarray(2.0 * np.abs(half) * (speed @ (weight * np.cos(tau))))
+    return np.asarray(2.0 * np.abs(half) * contract(speed, weight * np.cos(tau)))
 
 
 def saddles_of(A: Array, phi: Array, k: Array, torque: Array) -> Saddle:
     """The saddles of cells, on a last axis."""
     return saddle_at(A[:, None], phi, k, torque[:, None])
+
+
+def marks_of(phi: Array, saddle: Array, way: float) -> Array:
+    """Distances from the saddles to the equilibria on one side: center, saddle, center, saddle.
+
+    The last one is the next of the same saddle; infinite where there are no others.
+    """
+    own = np.arange(4) == np.array([[1], [3]])
+    far = np.mod(way * (phi[:, None, :] - saddle[..., None]), TURN)
+    far = np.where(own, TURN, np.where(np.isnan(far), np.inf, far))
+    return np.sort(far, axis=-1)

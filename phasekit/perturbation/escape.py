@@ -16,12 +16,15 @@ from phasekit.errors import EscapeRegime, Loop
 from phasekit.laws.perturbed import PerturbedTrigonometric
 from phasekit.perturbation.depopulation import depopulation
 from phasekit.perturbation.diffusion import (
+    TURN,
     configuration,
+    marks_of,
     passage,
     saddles_of,
     spatial_exponent,
     transition,
 )
+from phasekit.perturbation.escape_under_torque import escape_under_torque
 from phasekit.perturbation.rates import (
     Cells,
     Escape,
@@ -31,8 +34,6 @@ from phasekit.perturbation.rates import (
     place,
     returning,
 )
-from phasekit.perturbation.tilted import TURN, marks_of
-from phasekit.perturbation.tilted_escape import tilted_escape
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_energy
 from phasekit.phase.exact.potential import potential
 from phasekit.phase.exact.separatrices import phase_space
@@ -56,7 +57,7 @@ def escape_rate(
     number = 0 if center is None else center
     level = torque == 0.0
     found = cells.empty()
-    for part, function in ((level, level_escape), (~level, tilted_escape)):
+    for part, function in ((level, level_escape), (~level, escape_under_torque)):
         if part.any():
             parts: tuple[Any, ...] = function(cells.at(part), number)
             fields: tuple[Any, ...] = found

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.contract import contract
+
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
@@ -65,8 +67,8 @@ def _of_kind(Z: Complex, nu: Array, sign: Array) -> tuple[Array, Array]:
     count = SAMPLES * int(numbers.max())
     t = 2.0 * np.pi * np.arange(count + 1) / count
     turns = np.exp(1j * np.outer(numbers, t))
-    values = sign[:, None] * (Z @ turns).real
-    primitive = sign[:, None] * ((Z / numbers) @ turns).imag
+    values = sign[:, None] * contract(Z, turns.T).real
+    primitive = sign[:, None] * contract(Z / numbers, turns.T).imag
     return _peak(Z * sign[:, None], numbers, t, values), _above(
         values, primitive, Z, numbers, t, sign
     ) / base

@@ -16,14 +16,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import EquilibriumKind, Loop, ParameterError
+from phasekit.errors import Loop, ParameterError, Validity
 from phasekit.laws.perturbed import PerturbedRouthian
 from phasekit.mechanics.at_momentum import AtMomentum, Machines
 from phasekit.mechanics.steady import Steady, steady_at
 from phasekit.mechanics.two_degrees import TwoDegrees
-from phasekit.perturbation.capture import Capture, energy_size, of_loops
+from phasekit.perturbation.capture import Capture, energy_size, of_loops, weak
 from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
 from phasekit.perturbation.quadrature import CELLS, POINTS, Paths, along, closed, times_of
+from phasekit.perturbation.validity import greatest
 from phasekit.phase.numerical import motion
 from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.separatrices import SIDES, branch_of, saddles_of, separatrices
@@ -46,19 +47,6 @@ def equilibria(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Steady:
     return steady_at(one.machine, one.p, values["torque"] * one.machine.Jn)
 
 
-def most(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
-    """Greatest number of equilibria under the torque, and of saddles without it.
-
-    The third, stretches in which some may be missed, is empty: none is.
-    """
-    values = law.values(*parameters)
-    one = _machines(law).at(values)
-    free = steady_at(one.machine, one.p, np.zeros(()))
-    own = np.isin(free.kind, (EquilibriumKind.SADDLE, EquilibriumKind.DEGENERATE)).sum(axis=-1)
-    number = int(equilibria(law, *parameters).n_equilibria.max(initial=0))
-    return max(number, 0), int(own.max(initial=0)), np.empty((0, 2))
-
-
 def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
     """Melnikov's function along the separatrices of the amended potential, in J."""
     return _along_separatrices(law, parameters)[2]
@@ -67,8 +55,15 @@ def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
 def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
     loops, size, found = _along_separatrices(law, parameters)
-    push = law.values(*parameters)["torque"] if rotation else None
-    return of_loops(loops, -found.melnikov_mean, size, push)
+    values = law.values(*parameters)
+    push = values["torque"] if rotation else None
+    led = of_loops(loops, -found.melnikov_mean, size, push)
+    exponent = greatest(loops.saddle_exponent, -1)
+    with np.errstate(all="ignore"):
+        rate = np.abs(values["damping"]) / exponent
+    strong = (found.threshold_validity == Validity.NOT_WEAK).any(axis=(-2, -1))
+    rate = np.where(strong, np.inf, rate)
+    return weak(led, law, values, rate, True, exponent)
 
 
 # ------------------------------------------------------------------------- energies
@@ -176,7 +171,9 @@ def _part(
         if found is None:
             found, rows = better, np.flatnonzero(lost)
         else:
-            for field, values_ in zip(found, better, strict=True):
+            fields: tuple[Any, ...] = found
+            more: tuple[Any, ...] = better
+            for field, values_ in zip(fields, more, strict=True):
                 field[rows] = values_[rows]
         if not rows.size:
             break

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import Loop
+from phasekit.errors import Loop, Validity
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import (
     PerturbedConservative,
@@ -20,8 +20,11 @@ from phasekit.laws.perturbed import (
     drift_name,
     modulation_names,
 )
+from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
+from phasekit.perturbation.validity import OVERDAMPED, rates, validity
+from phasekit.phase.exact.inflections import extremes
 from phasekit.phase.exact.separatrices import Separatrices, separatrices
 
 Array = npt.NDArray[np.float64]
@@ -39,6 +42,7 @@ class Melnikov(NamedTuple):
     melnikov_phase: Array
     chaos_threshold: Array
     turnstile_area: Array
+    threshold_validity: npt.NDArray[np.int8]
 
 
 def melnikov(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Melnikov:
@@ -48,7 +52,30 @@ def melnikov(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Melniko
     A, B, C = law.coefficients(values)
     loops = separatrices(A, B, C)
     mean = means(law, values, loops)
-    return assembled(mean, oscillations(law, values, loops), undamped(law, values))
+    found = assembled(mean, oscillations(law, values, loops), undamped(law, values))
+    ends = extremes(A, B, C)
+    held = (values["torque"] >= ends[..., 0]) & (values["torque"] <= ends[..., 1])
+    return weak(law, values, found, side_areas(loops), loops.saddle_exponent, held)
+
+
+def weak(
+    law: PerturbedConservative, values: dict[str, Any], found: Melnikov, area: Any, exponent: Any,
+    held: Any,
+) -> Melnikov:  # fmt: skip
+    """Thresholds where damping and drive are weak, as the theory has it; NaN elsewhere."""
+    each = {name: np.asarray(x)[..., None, None] for name, x in values.items()}
+    held = np.asarray(held)[..., None, None]
+    k = np.asarray(exponent)[..., None]
+    rate = rates(found.melnikov_mean, area, exponent)
+    # Without a mean there is nothing that a threshold could be compared with.
+    rate = np.where(np.isfinite(area * k), np.where(np.isnan(rate), 0.0, rate), np.nan)
+    code = validity(law, each, rate, held, exponent=k, most=OVERDAMPED)
+    good = code == Validity.HOLDS
+    return found._replace(
+        chaos_threshold=np.where(good, found.chaos_threshold, np.nan),
+        turnstile_area=np.where(good, found.turnstile_area, np.nan),
+        threshold_validity=code,
+    )
 
 
 def refuse_prescribed(law: PerturbedConservative, what: str) -> None:
@@ -58,11 +85,12 @@ def refuse_prescribed(law: PerturbedConservative, what: str) -> None:
         raise bad("omega1", law.prescribed, f"None for {what}, which is in closed form", hint)
 
 
-def side_areas(loops: Separatrices) -> Array:
+def side_areas(loops: Any) -> Array:
     """Integral of phi'^2 over time along the loop on each side."""
     loop = loops.loop[..., None]
     lobe = np.where(loop == Loop.HETEROCLINIC, 0.5, 1.0) * loops.lobe_area
-    return np.where(loop == Loop.WINDING, loops.winding_area[..., None], lobe)
+    area: Array = np.where(loop == Loop.WINDING, loops.winding_area[..., None], lobe)
+    return area
 
 
 def net_angles(loops: Separatrices) -> Array:
@@ -141,7 +169,7 @@ def cubes(A: Any, loops: Separatrices) -> Array:
     inner = np.asarray(A)[..., None, None, None] * (np.cos(theta + 2.0 * phi) - np.cos(2.0 * phi))
     square = 2.0 * np.sin(0.5 * theta) ** 2 * (inner + 2.0 * k * k)
     passes = np.where(loops.loop[..., None] == Loop.LOBES, 2.0, 1.0)
-    return np.asarray(passes * 0.5 * np.abs(whole) * (square @ WEIGHTS))
+    return np.asarray(passes * 0.5 * np.abs(whole) * contract(square, WEIGHTS))
 
 
 def oscillations(
@@ -175,7 +203,7 @@ def assembled(mean: Array, parts: Sequence[Part], unmoved: Any) -> Melnikov:
     if not parts:
         nothing = np.full(mean.shape, np.nan)
         still = np.where(np.isnan(mean), np.nan, 0.0)
-        return Melnikov(mean, still, nothing, nothing.copy(), still.copy())
+        return Melnikov(mean, still, nothing, nothing.copy(), still.copy(), _held(mean))
     spread = [
         np.broadcast_arrays(Z, *(np.asarray(x)[..., None, None] for x in (a, nu, phase)), mean)[:4]
         for Z, a, nu, phase in parts
@@ -201,7 +229,11 @@ def assembled(mean: Array, parts: Sequence[Part], unmoved: Any) -> Melnikov:
             threshold = np.where(first == 0.0, np.nan, first * size / amplitude)
     none = np.asarray(unmoved)[..., None, None] & (mean == 0.0)
     threshold = np.where(none, np.nan, threshold)
-    return Melnikov(np.array(mean), amplitude, phase, threshold, area)
+    return Melnikov(np.array(mean), amplitude, phase, threshold, area, _held(mean))
+
+
+def _held(mean: Array) -> npt.NDArray[np.int8]:
+    return np.full(mean.shape, Validity.HOLDS, np.int8)
 
 
 def quiet_frequency(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Array:

@@ -15,8 +15,15 @@ import numpy.typing as npt
 
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.perturbed import PerturbedConservative, drift_name, modulation_names
-from phasekit.perturbation.melnikov import Melnikov, Part, assembled, refuse_prescribed, undamped
-from phasekit.phase.numerical import functions
+from phasekit.perturbation.melnikov import (
+    Melnikov,
+    Part,
+    assembled,
+    refuse_prescribed,
+    undamped,
+    weak,
+)
+from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import Separatrices
 
@@ -85,8 +92,14 @@ class Paths:
         return Sum(np.where(corner, fine + fourth, fine), error, size).times(self.step)
 
     def transform(self, values: Any, nu: Array) -> Sum:
-        """Integral of phi' g e^{i nu t}, its real and imaginary part."""
-        return self.integral(np.exp(1j * nu[:, None, None, None] * self.time) * self.dphi * values)
+        """Integral of phi' g e^{i nu t}, its real and imaginary part.
+
+        Nothing is known of a frequency that half of the points cannot tell from a lower one.
+        """
+        nu = nu[:, None, None, None]
+        found = self.integral(np.exp(1j * nu * self.time) * self.dphi * values)
+        told = 2.0 * np.abs(nu[..., 0]) * self.step < np.pi
+        return found._replace(error=np.where(told, found.error, np.inf))
 
 
 class Sum(NamedTuple):
@@ -155,11 +168,12 @@ def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov
             left = Separatrices._make(x[rows] for x in own)
             again = {name: x[rows] for name, x in one.items()}
             many, _ = _cells(law, formula, again, left, POINTS[1])
-            for field, better in zip(few, many, strict=True):
+            fields: tuple[Any, ...] = few
+            for field, better in zip(fields, many, strict=True):
                 field[rows] = better
         found.append(few)
-    fields = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in fields)
+    whole = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in whole)
 
 
 def _cells(
@@ -168,11 +182,20 @@ def _cells(
 ) -> tuple[Melnikov, Any]:  # fmt: skip
     """Melnikov's function by so many points in time, and in which cells they were too few."""
     paths = Paths.of(formula, [values[name] for name in formula.names], loops, points)
-    return along(law, paths, values)
+    held = np.ones(len(loops.saddle_phi), bool)
+    turned = np.flatnonzero(values["torque"] != 0.0)
+    if turned.size:
+        own = [values[name][turned] for name in law.names]
+        held[turned] = torqued.equilibria(law, *own).n_equilibria > 0
+    return along(law, paths, values, held=held)
 
 
 def along(
-    law: PerturbedConservative, paths: Paths, values: dict[str, Array], weight: Any = 1.0
+    law: PerturbedConservative,
+    paths: Paths,
+    values: dict[str, Array],
+    weight: Any = 1.0,
+    held: Any = True,
 ) -> tuple[Melnikov, Any]:
     """Melnikov's function along motions, and in which cells they have too few points.
 
@@ -216,6 +239,10 @@ def along(
             good |= sizes[i] * Z.error <= WORST * np.max(others, axis=0)
         parts.append((weight * np.where(good, Z.value, np.nan), amplitude, nu, phase))
     found = assembled(weight * mean, parts, undamped(law, values))
+    with np.errstate(all="ignore"):
+        exponent = REACH / paths.time[..., 0, -1]
+    area = weight * paths.integral(square).settled()
+    found = weak(law, values, found, area, exponent, held)
     closed = np.isfinite(paths.phi[..., 0])
     lost = closed & (np.isnan(found.melnikov_mean) | np.isnan(found.melnikov_amplitude))
     return found, lost.any(axis=(1, 2))

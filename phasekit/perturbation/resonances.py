@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from phasekit.errors import Loop, OrbitFamily
 from phasekit.laws.perturbed import PerturbedTrigonometric, modulation_names
+from phasekit.numerics.contract import contract
 from phasekit.perturbation.melnikov import refuse_prescribed
 from phasekit.phase.exact.flow import flow
 from phasekit.phase.exact.orbits import Orbits, energy_rises, orbits_at_gap
@@ -137,7 +138,7 @@ def _one(
     steps = at[:, None] + STEP * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
     gap, orbit = ladder.at(steps)
     # dOmega/du over dh/du = gap, times Omega = dh/dJ
-    slope = orbit.frequency @ (np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * STEP))
+    slope = contract(orbit.frequency, np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * STEP))
     twist = slope / gap[:, 2] * frequency
     force = _coefficient(law, values, ladder, gap[:, 2], orbit, drive, n, m, family)
     with np.errstate(all="ignore"):

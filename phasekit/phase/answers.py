@@ -16,12 +16,17 @@ import numpy.typing as npt
 
 from phasekit.errors import Loop, ParameterError
 from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
-from phasekit.laws.perturbed import PerturbedConservative, TiltedRouthian
+from phasekit.laws.perturbed import (
+    PerturbedConservative,
+    TiltedConservative,
+    TiltedRouthian,
+    TiltedTrigonometric,
+)
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
 from phasekit.phase.exact.orbits import orbits
 from phasekit.phase.exact.separatrices import phase_space
-from phasekit.phase.numerical import functions
+from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.separatrices import separatrices
@@ -147,6 +152,66 @@ def _(law: Formula, values: Mapping[str, float]) -> Answers:
         units="s-2" if is_turn(law.period) else "",
         potential=lambda x: law.values(x, *own),
         orbit=lambda x, v: functions.orbits(law, *own, x, v),
+        **present(points, loops),
+    )
+
+
+@answers.register
+def _(law: TiltedTrigonometric, values: Mapping[str, float]) -> Answers:
+    A, B, C = map(float, law.coefficients({name: np.asarray(x) for name, x in values.items()}))
+    N = values["torque"]
+    if N and not np.isfinite(4.0 * (abs(A) + abs(B) + abs(C)) + 4.0 * law.base.period * abs(N)):
+        raise ParameterError(
+            f"system: got coefficients {A!r}, {B!r}, {C!r} and torque {N!r}, wants a potential of "
+            "finite differences"
+        )
+    return _under_torque(law, values)
+
+
+@answers.register
+def _(law: TiltedConservative, values: Mapping[str, float]) -> Answers:
+    law.check_searchable()
+    return _under_torque(law, values)
+
+
+def _under_torque(
+    law: PerturbedConservative, values: Mapping[str, float], low: float | None = None
+) -> Answers:
+    """What is known under a torque: of the line, or of the turn that begins at a coordinate.
+
+    On the cylinder the energy of a state is known up to what turns change it by. What leaves the
+    picture at one side comes back at the other, on the level that its energy is there.
+    """
+    base: Any = law.base
+    torque, turn = values["torque"], base.period
+    if torque == 0.0:
+        return answers(base, {name: values[name] for name in law.inputs})
+    own = [values[name] for name in law.names]
+    points, loops = torqued.phase_space(law, *own)
+    places: dict[str, Any] = {}
+    if turn is None:
+        places["ends"] = base.ends
+    else:
+        first = -0.5 * turn if low is None else low
+        cut_at = functools.partial(_under_torque, law, values)
+        places.update(ends=(first, first + turn), tilt=turn * torque, cut_at=cut_at)
+
+        def home(phi: Array, energy: Array) -> tuple[Array, Array]:
+            turns = np.ceil((phi - first) / turn) - 1.0
+            return phi - turn * turns, energy + turn * torque * turns
+
+        phi, energy = home(points.phi, points.energy)
+        saddle_phi, saddle_energy = home(loops.saddle_phi, loops.saddle_energy)
+        points = points._replace(phi=phi, energy=energy)
+        loops = loops._replace(saddle_phi=saddle_phi, saddle_energy=saddle_energy)
+    return Answers(
+        coordinate=base.coordinate,
+        is_angle=is_turn(turn),
+        period=None,
+        units="s-2" if is_turn(turn) else "",
+        potential=lambda x: torqued.potential(law, *own, x),
+        orbit=lambda x, v: torqued.orbits(law, *own, x, v),
+        **places,
         **present(points, loops),
     )
 

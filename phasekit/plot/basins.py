@@ -36,7 +36,7 @@ def basins(
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw basins of attraction with their shares, and beside them the predicted odds.
+    r"""Draw basins of attraction with their shares, and the predicted odds of capture.
 
     Parameters
     ----------

@@ -283,7 +283,7 @@ def _looks(one: Branch) -> list[style.Look]:
     if "kind_of_pair" in points:
         pair = [str(name) or one.kind for name in points.kind_of_pair.values]
         return [_CURVES[name] for name in pair]
-    if one.kind not in ("equilibrium", "cycle"):
+    if one.kind not in ("equilibrium", "cycle", "event"):
         return [_CURVES[one.kind]] * points.sizes["point"]
     if "kind" in points:
         kinds = points.kind.values.copy()

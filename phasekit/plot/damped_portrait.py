@@ -20,15 +20,11 @@ from phasekit.plot.parts import strokes, style
 from phasekit.plot.parts.circle import TURN
 from phasekit.plot.parts.plane import StatePlane
 from phasekit.plot.parts.units import Units
-from phasekit.plot.phase_portrait import starts_of_pairs
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import single
 
 FloatArray = NDArray[np.float64]
 
-STABLE: style.Look = {"color": style.BLUE, "linestyle": (0, (5, 1.5)), "linewidth": 1.6}
-UNSTABLE: style.Look = {"color": style.VERMILLION, "linestyle": "-", "linewidth": 1.6}
-SHORT = {"stable manifold": "stable", "unstable manifold": "unstable"}
 #: Distance from a saddle at which its manifolds begin, in rad.
 NEAR = 1e-6
 #: How often the motion near a saddle grows by e along its manifolds.
@@ -47,7 +43,7 @@ def damped_portrait(
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw rests and saddles of a damped system, and the manifolds of its saddles.
+    r"""Draw the equilibria of a damped system and the manifolds of its saddles.
 
     The stable manifold of a saddle is what comes to it, and so the border between what falls to
     either side; the unstable manifold leads from it to where motions come to rest, or run round.
@@ -102,13 +98,13 @@ def damped_portrait(
     saddles = points[points[:, 1] == EquilibriumKind.SADDLE]
     if not len(saddles):
         raise bad("perturbed", system, "a system with a saddle", "its torque may be too large")
-    starts = [] if orbits is None else starts_of_pairs(orbits)
+    starts = [] if orbits is None else strokes.starts_of_pairs(orbits)
     axes = style.axes_for(ax, legend=legend)
     curves = [*_manifolds(system, saddles, period), *_orbits(system, saddles, starts)]
     # Of one kind of manifold the speeds may grow without end: backwards in time, where damped.
     fastest = [
         max(float(np.nanmax(np.abs(v))) for _, v, look in curves if look is kind)
-        for kind in (STABLE, UNSTABLE)
+        for kind in (style.STABLE, style.UNSTABLE)
     ]
     reach = max([1.6 * min(fastest), *(1.1 * abs(dphi) for _, dphi in starts)])
     for x, v, look in curves:
@@ -116,8 +112,8 @@ def damped_portrait(
         across, up = circle.unrolled(np.where(seen, x, np.nan), np.where(seen, v, np.nan))
         axes.plot(across * stretch, up * pace, **look)
     handles: list[Artist] = [
-        Line2D([], [], label="stable manifold", **STABLE),
-        Line2D([], [], label="unstable manifold", **UNSTABLE),
+        Line2D([], [], label="stable manifold", **style.STABLE),
+        Line2D([], [], label="unstable manifold", **style.UNSTABLE),
     ]
     for number, (phi, dphi) in enumerate(starts):
         look, where = strokes.orbit_look(number), float(circle.home(phi))
@@ -142,7 +138,7 @@ def damped_portrait(
         axes.set_xlim(*circle.ends)
     plane.name_axes(axes)
     if legend:
-        style.legend_below(axes, handles, SHORT)
+        style.legend_below(axes, handles, style.MANIFOLDS)
     return axes
 
 
@@ -171,7 +167,7 @@ def _manifolds(
     return [
         (*_manifold(system, phi, exponent, stable=stable, side=side, period=period), look)
         for phi, _, exponent in saddles
-        for stable, look in ((False, UNSTABLE), (True, STABLE))
+        for stable, look in ((False, style.UNSTABLE), (True, style.STABLE))
         for side in (1.0, -1.0)
     ]
 

@@ -52,7 +52,7 @@ def hodograph(
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw the hodograph of a rotator: what its tip runs through along orbits or motions.
+    r"""Draw the hodograph of a rotator: the curve of its tip along orbits or motions.
 
     The rotator R022 of the self-rotation is drawn in axes that turn with the disk: tangential
     :math:`u = \ddot\varphi`, radial :math:`v = \dot\varphi^2`. Its hodograph is the same for both

@@ -26,7 +26,7 @@ def hysteresis_loop(
     units: Mapping[str, str] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw what follows slow parameters: a hysteresis loop, or a slow run-up.
+    r"""Draw a quantity that follows slow parameters: a hysteresis loop or a slow run-up.
 
     The curve is broken where the center jumps; a dashed line leads from the last step before a jump
     to the first one after it, with an arrow in the direction of the jump.

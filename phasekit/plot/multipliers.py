@@ -20,7 +20,7 @@ def multipliers(
     units: Mapping[str, str] | None = None,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw the Floquet multipliers along a family of periodic orbits beside the unit circle.
+    r"""Draw the Floquet multipliers along a family of periodic orbits, with the unit circle.
 
     An orbit is stable while they lie inside: at a fold of cycles one leaves through 1, at a period
     doubling through -1, at a torus bifurcation a pair through the circle elsewhere. The color says

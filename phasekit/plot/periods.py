@@ -187,7 +187,7 @@ def _families(
     single(system)
     model = with_families(system, "a family of orbits")
     if issubclass(model.rung, Trigonometric) and not any(model.coefficients()):
-        raise bad("system", system, "a system with a force, for without one nothing oscillates")
+        raise bad("system", system, "a system with a force; without one nothing oscillates")
     families = orbit_families(system, n, energy_max=energy_max)
     points, loops = equilibria(system), separatrices(system)
     families = families.assign(

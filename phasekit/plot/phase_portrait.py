@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,13 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
-from phasekit.labels.arguments import bad, one_of, reals
+from phasekit.labels.arguments import bad, one_of
+from phasekit.laws.equations import equations_of
+from phasekit.laws.ladder import Lawful
 from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units, coordinate_symbol, printed
-from phasekit.systems.system import single
+from phasekit.systems.system import as_system, single
 
 FloatArray = NDArray[np.float64]
 
@@ -39,16 +40,22 @@ def phase_portrait(
     angles: style.Angles = "rad",
     units: Mapping[str, str] | None = None,
     cut: float | None = None,
+    window: Any = None,
+    duration: float | None = None,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw the phase portrait of one system on the cylinder.
+    r"""Draw the phase portrait of one system on the cylinder, or of a planar flow.
 
     Level curves of the energy integral :math:`h = \dot\varphi^2/2 + V(\varphi)` lie below, solid
     where they close and dotted where they run round the cylinder; separatrices lie on top; centers
     and saddles are marked, and the lobes of a figure-eight are filled. The left and right edges are
     the same line of the cylinder. Of a machine on a free support the levels are those of
     :math:`M\dot\varphi^2/2 + V_p(\varphi)`, in J, at one angular momentum :math:`p`.
+
+    Of a `Problem` of two states, or a system that states its rates: the direction of the flow, the
+    nullclines, the equilibria by kind, and the stable and unstable manifolds of saddles, in a
+    window.
 
     Parameters
     ----------
@@ -76,6 +83,10 @@ def phase_portrait(
     cut : float, optional
         Where the circle is cut open, in the unit in which the angle is shown; at half a turn if
         left out. What lies on the cut is drawn at both ends.
+    window : mapping of str to (float, float), optional
+        Of a flow: the part of the plane, by state; by default the system's window.
+    duration : float, optional
+        Of a flow: the time for which the motions of `orbits` are drawn.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -102,7 +113,26 @@ def phase_portrait(
     >>> ax = pk.plot.phase_portrait(pk.Reduced(lam=0.4, psi=0.1))
     >>> ax.get_xlabel()
     '$\\varphi$ (rad)'
+    >>> predator = pk.Problem(
+    ...     {"n": "n*(1 - n) - n*p/(n + 0.3)", "p": "p*(n/(n + 0.3) - 0.5)"},
+    ...     window={"n": (-0.05, 1.2), "p": (-0.05, 0.8)},
+    ... )
+    >>> ax = pk.plot.phase_portrait(predator, orbits=(0.6, 0.1))
     """
+    found = system if isinstance(system, Lawful) else as_system(system)
+    if (law := equations_of(found)) is not None:
+        given = {"energies": energies, "color_by": color_by, "units": units, "cut": cut}
+        for name, value in given.items():
+            if value is not None:
+                raise bad(name, value, "nothing for a flow, which has no energy")
+        from phasekit.plot.parts.flow_portrait import flow_portrait
+
+        return flow_portrait(
+            found, law, window=window, orbits=orbits, duration=duration, legend=legend, ax=ax
+        )
+    for name, value in {"window": window, "duration": duration}.items():
+        if value is not None:
+            raise bad(name, value, "nothing for a system in a potential")
     if color_by is not None:
         one_of("color_by", color_by, tuple(COLORED))
     shown = Shown(angles, units, cut)
@@ -227,7 +257,6 @@ class Picture:
 
 def curves_of(system: Any) -> LevelCurves:
     """Return the level curves of one system."""
-    importlib.import_module("phasekit.perturbation.tilted_answers")  # registers there
     return LevelCurves.of(answers(*single(system)))
 
 
@@ -251,7 +280,7 @@ def _colors(
 def levels_of(land: LevelCurves, energies: ArrayLike) -> list[Level]:
     """Return the levels that are asked for."""
     unit = {"s-2": "s^-2"}.get(land.answers.units, land.answers.units or "the unit of V")
-    array = _finite(energies, "energies", unit)
+    array = strokes.finite(energies, "energies", unit)
     if array.ndim > 1:
         raise bad("energies", energies, f"a number or a 1-D list of numbers, in {unit}")
     levels: list[Level] = [(float(energy), None) for energy in array.ravel()]
@@ -263,33 +292,13 @@ def levels_of(land: LevelCurves, energies: ArrayLike) -> list[Level]:
 
 def starts_of(land: LevelCurves, orbits: ArrayLike) -> list[strokes.State]:
     """Return initial conditions as pairs of floats."""
-    starts = starts_of_pairs(orbits)
+    starts = strokes.starts_of_pairs(orbits)
     for start in starts:
         if not _has_speed(land, land.energy(*start)):
             raise bad("orbits", start, "pairs (phi0, dphi0) whose energies are finite")
     return starts
 
 
-def starts_of_pairs(orbits: ArrayLike) -> list[strokes.State]:
-    """Return pairs of numbers as pairs of floats."""
-    pairs = _finite(orbits, "orbits", "rad and rad/s")
-    if not pairs.size:
-        return []
-    if pairs.ndim == 1:
-        pairs = pairs[np.newaxis]
-    if pairs.ndim != 2 or pairs.shape[1] != 2:
-        raise bad("orbits", orbits, "pairs (phi0, dphi0), of shape (2,) or (n, 2)")
-    return [(float(phi), float(speed)) for phi, speed in pairs]
-
-
 def _has_speed(land: LevelCurves, energy: float) -> bool:
     """Return whether the greatest speed on a level is a number."""
     return bool(np.isfinite(2.0 * (energy - land.floor)))
-
-
-def _finite(values: ArrayLike, argument: str, unit: str) -> FloatArray:
-    wants = f"finite numbers in {unit}"
-    array = reals(argument, getattr(values, "values", values), wants)
-    if not np.isfinite(array).all():
-        raise bad(argument, values, wants)
-    return array

@@ -26,7 +26,7 @@ def potential_well(
     legend: bool = True,
     ax: Axes | Sequence[Axes] | None = None,
 ) -> Axes | tuple[Axes, Axes]:
-    r"""Draw the potential well, and under it the phase portrait with the same angle axis.
+    r"""Draw the potential well, and the phase portrait below it on the same axis.
 
     The levels of the portrait stand in the well as horizontal chords, the energies of the saddles
     in the lines of their separatrices.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -12,8 +11,8 @@ from phasekit.constants import STANDARD_GRAVITY
 from phasekit.labels.arguments import NumberLike
 from phasekit.laws.perturbed import Rate
 from phasekit.laws.trigonometric import Values
-from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import Model, model
+from phasekit.systems.parameter import parameter
+from phasekit.systems.system import System
 
 
 def _particle_euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
@@ -25,9 +24,7 @@ def _particle_euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
     return sine, v["offset"] * sine / v["radius"], v["normal_offset"] / v["radius"]
 
 
-@model
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class ParticleOnCircle(Model):
+class ParticleOnCircle(System):
     """Heavy particle on a circle that is carried round a vertical axis.
 
     The circle lies in a plane tilted from the vertical; phi is measured from its lowest point.
@@ -65,35 +62,22 @@ class ParticleOnCircle(Model):
     Coefficients(A=4.0, B=20.0, C=2.0)
     """
 
-    radius: NumberLike
-    omega: NumberLike
-    tilt: NumberLike = 0.0
-    offset: NumberLike = 0.0
-    normal_offset: NumberLike = 0.0
-    g: NumberLike = STANDARD_GRAVITY
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="radius", units="m", long_name="radius of the circle", positive=True),
-        Parameter(name="omega", units="s-1", long_name="angular velocity about the vertical axis"),
-        Parameter(
-            name="tilt",
-            units="rad",
-            long_name="angle of the circle's plane from the vertical",
-            low=-np.pi / 2,
-            high=np.pi / 2,
-        ),
-        Parameter(
-            name="offset",
-            units="m",
-            long_name="distance of the circle's center from the axis, in the plane",
-        ),
-        Parameter(
-            name="normal_offset",
-            units="m",
-            long_name="distance of the circle's center from the axis, square to the plane",
-        ),
-        Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
+    radius: NumberLike = parameter("m", "radius of the circle", positive=True)
+    omega: NumberLike = parameter("s-1", "angular velocity about the vertical axis")
+    tilt: NumberLike = parameter(
+        "rad",
+        "angle of the circle's plane from the vertical",
+        default=0.0,
+        low=-np.pi / 2,
+        high=np.pi / 2,
     )
+    offset: NumberLike = parameter(
+        "m", "distance of the circle's center from the axis, in the plane", default=0.0
+    )
+    normal_offset: NumberLike = parameter(
+        "m", "distance of the circle's center from the axis, square to the plane", default=0.0
+    )
+    g: NumberLike = parameter("m s-2", "acceleration of gravity", default=STANDARD_GRAVITY)
 
     frame_rate: ClassVar[Rate | None] = Rate("omega", _particle_euler)
 
@@ -110,9 +94,7 @@ class ParticleOnCircle(Model):
         )
 
 
-@model
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Pendulum(Model):
+class Pendulum(System):
     """Plane pendulum, ``phi'' + (g/length) sin phi = 0``.
 
     Parameters
@@ -138,13 +120,8 @@ class Pendulum(Model):
     Coefficients(A=0.0, B=20.0, C=0.0)
     """
 
-    length: NumberLike
-    g: NumberLike = STANDARD_GRAVITY
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="length", units="m", long_name="length of the pendulum", positive=True),
-        Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
-    )
+    length: NumberLike = parameter("m", "length of the pendulum", positive=True)
+    g: NumberLike = parameter("m s-2", "acceleration of gravity", default=STANDARD_GRAVITY)
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -152,9 +129,7 @@ class Pendulum(Model):
         return 0 * v["g"], v["g"], 0 * v["g"], v["length"]
 
 
-@model
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class StonerWohlfarth(Model):
+class StonerWohlfarth(System):
     """Single-domain magnetic particle, ``V = K sin^2 phi - h_x cos phi - h_y sin phi``.
 
     phi is the angle of the magnetisation from the easy axis. Its switching astroid is the fold
@@ -187,15 +162,9 @@ class StonerWohlfarth(Model):
     Coefficients(A=-4.0, B=1.0, C=0.5)
     """
 
-    K: NumberLike
-    h_x: NumberLike
-    h_y: NumberLike
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="K", units="s-2", long_name="constant of the uniaxial anisotropy"),
-        Parameter(name="h_x", units="s-2", long_name="field along the easy axis"),
-        Parameter(name="h_y", units="s-2", long_name="field across the easy axis"),
-    )
+    K: NumberLike = parameter("s-2", "constant of the uniaxial anisotropy")
+    h_x: NumberLike = parameter("s-2", "field along the easy axis")
+    h_y: NumberLike = parameter("s-2", "field across the easy axis")
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:

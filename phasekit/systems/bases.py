@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import describe
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.system import MODELS, System
 
 #: Where models are; each registers itself when it is imported.
 HOMES = (
@@ -19,14 +19,14 @@ HOMES = (
 )
 
 
-def models(homes: Sequence[str] = HOMES) -> Mapping[str, type[Model]]:
+def models(homes: Sequence[str] = HOMES) -> Mapping[str, type[System]]:
     """Return the models of some modules, and all others that are known, by name."""
     for module in homes:
         importlib.import_module(module)
     return MODELS
 
 
-def named_model(argument: str, name: object, homes: Sequence[str] = HOMES) -> type[Model]:
+def named_model(argument: str, name: object, homes: Sequence[str] = HOMES) -> type[System]:
     """Return the model of a name, whether it was used in this process or not.
 
     Raises

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -16,8 +15,8 @@ from phasekit.labels.arguments import FloatArray, NumberLike, Value, bad
 from phasekit.labels.grid import combine
 from phasekit.laws.perturbed import Rate
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_mixing, disk_products
-from phasekit.systems.parameter import Parameter, attrs_of
-from phasekit.systems.system import Model, model
+from phasekit.systems.parameter import Parameter, attrs_of, parameter
+from phasekit.systems.system import System
 
 INERTIA_NAMES = (
     "moment of inertia about u2",
@@ -45,9 +44,7 @@ class DiskInertia(NamedTuple):
     Jvn: Any
 
 
-@model
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class GyroRotorDisk(Model):
+class GyroRotorDisk(System):
     """Heavy disk, skew and eccentric on its shaft, the shaft carried round the vertical.
 
     The disk turns by phi about a horizontal shaft, which itself is carried with the angular
@@ -99,41 +96,21 @@ class GyroRotorDisk(Model):
     beta: got 30, wants a number from 0 to 3.14159 in radians; if it is in degrees: 30 * pk.deg
     """
 
-    beta: NumberLike
-    e: NumberLike
-    a: NumberLike
-    r: NumberLike
-    omega1: NumberLike
-    m: NumberLike | None = None
-    g: NumberLike = STANDARD_GRAVITY
-    half_span: NumberLike | None = None
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="beta",
-            units="rad",
-            long_name="angle between the shaft and the disk's plane",
-            low=0.0,
-            high=np.pi,
-        ),
-        Parameter(name="e", units="m", long_name="distance of the mass center from O2", low=0.0),
-        Parameter(name="a", units="m", long_name="distance of the shaft from the vertical axis"),
-        Parameter(name="r", units="m", long_name="radius of the disk", low=0.0),
-        Parameter(name="omega1", units="s-1", long_name="angular velocity about the vertical axis"),
-        Parameter(name="m", units="kg", long_name="mass of the disk", positive=True, optional=True),
-        Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
-        Parameter(
-            name="half_span",
-            units="m",
-            long_name="half the distance between the bearings of the shaft",
-            positive=True,
-            optional=True,
-        ),
+    beta: NumberLike = parameter(
+        "rad", "angle between the shaft and the disk's plane", low=0.0, high=np.pi
+    )
+    e: NumberLike = parameter("m", "distance of the mass center from O2", low=0.0)
+    a: NumberLike = parameter("m", "distance of the shaft from the vertical axis")
+    r: NumberLike = parameter("m", "radius of the disk", low=0.0)
+    omega1: NumberLike = parameter("s-1", "angular velocity about the vertical axis")
+    m: NumberLike | None = parameter("kg", "mass of the disk", default=None, positive=True)
+    g: NumberLike = parameter("m s-2", "acceleration of gravity", default=STANDARD_GRAVITY)
+    half_span: NumberLike | None = parameter(
+        "m", "half the distance between the bearings of the shaft", default=None, positive=True
     )
 
-    def __post_init__(self) -> None:
-        """Check each parameter, then that the disk is a body."""
-        super().__post_init__()
+    def check(self) -> None:
+        """Refuse what is no body."""
         zero_e = isinstance(self.e, float) and self.e == 0.0
         zero_beta = isinstance(self.beta, float) and self.beta in (0.0, np.pi)
         if isinstance(self.r, float) and self.r == 0.0 and (zero_e or zero_beta):

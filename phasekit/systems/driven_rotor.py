@@ -10,6 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import is_whole
 from phasekit.labels.arguments import FloatArray, bad, describe, number
 from phasekit.labels.units import UNITS_OF
 from phasekit.mechanics import two_degrees as mechanics
@@ -114,7 +115,8 @@ def checked_torque(
     check_call(argument, value, wants)
     with np.errstate(all="ignore"):
         number = value(t, *np.array(state))
-    if not isinstance(number, (int, float, np.floating, np.integer)) or not np.isfinite(number):
+    known = is_whole(number) or isinstance(number, (float, np.floating))
+    if not known or not np.isfinite(number):
         raise bad(f"{argument} at t = {t!r}", number, "a function that returns a finite number")
     function: StateFunction = value
     return function

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any, ClassVar, Self
+from typing import Any, Self
 
 import numpy as np
 
 from phasekit.labels.arguments import NumberLike, bad, number
 from phasekit.laws.trigonometric import Values
-from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import Model, model
+from phasekit.systems.parameter import parameter
+from phasekit.systems.system import System
 
 
-@model
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class JosephsonJunction(Model):
+class JosephsonJunction(System):
     """Josephson junction with two harmonics of its current-phase relation, threaded by a flux.
 
     ``I(phi) = I_1 [sin(phi - flux) + second_harmonic sin(2 phi)]``, phi the gauge-invariant phase
@@ -52,19 +49,11 @@ class JosephsonJunction(Model):
     0.333333333333
     """
 
-    plasma_frequency: NumberLike
-    second_harmonic: NumberLike = 0.0
-    flux: NumberLike = 0.0
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(
-            name="plasma_frequency", units="s-1", long_name="plasma frequency", positive=True
-        ),
-        Parameter(
-            name="second_harmonic", units="1", long_name="second harmonic over the first, I_2/I_1"
-        ),
-        Parameter(name="flux", units="rad", long_name="phase of the flux, 2 pi Phi/Phi_0"),
+    plasma_frequency: NumberLike = parameter("s-1", "plasma frequency", positive=True)
+    second_harmonic: NumberLike = parameter(
+        "1", "second harmonic over the first, I_2/I_1", default=0.0
     )
+    flux: NumberLike = parameter("rad", "phase of the flux, 2 pi Phi/Phi_0", default=0.0)
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -122,9 +111,7 @@ class JosephsonJunction(Model):
         }
 
 
-@model
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class SpinOrbit(Model):
+class SpinOrbit(System):
     """Spin of a planet or moon next to a resonance with its orbit, averaged over the orbit.
 
     ``gamma'' + (3/2) n^2 asymmetry strength sin(2 gamma) = 0`` for ``gamma = theta - p M``, theta
@@ -160,15 +147,9 @@ class SpinOrbit(Model):
     0.0708
     """
 
-    mean_motion: NumberLike
-    asymmetry: NumberLike
-    strength: NumberLike = 1.0
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="mean_motion", units="s-1", long_name="mean motion on the orbit"),
-        Parameter(name="asymmetry", units="1", long_name="(B - A)/C of the body", low=0.0),
-        Parameter(name="strength", units="1", long_name="strength H(p, e) of the resonance"),
-    )
+    mean_motion: NumberLike = parameter("s-1", "mean motion on the orbit")
+    asymmetry: NumberLike = parameter("1", "(B - A)/C of the body", low=0.0)
+    strength: NumberLike = parameter("1", "strength H(p, e) of the resonance", default=1.0)
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:

@@ -138,7 +138,7 @@ class FreeGyroRotor(RotorStates):
 
     @property
     def parameters(self) -> dict[str, Value]:
-        """The parameters of disk and support by name, those that are None left out."""
+        """The parameters of disk and support by name, without those that are None."""
         own = {"carrier_inertia": self.carrier_inertia, "momentum": self.momentum}
         given: dict[str, Any] = {k: v for k, v in own.items() if v is not None}
         return {**self.disk.parameters, **given}
@@ -211,7 +211,7 @@ class FreeGyroRotor(RotorStates):
         kept = {k: None if v is None else declared[k].check(v) for k, v in own.items()}
         own_values = (x for x in kept.values() if x is not None)
         if all(isinstance(x, float) for x in (*disk.parameters.values(), *own_values)):
-            return cls(disk, **own)
+            return cls(disk=disk, **own)
         made = object.__new__(cls)
         for name, value in {"disk": disk, **kept}.items():
             object.__setattr__(made, name, value)

@@ -47,7 +47,8 @@ def model_name(ds: Any) -> str:
     if not isinstance(schema, str) or schema != SCHEMA_VERSION:
         raise ParameterError(
             f"ds: got schema {schema!r:.80}, wants {SCHEMA_VERSION!r}; "
-            "it was made by another version of phasekit: make it anew or read it with that version"
+            "it was made by another version of phasekit: compute it again or read it with that "
+            "version"
         )
     return str(ds.attrs[MODEL])
 

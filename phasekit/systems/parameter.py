@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import InvalidCellsWarning
-from phasekit.labels.arguments import FloatArray, Value, bad, describe, numeric
+from phasekit.labels.arguments import FloatArray, Value, bad, describe, flag, numeric
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,17 +24,26 @@ if TYPE_CHECKING:
 MANY = 0.1
 
 
+#: Default of a parameter that has to be given.
+REQUIRED = ...
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Parameter:
-    """One declared parameter of a model: its name, meaning, unit and domain."""
+    """One declared parameter of a model: its name, meaning, unit, domain and default."""
 
-    name: str
+    name: str = ""
     units: str
     long_name: str
     low: float = -np.inf
     high: float = np.inf
     positive: bool = False  # zero is excluded
     optional: bool = False
+    default: Any = REQUIRED
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        """Take the name of the field."""
+        object.__setattr__(self, "name", name)
 
     @property
     def least(self) -> float:
@@ -100,6 +109,74 @@ class Parameter:
         array = np.array(kept.values)
         array.flags.writeable = False
         return array
+
+
+def parameter(
+    units: str = "1",
+    long_name: str = "",
+    *,
+    default: Any = REQUIRED,
+    low: float = -math.inf,
+    high: float = math.inf,
+    positive: bool = False,
+) -> Any:
+    """Declare a parameter of a system: a field of the class.
+
+    Parameters
+    ----------
+    units : str
+        Unit as arrays have it in ``attrs["units"]``, such as ``"m s-2"``; ``"rad"`` of an angle,
+        ``"1"`` without one.
+    long_name : str
+        What it is, for labels and tables.
+    default : float or None, optional
+        Its value where none is given; None of a parameter that may be left out. Without it a value
+        has to be given.
+    low, high : float
+        Its domain, ends included. A value outside is refused; in arrays such cells are empty.
+    positive : bool
+        Whether zero is outside as well.
+
+    Returns
+    -------
+    Any
+        A field of a `System`.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> class Bob(pk.System):
+    ...     length = pk.parameter("m", "length of the pendulum", positive=True)
+    ...     g = pk.parameter("m s-2", "acceleration of gravity", default=9.81)
+    ...     coordinate = pk.angle("theta")
+    ...     potential = "-g/length*cos(theta)"
+    >>> Bob(length=0.5)
+    Bob(length=0.5, g=9.81)
+    """
+    for name, text in (("units", units), ("long_name", long_name)):
+        if not isinstance(text, str):
+            raise bad(name, text, "text")
+    flag("positive", positive)
+    low = 0.0 if positive and low == -math.inf else low
+    for name, end in (("low", low), ("high", high)):
+        if not isinstance(end, (int, float)) or math.isnan(end):
+            raise bad(name, end, "a number")
+    if not low <= high:
+        raise bad("low", low, f"a number up to high = {high!r}")
+    made = Parameter(
+        units=units, long_name=long_name, low=float(low), high=float(high), positive=positive,
+        optional=default is None, default=default,
+    )  # fmt: skip
+    if default is not REQUIRED and default is not None:  # labels are not loaded for it
+        known = isinstance(default, (int, float)) and not isinstance(default, bool)
+        if not known or not made.valid(default):
+            raise bad("default", default, made.wants)
+    return made
 
 
 def attrs_of(*parameters: Parameter) -> dict[str, dict[str, str]]:

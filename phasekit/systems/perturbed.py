@@ -32,10 +32,10 @@ from phasekit.systems.bases import named_model
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.identity import MODEL, parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.system import MODELS, System
 
 
-class Perturbed(Model):
+class Perturbed(System):
     """A system with damping and drive.
 
     ``phi'' + V'(phi; p(t)) = -damping phi' - quadratic |phi'| phi' + torque
@@ -67,7 +67,7 @@ class Perturbed(Model):
 
     Attributes
     ----------
-    system : Model
+    system : System
     damping, quadratic, torque, kT : Value
     forcing : tuple of Harmonic
     modulation, drift : dict
@@ -116,7 +116,7 @@ class Perturbed(Model):
     declared: ClassVar[tuple[Parameter, ...]] = ()
     rung: ClassVar[type[Law]] = PerturbedConservative
 
-    system: Model
+    system: System
     damping: Value
     quadratic: Value
     torque: Value
@@ -162,7 +162,7 @@ class Perturbed(Model):
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         """Refuse: a system does not change."""
-        raise AttributeError(f"a Perturbed does not change; use .replace({name}=...)")
+        raise AttributeError(f"a Perturbed is frozen; use .replace({name}=...)")
 
     def __getattr__(self, name: str) -> Any:
         """Return the value of a parameter."""
@@ -283,7 +283,7 @@ class Perturbed(Model):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What makes it again, by keyword."""
+        """The keyword arguments that rebuild it."""
         names = ("system", *OWN, "forcing", "modulation", "drift", "omega1")
         own = {name: getattr(self, name) for name in names}
         return {**own, "modulation": dict(self.modulation), "drift": dict(self.drift)}

@@ -26,7 +26,7 @@ from phasekit.laws.perturbed import (
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import Model, as_system
+from phasekit.systems.system import System, as_system
 
 OWN = (
     Parameter(name="damping", units="s-1", long_name="linear damping"),
@@ -43,7 +43,7 @@ DRIVES = {
 }
 
 
-def base_of(system: Any) -> Model:
+def base_of(system: Any) -> System:
     """Return the system that is perturbed.
 
     Raises
@@ -60,7 +60,7 @@ def base_of(system: Any) -> Model:
     return found
 
 
-def refuse_varying(base: Model, **arguments: Any) -> None:
+def refuse_varying(base: System, **arguments: Any) -> None:
     """Refuse to vary parameters of a system that is perturbed at a constant momentum.
 
     Raises
@@ -78,7 +78,7 @@ def refuse_varying(base: Model, **arguments: Any) -> None:
             raise bad(name, value, f"nothing, of a {type(base).__name__}", hint)
 
 
-def rung_of(base: Model, own: Mapping[str, Any], driven: bool) -> type[Law]:
+def rung_of(base: System, own: Mapping[str, Any], driven: bool) -> type[Law]:
     """Rung of the ladder of laws: the most special one that holds for all values."""
     still = all(isinstance(own[n], float) and own[n] == 0.0 for n in ("damping", "quadratic"))
     alone = still and not driven
@@ -99,7 +99,7 @@ class Drive:
     'm s-1'
     """
 
-    def __init__(self, base: Model, forcing: Any, modulation: Any, drift: Any) -> None:
+    def __init__(self, base: System, forcing: Any, modulation: Any, drift: Any) -> None:
         self.declared: list[Parameter] = []
         units = {p.name: p.units for p in base.declared}
         self.forcing = tuple(
@@ -164,7 +164,7 @@ def _harmonic(argument: str, harmonic: Any) -> Harmonic:
     return harmonic
 
 
-def _by_parameter(argument: str, given: Any, base: Model) -> list[tuple[str, Any]]:
+def _by_parameter(argument: str, given: Any, base: System) -> list[tuple[str, Any]]:
     """Return what is given by parameter of the equation of motion."""
     if given is None:
         return []
@@ -196,7 +196,7 @@ def worded(parameter: Parameter, value: Value) -> Parameter:
     return dataclasses.replace(parameter, long_name=words)
 
 
-def refuse_taken(base: Model, declared: Sequence[Parameter]) -> None:
+def refuse_taken(base: System, declared: Sequence[Parameter]) -> None:
     """Refuse a system with parameters that are named as those of damping and drive."""
     own = {p.name for p in base.declared}
     for parameter in declared:
@@ -214,7 +214,7 @@ def is_number_like(value: Any) -> bool:
     return value is not None and not callable(value)
 
 
-def prescribed(omega1: Any, base: Model, varying: set[str]) -> Any:
+def prescribed(omega1: Any, base: System, varying: set[str]) -> Any:
     """Return omega1 as a function of time, or as a table of two read-only arrays.
 
     Raises

@@ -18,24 +18,20 @@ from phasekit.labels.arguments import (
     same,
     unknown,
 )
-from phasekit.labels.coordinates import LABELS, STATES
+from phasekit.labels.coordinates import STATES
 from phasekit.laws.ladder import Conservative
 from phasekit.phase.numerical.formula import Formula, check_period, make_formula
 from phasekit.systems import potential_parts as parts
 from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import MODELS, Model
-from phasekit.table.numerical import NUMERICAL_ROWS
+from phasekit.systems.statement import TAKEN
+from phasekit.systems.system import MODELS, System
 from phasekit.table.quantities import ROWS
 
 if TYPE_CHECKING:
     from phasekit.systems.problem import Problem
 
-#: Names that parameters cannot have, because results have them.
-_TAKEN = {*LABELS, *STATES, "point"}
-_TAKEN |= {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
 
-
-class Potential(Model):
+class Potential(System):
     """Any system of one degree of freedom, ``x'' = -V'(x)``, by its potential.
 
     Goes wherever a `GyroRotorDisk` goes but for what is in closed form: potential and energy,
@@ -132,7 +128,7 @@ class Potential(Model):
         for key in given:
             if key == name:
                 raise bad("parameters", key, "names other than the coordinate's")
-            if key in _TAKEN or key in ROWS:  # rows may have been added
+            if key in TAKEN or key in ROWS:  # rows may have been added
                 raise bad("parameters", key, f"another name, because results have {key!r}")
         declared = tuple(
             Parameter(name=key, units="1", long_name=f"parameter {key} of the potential")
@@ -152,7 +148,7 @@ class Potential(Model):
 
     def __setattr__(self, name: str, value: Any) -> NoReturn:
         """Refuse: a system does not change."""
-        raise AttributeError(f"a Potential does not change; use .replace({name}=...)")
+        raise AttributeError(f"a Potential is frozen; use .replace({name}=...)")
 
     def __getattr__(self, name: str) -> Any:
         """Return the value of a parameter."""
@@ -163,7 +159,7 @@ class Potential(Model):
 
     @property
     def expression(self) -> Any:
-        """The potential as a sympy expression."""
+        """The potential as a sympy expression, its doubles as the fractions that they are."""
         return self.formula.expression
 
     @property
@@ -178,7 +174,7 @@ class Potential(Model):
 
     @property
     def interval(self) -> tuple[float, float] | None:
-        """The part of the line that is looked at."""
+        """The interval of the line that is searched."""
         return self.formula.interval
 
     @property
@@ -256,7 +252,9 @@ class Potential(Model):
         from phasekit.systems.problem import Problem
 
         values = dict(zip(self._values, self._scalars(), strict=True))
-        return Problem.from_potential(self.expression, self.coordinate, values, period=self.period)
+        return Problem.from_potential(
+            self.formula.text, self.coordinate, values, period=self.period
+        )
 
     def _scalars(self) -> list[float]:
         values = []
@@ -318,7 +316,7 @@ class Potential(Model):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What makes it again, by keyword."""
+        """The keyword arguments that rebuild it."""
         return {
             "expression": self.formula.text,
             "coordinate": self.coordinate,

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import keyword
 from typing import Any
 
 import numpy as np
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import is_whole
 from phasekit.labels.arguments import bad, brief, number, pair
-from phasekit.laws.formulas import NAME, is_name, read_formula
+from phasekit.laws.formulas import NAME, is_name, keyword_hint, read_formula
 from phasekit.systems.identity import model_name, parameter_values
 from phasekit.systems.parameter import Parameter
 
@@ -36,8 +36,7 @@ def expression(expression: Any) -> Any:
     # Numbers as text, for the formula of 1.0 is not that of 1.
     if isinstance(expression, (float, np.floating)):
         return repr(float(expression))
-    whole = isinstance(expression, (int, np.integer)) and not isinstance(expression, bool)
-    if whole and abs(expression) < 1e308:
+    if is_whole(expression) and abs(expression) < 1e308:
         return repr(int(expression))
     hint = "for a Python function of the state take pk.Problem" if callable(expression) else ""
     raise bad("expression", expression, "a string or a sympy expression", hint)
@@ -46,10 +45,9 @@ def expression(expression: Any) -> Any:
 def name(argument: str, name: Any) -> str:
     """Return a name that a coordinate or a parameter can have."""
     text = str(name) if type(name).__module__.startswith("sympy") else name
-    if isinstance(text, str) and keyword.iskeyword(text):
-        raise bad(argument, name, "a name that Python does not use itself", f"such as {text[:3]!r}")
     if not isinstance(text, str) or not is_name(text):
-        raise bad(argument, name, f"a name, such as 'x', of at most {NAME} letters and digits")
+        wants = f"a name, such as 'x', of at most {NAME} letters and digits"
+        raise bad(argument, name, wants, keyword_hint(text))
     return text
 
 

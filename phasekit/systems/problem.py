@@ -2,56 +2,66 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, ClassVar, NoReturn, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
-from phasekit.labels.arguments import bad, flag, reals, unknown, whole
+from phasekit.bifurcation.continuation.iterated_field import MOST, IteratedField
+from phasekit.labels.arguments import Value, bad, flag, reals, same, unknown, whole
 from phasekit.labels.equality import equal
+from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
-from phasekit.laws.ladder import Routhian
+from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
 from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.systems.maps import iterated
 from phasekit.systems.moving_problem import moving_formulas, moving_words
 from phasekit.systems.perturbed_problem import formulas_of, words_of
 from phasekit.systems.problem_parts import (
+    DEFINITION,
+    OfInstance,
     angles_of,
+    arrays_of,
     clock_of,
+    declared_of,
     jet_of,
     make_field,
     names_of,
+    problem_of_dataset,
+    refuse_arrays,
     refuse_of_maps,
-    values_of,
+    window_of,
     words_checked,
     written,
 )
 from phasekit.systems.problem_sources import ProblemSources
-from phasekit.systems.system import MODELS, Model
+from phasekit.systems.statement import StatedRates
+from phasekit.systems.system import MODELS, System
 
 FloatArray = npt.NDArray[np.float64]
 
 
-class Problem(ProblemSources):
+class Problem(ProblemSources, System):
     """A smooth system ``x' = f(x, **parameters)`` with states and parameters by name.
 
     Parameters
     ----------
     f : callable, str, sympy.Expr, or sequence or mapping of formulas
         The right-hand side. A callable is called as ``f(x, **parameters)`` with a 1-D array x and
-        returns as many numbers (a single number for one state); it may raise an ArithmeticError
-        or ValueError, or return NaN, where it is not defined. A function compiled by
+        returns as many numbers (a single number for one state). Where it is not defined it may
+        return NaN or raise an exception, which the end of a branch names. A function compiled by
         ``numba.njit`` is stepped in compiled code. Formulas (strings in Python's syntax, or sympy
         expressions), one a state or by its name, are turned into machine code, with exact
         derivatives.
-    state : str or sequence of str
-        Names of the states; of one state the name alone.
-    parameters : mapping of str to float
-        The parameters and their values.
+    state : str or sequence of str, optional
+        Names of the states; of one state the name alone. Formulas by name need none.
+    parameters : mapping of str to float, 1-D array_like or xarray.DataArray, optional
+        The parameters and their values. Arrays span the cells of maps and motions, as in other
+        systems; what follows one system, as `continuation` does, takes numbers.
     jac : callable, optional
         ``jac(x, **parameters)``, the matrix of derivatives of f by x, for a Python function.
         Without it derivatives are central differences.
@@ -67,6 +77,13 @@ class Problem(ProblemSources):
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
     map : bool, default False
         Whether f is a map ``x -> f(x, **parameters)``, whose fixed points are continued.
+    window : mapping of str to (float, float), optional
+        Ranges of the states: where equilibria are looked for and what pictures show, unless
+        something else is said. Errors of motions are measured by their widths.
+    definitions : mapping of str to str or sympy.Expr, optional
+        Names for formulas, to be used in formulas and in later definitions.
+    functions : mapping of str to str or sympy.Expr, optional
+        Functions by their form, ``{"s(x)": "1/(1 + exp(-x))"}``.
 
     Raises
     ------
@@ -104,29 +121,34 @@ class Problem(ProblemSources):
     """
 
     __slots__ = (
-        "_field", "_own", "conservative", "f", "jac", "map", "parameters", "period", "periods",
-        "state", "system", "time", "words",
+        "_field", "_own", "_values", "conservative", "f", "jac", "map", "period", "periods",
+        "state", "system", "time", "times", "window", "words",
     )  # fmt: skip
+
+    rung: ClassVar[Any] = OfInstance(lambda problem: Map if problem.map else Flow, Flow)
+    declared: ClassVar[Any] = OfInstance(declared_of, ())
 
     f: Any
     jac: Callable[..., Any] | None
     state: tuple[str, ...]
-    parameters: Mapping[str, float]
+    window: Mapping[str, tuple[float, float]]
     periods: Mapping[str, float]
     time: str | None
     period: Any
     conservative: bool
     map: bool
-    system: Model | None
+    times: int  # that a map is applied: f is one step
+    system: System | None
     words: Mapping[str, Mapping[str, str]]  # long_name and units, of what a system made
+    _values: dict[str, Value]
     _field: Field
     _own: Field  # f itself, where that of a map is f(x) - x
 
     def __init__(
         self,
         f: Any,
-        state: str | Sequence[str],
-        parameters: Mapping[str, float],
+        state: str | Sequence[str] | None = None,
+        parameters: Mapping[str, Any] | None = None,
         jac: Callable[..., Any] | None = None,
         *,
         periods: Mapping[str, float] | None = None,
@@ -134,9 +156,16 @@ class Problem(ProblemSources):
         period: Any = None,
         conservative: bool = False,
         map: bool = False,  # noqa: A002 - the field's word
+        window: Mapping[str, tuple[float, float]] | None = None,
+        definitions: Mapping[str, Any] | None = None,
+        functions: Mapping[str, Any] | None = None,
     ) -> None:
+        if state is None:
+            if not isinstance(f, Mapping):
+                raise bad("state", None, "the names of the states, beside an f that has no names")
+            state = tuple(f)
         states = names_of("state", (state,) if isinstance(state, str) else state)
-        values = values_of("parameters", parameters)
+        values = arrays_of("parameters", {} if parameters is None else parameters)
         for name in values:
             if name in states:
                 raise bad("parameters", list(values), f"names that are no states; {name!r} is one")
@@ -148,21 +177,25 @@ class Problem(ProblemSources):
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
             raise bad("conservative", True, "one state (the force) or pairs of states")
-        clock = clock_of(time, period, states, values)
+        # The first of arrays stands for all.
+        first = {name: float(np.ravel(value)[0]) for name, value in values.items()}
+        clock = clock_of(time, period, states, first)
         if clock is not None and conservative:
             raise bad("conservative", True, "False with time: a forced system has no energy")
         self._set("time", time)
         self._set("period", clock)
         self._set("state", states)
-        self._set("parameters", MappingProxyType(values))
+        self._set("_values", values)
         self._set("periods", MappingProxyType(angles))
+        self._set("window", MappingProxyType(window_of("window", window, states)))
         self._set("conservative", bool(conservative))
         self._set("map", bool(map))
+        self._set("times", 1)
         self._set("jac", jac)
         self._set("system", None)
         self._set("words", MappingProxyType({}))
         names = (*values, *self._times())
-        own, kept = make_field(f, jac, states, names)
+        own, kept = make_field(f, jac, states, names, definitions=definitions, functions=functions)
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
         self._set("f", kept)
         self._set("_field", field)
@@ -172,10 +205,103 @@ class Problem(ProblemSources):
         """The name of time, if f depends on it."""
         return () if self.time is None else (self.time,)
 
+    #: What messages say where a Problem cannot be taken.
+    answered_by: ClassVar[str] = (
+        "pk.continuation, pk.diagram, pk.equilibria, pk.flow, pk.lyapunov, pk.periodic_orbit and "
+        "pk.poincare_section take a Problem"
+    )
+
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
 
-    def __setattr__(self, name: str, value: Any) -> None:
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters by name."""
+        return dict(self._values)
+
+    @property
+    def law(self) -> Law:
+        """The equations."""
+        kind = Step if self.map else Rates
+        units = {name: words["units"] for name, words in self.words.items() if "units" in words}
+        return kind(
+            self.state, tuple(self._values), self.f, self.periods, self.time, self.window,
+            {name: units[name] for name in self.state if name in units}, self.times,
+            self.period,
+        )  # fmt: skip
+
+    def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Names of the parameters: all of them.
+
+        Returns
+        -------
+        tuple of str
+        """
+        return tuple(self._values)
+
+    @classmethod
+    def in_domain(cls, name: str, value: FloatArray) -> FloatArray:
+        """Values of a parameter: none is refused.
+
+        Parameters
+        ----------
+        name : str
+            The parameter.
+        value : ndarray
+            Values.
+
+        Returns
+        -------
+        ndarray
+        """
+        return value
+
+    def unit_of(self, name: str) -> str | None:
+        """Unit of a state or parameter, where it is known; the time may be in any.
+
+        Parameters
+        ----------
+        name : str
+            The state or parameter.
+
+        Returns
+        -------
+        str or None
+        """
+        return self.words.get(name, {}).get("units")
+
+    @property
+    def definition(self) -> dict[str, str]:
+        """What maps store beside the parameters' values."""
+        return {DEFINITION: json.dumps(self.specification(values=False))}
+
+    @classmethod
+    def from_dataset(cls, ds: Any) -> Self:
+        """Rebuild the problem from a map, or from any selection of it.
+
+        Parameters
+        ----------
+        ds : xarray.Dataset
+            A Dataset that phasekit made.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        ParameterError
+            If the map was made with another model, a parameter's coordinate is gone, or f was a
+            function, of which a map holds no formulas.
+        """
+        made: Self = problem_of_dataset(cls, ds)
+        return made
+
+    def __str__(self) -> str:
+        """Write the equations and parameters."""
+        return repr(self)
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
         """Refuse: a problem is frozen."""
         raise AttributeError(f"a Problem is frozen; use .replace({name}=...) for a parameter")
 
@@ -183,6 +309,8 @@ class Problem(ProblemSources):
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
         arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
         more = {name: getattr(self, name) for name in ("conservative", "time", "period", "map")}
+        more["window"] = dict(self.window)
+        more["times"] = self.times
         words = {name: dict(one) for name, one in self.words.items()}
         return _made, (type(self), *arguments, more, self.system, words)
 
@@ -194,16 +322,17 @@ class Problem(ProblemSources):
     @property
     def kind(self) -> str:
         """How f was given: "symbolic", "compiled" or "python"."""
-        if isinstance(self._field, SymbolicField):
+        step = getattr(self._own, "base", self._own)
+        if isinstance(step, SymbolicField):
             return "symbolic"
-        return "compiled" if isinstance(self._field, CompiledField) else "python"
+        return "compiled" if isinstance(step, CompiledField) else "python"
 
-    def replace(self, **changes: float) -> Self:
+    def replace(self, **changes: Any) -> Self:
         """Return a copy with some parameters changed, given by name.
 
         Parameters
         ----------
-        **changes : float
+        **changes : float, 1-D array_like or xarray.DataArray
             New values, by the parameters' names.
 
         Returns
@@ -220,17 +349,17 @@ class Problem(ProblemSources):
         for name, value in changes.items():
             if name not in values:
                 raise unknown("parameter of the problem", name, values)
-            values[name] = values_of("parameters", {name: value})[name]
+            values[name] = arrays_of("parameters", {name: value})[name]
         copy = object.__new__(type(self))
         for slot in self.__slots__:
             copy._set(slot, getattr(self, slot))
-        copy._set("parameters", MappingProxyType(values))
+        copy._set("_values", values)
         if self.system is not None:
             copy._set("system", self.system.replace(**changes))
         return copy
 
     def described(self, words: Mapping[str, Mapping[str, str]]) -> Self:
-        """Return a copy whose states and parameters have words, which branches and axes show.
+        """Return a copy with long names and units of states and parameters, for branches and plots.
 
         Parameters
         ----------
@@ -263,7 +392,7 @@ class Problem(ProblemSources):
         return problem.derivatives(x, at)[0]
 
     def iterated(self, times: int) -> Problem:
-        """The map applied so many times, whose fixed points are orbits of that period of this map.
+        """The n-th iterate of the map: its fixed points are the periodic orbits of period n.
 
         Parameters
         ----------
@@ -288,20 +417,28 @@ class Problem(ProblemSources):
         times = whole("times", times, "a whole number >= 1")
         if not self.map:
             raise bad("problem", self, "a map, to be applied several times")
-        symbols = symbols_of(self.state) if self.kind == "symbolic" else None
-        f, jac = iterated(self.f, self.jac, symbols, times)
-        return Problem(f, self.state, self.parameters, jac, periods=self.periods, map=True)
+        total = times * self.times
+        if total > MOST:
+            raise bad("times", times, f"a whole number from 1 to {MOST // self.times}")
+        copy = self.replace()
+        if total > 1:
+            step = getattr(self._own, "base", self._own)
+            copy._set("times", total)
+            copy._set("_own", IteratedField(step, total))
+            copy._set("_field", IteratedField(step, total, less=True))
+        return copy
 
     @property
     def forcing_period(self) -> float:
         """The period of f in time; infinite if f does not depend on it."""
         if self.period is None:
             return np.inf
+        refuse_arrays(self)
         symbols = symbols_of(self.parameters)
         return float(self.period.subs({symbols[k]: v for k, v in self.parameters.items()}))
 
     def derivatives(self, x: npt.ArrayLike, time: float = 0.0) -> tuple[FloatArray, FloatArray]:
-        """Value of f and its matrix of derivatives by the states, at a time if f depends on it.
+        """Value of f and its Jacobian matrix, at a time if f depends on it.
 
         Parameters
         ----------
@@ -327,6 +464,7 @@ class Problem(ProblemSources):
         x = np.atleast_1d(reals("x", x, wants))
         if x.shape != (n,):
             raise bad("x", x, wants)
+        refuse_arrays(self)
         par = np.array([*self.parameters.values(), *(time for _ in self._times())])
         return jet_of(self._own, par, x)
 
@@ -335,15 +473,22 @@ class Problem(ProblemSources):
         if type(self) is not type(other):
             return NotImplemented
         slots = (name for name in Problem.__slots__ if not name.startswith("_"))
-        return all(equal(getattr(self, name), getattr(other, name)) for name in slots)
+        if not all(equal(getattr(self, name), getattr(other, name)) for name in slots):
+            return False
+        mine, other_ = self._values, getattr(other, "_values", {})
+        return list(mine) == list(other_) and all(same(mine[n], other_[n]) for n in mine)
 
     def __hash__(self) -> int:
         """Hash of states, parameters and their values."""
-        return hash((self.state, frozenset(self.parameters.items())))
+        values = ((n, v if isinstance(v, float) else str(v)) for n, v in self._values.items())
+        return hash((self.state, frozenset(values)))
 
     def __repr__(self) -> str:
         """Write the equations, if they are formulas, and the parameters."""
         return f"Problem({written(self)})"
+
+
+MODELS["Problem"] = Problem
 
 
 def _made(
@@ -351,17 +496,27 @@ def _made(
     more: Any, system: Any, words: Mapping[str, Mapping[str, str]] = MappingProxyType({}),
 ) -> Problem:  # fmt: skip
     """The problem of its arguments, for copies and pickles."""
-    more = more if isinstance(more, dict) else {"conservative": more}
+    more = dict(more) if isinstance(more, dict) else {"conservative": more}
+    times = more.pop("times", 1)
     problem = kind(f, state, parameters, jac, periods=periods, **more)
     problem._set("system", system)
+    problem = problem.iterated(times) if times > 1 else problem
     return problem.described(words)
 
 
-def as_problem(problem: Any, *, moving: bool = False) -> Problem:
+def system_of(given: Any, problem: Problem) -> System | None:
+    """The system that was given or that made a problem, where its equilibria can be computed."""
+    if not isinstance(given, System) or isinstance(given, Problem):
+        return problem.system
+    return problem.system if isinstance(given.stated, StatedRates) else given
+
+
+def as_problem(problem: Any, *, moving: bool = False, arrays: bool = False) -> Problem:
     """Return the problem that an argument is: a Problem, or a system.
 
     Of a `Perturbed` system the states are the angle and its rate; forced, it depends on time. So
     they are of a `FreeGyroRotor`, at its momentum, and of a ``moving`` system in a potential.
+    Parameters are numbers, or of equations also ``arrays``.
 
     Raises
     ------
@@ -369,16 +524,17 @@ def as_problem(problem: Any, *, moving: bool = False) -> Problem:
         If it is neither.
     """
     if isinstance(problem, Problem):
-        return problem
-    if isinstance(problem, Model) and issubclass(problem.rung, PerturbedConservative):
+        return problem if arrays else refuse_arrays(problem)
+    if isinstance(problem, System) and issubclass(problem.rung, PerturbedConservative):
         f, states, values, keywords = formulas_of(problem)
         return Problem(f, states, values, **keywords).described(words_of(problem, states, values))
-    if isinstance(problem, Model) and (moving or issubclass(problem.rung, Routhian)):
+    in_time = (Conservative, Routhian) if moving else Routhian
+    if isinstance(problem, System) and issubclass(problem.rung, in_time):
         f, states, values, keywords = moving_formulas(problem)
         made = Problem(f, states, values, **keywords)
         return made.described(moving_words(problem, states, list(values)))
-    if isinstance(problem, Model):
-        return Problem.from_system(problem)
+    if isinstance(problem, System):
+        return Problem.from_system(problem, arrays=arrays)
     convert = getattr(problem, "as_problem", None)
     if callable(convert):
         made = convert()

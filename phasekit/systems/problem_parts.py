@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import inspect
+import json
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -13,8 +15,17 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import bad, number, unknown
-from phasekit.laws.formulas import NAME, is_name, symbols_of, take_formula, write_formula
+from phasekit.labels.arguments import Value, bad, brief, number, numeric, pair, unknown
+from phasekit.laws.formulas import (
+    NAME,
+    is_name,
+    keyword_hint,
+    symbols_of,
+    take_formula,
+    write_formula,
+)
+from phasekit.systems.identity import parameter_values, refuse_another
+from phasekit.systems.parameter import Parameter
 
 Array = npt.NDArray[np.float64]
 
@@ -30,6 +41,7 @@ def names_of(argument: str, given: Any) -> tuple[str, ...]:
             raise bad(
                 argument, name,
                 f"names that are Python identifiers and no keywords, of at most {NAME} letters",
+                keyword_hint(name),
             )  # fmt: skip
     if not names:
         raise bad(argument, given, "at least one name")
@@ -40,14 +52,114 @@ def names_of(argument: str, given: Any) -> tuple[str, ...]:
 
 def values_of(argument: str, given: Any) -> dict[str, float]:
     """Names with finite numbers."""
+    return {
+        name: number(f"{argument}[{name!r}]", value, "a number, finite", None)
+        for name, value in _named(argument, given)
+    }
+
+
+def arrays_of(argument: str, given: Any) -> dict[str, Value]:
+    """Names with finite numbers, 1-D arrays or DataArrays."""
+    return {
+        name: numeric(f"{argument}[{name!r}]", value, None)
+        for name, value in _named(argument, given)
+    }
+
+
+def _named(argument: str, given: Any) -> Iterable[tuple[str, Any]]:
     if not isinstance(given, Mapping):
         raise bad(argument, given, "a mapping from names to numbers")
     if given:
         names_of(argument, given)
-    values = {}
-    for name, value in given.items():
-        values[name] = number(f"{argument}[{name!r}]", value, "a number, finite", None)
-    return values
+    return given.items()
+
+
+def window_of(argument: str, window: Any, states: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Ranges of states by name.
+
+    Raises
+    ------
+    ParameterError
+        If a name is no state, or a range is none.
+    """
+    if window is None:
+        return {}
+    if not isinstance(window, Mapping):
+        raise bad(argument, window, "a mapping of states to (low, high)")
+    kept = {}
+    for name, ends in window.items():
+        if name not in states:
+            raise unknown(f"{argument}: state", name, states)
+        wants = "two finite numbers (low, high), low < high"
+        low, high = pair(f"{argument}[{name!r}]", ends, wants)
+        if not low < high:
+            raise bad(f"{argument}[{name!r}]", ends, wants)
+        kept[name] = (low, high)
+    return kept
+
+
+class OfInstance:
+    """An attribute that each instance has of its own, and its class by default."""
+
+    def __init__(self, function: Callable[[Any], Any], default: Any) -> None:
+        self.function, self.default = function, default
+
+    def __get__(self, instance: Any, owner: type) -> Any:
+        """Return the instance's, or the default."""
+        return self.default if instance is None else self.function(instance)
+
+
+def declared_of(problem: Any) -> tuple[Parameter, ...]:
+    """The parameters of a problem with their units and meaning, where these are known."""
+    found = []
+    for name, value in problem.parameters.items():
+        words = problem.words.get(name, {})
+        units = words.get("units") or getattr(value, "attrs", {}).get("units", "1")
+        long_name = words.get("long_name", f"parameter {name}")
+        found.append(Parameter(name=name, units=units, long_name=long_name))
+    return tuple(found)
+
+
+def refuse_arrays(problem: Any) -> Any:
+    """Return a problem whose parameters are numbers; refuse any other.
+
+    Raises
+    ------
+    ParameterError
+    """
+    for name, value in problem.parameters.items():
+        if not isinstance(value, float):
+            raise bad(
+                f"parameters[{name!r}]", brief(value), "a number, to follow one system",
+                f"use .replace({name}=...) for one of them",
+            )  # fmt: skip
+    return problem
+
+
+#: The attribute of maps that holds the equations.
+DEFINITION = "phasekit_problem"
+
+
+def problem_of_dataset(kind: Any, ds: Any) -> Any:
+    """The problem of a Dataset that it made."""
+    refuse_another(ds, "Problem")
+    text = ds.attrs.get(DEFINITION, "")
+    try:
+        spec = json.loads(text)
+        names = spec["parameters"]
+    except (TypeError, ValueError, KeyError):
+        raise ParameterError(
+            f"ds: got a damaged attribute {DEFINITION!r}, wants the one that phasekit wrote"
+        ) from None
+    if spec.get("f") is None:
+        raise ParameterError(
+            "ds: got a map of a problem whose f is a function, wants one of formulas: a map holds "
+            "no code; make the problem again"
+        )
+    declared = [Parameter(name=name, units="1", long_name=name) for name in names]
+    values = parameter_values(ds, declared)
+    made = kind.from_specification({**spec, "parameters": dict.fromkeys(names, 1.0)})
+    return made.replace(**{name: values[name] for name in names})
 
 
 def angles_of(periods: Any, states: Sequence[str]) -> dict[str, float]:
@@ -102,9 +214,45 @@ def refuse_of_maps(discrete: bool, **given: Any) -> None:
             raise bad(name, value, "nothing with map=True: a map has no time and no energy")
 
 
+def shorthands(
+    definitions: Any, functions: Any, symbols: Mapping[str, Any], declare: str
+) -> dict[str, Any]:
+    """What names stand for in formulas: formulas, each by those before it, and functions.
+
+    Raises
+    ------
+    ParameterError
+        If a name is taken, a formula cannot be read, or a function has no such form as s(x).
+    """
+    import sympy
+
+    from phasekit.laws.nodes import FUNCTIONS
+
+    known = dict(symbols)
+    for argument, given in (("functions", functions), ("definitions", definitions)):
+        if given is not None and not isinstance(given, Mapping):
+            raise bad(argument, given, "a mapping from names to formulas")
+        for form, formula in (given or {}).items():
+            where, variables = f"{argument}[{form!r}]", dict[str, Any]()
+            name = form
+            if argument == "functions":
+                match = re.fullmatch(r"\s*(\w+)\s*\(([\w\s,]*)\)\s*", str(form))
+                if match is None:
+                    raise bad(argument, form, "forms such as 's(x)' or 'g(x, y)'")
+                name = match[1]
+                variables = symbols_of(names_of(where, [v.strip() for v in match[2].split(",")]))
+            names_of(where, (name,))
+            if name in known or name in FUNCTIONS:
+                raise bad(argument, name, "a name that is not taken")
+            found = take_formula(formula, {**known, **variables}, where, declare)
+            known[name] = sympy.Lambda(tuple(variables.values()), found) if variables else found
+    return {name: value for name, value in known.items() if name not in symbols}
+
+
 def expressions_of(
-    given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str]
-) -> list[Any]:
+    given: Iterable[Any], names: Sequence[str], argument: str, states: Sequence[str],
+    definitions: Any = None, functions: Any = None,
+) -> list[Any]:  # fmt: skip
     """Formulas as sympy expressions of real symbols, that there is machine code for.
 
     Raises
@@ -114,7 +262,8 @@ def expressions_of(
     """
     symbols = symbols_of(names)
     declare = "declare it in state or parameters"
-    found = [take_formula(one, symbols, argument, declare) for one in given]
+    known = symbols | shorthands(definitions, functions, symbols, declare)
+    found = [take_formula(one, known, argument, declare) for one in given]
     moving = {symbols[name] for name in states}
     for expression in found:
         refuse_uncompiled(expression, moving, argument)
@@ -123,7 +272,7 @@ def expressions_of(
 
 def make_field(
     f: Any, jac: Callable[..., Any] | None, states: tuple[str, ...], names: tuple[str, ...],
-    *, discrete: bool = False,
+    *, discrete: bool = False, definitions: Any = None, functions: Any = None,
 ) -> tuple[Field, Any]:  # fmt: skip
     """The right-hand side in the form that the stepping code takes, and f as it is kept.
 
@@ -144,12 +293,17 @@ def make_field(
         given = [f] if is_one and not hasattr(f, "tolist") else list(f)
         if len(given) != len(states):
             raise bad("f", given, f"{len(states)} formulas, one for each of {', '.join(states)}")
-        expressions = tuple(expressions_of(given, [*states, *names], "f", states))
+        expressions = tuple(
+            expressions_of(given, [*states, *names], "f", states, definitions, functions)
+        )
         if discrete:
             symbols = symbols_of(states)
             moved = tuple(e - symbols[s] for e, s in zip(expressions, states, strict=True))
             return SymbolicField(moved, states, names), expressions
         return SymbolicField(expressions, states, names), expressions
+    for argument, value in (("definitions", definitions), ("functions", functions)):
+        if value is not None:
+            raise bad(argument, value, "None beside an f that is no formula")
     if not callable(f):
         raise bad(
             "f", f, "a function f(x, **parameters), formulas as strings, or sympy expressions"
@@ -199,7 +353,8 @@ def written(problem: Any) -> str:
     else:
         name = getattr(problem.f, "__name__", "f")
         equations = f"({', '.join(problem.state)}){arrow}{name}(x, **parameters), {problem.kind}"
-    notes = [f"{name}={value!r}" for name, value in problem.parameters.items()]
+    notes = [f"applied {problem.times} times"] * (problem.times > 1)
+    notes += [f"{name}={brief(value)}" for name, value in problem.parameters.items()]
     notes += [f"{name} modulo {value:.6g}" for name, value in problem.periods.items()]
     if problem.time is not None:
         notes.append(f"{problem.time} modulo {problem.period}")
@@ -207,13 +362,16 @@ def written(problem: Any) -> str:
     return f"{equations}{'; ' if notes else ''}{', '.join(notes)}"
 
 
-def specified(problem: Any) -> dict[str, Any]:
-    """What is needed to make a problem again, as plain values; f is None if it is code."""
+def specified(problem: Any, values: bool = True) -> dict[str, Any]:
+    """What is needed to make a problem again, as plain values; f is None if it is code.
+
+    Without values of the parameters their names stand alone.
+    """
     formulas = [write_formula(e) for e in problem.f] if problem.kind == "symbolic" else None
     spec: dict[str, Any] = {
         "f": formulas,
         "state": list(problem.state),
-        "parameters": dict(problem.parameters),
+        "parameters": dict(problem.parameters) if values else list(problem.parameters),
         "periods": dict(problem.periods),
         "conservative": problem.conservative,
     }
@@ -221,6 +379,10 @@ def specified(problem: Any) -> dict[str, Any]:
         spec.update(time=problem.time, period=write_formula(problem.period))
     if problem.map:
         spec["map"] = True
+    if problem.window:
+        spec["window"] = {name: list(ends) for name, ends in problem.window.items()}
+    if problem.times > 1:
+        spec["times"] = problem.times
     if problem.words:
         spec["words"] = {name: dict(words) for name, words in problem.words.items()}
     if problem.system is not None:

@@ -8,8 +8,10 @@ from typing import Any, Self
 from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Conservative
+from phasekit.systems.moving_problem import numbers
 from phasekit.systems.problem_parts import names_of, specified, values_of
-from phasekit.systems.system import Model, as_system, stands_on
+from phasekit.systems.statement import StatedRates
+from phasekit.systems.system import System, as_system, stands_on
 
 
 class ProblemSources:
@@ -68,13 +70,15 @@ class ProblemSources:
         return made
 
     @classmethod
-    def from_system(cls, system: Model) -> Self:
-        """The problem phi' = -V'(phi) whose equilibria are those of a system with scalars.
+    def from_system(cls, system: System, *, arrays: bool = False) -> Self:
+        """The problem of a system: its rates, its step, or phi' = -V'(phi) with its equilibria.
 
         Parameters
         ----------
         system : system
-            A system in a potential, of scalar parameters.
+            A system in a potential, or one that states its rates or step.
+        arrays : bool, default False
+            Whether parameters may be arrays, of a system that states its rates or step.
 
         Returns
         -------
@@ -85,33 +89,37 @@ class ProblemSources:
         ParameterError
             If a parameter is an array, or the system is damped or driven.
         """
-        system = stands_on(as_system(system), Conservative, "continuation")
+        system = as_system(system)
+        make: Any = cls
+        if isinstance(stated := system.stated, StatedRates):
+            own: Self = stated_problem(make, system, stated, arrays)
+            return own
+        system = stands_on(system, Conservative, "continuation")
         law: Any = system.law
         names = system.formula_inputs()
-        values: dict[str, float] = {}
-        for key in names:
-            value = system.parameters[key]
-            if not isinstance(value, float):
-                raise bad(key, value, "a single number, to continue a single system")
-            values[key] = value
+        values = numbers(system, names)
         x = law.coordinate
         force = -law.gradient_formula(symbols_of([x, *names]))
         periods = {} if law.period is None else {x: law.period}
-        make: Any = cls
         problem: Any = make([force], x, values, periods=periods, conservative=True)
         problem._set("system", system)
         kept: Self = problem
         return kept
 
-    def specification(self) -> dict[str, Any]:
+    def specification(self, *, values: bool = True) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code.
+
+        Parameters
+        ----------
+        values : bool, default True
+            Whether the values of the parameters are a part of it, or their names alone.
 
         Returns
         -------
         dict
             Numbers, strings, lists and mappings, which JSON can hold.
         """
-        return specified(self)
+        return specified(self, values)
 
     @classmethod
     def from_specification(cls, spec: Mapping[str, Any]) -> Self | None:
@@ -140,7 +148,22 @@ class ProblemSources:
         made: Any = make(
             spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
             conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
-            map=bool(spec.get("map", False)),
+            map=bool(spec.get("map", False)), window=spec.get("window"),
         )  # fmt: skip
+        times = spec.get("times", 1)
+        made = made.iterated(times) if times != 1 else made
         described: Self = made.described(spec.get("words", {}))
         return described
+
+
+def stated_problem(make: Any, system: System, stated: StatedRates, arrays: bool) -> Any:
+    """The problem of a system whose class states rates or a step."""
+    values: dict[str, Any] = {name: system.parameters[name] for name in stated.inputs}
+    if not arrays:
+        values = numbers(system, stated.inputs)
+    words = {p.name: {"units": p.units, "long_name": p.long_name} for p in system.declared}
+    problem = make(
+        stated.f, stated.states, values, periods=stated.periods, map=stated.map,
+        window=stated.window,
+    )  # fmt: skip
+    return problem.described({**{name: words[name] for name in values}, **stated.words})

@@ -12,7 +12,7 @@ from phasekit.labels.grid import combine
 
 
 def reduced_form(A: Any, B: Any, C: Any, attrs: Any) -> tuple[Any, ...]:
-    """Return lambda, psi and Omega^2 ([Veljovic2015] (12)); `Model.reduced` has the words."""
+    """Return lambda, psi and Omega^2 ([Veljovic2015] (12)); `System.reduced` has the words."""
     if isinstance(A, float) and A == 0.0:
         raise ParameterError(
             "A: got 0.0, wants A != 0, because lambda = B/A and psi = C/A; "

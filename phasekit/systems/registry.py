@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from phasekit.systems import bases
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 #: Where models are; each registers itself when it is imported.
 HOMES = (*bases.HOMES, "phasekit.systems.perturbed")
 
 
-def models() -> Mapping[str, type[Model]]:
+def models() -> Mapping[str, type[System]]:
     """Return every model by its name.
 
     Examples
@@ -22,7 +22,7 @@ def models() -> Mapping[str, type[Model]]:
     return bases.models(HOMES)
 
 
-def model_named(argument: str, name: object) -> type[Model]:
+def model_named(argument: str, name: object) -> type[System]:
     """Return the model of a name.
 
     Raises

@@ -32,14 +32,14 @@ from phasekit.systems.driven_rotor import (
     event_of,
 )
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 from phasekit.systems.trajectory import Labels, Trajectory, trajectory
 
 #: Most states that a section may have.
 MOST = 10_000_000
 
 
-class RotorMotions(Model):
+class RotorMotions(System):
     """What `FreeGyroRotor` does in time, where its parameters are numbers."""
 
     disk: GyroRotorDisk

@@ -1,15 +1,16 @@
-"""What every system shares: declared parameters, validation, copies, equality, rebuilding.
+"""What every system shares: declared parameters, its law, validation, copies, rebuilding.
 
-A model declares its parameters once, as a tuple of `Parameter`; validation, sweeps, coordinates of
-maps and rebuilding from a map all follow from that declaration.
+A class declares each parameter once, as a field, and states its law once; the constructor,
+validation, sweeps, coordinates of maps and rebuilding from a map all follow from that.
 """
 
 from __future__ import annotations
 
 import functools
+import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, Self, TypeVar
+from dataclasses import FrozenInstanceError
+from typing import Any, ClassVar, NamedTuple, NoReturn, Self, dataclass_transform
 
 import numpy as np
 
@@ -30,23 +31,64 @@ from phasekit.laws.ladder import Law, Lawful
 from phasekit.laws.perturbed import PerturbedConservative, Rate, TiltedConservative
 from phasekit.laws.trigonometric import Trigonometric, Values, checked_products
 from phasekit.laws.trigonometric import law as make_law
-from phasekit.systems.parameter import Parameter, attrs_of
+from phasekit.systems.parameter import REQUIRED, Parameter, attrs_of, parameter
 from phasekit.systems.reduced_form import reduced_form
+from phasekit.systems.statement import Stated, refuse_name, stated
 from phasekit.systems.value import ModelValue
 
 #: Every model by its name, as maps store it.
-MODELS: dict[str, type[Model]] = {}
-
-ModelType = TypeVar("ModelType", bound="Model")
+MODELS: dict[str, type[System]] = {}
 
 
-class Model(ModelValue):
-    """Base of the systems: frozen, compared by value, rebuilt from any map that they made.
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(parameter,))
+class System(ModelValue):
+    """Base of all systems, and of your own: parameters are fields, and the law is stated once.
+
+    A class declares each parameter by `parameter` and states one law:
+
+    ``products``
+        A function of the parameters with A N, B N, C N and N > 0, polynomials, for the
+        trigonometric law ``phi'' = -B sin phi + A sin phi cos phi + C cos phi``. Everything is
+        answered in closed form.
+    ``potential``
+        A formula V of the ``coordinate`` (`angle` or `coordinate`), per unit of inertia, for
+        ``x'' = -V'(x)``. It is answered like a `Potential`.
+    ``rates``
+        Formulas of ``x' = f(x)`` by state, or a function ``f(x, **parameters)``. It is answered
+        like a `Problem`.
+    ``step``
+        The same of a map ``x -> f(x)``.
+
+    Beside rates and steps stand ``states`` (their names, or a mapping from names to units and
+    meaning), ``periods`` of states that are angles, and ``window``, ranges of the states, in which
+    `equilibria` looks where no box is given.
+
+    Systems are frozen, compared by value, and rebuilt from any map that they made. Files and worker
+    processes find a class by its name once its module is imported.
+
+    Parameters
+    ----------
+    *args, **parameters : float, 1-D array_like or xarray.DataArray
+        The declared parameters by name; in their order as well, if the class is made with
+        ``class Name(pk.System, kw_only=False)``.
+
+    Raises
+    ------
+    ParameterError
+        If a value is unusable. A class that states two laws, or one that cannot be read, or takes a
+        reserved name, is refused where it is made.
 
     Examples
     --------
-    >>> import xarray as xr
     >>> import phasekit as pk
+    >>> class SpringHoop(pk.System):
+    ...     spin = pk.parameter("s-1", "angular velocity of the hoop")
+    ...     k = pk.parameter("s-2", "stiffness over mass", positive=True)
+    ...     coordinate = pk.angle("theta")
+    ...     potential = "k*(sqrt(5/4-cos(theta)) - 1/2)^2 - (spin*sin(theta))^2/2 - 9.8*cos(theta)"
+    >>> pk.equilibria(SpringHoop(spin=6.0, k=10.0)).n_equilibria.item()
+    4
+    >>> import xarray as xr
     >>> magnet = pk.StonerWohlfarth(K=-2.0, h_x=1.0, h_y=0.5)
     >>> magnet.coefficients(), magnet.reduced()
     (Coefficients(A=4.0, B=1.0, C=0.5), Reduced(lam=0.25, psi=0.125, Omega_sq=4.0))
@@ -58,6 +100,13 @@ class Model(ModelValue):
     (('K', 'h_x', 'h_y'), 's-2', (4.0, 1.0, 0.5, 1))
     >>> law, K = magnet.trigonometric(), magnet.in_domain("K", 1.0)
     >>> A, B, C = magnet.valid_coefficients({"K": K, "h_x": 1.0, "h_y": 2.0})
+    >>> magnet.check()  # raises if the parameters make no system
+    >>> class VanDerPol(pk.System):
+    ...     mu = pk.parameter("1", "strength of the damping", default=1.0)
+    ...     rates = {"x": "y", "y": "mu*(1 - x^2)*y - x"}
+    >>> branch = pk.continuation(VanDerPol(), "mu", x0=[0.0, 0.0], span=(-1.0, 2.0))
+    >>> [point.kind for point in branch.special("hopf")]
+    ['hopf']
     """
 
     __slots__ = ()
@@ -68,17 +117,70 @@ class Model(ModelValue):
     rung: ClassVar[type[Law]] = Trigonometric
     #: The angular velocity of its frame: a change of it is felt as a torque.
     frame_rate: ClassVar[Rate | None] = None
+    #: The law that the class states beside products.
+    stated: ClassVar[Stated | None] = None
+    declared: ClassVar[tuple[Parameter, ...]] = ()
 
-    def __init_subclass__(cls, **keywords: Any) -> None:
-        """Refuse what is no law, and let one that is asked for no parameters say so."""
+    def __init_subclass__(cls, *, kw_only: bool = True, **keywords: Any) -> None:
+        """Read the fields and the law, refuse what is none, and register the class."""
         super().__init_subclass__(**keywords)
-        own = cls.__dict__.get("products")
-        if own is not None:
-            units = {parameter.name: parameter.units for parameter in getattr(cls, "declared", ())}
-            law = checked_products(cls.__name__, own.__func__, units)
+        own = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
+        for name in own:
+            refuse_name(f"parameter of {cls.__name__}", name)
+            if hasattr(System, name):
+                wants = f"another name, because every system has {name!r}"
+                raise bad(f"parameter of {cls.__name__}", name, wants)
+        if own:
+            cls.declared = tuple({**{p.name: p for p in cls.declared}, **own}.values())
+        law = vars(cls).get("products")
+        if law is not None:
+            units = {parameter.name: parameter.units for parameter in cls.declared}
+            law = checked_products(cls.__name__, law.__func__, units)
             # By these names it travels to worker processes, whatever it was called before.
             law.__module__, law.__qualname__ = cls.__module__, f"{cls.__qualname__}.products"
             cls.products = staticmethod(law)  # type: ignore[assignment, method-assign]
+        if (statement := stated(cls, cls.declared)) is not None:
+            cls.stated, cls.rung = statement, statement.rung
+            for name, one in statement.kept.items():
+                setattr(cls, name, one)
+        if own and cls.stated is None and cls.products is System.products:
+            raise bad(cls.__name__, list(own), "a law: products, potential, rates or step")
+        if own or law is not None or statement is not None:
+            if "__init__" not in vars(cls) and "__new__" not in vars(cls):
+                cls.__signature__ = _signature(cls.declared, kw_only)  # type: ignore[attr-defined]
+            MODELS[cls.__name__] = cls
+
+    def __init__(self, *args: Any, **parameters: Any) -> None:
+        title = type(self).__name__
+        if not self.declared and type(self) is System:
+            raise ParameterError("System: wants a class of your own that states a law")
+        signature = inspect.signature(type(self))
+        for name in parameters:
+            if name not in signature.parameters:
+                raise unknown(f"parameter of {title}", name, signature.parameters)
+        try:
+            given = signature.bind(*args, **parameters)
+        except TypeError as error:
+            names = ", ".join(signature.parameters)
+            raise ParameterError(f"{title}: {error}; its parameters are {names}") from None
+        given.apply_defaults()
+        for declared in self.declared:
+            value = given.arguments[declared.name]
+            if value is not None or not declared.optional:
+                value = declared.check(value)
+            object.__setattr__(self, declared.name, value)
+        self.check()
+
+    def check(self) -> None:
+        """Refuse parameters that go together badly; each alone has been checked.
+
+        Raises
+        ------
+        ParameterError
+            If they make no system.
+        """
+        if self.stated is not None:
+            self.stated.check(self)
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -107,7 +209,7 @@ class Model(ModelValue):
     @property
     def law(self) -> Law:
         """The law, and what follows from it."""
-        return self.trigonometric()
+        return self.trigonometric() if self.stated is None else self.stated.law()
 
     @property
     def law_of_parameters(self) -> Law:
@@ -121,26 +223,32 @@ class Model(ModelValue):
         declared = ((p.name, p.units, p.least, p.high) for p in cls.declared)
         return make_law(cls.products, tuple(declared))
 
-    def __post_init__(self) -> None:
-        """Check the parameters and keep them."""
-        for parameter in self.declared:
-            value = getattr(self, parameter.name)
-            if value is not None or not parameter.optional:
-                object.__setattr__(self, parameter.name, parameter.check(value))
+    @property
+    def answered_by(self) -> str:
+        """What messages say of a system that a function cannot take."""
+        return "" if self.stated is None else self.stated.answered_by
+
+    def __setattr__(self, name: str, value: Any) -> NoReturn:
+        """Refuse to change a system, with what to write instead."""
+        raise FrozenInstanceError(f"a {type(self).__name__} is frozen; use .replace({name}=...)")
+
+    def __delattr__(self, name: str) -> NoReturn:
+        """Refuse to take a part of a system away."""
+        raise FrozenInstanceError(f"a {type(self).__name__} is frozen; it keeps {name}")
 
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
-        """Names of the parameters on which the coefficients depend.
+        """Names of the parameters on which the law depends.
 
         Returns
         -------
         tuple of str
         """
-        return cls.trigonometric().parameters
+        return cls.trigonometric().parameters if cls.stated is None else cls.stated.inputs
 
     @property
     def parameters(self) -> dict[str, Value]:
-        """The parameters by name, those that are None left out."""
+        """The parameters by name, without those that are None."""
         values = {p.name: getattr(self, p.name) for p in self.declared}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -179,7 +287,12 @@ class Model(ModelValue):
             Floats, or DataArrays on the parameters' dims where a parameter is an array.
         """
         if not issubclass(self.rung, Trigonometric):
-            raise bad("system", self, f"{Trigonometric.called}; this needs the closed form")
+            raise bad(
+                "system",
+                self,
+                f"{Trigonometric.called}; this needs the closed form",
+                self.answered_by,
+            )
         names = self.formula_inputs()
         used = {name: self.parameters[name] for name in names}
 
@@ -222,7 +335,7 @@ class Model(ModelValue):
 
         Returns
         -------
-        Model
+        System
             Of the same class; this one stays as it is.
 
         Raises
@@ -237,11 +350,16 @@ class Model(ModelValue):
         return type(self)(**{**{n: getattr(self, n) for n in names}, **changes})
 
 
-def model(cls: type[ModelType]) -> type[ModelType]:
-    """Class decorator of a model: register its name, refuse wrong argument names readably."""
-    cls.__init__ = named_arguments(cls.__name__, cls.__init__)  # type: ignore[method-assign]
-    MODELS[cls.__name__] = cls
-    return cls
+def _signature(declared: Iterable[Parameter], kw_only: bool) -> inspect.Signature:
+    """The call that makes a system; values by name alone, where order would mean nothing."""
+    kind: Any = inspect.Parameter
+    how = kind.KEYWORD_ONLY if kw_only else kind.POSITIONAL_OR_KEYWORD
+    return inspect.Signature(
+        [
+            kind(p.name, how, default=kind.empty if p.default is REQUIRED else p.default)
+            for p in declared
+        ]
+    )
 
 
 class _ABC(NamedTuple):
@@ -250,7 +368,7 @@ class _ABC(NamedTuple):
     C: Any
 
 
-class Coefficients(Model, _ABC):
+class Coefficients(System, _ABC):
     """Coefficients of ``phi'' + B sin phi - A sin phi cos phi - C cos phi = 0``, in s^-2.
 
     A system by themselves; every other system reduces to them. Of any sign, zero included.
@@ -294,6 +412,9 @@ class Coefficients(Model, _ABC):
         kept = [p.check(x) for p, x in zip(cls.declared, (A, B, C), strict=True)]
         return super().__new__(cls, *kept)
 
+    def __init__(self, A: NumberLike, B: NumberLike, C: NumberLike) -> None:
+        """Nothing is left to do: a tuple is made at once."""
+
     @classmethod
     def _make(cls, iterable: Iterable[Any]) -> Coefficients:  # type: ignore[override]
         """Make coefficients from three values, checked; ``_replace`` comes here as well."""
@@ -315,8 +436,8 @@ class Coefficients(Model, _ABC):
 
     def __eq__(self, other: object) -> bool:
         """Compare as a model with models, arrays included, and as a tuple with plain tuples."""
-        if isinstance(other, Model):
-            return Model.__eq__(self, other)
+        if isinstance(other, System):
+            return System.__eq__(self, other)
         if not isinstance(other, tuple) or len(other) != 3:
             return NotImplemented
         return all(same(x, y) for x, y in zip(self, other, strict=True))
@@ -336,9 +457,7 @@ Coefficients.__new__ = named_arguments("Coefficients", Coefficients.__new__)  # 
 MODELS["Coefficients"] = Coefficients
 
 
-@model
-@dataclass(frozen=True, eq=False, repr=False)
-class Reduced(Model):
+class Reduced(System, kw_only=False):
     """The papers' reduced form, in lambda and psi.
 
     ``phi'' + Omega^2 (lam - cos phi) sin phi - Omega^2 psi cos phi = 0``.
@@ -366,15 +485,9 @@ class Reduced(Model):
     Coefficients(A=4.0, B=1.0, C=0.5)
     """
 
-    lam: NumberLike
-    psi: NumberLike
-    Omega_sq: NumberLike = 1.0
-
-    declared: ClassVar[tuple[Parameter, ...]] = (
-        Parameter(name="lam", units="1", long_name="lambda = B/A"),
-        Parameter(name="psi", units="1", long_name="psi = C/A"),
-        Parameter(name="Omega_sq", units="s-2", long_name="Omega^2 = A"),
-    )
+    lam: NumberLike = parameter("1", "lambda = B/A")
+    psi: NumberLike = parameter("1", "psi = C/A")
+    Omega_sq: NumberLike = parameter("s-2", "Omega^2 = A", default=1.0)
 
     @staticmethod
     def products(v: Values) -> tuple[Any, Any, Any, Any]:
@@ -385,7 +498,7 @@ class Reduced(Model):
 # ------------------------------------------------------------------------------ arguments
 
 
-def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
+def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
     """Return the system that an argument is.
 
     Parameters
@@ -402,7 +515,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
     ParameterError
         If it is not a system, with the way from what it is to one.
     """
-    if isinstance(system, Model):
+    if isinstance(system, System):
         return system if issubclass(system.rung, rung) else stands_on(system, rung, what)
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
         coefficients = system.coefficients()
@@ -415,10 +528,13 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> Model:
         hint = "it is a class: call it with its parameters"
     elif hasattr(system, "data_vars"):
         hint = "a map gives its system back by ds.phasekit.system()"
-    raise bad("system", system, f"one of {', '.join(MODELS)}", hint)
+    else:
+        hint = getattr(system, "answered_by", "")
+    names = [name for name, kind in MODELS.items() if issubclass(kind.rung, rung)]
+    raise bad("system", system, f"one of {', '.join(names)}", hint)
 
 
-def stands_on(system: Model, rung: type[Law], what: str, *, tilted: bool = False) -> Model:
+def stands_on(system: System, rung: type[Law], what: str, *, tilted: bool = False) -> System:
     """Return a system whose law stands on a rung, or on a more special one.
 
     Raises
@@ -430,7 +546,7 @@ def stands_on(system: Model, rung: type[Law], what: str, *, tilted: bool = False
         return system
     if issubclass(system.rung, PerturbedConservative):
         # What is a function of the potential alone.
-        if issubclass(getattr(system, "system", system).rung, rung):
+        if issubclass((getattr(system, "system", None) or system).rung, rung):
             hint = ""
             if issubclass(system.rung, TiltedConservative):
                 hint = "; on a line, the torque can be a part of its potential: V - torque*x"
@@ -439,7 +555,8 @@ def stands_on(system: Model, rung: type[Law], what: str, *, tilted: bool = False
                 f"{' but a constant torque' * tilted} for {what}; perturbed.system has none{hint}"
             )
     because = f"because {what} is in closed form" if rung.labels_fixed else f"for {what}"
-    raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}")
+    hint = f"; {system.answered_by}" if system.answered_by else ""
+    raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}{hint}")
 
 
 def single(system: Any) -> tuple[Law, dict[str, float]]:

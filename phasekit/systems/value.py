@@ -49,7 +49,7 @@ class ModelValue(Lawful):
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """What makes it again, by keyword."""
+        """The keyword arguments that rebuild it."""
         return dict(self.parameters)
 
     @classmethod
@@ -84,7 +84,7 @@ class ModelValue(Lawful):
 
         Returns
         -------
-        Model
+        System
 
         Raises
         ------

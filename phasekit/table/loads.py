@@ -47,8 +47,9 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("force", "bearing_forces", _FORCE, "float64", "N",
              "reaction of the bearing on the rotor", "F = F_kinetic + F_weight", PRESSURES),
     Quantity("force_kinetic", "bearing_forces", _FORCE, "float64", "N",
-             "kinetic part of the reaction on the rotor, the kinetic pressure on the bearing "
-             "reversed", "Newton-Euler with phi'' of the motion and without the weight", PRESSURES),
+             "kinetic part of the reaction on the rotor: minus the kinetic pressure "
+             "on the bearing", "Newton-Euler with phi'' of the motion and without the weight",
+             PRESSURES),
     Quantity("force_weight", "bearing_forces", _FORCE, "float64", "N",
              "weight part of the reaction on the rotor", "(m g/2) (1 +- (e/l) cos(beta)) n1",
              "[HedrihVeljovic2013] (28), corrected"),
@@ -62,7 +63,7 @@ QUANTITIES: tuple[Quantity, ...] = (
              "couple of the kinetic reactions of both bearings", "|l [n2, F_A2 - F_B2]|",
              "[HedrihVeljovic2013] figure 9, corrected"),
     Quantity("drive_torque", "bearing_forces", (), "float64", "N m",
-             "torque about n1 that moves a massless carrier as it moves", "(n1, dL_O1/dt)",
+             "torque about n1 that drives a massless carrier", "(n1, dL_O1/dt)",
              "[HedrihVeljovic2013] (2), with the torque that it omits"),
     Quantity("force_component", "bearing_forces", ("bearing", "component"), "float64", "N",
              "component of the kinetic reaction on the rotor, for constant omega1",
@@ -72,8 +73,8 @@ QUANTITIES: tuple[Quantity, ...] = (
              "reaction of the fixed shaft's bearing on the rotor", "F = F_kinetic + F_weight",
              FIXED_PRESSURES),
     Quantity("fixed_force_kinetic", "fixed_bearing_forces", _FIXED, "float64", "N",
-             "kinetic part of the fixed shaft's reaction on the rotor, the kinetic pressure on "
-             "the bearing reversed", "Newton-Euler with phi'' of the motion and without the weight",
+             "kinetic part of the fixed shaft's reaction on the rotor: minus the kinetic pressure "
+             "on the bearing", "Newton-Euler with phi'' of the motion and without the weight",
              FIXED_PRESSURES),
     Quantity("fixed_force_weight", "fixed_bearing_forces", _FIXED, "float64", "N",
              "weight part of the fixed shaft's reaction on the rotor", "Newton-Euler at rest",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from phasekit.errors import AttractorKind
 from phasekit.labels.coordinates import LABELS
 from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import PerturbedConservative
@@ -40,20 +41,35 @@ QUANTITIES: tuple[Quantity, ...] = (
              "angle on the attractor, once a period", "phi(n T), wrapped", RECURRENCE, of=_OF),
     Quantity("attractor_dphi", "attractors", (*_ATTRACTOR, "crossing"), "float64", "s-1",
              "angular velocity on the attractor, once a period", "phi'(n T)", RECURRENCE, of=_OF),
+    Quantity("attractor_kind", "attractors", _ATTRACTOR, "int8", "1",
+             "kind of the attractor", "by its return and its exponent", RECURRENCE, of=_OF,
+             flags=AttractorKind),
     Quantity("attractor_period", "attractors", _ATTRACTOR, "int64", "1",
              "periods after which the attractor repeats itself, 0: it does not",
              "least q with phi(n + q) = phi(n)", RECURRENCE, of=_OF),
     Quantity("attractor_multiplier", "attractors", _ATTRACTOR, "float64", "1",
-             "greatest modulus of the attractor's multipliers, NaN where it is not periodic",
+             "greatest modulus of the attractor's multipliers over its period, of a rotation over "
+             "a turn; NaN where it is neither",
              "max |eigenvalue of the map's derivative|", RECURRENCE, of=_OF),
+    Quantity("attractor_exponent", "attractors", _ATTRACTOR, "float64", "s-1",
+             "largest Lyapunov exponent on the attractor", "log(multiplier)/period, or the mean "
+             "growth of log|u|", EXPONENTS, of=_OF),
+    Quantity("attractor_exponent_error", "attractors", _ATTRACTOR, "float64", "s-1",
+             "estimated error of the exponent, 0 where it comes from a multiplier",
+             "of the mean over 18 parts of the time, or their trend", EXPONENTS, of=_OF),
     Quantity("attractor_rotation", "attractors", _ATTRACTOR, "float64", "1",
              "turns in a period on the attractor", "(phi(n T) - phi(0))/(2 pi n)", RECURRENCE,
              of=_OF),
     Quantity("basin", "basins", (), "int16", "1",
-             "attractor to which the motion comes; -1: undecided, -2: away to infinity",
+             "attractor of the motion; -1: undecided, -2: to infinity",
              "first state near the attractor", RECURRENCE, of=_OF),
+    Quantity("basin_decided", "basins", (), "bool", "1",
+             "whether the errors of the steps stayed smaller than a cell until the motion was "
+             "caught, so that they do not decide where it comes to", "10 rtol max|u| < cell",
+             RECURRENCE, of=_OF),
     Quantity("basin_time", "basins", (), "float64", "s",
-             "time until the motion is near its attractor", "first state near the attractor",
+             "time until the motion is seen to come to its attractor",
+             "first state that is caught",
              RECURRENCE, of=_OF),
     Quantity("boundary_fraction", "basins", (), "float64", "1",
              "share of the states beside another basin", "number of cells over all",
@@ -69,10 +85,10 @@ QUANTITIES: tuple[Quantity, ...] = (
              "angle of the attractor, once a period the least one; attractors are numbered by "
              "period, then by it", "phi(n T), wrapped", RECURRENCE, of=_OF, labels=_NUMBERED),
     Quantity("remaining_fraction", "basin_fractions", (), "float64", "1",
-             "share of the states that come to none of the numbered attractors: undecided, away "
-             "to infinity, or to further ones", "1 - sum of the shares", RECURRENCE, of=_OF),
+             "share of the states that reach none of the numbered attractors: undecided, "
+             "to infinity, or to others", "1 - sum of the shares", RECURRENCE, of=_OF),
     Quantity("n_attractors", "basin_fractions", (), "int64", "1",
-             "number of attractors that were found, also beyond those that are numbered; "
+             "number of attractors found, including those that are not numbered; "
              "-1: without damping or a common period", "attractors of 256 states",
              RECURRENCE, of=_OF),
 )

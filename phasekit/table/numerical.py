@@ -11,7 +11,7 @@ _NUMERICAL = "phasekit.phase.numerical.functions:"
 NUMERICAL_ROWS: dict[str, tuple[Quantity, ...]] = {
     "equilibria": (
         Quantity("complete", "equilibria", (), "bool", "1",
-                 "whether it is proved that there are these equilibria and no others",
+                 "whether these are proved to be all equilibria",
                  "bounds of V' and V'' over all pieces; disjoint discs; exact isolation of roots",
                  "[MooreKearfottCloud2009]; [Smith1970]"),
         Quantity("phi_error", "equilibria", BRANCHES, "float64", "rad",
@@ -31,19 +31,28 @@ NUMERICAL_ROWS: dict[str, tuple[Quantity, ...]] = {
                  "estimated error of the period", "of its quadrature", FROM_ENERGY),
         Quantity("action_error", "orbits", (), "float64", "s-1",
                  "estimated error of the action", "of its quadrature", FROM_ENERGY),
+        Quantity("phi_min_error", "orbits", (), "float64", "rad",
+                 "bound of the error of the least angle, NaN for a rotation",
+                 "the nearest points at which the sign of V - h is known", FROM_ENERGY),
+        Quantity("phi_max_error", "orbits", (), "float64", "rad",
+                 "bound of the error of the greatest angle, NaN for a rotation",
+                 "the nearest points at which the sign of V - h is known", FROM_ENERGY),
     ),
     "action_angle": (
         Quantity("angle_error", "action_angle", (), "float64", "rad",
-                 "estimated error of the angle variable", "distance from the orbit found back",
+                 "estimated error of the angle variable", "distance between the orbit and its "
+                 "reconstruction",
                  FROM_ENERGY),
     ),
     "motion": (
         Quantity("motion_phi_error", "motion", (), "float64", "rad",
-                 "estimated error of the angle", "change of the energy, error of the period",
+                 "estimated error of the angle",
+                 "rounding of each step, carried along by linear motions; error of the period",
                  FROM_MOTION),
         Quantity("motion_dphi_error", "motion", (), "float64", "s-1",
                  "estimated error of the angular velocity",
-                 "change of the energy, error of the period", FROM_MOTION),
+                 "rounding of each step, carried along by linear motions; error of the period",
+                 FROM_MOTION),
     ),
 }  # fmt: skip
 
@@ -51,10 +60,8 @@ PASSES: tuple[Pass, ...] = (
     *(
         Pass(_NUMERICAL + name, (LAW, *states), groups, Conservative, options)
         for name, states, groups, options in (
-            ("most", (), ("labels",), ()),
             ("phase_space", (), ("equilibria", "separatrices"), ()),
             ("equilibria", (), ("equilibria",), ()),
-            ("separatrices", (), ("separatrices",), ()),
             ("potential", ("state_phi",), ("potential",), ()),
             ("gradient", ("state_phi",), ("potential_gradient",), ()),
             ("curvature", ("state_phi",), ("potential_curvature",), ()),
@@ -67,5 +74,11 @@ PASSES: tuple[Pass, ...] = (
             ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
             ("separatrix_motion_with_errors", ("time",), ("motion",), ("saddle", "side")),
         )
+    ),
+    Pass(
+        "phasekit.phase.numerical.asymptotics:near_center",
+        (LAW, "state_excess"),
+        ("near_center",),
+        Conservative,
     ),
 )

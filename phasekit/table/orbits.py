@@ -25,7 +25,7 @@ QUANTITIES: tuple[Quantity, ...] = (
     Quantity("orbit_energy", "orbits", (), "float64", "s-2", "energy of the orbit",
              "h = phi'^2/2 + V(phi)", FROM_ENERGY),
     Quantity("period", "orbits", (), "float64", "s",
-             "time of one round, infinite on a separatrix",
+             "period of the orbit, infinite on a separatrix",
              "T = closed integral of dphi/phi' (rotation: over 2 pi)", FROM_ENERGY,
              general="T = closed integral of dphi/phi' (rotation: over the circle)"),
     Quantity("frequency", "orbits", (), "float64", "s-1", "angular frequency of the orbit",

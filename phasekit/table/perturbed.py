@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from phasekit.errors import EscapeRegime
+from phasekit.errors import EscapeRegime, Validity
 from phasekit.laws.ladder import Routhian
 from phasekit.laws.perturbed import (
     PerturbedConservative,
@@ -26,43 +26,56 @@ _GENERAL = PerturbedConservative
 # fmt: off
 QUANTITIES: tuple[Quantity, ...] = (
     Quantity("melnikov_mean", "melnikov", SIDES, "float64", "s-2",
-             "mean of Melnikov's function: energy that the loop gains on average",
+             "mean of Melnikov's function: mean energy gained along the loop",
              "-damping S - quadratic int |phi'|^3 dt + torque (phi(inf) - phi(-inf)) - dS/dt",
              MELNIKOV, of=_GENERAL),
     Quantity("melnikov_amplitude", "melnikov", SIDES, "float64", "s-2",
-             "greatest oscillation of Melnikov's function against its mean",
+             "largest deviation of Melnikov's function from its mean",
              "|int phi' f(phi) exp(i nu t) dt| of the drive f(phi) cos(nu t)", MELNIKOV,
              of=_GENERAL),
     Quantity("melnikov_phase", "melnikov", SIDES, "float64", "rad",
              "phase of the oscillation of Melnikov's function, NaN with several frequencies",
              "M(t0) = mean + amplitude cos(nu t0 + phase)", MELNIKOV, of=_GENERAL),
     Quantity("chaos_threshold", "melnikov", SIDES, "float64", "s-2",
-             "amplitude of the first harmonic of the drive, the others in proportion, from which "
-             "on stable and unstable manifold intersect transversally",
+             "amplitude of the first harmonic of the drive, the others in proportion, above which "
+             "stable and unstable manifolds intersect",
              "forcing_amplitude |mean|/amplitude", MELNIKOV, of=_GENERAL),
     Quantity("turnstile_area", "melnikov", SIDES, "float64", "s-1",
-             "area of a turnstile of the undamped system: what crosses in one period of the drive",
+             "area of a turnstile of the undamped system: flux across the separatrix in one "
+             "period of the drive",
              "integral of the positive part of M(t0) over one period; 2 amplitude/nu",
              "[MacKayMeissPercival1984]; " + MELNIKOV, of=_GENERAL),
+    Quantity("threshold_validity", "melnikov", SIDES, "int8", "1",
+             "whether damping and drive are weak enough for the threshold, or why it is NaN",
+             "|mean|, damping S, torque S < S k; |torque| up to the critical one", MELNIKOV,
+             Validity, of=_GENERAL),
     Quantity("quiet_frequency", "quiet_frequencies", SIDES, "float64", "s-1",
-             "least frequency of a torque to which the lobe does not respond to first order; its "
-             "multiples are the others",
+             "lowest frequency of a torque to which the lobe does not respond at first order; the "
+             "others are its multiples",
              "nu x = pi, cosh(k (x + i y)) = (-S + i k^2)/sqrt(D)", MELNIKOV,
              of=PerturbedTrigonometric),
     Quantity("capture_flux", "capture", REGION, "float64", "s-2",
-             "energy that a round of the region's separatrix loses: rate at which it takes phase",
+             "energy lost in one round of the region's separatrix: rate at which the region gains "
+             "phase space",
              "damping S + dS/dt", CAPTURE, of=_GENERAL),
     Quantity("capture_probability", "capture", REGION, "float64", "1",
-             "probability that a motion led to the separatrix ends in the region",
-             "P_i = Theta_i/sum Theta, 0 or 1 where one region gives phase away", CAPTURE,
+             "probability that a motion that reaches the separatrix is captured in the region",
+             "P_i = Theta_i/sum Theta, 0 or 1 where one region loses phase space", CAPTURE,
+             of=_GENERAL),
+    Quantity("capture_error", "capture", (), "float64", "1",
+             "estimated error of the probabilities",
+             "(1 + log(1/rate)) rate/4, rate = (damping S + dS/dt)/(S k)", CAPTURE, of=_GENERAL),
+    Quantity("capture_validity", "capture", (), "int8", "1",
+             "whether the probabilities hold, or why they are NaN",
+             "rate < 1, no drive, no noise, |torque| up to the critical one", CAPTURE, Validity,
              of=_GENERAL),
     Quantity("critical_torque", "critical_torques", DIRECTION, "float64", "s-2",
-             "least and greatest constant torque, over the inertia, under which an equilibrium "
-             "exists", "extremes of V'(phi), where V''(phi) = 0", TORQUE),
+             "smallest and largest constant torque, over the inertia, with an equilibrium",
+             "extremes of V'(phi), where V''(phi) = 0", TORQUE),
     Quantity("critical_phi", "critical_torques", DIRECTION, "float64", "rad",
              "angle at which equilibria merge under the critical torque", "V''(phi) = 0", TORQUE),
     Quantity("energy_per_turn", "separatrices", (), "float64", "s-2",
-             "energy that a turn forward gains under the torque, NaN on a line", "2 pi torque",
+             "energy gained in a forward turn under the torque, NaN on a line", "2 pi torque",
              TORQUE, of=_GENERAL),
     Quantity("lobe_area_error", "separatrices", SIDES, "float64", "s-1",
              "estimated error of the area inside the separatrix", "of its quadrature", TORQUE,
@@ -71,18 +84,31 @@ QUANTITIES: tuple[Quantity, ...] = (
              "of its quadrature", TORQUE, of=TiltedTrigonometric),
     Quantity("action_error", "orbits", (), "float64", "s-1", "estimated error of the action",
              "of its quadrature", TORQUE, of=TiltedTrigonometric),
+    Quantity("phi_min_error", "orbits", (), "float64", "rad",
+             "bound of the error of the least angle, NaN for a rotation and without a torque",
+             "the nearest points at which the sign of V - torque phi - h is known", TORQUE,
+             of=TiltedTrigonometric),
+    Quantity("phi_max_error", "orbits", (), "float64", "rad",
+             "bound of the error of the greatest angle, NaN for a rotation and without a torque",
+             "the nearest points at which the sign of V - torque phi - h is known", TORQUE,
+             of=TiltedTrigonometric),
     Quantity("gain_per_turn", "orbits", (), "float64", "s-2",
-             "energy that an orbit which runs gains each turn, 0 for others", "2 pi |torque|",
+             "energy gained in each turn of a running orbit, 0 for others", "2 pi |torque|",
              TORQUE, of=_GENERAL),
     Quantity("angle_error", "action_angle", (), "float64", "rad",
-             "estimated error of the angle variable", "distance from the orbit found back", TORQUE,
+             "estimated error of the angle variable",
+             "distance between the orbit and its reconstruction", TORQUE,
              of=TiltedTrigonometric),
     Quantity("retrapping_torque", "retrapping", DIRECTION, "float64", "s-2",
-             "least constant torque, over the inertia, that keeps a rotation going, at small "
+             "smallest constant torque, over the inertia, that sustains a rotation, at small "
              "damping", "(damping S + quadratic int |phi'|^3 dt)/(2 pi) of a winding separatrix",
              "[Stewart1968]; " + MELNIKOV, of=PerturbedTrigonometric),
+    Quantity("retrapping_validity", "retrapping", DIRECTION, "int8", "1",
+             "whether the torque holds, or why it is NaN",
+             "damping < k, |torque| below the critical one", TORQUE, Validity,
+             of=PerturbedTrigonometric),
     Quantity("escape_rate", "escape", SIDES, "float64", "s-1",
-             "rate at which noise leads out of the well on that side of the saddle, over it",
+             "rate of escape by noise from the well on that side, over the saddle",
              "[sqrt(1 + (d/2k)^2) - d/2k] Y sqrt(kT/2 pi) exp(-barrier/kT)/int exp(-(V - V_c)/kT); "
              "Y = Y(D1) Y(D2)/Y(D1 + D2), D = d S/kT; D corrected by the mean passage of the "
              "energy, k by that of the angle",
@@ -97,7 +123,7 @@ QUANTITIES: tuple[Quantity, ...] = (
              of=PerturbedTrigonometric),
     Quantity("escape_error", "escape", SIDES, "float64", "1",
              "estimated relative error of the rate",
-             "to the farther one of the rates with all and with none of the corrections", ESCAPE,
+             "distance to the farther of the rates with all corrections and with none", ESCAPE,
              of=PerturbedTrigonometric),
     Quantity("resonance_action", "resonances", ("order",), "float64", "s-1",
              "action of the orbit in resonance with the drive", "n Omega(J) = m nu", CHIRIKOV,
@@ -107,17 +133,15 @@ QUANTITIES: tuple[Quantity, ...] = (
              "2 sqrt(V/|dOmega/dJ|), V = |(f dphi/dtheta)_n|/n of the drive f(phi) cos(m nu t)",
              CHIRIKOV, of=PerturbedTrigonometric),
     Quantity("resonance_overlap", "resonances", ("order",), "float64", "1",
-             "half-widths of the resonance and of that of the next order over their distance",
+             "half-widths of the resonance and of the next one, over their distance",
              "(width_n + width_(n+1))/|J_(n+1) - J_n|", CHIRIKOV, of=PerturbedTrigonometric),
 )
 # fmt: on
 
 _CAPTURE = "phasekit.perturbation.capture:"
 _TORQUE = "phasekit.perturbation.torque:"
-_TILTED = "phasekit.perturbation.tilted_"
-_POTENTIAL = "phasekit.perturbation.tilted_potential:"
 _MELNIKOV = "phasekit.perturbation.melnikov:"
-_NUMERICAL = "phasekit.perturbation.tilted_numerical:"
+_TORQUED = "phasekit.phase.numerical.torqued:"
 _KEPT = "phasekit.perturbation.kept_momentum:"
 
 PASSES: tuple[Pass, ...] = (
@@ -129,34 +153,6 @@ PASSES: tuple[Pass, ...] = (
     Pass(_TORQUE + "critical_torque", ABC, ("critical_torques",)),
     Pass(_TORQUE + "critical_of_perturbed", (LAW,), ("critical_torques",), PerturbedTrigonometric),
     Pass(_TORQUE + "retrapping_torque", (LAW,), ("retrapping",), PerturbedTrigonometric),
-    Pass(_TORQUE + "torqued_equilibria", (LAW,), ("equilibria",), PerturbedTrigonometric),
-    Pass(
-        "phasekit.perturbation.tilted:tilted_separatrices",
-        (LAW,),
-        ("separatrices",),
-        TiltedTrigonometric,
-    ),
-    Pass(
-        "phasekit.perturbation.tilted:tilted_phase_space",
-        (LAW,),
-        ("equilibria", "separatrices"),
-        TiltedTrigonometric,
-    ),
-    *(
-        Pass(_TILTED + name, (LAW, *states), groups, TiltedTrigonometric, options)
-        for name, states, groups, options in (
-            ("energy:potential", ("state_phi",), ("potential",), ()),
-            ("energy:gradient", ("state_phi",), ("potential_gradient",), ()),
-            ("energy:curvature", ("state_phi",), ("potential_curvature",), ()),
-            ("energy:energy", STATE, ("energy_integral",), ()),
-            ("energy:phase_velocity", ("state_phi", "state_energy"), ("phase_velocity",), ()),
-            ("orbits:orbits", STATE, ("orbits",), ()),
-            ("orbits:angle_variables", STATE, ("action_angle",), ()),
-            ("orbits:orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
-            ("orbits:orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
-            ("orbits:separatrix_motion", ("time",), ("motion",), ("saddle", "side")),
-        )
-    ),
     Pass("phasekit.perturbation.escape:escape_rate", (LAW,), ("escape",), PerturbedTrigonometric),
     Pass(
         "phasekit.perturbation.resonances:resonances",
@@ -164,12 +160,26 @@ PASSES: tuple[Pass, ...] = (
         ("resonances",),
         PerturbedTrigonometric,
     ),
-    Pass(_POTENTIAL + "most", (LAW,), ("labels",), _GENERAL),
-    Pass(_POTENTIAL + "equilibria", (LAW,), ("equilibria",), _GENERAL),
+    Pass(_TORQUED + "equilibria", (LAW,), ("equilibria",), _GENERAL),
+    *(
+        Pass(_TORQUED + name, (LAW, *states), groups, rung, options)
+        for rung in (TiltedConservative, TiltedTrigonometric)
+        for name, states, groups, options in (
+            ("phase_space", (), ("equilibria", "separatrices"), ()),
+            ("equilibria", (), ("equilibria",), ()),
+            ("separatrices", (), ("separatrices",), ()),
+            ("orbits", STATE, ("orbits",), ()),
+            ("angles", STATE, ("action_angle",), ()),
+            ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
+            ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
+            ("separatrix_motion_with_errors", ("time",), ("motion",), ("saddle", "side")),
+        )
+    ),
     *(
         Pass(module + name, (LAW, *states), (group,), rung)
         for module, rung in (
-            (_POTENTIAL, TiltedConservative),
+            (_TORQUED, TiltedConservative),
+            (_TORQUED, TiltedTrigonometric),
             (_KEPT, TiltedRouthian),
             (_KEPT, Routhian),
         )
@@ -182,21 +192,8 @@ PASSES: tuple[Pass, ...] = (
         )
     ),
     *(
-        Pass(_NUMERICAL + name, (LAW, *states), groups, TiltedConservative, options)
-        for name, states, groups, options in (
-            ("most", (), ("labels",), ()),
-            ("separatrices", (), ("separatrices",), ()),
-            ("orbits", STATE, ("orbits",), ()),
-            ("angle_variables", STATE, ("action_angle",), ()),
-            ("orbits_at_energy", ("state_energy",), ("orbits",), ("center",)),
-            ("orbits_at_gap", ("state_gap",), ("orbits",), ("saddle", "side")),
-            ("separatrix_motion", ("time",), ("motion",), ("saddle", "side")),
-        )
-    ),
-    *(
         Pass(_KEPT + name, (LAW,), (group,), PerturbedRouthian)
         for name, group in (
-            ("most", "labels"),
             ("equilibria", "equilibria"),
             ("melnikov", "melnikov"),
             ("capture", "capture"),

@@ -304,6 +304,9 @@ class Table:
         results = result if len(one.groups) > 1 else (result,)
         named: dict[str, Any] = {}
         for group, part in zip(one.groups, results, strict=True):
+            if isinstance(part, dict):
+                named.update(part)
+                continue
             names = [row.name for row in self.rows.values() if row.group == group]
             if names[0] in getattr(part, "_fields", ()):
                 named.update(part._asdict())

@@ -50,7 +50,6 @@ PASSES: tuple[Pass, ...] = (
         for name, more, groups in (
             ("steady", (), ("equilibria",)),
             ("support_speed", ("phi",), ("steady_rotations",)),
-            ("most", (), ("labels",)),
         )
     ),
 )

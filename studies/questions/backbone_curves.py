@@ -5,13 +5,13 @@ How does the frequency of the disk change with its amplitude?
 Backbone curves: frequency against amplitude, for skew angles on either side of the fold at
 :math:`\beta = 0.3664\pi`.
 
-Below the fold the disk can swing about two centers, and both swings end at the saddle between them.
-On the fold the upper center and the lower saddle are gone; the swing about the lower center then
-goes on to the top.
+Below the fold the disk can swing about two centers, and both families of swings end at the saddle
+between them. At the fold the upper center and the lower saddle disappear; the swings about the
+lower center then reach the top.
 
-Answer. It always falls: from 2.52 rad/s at rest to nothing at an amplitude of 90 degrees for
-:math:`\beta = 0.01\pi`, from 0.75 rad/s to nothing at 180 degrees for :math:`\pi/2`. All numbers
-are printed.
+Answer. The frequency always falls with the amplitude. For :math:`\beta = 0.01\pi` it falls from
+2.52 rad/s at rest to zero at 90 degrees; for :math:`\pi/2` from 0.75 rad/s to zero at 180 degrees.
+The script prints all numbers.
 
 Run: ``python studies/questions/backbone_curves.py [PICTURE]``
 """

@@ -1,17 +1,17 @@
 """
-Which rest does a decaying rotor fall into?
-===========================================
+In which well does a decaying rotor come to rest?
+=================================================
 
-Whether the odds in closed form are those of motions.
+Odds of capture in closed form, against simulated motions.
 
-A rotor swings round both of its rests, loses speed by friction, and comes to lie in one of them.
-For damping that vanishes the odds are the areas of the lobes of the separatrix over their sum; here
-they are held against the basins of thousands of motions between the two saddles' energies, at
-damping that does not vanish.
+A rotor swings round both of its wells, loses energy by friction, and comes to rest in one of them.
+In the limit of weak damping the odds are the shares of the lobe areas. This study compares them
+with the basins of thousands of motions that start between the energies of the two saddles, at
+finite damping.
 
-Answer. The odds of the right rest are 0.719. At a damping of 0.04 of the frequency of small
-oscillations and less the share of the motions is that, to its standard error of 0.01; at 0.08 it is
-0.04 less. All numbers are printed.
+Answer. The odds of the right well are 0.719. If the damping is at most 0.04 of the frequency of
+small oscillations, the share of the motions agrees with this to its standard error of 0.01. At
+0.08 it is 0.04 lower. The script prints all numbers.
 
 Run: ``python studies/questions/capture_against_simulation.py [PICTURE]``
 """

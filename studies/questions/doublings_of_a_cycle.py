@@ -1,16 +1,16 @@
 """
-How fast do the doublings of a cycle follow each other?
-=======================================================
+How fast do period doublings accumulate?
+========================================
 
 The cascade of Rössler's equations x' = -y - z, y' = x + y/5, z' = 1/5 + z (x - c), over c.
 
-A cycle loses its stability where a multiplier is -1; there a cycle of twice the period begins,
-which does the same soon after, and so on. [Feigenbaum1978] found that the distances between these
-places shrink by the same factor, 4.669201..., whatever the equations.
+A cycle loses its stability where a multiplier is -1. A cycle of twice the period begins there and
+soon loses its stability in the same way, and so on. [Feigenbaum1978] found that the distances
+between these points shrink by a universal factor, 4.669201...
 
-Answer. The first four doublings are located to rounding, each on the branch that begins at the one
-before. Their distances shrink by 3.50, then by 4.57, and the last two foretell where chaos begins:
-at c = 4.204.
+Answer. The first four doublings are located to rounding, each on the branch that begins at the
+previous one. Their distances shrink by 3.50 and then by 4.57. The last two predict the onset of
+chaos at c = 4.204.
 
 Run: ``python studies/questions/doublings_of_a_cycle.py [PICTURE]``
 """

@@ -2,11 +2,11 @@ r"""
 Can two different wells have the same period?
 =============================================
 
-They can, and always do at equal energy: to all digits, in every system with two wells.
+Yes: at equal energy the periods always agree, to all digits, in every system with two wells.
 
-One well is deeper and wider than the other, so their orbits of one energy enclose different areas;
-still both take the same time. The period is 2 pi times the derivative of the action with respect
-to the energy, so the actions differ by a constant: :math:`2|C|/\sqrt{A}` where A > 0.
+One well is deeper and wider than the other, so orbits of equal energy enclose different areas.
+Their periods are nevertheless equal. The period is 2 pi times the derivative of the action with
+respect to the energy, so the actions differ by a constant: :math:`2|C|/\sqrt{A}` for A > 0.
 
 Run: ``python studies/questions/equal_periods_of_two_wells.py [PICTURE]``
 """

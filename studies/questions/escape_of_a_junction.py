@@ -1,17 +1,19 @@
 """
-When does a Josephson junction leave its state without voltage?
-===============================================================
+When does a Josephson junction switch?
+======================================
 
-At which bias current a ramp switches it, and how damping and temperature shift that.
+The bias current at which a ramp switches a junction to the voltage state, for several dampings and
+temperatures.
 
-The phase of a junction rests in a well of a washboard that the bias current tilts; noise lifts it
-over the edge before the well is gone. While the current is ramped, the chance that it still rests
-falls by the rate of escape at each current: half of the ramps have switched at the median.
+The phase of a junction rests in a well of a washboard potential that the bias current tilts. Noise
+lifts the phase over the barrier before the well disappears. While the current is ramped, the
+probability of still resting decreases at the escape rate of each current. At the median, half of
+the ramps have switched.
 
-Answer. At a noise of 0.01 of the Josephson energy, a quality of 10 and a ramp of 1e-6 of the
-critical current in the inverse plasma frequency, half have switched at 0.886 of the critical
-current, 0.114 before the well is gone; at a tenth of the noise at 0.978. Simulated phases, 1,000 at
-each of two currents, leave at the rate in closed form to within their errors of a tenth.
+Answer. With a noise of 0.01 of the Josephson energy, a quality of 10 and a ramp of 1e-6 of the
+critical current per inverse plasma frequency, half of the junctions have switched at 0.886 of the
+critical current. With a tenth of the noise it is 0.978. Of simulated phases, 1,000 at each of two
+currents escape at the rate in closed form, within their errors of a tenth.
 
 Run: ``python studies/questions/escape_of_a_junction.py [PICTURE]``
 """

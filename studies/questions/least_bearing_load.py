@@ -1,23 +1,24 @@
 r"""
-Which skew angle spares the bearings, and what does the fold do to them?
-========================================================================
+Which skew angle gives the lowest bearing load?
+===============================================
 
-The least peak load of the bearings over :math:`\beta` and :math:`e`, and what crossing the fold
-does to it.
+The lowest peak load of the bearings over :math:`\beta` and :math:`e`, and the effect of crossing
+the fold.
 
-A disk of 2 kg on a carrier at 300 rpm. "Peak load" is the greatest force in either bearing over the
-winding separatrix, both ways round: the worst that any swing below turning over can reach. That no
-state inside the separatrix has a greater load is checked here on a grid, not proved.
+A disk of 2 kg turns on a carrier at 300 rpm. The "peak load" is the largest force in either
+bearing along the winding separatrix, in both directions. It bounds the load of every libration.
+This is checked here on a grid, not proved.
 
-Answer. Without eccentricity the load is least for a disk square to its shaft (e = 0,
-beta = 90 deg): the rotor is balanced. Up to e = 16 mm or so a square disk remains the best, or
-within 0.3 % of it. With more eccentricity a skewness of 6 to 12 deg is better, and takes up to a
-tenth off the peak load. From about 75 mm on the least load is at the other end, with the shaft in
-the disk's plane (beta near 0).
-Crossing the fold does nothing to the worst swing: the upper saddle has no part in the fold, and
-the peak load is continuous there. It is the rotor at rest that it hits. Its upper center is gone; a
-rotor that rested there swings down, and its bearings get a peak load of up to several times what
-they bore. All numbers are printed.
+Answer. Without eccentricity the load is lowest for a disk perpendicular to its shaft (e = 0, beta
+= 90 deg), because the rotor is balanced. Up to about e = 16 mm a perpendicular disk remains the
+best, or within 0.3 % of the best. With more eccentricity a skew of 6 to 12 deg is better and
+lowers the peak load by up to a tenth. From about 75 mm on, the lowest load is at the other end,
+with the shaft in the plane of the disk (beta near 0).
+
+Crossing the fold does not change the worst libration: the upper saddle takes no part in the fold,
+and the peak load is continuous there. A rotor at rest is affected: its upper center disappears,
+the rotor swings down, and its bearings carry a peak load of up to several times the load at rest.
+The script prints all numbers.
 
 Run: ``python studies/questions/least_bearing_load.py [PICTURE]``
 """

@@ -4,12 +4,12 @@ How long does every orbit take?
 
 Map of the period over the phase plane.
 
-Every point of the plane is a state; its color is the period of the orbit through it. The period
-grows without bound towards the separatrices, but only like a logarithm.
+Every point of the plane is a state, and its color is the period of the orbit through it. The period
+grows without bound towards the separatrices, but only logarithmically.
 
-Answer. Small oscillations take 6.36 s about the lower center and 7.59 s about the upper one, and
-an orbit round both at least 11.77 s, for :math:`\lambda = 0.4` and :math:`\psi = 0.1` at
-:math:`\Omega = 1` 1/s.
+Answer. For :math:`\lambda = 0.4` and :math:`\psi = 0.1` at :math:`\Omega = 1` 1/s, small
+oscillations take 6.36 s about the lower center and 7.59 s about the upper one. An orbit round both
+takes at least 11.77 s.
 
 Run: ``python studies/questions/period_map.py [PICTURE]``
 """

@@ -4,12 +4,12 @@ Where does a driven disk jump?
 
 The response of a damped disk to a periodic torque, over the frequency of the torque.
 
-The disk swings about its lowest rest. The torque is too strong for a linear answer: the response
-curve leans to lower frequencies and folds, and between the folds two motions are stable. Driven
-ever faster or ever slower, the disk jumps at one fold and at the other.
+The disk swings about its lower center. The torque is too strong for a linear theory: the response
+curve leans to lower frequencies and folds, and between the folds two motions are stable. While the
+frequency slowly increases or decreases, the disk jumps at one of the folds.
 
-Answer. The curve leans so far that the disk jumps at 0.89 and 0.87 of the frequency of small
-oscillations; between these the amplitude depends on where it came from. All numbers are printed.
+Answer. The disk jumps at 0.89 and at 0.87 of the frequency of small oscillations. Between these
+frequencies the amplitude depends on the history. The script prints all numbers.
 
 Run: ``python studies/questions/response_of_a_driven_disk.py [PICTURE]``
 """

@@ -1,18 +1,18 @@
 """
-How long does a rotor stay in a rest that has ceased to exist?
-==============================================================
+How long does a rotor stay at an equilibrium that has disappeared?
+==================================================================
 
-And what its bearings bear when it falls.
+The delay of the fall, and the bearing forces during the fall.
 
-A disk of 2 kg rests in its upper center while its support is run down. At the fold, omega1 = 18.99
-1/s, that center meets the lower saddle and is gone. A slow path would have the rotor fall there and
-then. It stays: a motion that is led slowly through a fold leaves late, with damping by a lag of
-omega1 that grows like the rate to the power 2/3, with none like the power 4/5.
+A disk of 2 kg rests at its upper center while its support slows down. At the fold, omega1 = 18.99
+1/s, that center merges with the lower saddle and disappears. In a quasi-static theory the rotor
+falls at once. In fact it stays: a motion that is led slowly through a fold leaves late. The lag of
+omega1 grows like the rate to the power 2/3 with damping, and to the power 4/5 without.
 
-Answer. Run down by 0.5 1/s^2 the rotor leaves 0.62 1/s below the fold, and by 0.02 1/s^2 still
-0.06 1/s below it: with little damping the lag grows like the power 0.72, between the two. In the
-fall its bearings bear 2.1 to 2.3 times what they bore at rest, the more the slower it is led. All
-numbers are printed.
+Answer. At 0.5 1/s^2 the rotor leaves 0.62 1/s below the fold, and at 0.02 1/s^2 still 0.06 1/s
+below it. With weak damping the lag grows like the power 0.72, between the two. During the fall the
+bearings carry 2.1 to 2.3 times their load at rest, and more if the run-down is slower. The script
+prints all numbers.
 
 Run: ``python studies/questions/run_down_through_the_fold.py [PICTURE]``
 """

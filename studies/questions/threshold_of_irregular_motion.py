@@ -1,18 +1,19 @@
 """
-How strong must a drive be to make a damped disk's motion irregular?
-====================================================================
+How strong a drive makes the motion of a damped disk irregular?
+===============================================================
 
 The threshold of [Melnikov1963] over the skew angle and the frequency of a periodic torque.
 
-The separatrix of the damped disk is two curves: motions leave the saddle on one and reach it on the
-other. A torque makes both wave, and from a threshold on they cross, without end once they do: which
-well a motion comes to then depends on its start in every digit. The threshold is a closed form in
-the disk's parameters. It is held against the two curves themselves, integrated from the saddle.
+Damping splits the separatrix of the disk into two curves: motions leave the saddle on one and
+reach it on the other. A torque makes both curves oscillate. Above a threshold they cross, and then
+they cross infinitely often. Which well a motion reaches then depends on every digit of its start.
+The threshold has a closed form in the parameters of the disk. The study compares it with the two
+curves, integrated from the saddle.
 
-Answer. The threshold is least, seven times the damping, next to the fold of the equilibria, where
-the wells are shallow. On two lines, of quiet frequencies, no torque makes the curves cross; beyond
-them the threshold rises steeply. Curves that are integrated begin to cross within 2e-5 of it. All
-numbers are printed.
+Answer. The threshold is lowest, seven times the damping, next to the fold of the equilibria, where
+the wells are shallow. On two lines of quiet frequencies no torque makes the curves cross, and next
+to these lines the threshold rises steeply. Integrated curves begin to cross within 2e-5 of the
+threshold. The script prints all numbers.
 
 Run: ``python studies/questions/threshold_of_irregular_motion.py [PICTURE]``
 """

@@ -11,9 +11,9 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.cells import evaluate, request
-from phasekit.cells.request import inputs_of, passes_of
+from phasekit.cells.request import passes_of
 from phasekit.cells.states import at_states, pass_from
-from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.ladder import Conservative, Flow, Law, Routhian
 from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
@@ -28,7 +28,7 @@ SYSTEMS = (
 )
 STATES = {
     "state_phi": [0.3, -1.2, 2.5], "state_dphi": [0.1, 0.0, -4.0], "state_energy": [1.0, 2.0, 3.0],
-    "state_gap": [-0.01, 0.02, 0.3], "time": [0.0, 0.7, 5.0],
+    "state_gap": [-0.01, 0.02, 0.3], "state_excess": [0.0, 0.01, 0.3], "time": [0.0, 0.7, 5.0],
 }  # fmt: skip
 CHOICES = {"center": None, "saddle": None, "side": "right"}
 #: Each way on which two rungs compute the same: groups, what they start from, what a call says.
@@ -61,7 +61,7 @@ def as_potential(system):
 def test_every_rung_below_is_reached():
     assert len(SHARED) >= 12
     groups = {group for groups, _, _ in SHARED for group in groups}
-    assert {"equilibria", "separatrices", "orbits", "motion", "potential"} <= groups
+    assert {"equilibria", "separatrices", "orbits", "motion", "potential", "near_center"} <= groups
 
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda s: type(s).__name__)
@@ -69,6 +69,8 @@ def test_every_rung_below_is_reached():
 def test_the_rungs_agree(system, way):
     groups, needed, options = way
     rows = [row for row in ROWS.values() if row.group in groups]
+    # By which labels are put in order.
+    places = [ROWS["phi"]] if groups == ("near_center",) else []
     states = {name: (name, STATES[name]) for name in needed}
     results = []
     for one in (system, as_potential(system)):
@@ -76,8 +78,8 @@ def test_the_rungs_agree(system, way):
             chosen = {name: CHOICES[name] for name in options}
             passes = (pass_from(one, groups[0], needed[-1], **chosen)[0],)
         else:
-            passes = passes_of(one, rows)
-        results.append(in_order(at_states(one, rows, states, passes)))
+            passes = passes_of(one, [*places, *rows])
+        results.append(in_order(at_states(one, [*places, *rows], states, passes)))
     exact, numerical = results
     names = [row.name for row in rows if row.of is Law]
     assert names
@@ -110,7 +112,7 @@ def test_a_quantity_of_a_higher_rung_is_refused_below():
 def test_rungs_are_the_only_thing_that_systems_are_asked_for():
     rungs = {model.rung for model in models().values()}
     driven = {PerturbedTrigonometric, PerturbedConservative}
-    assert rungs <= {Trigonometric, Conservative, Routhian} | driven
+    assert rungs <= {Trigonometric, Conservative, Routhian, Flow} | driven
     assert isinstance(pk.equilibria(SYSTEMS[1]), xr.Dataset)
 
 
@@ -140,8 +142,7 @@ def test_what_a_row_starts_from_is_that_of_the_same_rung(monkeypatch):
         swept = system.replace(**{axis: A})
         known = pk.equilibria(swept).merge(pk.separatrices(swept), compat="override")
         wanted = known.saddle_energy.max("saddle") - known.energy.min("equilibrium")
-        rows = [*of, *inputs_of(swept, of)]
-        found = evaluate.evaluate(swept, rows)
+        found = evaluate.evaluate(swept, of)
         np.testing.assert_allclose(found.barrier, wanted, rtol=1e-13)
         np.testing.assert_array_equal(found.twice, 2.0 * found.barrier)
     chunked = xr.DataArray(A, dims="A").chunk({"A": 2})

@@ -102,7 +102,7 @@ def test_which_families_there_are(text, keywords, families):
 
 
 def test_families_that_cannot_be():
-    with pytest.raises(pk.ParameterError, match="energy_max: got nothing, wants the energy up to"):
+    with pytest.raises(pk.ParameterError, match="energy_max: .* wants the largest energy"):
         pk.orbit_families(pk.Potential("x^2", "x"))
     with pytest.raises(pk.ParameterError, match="wants a system with a center"):
         pk.orbit_families(pk.Potential("-x^2", "x"))

@@ -92,7 +92,7 @@ def test_every_form_of_f_gives_the_same_branch(form):
         (lambda: Problem({"x": "x", "z": "1"}, ("x", "y"), {}), "'z' is unknown"),
         (lambda: Problem(3.0, "x", {}), "a function"),
         (lambda: Problem("x", "x", {"a": math.nan}), "finite"),
-        (lambda: Problem("x", "x", {"a": "1"}), "a number"),
+        (lambda: Problem("x", "x", {"a": "1"}), "a real number"),
         (lambda: Problem("x", "x", {}, periods={"y": 1.0}), "'y' is unknown"),
         (lambda: Problem("x", "x", {}, periods={"x": -1.0}), "> 0"),
         (lambda: Problem("x", "x", {}, lambda x: x), "derivatives are exact"),
@@ -527,6 +527,30 @@ def test_conservative_problems_have_centers_and_saddles():
 # ------------------------------------------------------------------------------ results
 
 
+def test_points_are_labelled_when_asked_for():
+    """Short branches are followed by the thousand; what the user records is called at once."""
+    calls = []
+
+    def square(x, **p):
+        calls.append(p["mu"])
+        return x[0] ** 2
+
+    branch = continuation(CUSP, "mu", x0=[-1.3], span=(-1.0, 1.0))
+    assert "_points" not in vars(branch)
+    assert branch.points.sizes["point"] > 20
+    assert branch.points.identical(vars(branch)["_points"])
+    assert not branch.points.mu.values.flags.writeable
+    again = continuation(CUSP, "mu", x0=[-1.3], span=(-1.0, 1.0))
+    assert again == branch
+    assert hash(again) == hash(branch)
+    other = continuation(CUSP, "mu", x0=[-1.3], span=(-1.0, 1.0), record={"square": square})
+    count = len(calls)
+    assert count > 0
+    assert other != branch
+    np.testing.assert_allclose(other.points.square, other.points.x**2, rtol=1e-14)
+    assert len(calls) == count
+
+
 def test_recorded_quantities():
     branch = continuation(
         REACTION, "p1", x0=[0, 0], span=(0.0, 0.2),
@@ -579,8 +603,9 @@ def test_a_branch_as_a_dataset():
     assert "p1 met its upper bound" in text
 
 
-@pytest.mark.parametrize("name", ["branch.zarr", "branch.nc"])
-@pytest.mark.parametrize("problem", [REACTION, DISK], ids=["formulas", "disk"])
+@pytest.mark.parametrize(
+    ("name", "problem"), [("branch.zarr", REACTION), ("branch.nc", DISK)], ids=["formulas", "disk"]
+)
 def test_a_branch_resumes_exactly(tmp_path, name, problem):
     parameter, start, span = ("p1", [0, 0], (0.0, 0.2)) if problem is REACTION else (
         "beta", None, (0.1, 1.5))  # fmt: skip
@@ -781,7 +806,7 @@ def test_functions_of_fixed_parameters_need_no_derivative():
     assert problem([1.0])[0] == pytest.approx(6.0 + 0.22389077914123566805, rel=1e-15)
 
 
-@pytest.mark.parametrize("value", [10**400, [1.0], np.array([1.0])])
+@pytest.mark.parametrize("value", [10**400, [[1.0]], np.zeros((1, 1))])
 def test_parameters_that_are_no_numbers(value):
     with pytest.raises(pk.ParameterError, match=r"^parameters\['m'\]: got"):
         Problem("x - m", "x", {"m": value})

@@ -33,6 +33,23 @@ def test_a_fold_in_closed_form(p2, k, scale):
     assert fold.normal_form["a"] * fold.normal_form["b"] == pytest.approx(-p2 * p2, rel=1e-10)
 
 
+@pytest.mark.parametrize("intervals", [25, 30, 45])
+def test_folds_on_meshes_that_were_asked_for(intervals):
+    """A fixed mesh makes the trivial multiplier as wrong as itself, and hides no fold."""
+    rest = pk.continuation(REACTION, "p1", x0=[0.45, 1.6], span=(0.15, 0.25))
+    (hopf,) = (one for one in rest.special("H") if one["p1"] < 0.2)
+    family = hopf.switch(options=pk.ContinuationOptions(intervals=intervals))
+    assert (family.points.n_intervals == intervals).all()
+    (fold,) = family.special("LPC")
+    near = family.points.isel(point=fold.index)
+    # The digits of a mesh of 1e-8; errors of parameters go with twice the order of states'.
+    assert fold["p1"] == pytest.approx(0.16169612889773752, abs=float(near.mesh_error) ** 1.5)
+    assert fold["period"] == pytest.approx(7.1137549299655785, rel=float(near.mesh_error))
+    unstable = family.points.n_unstable.values
+    assert np.all(unstable[: fold.index][unstable[: fold.index] >= 0] == 1)
+    assert np.all(unstable[fold.index + 1 :] <= 0)
+
+
 def folded(scales):
     options = pk.ContinuationOptions(scales=scales)
     orbit = pk.periodic_orbit(REACTION, [0.9, 3.0], 5.0)

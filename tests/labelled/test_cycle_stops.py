@@ -70,8 +70,12 @@ def test_families_end_where_they_are_to(stop, reasons, ends):
         s.index for s in branch.special_points
     )
     if "bound" not in reasons:
-        with pytest.raises(pk.ParameterError, match="other reasons"):
-            branch.extend()
+        longer = branch.extend()
+        assert [one.reason for one in longer.stops] == ["bound", "bound"]
+        whole = turning(None)
+        for name in ("l", "period"):
+            values = (one.points[name].values[one.points.special == ""] for one in (longer, whole))
+            np.testing.assert_array_equal(*values)
 
 
 @pytest.mark.parametrize("stop", ["LPC", "fold_of_cycles", ["torus", "LPC"]])

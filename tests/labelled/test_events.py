@@ -120,8 +120,11 @@ def test_a_branch_ends_where_it_is_to(stop, reason, x):
     assert branch.special_points[-1].kind == "end"
     assert branch.points.sizes["point"] > 5
     assert np.all(np.diff(branch.points.x) > 0.0)
-    with pytest.raises(pk.ParameterError, match="other reasons"):
-        branch.extend()
+    whole = traced({"half": "x + 1/2", "level": "mu - 0.3"}, None)
+    longer = branch.extend()  # to the next one, if there is one
+    plain, kept = (one.points.x.values[one.points.special == ""] for one in (longer, whole))
+    assert np.sum(branch.points.special == "") < len(plain)
+    np.testing.assert_array_equal(plain, kept[: len(plain)])
 
 
 def test_both_ways_may_end_and_the_start_does_not():

@@ -95,7 +95,7 @@ def test_a_box_of_few_doubles_ends(low):
 
 def test_a_double_zero_is_said_to_be_open():
     problem = pk.Problem("x**2*(x - 1)", "x", {})
-    with pytest.warns(UserWarning, match=r"may be others.*multiple one.*x in \(-?\d"):
+    with pytest.warns(UserWarning, match=r"may be others.*a multiple equilibrium.*x in \(-?\d"):
         ds = pk.equilibria(problem, box={"x": (-3, 3)})
     np.testing.assert_allclose(ds.x, [[1.0]], rtol=1e-15)
     assert not ds.complete.item()
@@ -130,3 +130,58 @@ def test_bad_boxes(box, message):
 def test_a_system_takes_no_box():
     with pytest.raises(pk.ParameterError, match="box: got .*, wants None"):
         pk.equilibria(pk.Pendulum(length=1.0), box={"phi": (0, 1)})
+
+
+PLANAR = {
+    "center": ([[0.0, 1.0], [-4.0, 0.0]], "DEGENERATE"),  # of the linear part alone
+    "saddle": ([[1.0, 2.0], [0.0, -3.0]], "SADDLE"),
+    "stable node": ([[-1.0, 1.0], [0.0, -1.0]], "STABLE_NODE"),  # a double eigenvalue
+    "unstable node": ([[2.0, 1.0], [0.0, 1.0]], "UNSTABLE_NODE"),
+    "stable focus": ([[-0.01, 1.0], [-1.0, -0.01]], "STABLE_FOCUS"),
+    "unstable focus": ([[0.3, 1.0], [-1.0, 0.3]], "UNSTABLE_FOCUS"),
+}
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e12])
+@pytest.mark.parametrize("kind", PLANAR)
+def test_kinds_follow_from_the_linear_part(kind, size):
+    """In any unit of time."""
+    (a, b), (c, d) = np.array(PLANAR[kind][0]) * size
+    formulas = [f"{a!r}*x + {b!r}*y - x**3*{size!r}", f"{c!r}*x + {d!r}*y"]
+    problem = pk.Problem([f.replace("np.float64", "") for f in formulas], ["x", "y"], {})
+    ds = pk.equilibria(problem, box={"x": (-0.3, 0.31), "y": (-0.3, 0.31)})
+    at = int(np.argmin(np.abs(ds.x).sum("state").values))
+    assert pk.FlowEquilibriumKind(ds.kind.values[at]).name == PLANAR[kind][1]
+
+
+def test_cells_of_arrays_have_equilibria_of_their_own():
+    fold = pk.Problem("mu - x^2", "x", {"mu": [-1.0, 0.25, 1.0, np.nan]}, window={"x": (-2, 2)})
+    ds = pk.equilibria(fold)
+    assert ds.n_equilibria.dims == ("mu",)
+    assert ds.n_equilibria.values.tolist() == [0, 2, 2, -1]
+    np.testing.assert_array_equal(ds.x[1, :, 0], [-0.5, 0.5])
+    assert ds.kind.values.tolist() == [[0, 0], [5, 4], [5, 4], [0, 0]]
+    assert ds.complete.values.tolist() == [True, True, True, False]
+    assert ds.isel(mu=2).phasekit.system() == fold.replace(mu=1.0)
+
+
+def test_fixed_points_of_maps_and_their_iterates():
+    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 3.2}, map=True, window={"x": (-0.1, 1.1)})
+    ds = pk.equilibria(logistic)
+    np.testing.assert_allclose(ds.x[:, 0], [0.0, 1.0 - 1.0 / 3.2], atol=1e-15)
+    np.testing.assert_allclose(ds.eigenvalue[:, 0], [3.2, 2.0 - 3.2], rtol=1e-12)
+    assert ds.complete
+    assert ds.n_unstable.values.tolist() == [1, 1]
+    twice = pk.equilibria(logistic, n=2)
+    root = math.sqrt((3.2 + 1.0) * (3.2 - 3.0))
+    pair = [(3.2 + 1.0 - root) / 6.4, (3.2 + 1.0 + root) / 6.4]
+    np.testing.assert_allclose(twice.x[:, 0], sorted([0.0, 1.0 - 1.0 / 3.2, *pair]), atol=1e-14)
+    # Multiplier 4 + 2 r - r^2 of the orbit of period two.
+    stable = twice.eigenvalue.values[twice.n_unstable.values == 0]
+    np.testing.assert_allclose(stable.ravel(), 4.0 + 6.4 - 3.2**2, rtol=1e-9)
+
+
+def test_a_forced_system_has_no_equilibria():
+    forced = pk.Problem("-x + cos(t)", "x", {}, time="t", period="2*pi", window={"x": (-2, 2)})
+    with pytest.raises(pk.ParameterError, match="without forcing"):
+        pk.equilibria(forced)

@@ -68,7 +68,7 @@ def test_orbits_of_period_two_and_four():
     gap = np.abs(r**2 * x**2 - r * (r + 1.0) * x + r + 1.0)  # orbits of period 2 proper
     assert np.max(gap) < 1e-12
     seconds = twice.special("PD")
-    np.testing.assert_allclose([s["r"] for s in seconds], [1.0 + np.sqrt(6.0)] * 2, rtol=1e-15)
+    np.testing.assert_allclose([s["r"] for s in seconds], [1.0 + np.sqrt(6.0)], rtol=1e-15)
     (third,) = seconds[0].switch().special("PD")[:1]
     assert abs(third["r"] - 3.5440903595519229) < 1e-13  # the root of a polynomial of degree 12
 
@@ -234,7 +234,6 @@ def test_maps_are_saved_pickled_drawn_and_have_events(tmp_path):
         (lambda: pk.Problem("x", "x", {"a": 1.0}, map=True, period=1.0), "period: got 1.0"),
         (lambda: pk.periodic_orbit(HENON, [0.1, 0.1]), "wants a flow"),
         (lambda: pk.continuation(HENON, "a", orbit=1, span=(0, 1)), "orbit: got 1, wants None"),
-        (lambda: pk.equilibria(LOGISTIC, box={"x": (0, 1)}), "wants a flow"),
         (lambda: pk.poincare_section(LOGISTIC, [0.1], duration=1.0, section="x"), "wants a flow"),
         (lambda: pk.continuation(LOGISTIC, "r", x0=[0.5], span=(1, 4), stop="H"), "stop: event"),
         (lambda: LOGISTIC.iterated(0), "times: got 0"),
@@ -285,3 +284,20 @@ def test_values_of_maps_are_those_of_f_to_the_last_digit():
 def test_what_a_map_returns_is_checked(f, jac, message):
     with pytest.raises(pk.ParameterError, match=message):
         pk.Problem(f, "x", {"a": 0.5}, jac, map=True).derivatives([0.1])
+
+
+@pytest.mark.parametrize("bulge", [0.5, 0.8])
+def test_orbits_between_two_period_doublings_are_followed_once(bulge):
+    # x -> -(1 + m) x + x^3 with m = bulge - r^2: doublings at r = -+ sqrt(bulge), x^2 = m between.
+    f = f"-(1 + {bulge} - r**2)*x + x**3"
+    problem = pk.Problem(f, "x", {"r": -1.2}, map=True)
+    ends = pk.continuation(problem, "r", x0=[0.0], span=(-1.3, 1.3)).special("PD")
+    assert len(ends) == 2
+    for point in ends:
+        orbits = point.switch()
+        r, x = orbits.points.r.values, orbits.points.x.values
+        assert len(r) > 10
+        assert np.max(np.abs(x**2 - (bulge - r**2))) < 1e-9
+        assert np.all(x > -1e-9) or np.all(x < 1e-9)
+        assert abs(np.ptp(r) - 2.0 * np.sqrt(bulge)) < 1e-6
+        assert "another period doubling" in orbits.stops[1].message

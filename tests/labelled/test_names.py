@@ -124,3 +124,11 @@ def test_critical_values_in_the_parameters_of_the_analogues():
     assert found == pytest.approx(field, rel=1e-14)
     found = pk.critical(magnet, "K").critical_fold
     assert found.attrs["parameter"] == "K"
+
+
+def test_calls_by_the_first_argument_s_old_name_go_on_working():
+    start = {"phi0": 0.1, "dphi0": 0.0}
+    for function, more in ((pk.stroboscopic, {"n": 2}), (pk.lyapunov, {"time": 3.0})):
+        with pytest.warns(DeprecationWarning, match=r"\(system=\.\.\.\)"):
+            old = function(perturbed=DRIVEN, **start, **more)
+        assert old.identical(function(DRIVEN, **start, **more))

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from fractions import Fraction
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
+from scipy.special import ellipk
 
 import phasekit as pk
 from phasekit.systems.perturbed_problem import ratios_of
@@ -132,3 +135,95 @@ def test_a_prescribed_speed_is_refused():
     disk = pk.GyroRotorDisk(beta=1.0, e=0.01, a=0.1, r=0.1, omega1=9.0, m=2.0, half_span=0.1)
     with pytest.raises(pk.ParameterError, match="^omega1: got"):
         pk.periodic_orbit(pk.Perturbed(disk, omega1=lambda t: 9.0 + t), [0.0, 1.0])
+
+
+def resonator(Q, force, cubic):
+    return pk.Problem(
+        ["v", "F*cos(w*t) - x - d*v - k*x**3"], ("x", "v"),
+        {"d": 1.0 / Q, "F": force, "w": 0.5, "k": cubic}, time="t", period="2*pi/w",
+    )  # fmt: skip
+
+
+def through(problem, low=0.5, high=3.0, **options):
+    orbit = pk.periodic_orbit(problem, [0.0, 0.0])
+    made = pk.ContinuationOptions(**options)
+    return pk.continuation(problem, "w", orbit=orbit, span=(low, high), options=made)
+
+
+@pytest.mark.parametrize("Q", [10.0, 100.0, 1e4])
+def test_a_sharp_resonance_is_passed_in_few_points(Q):
+    """The amplitude grows by a factor of 0.75 Q over that of the start, and comes down again."""
+    branch = through(resonator(Q, 0.01, 0.0))
+    w, x = branch.points.w.values, branch.points.x_max.values
+    assert 30 < len(w) <= 150
+    assert [stop.reason for stop in branch.stops] == ["bound", "bound"]
+    np.testing.assert_allclose(x, 0.01 / np.hypot(1.0 - w**2, w / Q), rtol=2e-6)
+    assert np.max(x) > 0.9 * 0.01 * Q
+    assert np.all(np.diff(w) > 0.0)
+
+
+@pytest.mark.parametrize("Q", [100.0, 1e4])
+def test_a_response_that_leans_over_is_followed_round_both_folds(Q):
+    branch = through(resonator(Q, 1.0 / Q, 1.0))
+    assert branch.points.sizes["point"] <= 150
+    assert [stop.reason for stop in branch.stops] == ["bound", "bound"]
+    found = branch.special("LPC")
+    assert len(found) == 2
+    assert all(point.status == "converged" for point in found)
+    if Q == 100.0:
+        folds = [point["w"] for point in found]
+        np.testing.assert_allclose(folds, [1.22644946, 1.03860429], rtol=0, atol=1e-8)
+        assert branch.points.x_max.values.max() == pytest.approx(0.82564, abs=1e-4)
+    for point in found:
+        w, d = point["w"], 1.0 / Q
+
+        def rates(t, y, w=w, d=d):
+            slopes = np.array([[0.0, 1.0], [-1.0 - 3.0 * y[0] ** 2, -d]])
+            force = d * np.cos(w * t) - d * y[1] - y[0] - y[0] ** 3
+            return [y[1], force, *(slopes @ y[2:].reshape(2, 2)).ravel()]
+
+        start = np.append(point.x, [1.0, 0.0, 0.0, 1.0])
+        T = 2.0 * np.pi / w
+        end = solve_ivp(rates, (0.0, T), start, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+        np.testing.assert_allclose(end[:2], point.x, rtol=0, atol=1e-9)
+        # One multiplier is 1, the product of both exp(-d T).
+        assert end[2] + end[5] == pytest.approx(1.0 + np.exp(-d * T), abs=1e-7)
+
+
+def test_a_bound_next_to_a_fold_is_met_exactly():
+    branch = through(resonator(1e3, 0.01, 1.0))  # it folds at 3.0388
+    assert branch.stops[1].reason == "bound"
+    assert branch.points.w.values[-1] == 3.0
+    assert np.all(branch.points.n_unstable == 0)
+
+
+def test_a_family_that_grows_a_thousand_times_has_the_periods_of_its_amplitudes():
+    oscillator = pk.Problem(["v", "-x - k*x**3"], ("x", "v"), {"k": 1.0}, conservative=True)
+    first = pk.periodic_orbit(oscillator, [1e-2, 0.0], 6.283)
+    family = pk.continuation(oscillator, "period", orbit=first, span=(0.5, 6.3))
+    a, T = family.points.x_max.values, family.points.period.values
+    assert 40 < len(a) <= 150
+    assert a.max() / a.min() > 500.0
+    wanted = 4.0 * ellipk(a**2 / (2.0 * (1.0 + a**2))) / np.sqrt(1.0 + a**2)
+    np.testing.assert_allclose(T, wanted, rtol=1e-7)
+
+
+def test_a_family_whose_scales_grow_goes_on_as_if_it_had_never_stopped():
+    problem = resonator(100.0, 0.01, 1.0)
+    whole = through(problem, directions="forward")
+    with pytest.warns(RuntimeWarning, match=r"not complete, last point: max_points = 40 .* w = "):
+        part = through(problem, directions="forward", max_points=40)
+    longer = part.extend(2000)
+    xr.testing.assert_identical(longer.points, whole.points)
+
+
+def test_a_branch_that_ends_for_its_number_of_points_is_announced():
+    problem = pk.Problem("mu - x**2", "x", {"mu": 1.0})
+    few = pk.ContinuationOptions(max_points=3)
+    match = r"the branch in mu is not complete, first point: .*; last point: .* extend\(\)"
+    with pytest.warns(RuntimeWarning, match=match):
+        branch = pk.continuation(problem, "mu", x0=[1.0], span=(0.0, 2.0), options=few)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        pk.continuation(problem, "mu", x0=[1.0], span=(0.0, 2.0))
+    assert branch.points.sizes["point"] == 7

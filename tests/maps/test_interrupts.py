@@ -24,8 +24,10 @@ from phasekit.maps import interrupts, run
 pytest.importorskip("zarr")
 
 SHAPE = Map()
-TOLD = re.compile(r"KeyboardInterrupt: (\d+) of 8 tiles are done; the same call goes on\n$")
-COMMAND = re.compile(r"phasekit: interrupted: (\d+) of 8 tiles are done; the same call goes on\n")
+TOLD = re.compile(r"KeyboardInterrupt: (\d+) of 8 tiles are done; the same call resumes the map\n$")
+COMMAND = re.compile(
+    r"phasekit: interrupted: (\d+) of 8 tiles are done; the same call resumes the map\n"
+)
 
 in_proc = pytest.mark.skipif(
     not Path("/proc/self/stat").exists(), reason="looks for processes in /proc"
@@ -171,7 +173,9 @@ def test_interrupts_before_anything_is_written(tmp_path, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(run, "prepare", interrupted)
-    with pytest.raises(KeyboardInterrupt, match=r"^0 of 8 tiles are done; the same call goes on$"):
+    with pytest.raises(
+        KeyboardInterrupt, match=r"^0 of 8 tiles are done; the same call resumes the map$"
+    ):
         SHAPE.sweep(tmp_path / "map.zarr", workers=1)
     assert not (tmp_path / "map.zarr").exists()
 
@@ -232,7 +236,9 @@ def test_the_same_command_says_how_much_is_left(tmp_path, third, capsys):
     command = ["sweep", str(recipe)]
     assert cli.main(command) == 130
     said = capsys.readouterr()
-    assert said.err == ("phasekit: interrupted: 3 of 8 tiles are done; the same call goes on\n")
+    assert said.err == (
+        "phasekit: interrupted: 3 of 8 tiles are done; the same call resumes the map\n"
+    )
     assert said.out == ""
     assert cli.main(command) == 0
     assert capsys.readouterr().out.startswith("5 of 8 tiles are left\n")

@@ -141,7 +141,7 @@ def kill_scheduler(sweep: Sweep) -> None:
     assert sweep.process.returncode != 0
     assert "StoreError" in error
     assert "scheduler" in error
-    assert "the same call goes on" in error
+    assert "the same call resumes the map" in error
     sweep.group.kill()
 
 

@@ -4,6 +4,7 @@
 those of every run; ``PHASEKIT_KILLS=1`` stops an extension after each of its writes.
 """
 
+import dataclasses
 import json
 import os
 import random
@@ -123,14 +124,14 @@ def test_a_damaged_chunk(damage, finished, store, tmp_path, whole, capsys):
             np.testing.assert_array_equal(ds.phi[:2, :2], EXPECTED.phi[:2, :2])
             with pytest.raises(pk.StoreError, match=rf"phi in the tile {tiles}"):
                 ds.phi.load()
-    with pytest.raises(pk.StoreError, match=rf"({tiles}).*phi.*make the sweep's call again"):
+    with pytest.raises(pk.StoreError, match=rf"({tiles}).*phi.*repeat the call of sweep"):
         pk.open_map(store, verify=True).load()
     capsys.readouterr()
     assert main(["info", str(store), "--verify"]) == 2
     said = capsys.readouterr().err
     assert "phi" in said
-    assert "make the sweep's call again" in said
-    with pytest.warns(UserWarning, match=rf"({tiles}).*phi.*computed anew"):
+    assert "repeat the call of sweep" in said
+    with pytest.warns(UserWarning, match=rf"({tiles}).*phi.*computed again"):
         xr.testing.assert_identical(sweep(store).load(), EXPECTED)
     assert content(store) == content(whole)
     assert main(["info", str(store), "--verify"]) == 0
@@ -409,7 +410,7 @@ def test_an_overwrite_that_is_interrupted_while_it_clears(store, monkeypatch):
         pk.sweep(other, AXES, store=store, **call)
     monkeypatch.undo()
     (store / "phi" / "c.0.0.0").unlink()  # as the next moment would have it
-    with pytest.raises(pk.StoreError, match="make the sweep's call again"):
+    with pytest.raises(pk.StoreError, match="repeat the call of sweep"):
         pk.open_map(store)
     ds = pk.sweep(other, AXES, store=store, **CALL)
     xr.testing.assert_identical(ds.load(), pk.sweep(other, AXES, of=CALL["of"]))
@@ -489,7 +490,7 @@ def test_what_comes_late_is_not_written(how, tmp_path):
         pk.sweep(DISK.replace(e=0.02), AXES, store=path, **CALL, overwrite=how == "overwritten")
     before = content(path)
     for one in late:
-        with pytest.raises(pk.StoreError, match="replaced, or made longer, by another sweep"):
+        with pytest.raises(pk.StoreError, match="replaced or extended by another sweep"):
             tile.compute(one)
     assert content(path) == before
 
@@ -505,7 +506,7 @@ def test_a_map_that_is_removed_while_it_is_made(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(tile, "compute_cells", removes)
-        with pytest.raises(pk.StoreError, match="the map was removed while it was being made"):
+        with pytest.raises(pk.StoreError, match="the map was removed while it was being computed"):
             sweep(path)
     assert not path.exists() or not list(path.rglob("*"))
     xr.testing.assert_identical(sweep(path).load(), EXPECTED)
@@ -522,7 +523,7 @@ def test_a_map_that_is_removed_while_a_tile_is_written(tmp_path, monkeypatch):
 
     with monkeypatch.context() as patch:
         patch.setattr(zarr.Array, "__setitem__", removes)
-        with pytest.raises(pk.StoreError, match="the map was removed while it was being made"):
+        with pytest.raises(pk.StoreError, match="the map was removed while it was being computed"):
             sweep(path)
     with pytest.raises(pk.StoreError):
         pk.open_map(path)
@@ -748,3 +749,82 @@ def test_netcdf_files_without_a_digest_open_as_before(tmp_path):
 def test_names_that_are_too_long_are_refused(call, tmp_path):
     with pytest.raises(pk.StoreError, match="cannot be reached: File name too long"):
         call(tmp_path / f"{'x' * 300}.zarr")
+
+
+# ------------------------------------------------------------------------------ what it is a map of
+
+
+DRIVEN = pk.Perturbed(pk.Pendulum(length=1.0), damping=0.1, forcing=pk.Harmonic(0.5, 2.0))
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    path = tmp_path_factory.mktemp("driven") / "map.zarr"
+    pk.sweep(DRIVEN, length=[1.0, 2.0], of=["phi"], store=path, workers=1)
+    return path
+
+
+CHANGED = r"is damaged: zarr\.json has changed since it was written"
+
+
+def test_the_forcing_cannot_be_switched_off(driven, tmp_path):
+    path = Path(shutil.copytree(driven, tmp_path / "map.zarr"))
+    assert pk.open_map(path).phasekit.system().forcing
+    file = path / "zarr.json"
+    text = file.read_text()
+    assert text.count('"phasekit_forcing": "1"') == 1
+    file.write_text(text.replace('"phasekit_forcing": "1"', '"phasekit_forcing": "0"'))
+    for verify in (False, True):
+        with pytest.raises(pk.StoreError, match=CHANGED):
+            pk.open_map(path, verify=verify)
+    assert main(["info", str(path), "--verify"]) == 2
+    with pytest.raises(pk.StoreError, match=CHANGED):
+        pk.sweep(DRIVEN, length=[1.0, 2.0, 3.0], of=["phi"], store=path)
+
+
+def test_each_bit_of_what_a_map_is_of(driven, tmp_path):
+    """The document of the store: refused, or the same, by each way to verify it."""
+    path = Path(shutil.copytree(driven, tmp_path / "map.zarr"))
+    expected = pk.open_map(path).load()
+    file = path / "zarr.json"
+    data, rng = file.read_bytes(), random.Random(0)
+    refused = 0
+    for place in sorted(rng.sample(range(len(data)), 60)):
+        changed = bytearray(data)
+        changed[place] ^= 1 << rng.randrange(8)
+        file.write_bytes(changed)
+        try:
+            with pk.open_map(path, verify=True) as ds:
+                assert ds.load().identical(expected)
+        except pk.StoreError:
+            refused += 1
+    assert refused == 60
+    for damage in (data[:-1], data[: len(data) // 2], b""):
+        file.write_bytes(damage)
+        with pytest.raises(pk.StoreError):
+            pk.open_map(path)
+    file.unlink()
+    assert main(["info", str(path), "--verify"]) == 2
+    file.write_bytes(data)
+    assert main(["info", str(path), "--verify"]) == 0
+
+
+def test_stores_that_do_not_say_it_go_on(driven, tmp_path, capsys):
+    """Those of versions before there was a checksum of it get one when they get longer."""
+    from phasekit.maps.plan_file import plan_bytes, plan_from
+
+    path = Path(shutil.copytree(driven, tmp_path / "map.zarr"))
+    file = path / "sweep" / "zarr.json"
+    file.write_bytes(plan_bytes(dataclasses.replace(plan_from(file.read_bytes()), root={})))
+    assert main(["info", str(path), "--verify"]) == 0
+    assert "zarr.json, of earlier versions, has no checksum" in capsys.readouterr().out
+    root = (path / "zarr.json").read_text()
+    (path / "zarr.json").write_text(
+        root.replace('"phasekit_forcing": "1"', '"phasekit_forcing": "0"')
+    )
+    with pytest.raises(pk.StoreError, match="phasekit_forcing is '0', in the call '1'"):
+        pk.sweep(DRIVEN, length=[1.0, 2.0, 3.0], of=["phi"], store=path)
+    (path / "zarr.json").write_text(root)
+    pk.sweep(DRIVEN, length=[1.0, 2.0, 3.0], of=["phi"], store=path)
+    assert main(["info", str(path), "--verify"]) == 0
+    assert "checksum" not in capsys.readouterr().out.replace("no checksums", "")

@@ -12,9 +12,9 @@ from witnesses import particles
 from witnesses.disk_forces import Disk, Motion
 
 from phasekit.mechanics.bearings import bearing_forces, fixed_bearing_forces
-from phasekit.mechanics.coupled_rotation import CoupledRotation
 from phasekit.mechanics.disk import disk_coefficients
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
+from phasekit.mechanics.general.rotation import CoupledRotation
 from phasekit.mechanics.rotators import rotators
 from phasekit.numerics import launch
 from phasekit.phase.exact.flow import flow

@@ -13,8 +13,8 @@ from mpmath import mp, mpf
 from witnesses import particles
 
 from phasekit.errors import ParameterError
-from phasekit.mechanics.coupled_rotation import CoupledRotation
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
+from phasekit.mechanics.general.rotation import CoupledRotation
 from phasekit.mechanics.vectors import rotation, unit
 
 DATA = Path(__file__).parents[1] / "data"

@@ -25,8 +25,8 @@ from witnesses.errata import (
     unit,
 )
 
-from phasekit.mechanics.coupled_rotation import CoupledRotation
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
+from phasekit.mechanics.general.rotation import CoupledRotation
 
 H11, H13, V15 = "HedrihVeljovic2011", "HedrihVeljovic2013", "Veljovic2015"
 GENERAL = machines()

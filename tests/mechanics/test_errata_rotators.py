@@ -25,8 +25,8 @@ from witnesses.errata import (
     unit,
 )
 
-from phasekit.mechanics.coupled_rotation import CoupledRotation
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
+from phasekit.mechanics.general.rotation import CoupledRotation
 from phasekit.mechanics.rotators import ROTATORS, rotators
 
 H11, H13 = "HedrihVeljovic2011", "HedrihVeljovic2013"

@@ -10,8 +10,8 @@ from witnesses.mujoco_mechanism import Mechanism  # skips this module where MuJo
 
 import phasekit as pk
 from phasekit.mechanics import two_degrees as machines
-from phasekit.mechanics.coupled_rotation import CoupledRotation
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
+from phasekit.mechanics.general.rotation import CoupledRotation
 from phasekit.mechanics.two_degrees import mass_matrix, two_degrees
 
 PRECISION = 1e-12

@@ -14,7 +14,7 @@ from mpmath import mpf
 from witnesses import particles
 
 from phasekit.errors import ParameterError
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
 from phasekit.mechanics.vectors import rotation, unit
 
 DATA = json.loads((Path(__file__).parents[1] / "data" / "vectors.json").read_text())

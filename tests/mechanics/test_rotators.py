@@ -10,9 +10,9 @@ import pytest
 from mpmath import mp, mpf
 from witnesses import particles
 
-from phasekit.mechanics.coupled_rotation import CoupledRotation
 from phasekit.mechanics.disk import disk_coefficients
-from phasekit.mechanics.rigid_body import RigidBody
+from phasekit.mechanics.general.body import RigidBody
+from phasekit.mechanics.general.rotation import CoupledRotation
 from phasekit.mechanics.rotators import ROTATORS, rotators
 from phasekit.numerics import launch
 from phasekit.phase.exact.flow import flow

@@ -246,14 +246,16 @@ def test_slow_spirals_end_at_rest(damping):
 
 def test_damping_too_weak_to_settle_is_announced():
     with pytest.warns(RuntimeWarning, match="damped so weakly that they did not settle"):
-        ds = pk.attractors(pk.Perturbed(EIGHT, damping=1e-7), phi=[0.5, 1.0], dphi=[0.4])
+        ds = pk.attractors(pk.Perturbed(EIGHT, damping=1e-7), phi=[0.5, 1.0], dphi=[3.0])
     assert (ds.attractor_period > 0).all()
+    trapped = pk.attractors(pk.Perturbed(EIGHT, damping=1e-7), phi=[0.5, 1.0], dphi=[0.4])
+    assert trapped.sizes["attractor"] == 1  # below both barriers, however weak damping is
 
 
 def test_attractors_to_which_motions_are_too_slow_are_not_passed_over(monkeypatch):
     few = functools.partial(method.limits_of, most=2000)
     monkeypatch.setattr("phasekit.motion.strobe.limits_of", few)
-    strong = pk.Perturbed(EIGHT, damping=1e3, forcing=DRIVE)
+    strong = pk.Perturbed(EIGHT, damping=1e3, quadratic=0.1, forcing=DRIVE)
     said = "attractor_phi: .* take more than 10000000 steps: there may be attractors .* not found"
     with pytest.warns(RuntimeWarning, match=said):
         assert pk.attractors(strong, phi=[0.5, 1.0], dphi=[0.4]).sizes["attractor"] == 0

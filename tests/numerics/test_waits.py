@@ -9,6 +9,7 @@ import numba
 import pytest
 from numba.core import event
 
+import phasekit as pk
 from phasekit.cells import progress
 from phasekit.numerics import compiling, waits
 
@@ -39,7 +40,7 @@ def compiled(module, seconds=0.0):
 def test_compiling_is_said_once(terminal, capfd):
     compiled("phasekit.made_up", 0.3)
     compiled("phasekit.made_up", 0.3)
-    text = "phasekit: compiling once for this machine, which takes some seconds\n"
+    text = "phasekit: compiling once for this machine, which takes up to half a minute\n"
     assert capfd.readouterr().err == text
 
 
@@ -63,6 +64,41 @@ def test_what_takes_long_is_said_once_by_the_outermost(terminal, capfd):
     with waits.said("counting again"):
         time.sleep(0.1)
     assert capfd.readouterr().err == "phasekit: counting again\n"
+
+
+def test_how_far_it_is_is_said_again_and_again(terminal, monkeypatch, capfd):
+    monkeypatch.setattr(waits, "AGAIN", 0.1)
+    with waits.said("counting sheep"):
+        for count in range(1, 4):
+            waits.stage(f"{count} sheep")
+            time.sleep(0.25)
+    time.sleep(0.2)
+    lines = capfd.readouterr().err.splitlines()
+    assert lines == [f"phasekit: counting sheep: {count} sheep" for count in (1, 2, 3)]
+    with waits.said("counting legs"):
+        time.sleep(0.05)
+    assert capfd.readouterr().err == "phasekit: counting legs\n"
+
+
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_branch_says_how_many_points_it_has(terminal, monkeypatch, capfd, moving):
+    monkeypatch.setattr(waits, "AGAIN", 0.02)
+    f = {"x": "y", "y": "mu*y - x - y**3"}
+    problem = pk.Problem(f, ("x", "y"), {"mu": 0.5})
+    if moving:
+        orbit = pk.periodic_orbit(problem, [1.0, 0.0])
+        capfd.readouterr()
+        options = pk.ContinuationOptions(max_step=2e-3, max_points=10_000)
+        branch = pk.continuation(problem, "mu", orbit=orbit, span=(0.4, 0.6), options=options)
+    else:
+        # Enough of them that the lines, which a thread writes, come in between on any machine.
+        options = pk.ContinuationOptions(max_step=2e-5, max_points=1_000_000)
+        branch = pk.continuation(problem, "mu", x0=[0.0, 0.0], span=(-1.0, 1.0), options=options)
+    assert len(branch.points.point) > 5
+    text = capfd.readouterr().err
+    kind = "periodic orbits" if moving else "equilibria"
+    assert f"phasekit: following {kind} along mu" in text
+    assert " points" in text
 
 
 def test_functions_of_others_and_quick_ones_are_not_said(terminal, monkeypatch, capfd):

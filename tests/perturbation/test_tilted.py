@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
-from phasekit.perturbation.tilted import sine_excess
+from phasekit.phase.exact.under_torque import sine_excess
 
 CELLS = int(os.environ.get("PHASEKIT_EDGES", "4"))
 
@@ -104,6 +104,40 @@ def test_a_small_torque_opens_the_eight_as_little():
     assert lower == pytest.approx(level.sel(saddle="lower").lobe_area.values, rel=1e-6)
     area = bent.sel(saddle="upper", side="left").lobe_area.item()
     assert area == pytest.approx(2.0 * level.sel(saddle="upper").winding_area.item(), rel=1e-3)
+
+
+@pytest.mark.parametrize("less", [1e-6, 1e-10])
+def test_next_to_a_fold_areas_are_as_good_as_their_errors(less):
+    biased = pk.Perturbed(pk.Pendulum(length=1.0, g=1.0), torque=1.0 - less)
+    found = pk.separatrices(biased).sel(saddle="upper", side="left")
+    with mpmath.workdps(40):
+        N = mpmath.mpf(1.0 - less)
+        gap = 2 * mpmath.acos(N)  # from the saddle to the center
+        at = mpmath.pi - mpmath.asin(N)
+        depth = lambda x: mpmath.cos(at + x) - mpmath.cos(at) + N * x  # noqa: E731
+        end = mpmath.findroot(depth, -1.5 * gap)
+        want = abs(mpmath.quad(lambda x: 2 * mpmath.sqrt(2 * abs(depth(x))), [0, -gap, end]))
+        off = abs(found.lobe_area.item() - want)
+        assert off < found.lobe_area_error.item() < 1e-5 * want
+        assert abs(found.turning_offset.item() - end) < 5e-16 / gap
+
+
+@pytest.mark.parametrize("torque", [1e-9, -1e-14, 1e-17])
+def test_a_small_torque_parts_two_saddles_as_little(torque):
+    """Where V rises, a separatrix turns just before the other saddle, by sqrt(N)."""
+    ds = pk.separatrices(pk.Perturbed(pk.Coefficients(-1.0, 0.35, 0.0), torque=torque))
+    assert ds.loop.values.tolist() == [pk.Loop.LOBE, pk.Loop.LOBE]
+    side, way = ("left", -1) if torque > 0 else ("right", 1)
+    offsets = ds.turning_offset.sel(side=side).values
+    with mpmath.workdps(60):
+        A, B, N = map(mpmath.mpf, (-1.0, 0.35, torque))
+        V = lambda x: -B * mpmath.cos(x) + A / 2 * mpmath.cos(x) ** 2 - N * x  # noqa: E731
+        slope = lambda x: B * mpmath.sin(x) - A * mpmath.sin(2 * x) / 2 - N  # noqa: E731
+        for start, offset in zip(ds.saddle_phi.values, offsets, strict=True):
+            own, other = mpmath.findroot(slope, start), mpmath.findroot(slope, start + offset)
+            gap = mpmath.sqrt(2 * (V(own) - V(other)) / mpmath.diff(slope, other))
+            end = mpmath.findroot(lambda x, own=own: (V(own) - V(x)) / slope(x), other - way * gap)
+            assert abs(end - own - offset) < 1e-15
 
 
 @pytest.mark.parametrize("scale", [1e-200, 1e150])

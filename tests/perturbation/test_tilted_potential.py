@@ -169,7 +169,7 @@ DRIVEN, TORQUED = pk.Perturbed(EIGHT, forcing=H(0.1, 1.0)), pk.Perturbed(EIGHT, 
         (lambda: pk.potential(DAMPED, 0.1), "without damping and drive but a constant torque for"),
         (lambda: pk.orbits(DAMPED, 0.1, 0.1), "damping and drive but a constant torque for orbits"),
         (lambda: pk.separatrices(DAMPED), "damping and drive but a constant torque for separatri"),
-        (lambda: pk.near_center(TILTED, 0.1), "wants a system with coefficients"),
+        (lambda: pk.near_center(TILTED, 0.1), "without damping and drive for near_center"),
         (
             lambda: pk.orbits(DRIVEN, 0.1, 0.1),
             "without damping and drive but a constant torque for",

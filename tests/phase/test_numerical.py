@@ -445,7 +445,7 @@ def test_collocation_solves_a_nonlinear_equation_exactly_as_known():
     """The logistic function solves y' = y (1 - y)."""
     time = np.array([3.0, -2.5, 0.0, np.nan])
     start = np.full((4, 1), 0.3)
-    got = integrate(lambda rows, y: y * (1.0 - y), start, time, np.full(4, 0.1))[:, 0]
+    got = integrate(lambda rows, y: y * (1.0 - y), start, time, np.full(4, 0.1))[0][:, 0]
     np.testing.assert_allclose(got[:3], 0.3 / (0.3 + 0.7 * np.exp(-time[:3])), rtol=2e-15)
     assert np.isnan(got[3])
 
@@ -464,10 +464,10 @@ def test_many_times_of_few_motions_are_reached_as_each_alone():
         return y * (1.0 - y)
 
     step = np.full(200, 0.1)
-    got = follow(rate, start, owner, time, step)[:, 0]
+    got = follow(rate, start, owner, time, step)[0][:, 0]
     few = sum(calls)
     calls.clear()
-    alone = integrate(rate, start, time, step)[:, 0]
+    alone = integrate(rate, start, time, step)[0][:, 0]
     assert 4 * few < sum(calls)
     x = start[:, 0]
     # From -0.2 the function ends, backwards, never; forwards at log 6.
@@ -489,17 +489,18 @@ def test_a_rate_that_vanishes_on_the_way_takes_no_more_steps(time):
         return np.stack([v, -force], axis=-1)
 
     start = np.array([[0.10533447, 1.68635812]])
-    end = integrate(rate, start, np.array([time]), np.array([0.065]))
+    end, _ = integrate(rate, start, np.array([time]), np.array([0.065]))
     assert len(calls) < 60
-    back = integrate(rate, end, np.array([-time]), np.array([0.065]))
+    back, _ = integrate(rate, end, np.array([-time]), np.array([0.065]))
     np.testing.assert_allclose(back, start, rtol=1e-15)
 
 
 def test_times_after_the_end_of_a_motion_are_not_reached():
     time = np.concatenate([np.linspace(0.0, 0.99, 30), np.linspace(1.01, 3.0, 20)])
-    found = follow(
+    found, _ = follow(
         lambda rows, y: y * y, np.ones((50, 1)), np.zeros(50, dtype=int), time, np.full(50, 0.1)
-    )[:, 0]
+    )
+    found = found[:, 0]
     np.testing.assert_allclose(found[:30], 1.0 / (1.0 - time[:30]), rtol=1e-11)
     assert np.isnan(found[30:]).all()
 
@@ -509,5 +510,5 @@ def test_bad_formulas():
         line("k*x^2")
     with pytest.raises(ParameterError, match="wants a real function"):
         line("abs(x)")
-    with pytest.raises(ParameterError, match="wants a formula that sympy reads"):
+    with pytest.raises(ParameterError, match="wants a formula such as"):
         line("x^^2")

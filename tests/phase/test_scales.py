@@ -6,6 +6,7 @@ import pytest
 
 import phasekit as pk
 from phasekit.errors import EquilibriumKind, OrbitKind, ParameterError
+from phasekit.laws.formulas import read_formula, symbols_of
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.formula import make_formula
 
@@ -30,7 +31,7 @@ def quartic_period(power, start):
 @pytest.mark.parametrize("unit", [1e-30, 1e-9, 1.0, 1e9, 1e30])
 def test_wells_without_a_bend_of_any_size(power, unit):
     if power * abs(np.log10(unit)) > 300:
-        with pytest.raises(ParameterError, match="which no double holds"):
+        with pytest.raises(ParameterError, match="which is outside the range of doubles"):
             line(f"u^{power}", unit)
         return
     formula = line(f"u^{power}", unit)
@@ -42,23 +43,31 @@ def test_wells_without_a_bend_of_any_size(power, unit):
     np.testing.assert_allclose(got.phi_min / unit, -start, rtol=1e-14)
 
 
+START, SPEED = np.array([0.5, 1.2, 1.5]), np.array([0.1, 0.2, -0.3])
+
+
+@pytest.fixture(scope="module")
+def whole():
+    """Orbits and angles of the double well in the units 1 and 1."""
+    formula = line("u^4/4 - u^2/2")
+    angle = functions.angles(formula, START, SPEED).angle
+    assert np.isfinite(angle).all()
+    return functions.orbits(formula, START, 0.0), angle
+
+
 @pytest.mark.parametrize(
     ("unit", "level"), [(1e30, 1.0), (1e-30, 1.0), (1.0, 1e-200), (1.0, 1e200), (1e9, 1e-100)]
 )
-def test_a_double_well_in_any_units(unit, level):
+def test_a_double_well_in_any_units(unit, level, whole):
     formula = line("u^4/4 - u^2/2", unit, level)
     rate = np.sqrt(level) / unit
     loops = functions.separatrices(formula)
     np.testing.assert_allclose(loops.lobe_area, [[4 / 3 * unit**2 * rate] * 2], rtol=1e-13)
-    start = np.array([0.5, 1.2, 1.5])
-    whole = functions.orbits(line("u^4/4 - u^2/2"), start, 0.0)
-    here = functions.orbits(formula, unit * start, 0.0)
-    np.testing.assert_allclose(here.period * rate, whole.period, rtol=1e-12)
-    np.testing.assert_allclose(here.phi_min / unit, whole.phi_min, rtol=1e-12)
-    speed = np.array([0.1, 0.2, -0.3])
-    angle = functions.angles(formula, unit * start, unit * rate * speed).angle
-    want = functions.angles(line("u^4/4 - u^2/2"), start, speed).angle
-    assert np.isfinite(want).all()
+    orbits, want = whole
+    here = functions.orbits(formula, unit * START, 0.0)
+    np.testing.assert_allclose(here.period * rate, orbits.period, rtol=1e-12)
+    np.testing.assert_allclose(here.phi_min / unit, orbits.phi_min, rtol=1e-12)
+    angle = functions.angles(formula, unit * START, unit * rate * SPEED).angle
     np.testing.assert_allclose(angle, want, rtol=1e-12)
 
 
@@ -99,9 +108,22 @@ def test_exponentials_far_from_0(origin):
 def test_terms_that_no_double_holds_are_refused():
     """They would be gone, or have few digits."""
     for text in ("(x/1e-30)^-12 - (x/1e-30)^-6", "(x/1e30)^20", "1e-200*(1e-115*x^2)"):
-        with pytest.raises(ParameterError, match="which no double holds"):
+        with pytest.raises(ParameterError, match="which is outside the range of doubles"):
             pk.Potential(text, "x")
     pk.Potential("5e-324*x^2", "x")  # as it is given
+
+
+@pytest.mark.parametrize("power", [20, 31])
+@pytest.mark.parametrize("above", [1.0, 0.7, 7.3])
+@pytest.mark.parametrize("below", [0.3, 5.1, 1.1e-2])
+def test_powers_of_quotients_of_doubles(above, below, power):
+    """Their fractions are longer than any double, but not larger."""
+    formula = make_formula(f"1.0*(({above!r}*x/{below!r})^{power})", "x", (), None, None)
+    with mpmath.workdps(50):
+        want = float(power * (mpmath.mpf(above) / mpmath.mpf(below)) ** power)
+        written = read_formula(formula.text, symbols_of(["x"]), exact=True)
+    assert written == formula.expression
+    np.testing.assert_allclose(formula.slopes(1.0), want, rtol=1e-14)
 
 
 def test_families_below_any_energy():
@@ -141,7 +163,8 @@ def test_gaps_without_digits_are_told():
 def test_areas_that_are_not_known_are_told(monkeypatch):
     from phasekit.phase.numerical import separatrices
 
-    monkeypatch.setattr(separatrices, "WORST", 0.0)
+    defaults = {**separatrices.separatrices.__kwdefaults__, "worst": 0.0}
+    monkeypatch.setattr(separatrices.separatrices, "__kwdefaults__", defaults)
     functions._surveyed.cache_clear()
     with pytest.warns(RuntimeWarning, match="lobe_area of Potential.*2 of 2 values are NaN"):
         found = pk.separatrices(pk.Potential("x^4/4 - x^2/2 + x^3/7", "x"))

@@ -14,6 +14,7 @@ COARSE = pk.ContinuationOptions(max_step=0.3)
 def corners(ax):
     """The angles (degrees) by which lines turn from one segment to the next, on the page."""
     found = []
+    ax.figure.draw_without_rendering()  # its layout is made when it is drawn
     for line in ax.lines:
         x, y = ax.transData.transform(np.column_stack(line.get_data())).T
         if line.get_linestyle() != "None":

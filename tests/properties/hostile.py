@@ -22,7 +22,7 @@ from phasekit.cli import main
 from phasekit.explorer.explore import Explorer
 from phasekit.inputs import describe
 from phasekit.labelled.accessor import MapPlots, PhasekitAccessor
-from phasekit.mechanics.coupled_state import CoupledRotationState
+from phasekit.mechanics.general.state import CoupledRotationState
 from phasekit.systems.trajectory import Trajectory
 
 #: What models share for the rest of the package, and results that only phasekit makes.
@@ -306,6 +306,7 @@ GOOD: dict[str, Callable[[], Any]] = {
     "p": lambda: 1.0,
     "label": lambda: "LP",
     "carrier_inertia": lambda: 0.1,
+    "values": lambda: [1.0, 1.1],
     "duration": lambda: 1.0,
     "energy": lambda: 9.0,
     "gap": lambda: 0.1,
@@ -497,7 +498,7 @@ LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surf
 _MOTIONS = ("attractors", "basins", "lyapunov", "poincare_section", "run_up", "stroboscopic")
 LONG |= {(name, value) for name in _MOTIONS for value in ("1e16", "1e200", "huge in list")}
 #: Warnings that are part of an answer, by how they begin: the grid is too coarse, motions are lost.
-ANNOUNCED = ("basin: ", "motion_phi: ")
+ANNOUNCED = ("basin: ", "motion_phi: ", "the branch in .* is not complete")
 
 
 def callables() -> dict[str, Callable[..., Any]]:
@@ -506,7 +507,7 @@ def callables() -> dict[str, Callable[..., Any]]:
     for name in pk.__all__:
         thing = getattr(pk, name)
         if inspect.isclass(thing):
-            if issubclass(thing, (enum.Enum, Exception)):
+            if issubclass(thing, (enum.Enum, Exception)) or thing is pk.System:  # a base
                 continue
             if thing not in RESULTS:
                 found[name] = thing

@@ -157,7 +157,7 @@ def test_resumed(folder, call, data):
                 total += len(computed)
                 break
             assert "Input/output error" in message
-            assert "the same call goes on" in message
+            assert "the same call resumes the map" in message
             with pk.open_map(store) as partial:
                 assert_partial(partial, expected)
             total += len(computed)

@@ -267,9 +267,16 @@ def test_a_branch_point_on_the_end_of_the_span(form, high):
 
 
 def test_a_start_where_f_has_no_derivatives_is_refused():
-    problem = one_state(lambda x, p: [math.log(x[0] + 1) - p + 0 * math.sqrt(x[0])], {"p": 0.0})
+    problem = one_state(lambda x, p: [math.log(x[0] + 1) - p + math.sqrt(x[0])], {"p": 0.0})
     with pytest.raises(pk.ConvergenceError, match=r"x0: the derivatives of f are not finite"):
         pk.continuation(problem, "p", x0=[0.0], span=(0.0, 2.0))
+
+
+def test_a_start_on_the_edge_of_a_domain_is_followed_inside():
+    problem = one_state(lambda x, p: [math.log(x[0] + 1) - p + 0 * math.sqrt(x[0])], {"p": 0.0})
+    branch = pk.continuation(problem, "p", x0=[0.0], span=(0.0, 2.0))
+    np.testing.assert_allclose(branch.points.x, np.expm1(branch.points.p), rtol=1e-12)
+    assert branch.stops[1].reason == "bound"
 
 
 def test_four_branches_whose_point_is_known_to_few_digits_say_so():

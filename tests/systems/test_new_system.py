@@ -2,38 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.labels.arguments import NumberLike
 from phasekit.laws.factors import named
-from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import MODELS, Model, model
+from phasekit.systems.system import MODELS
 
 
 @pytest.fixture(scope="module")
 def Governor():
     """A bead on a hoop in a wind: A = w^2, B = g/R, C = a/R."""
 
-    @model
-    @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-    class Governor(Model):
-        R: NumberLike
-        w: NumberLike
-        wind: NumberLike = 0.0
-        g: NumberLike = 9.81
-
-        declared: ClassVar[tuple[Parameter, ...]] = (
-            Parameter(name="R", units="m", long_name="radius of the hoop", positive=True),
-            Parameter(name="w", units="s-1", long_name="angular velocity of the hoop"),
-            Parameter(name="wind", units="m s-2", long_name="acceleration by the wind"),
-            Parameter(name="g", units="m s-2", long_name="acceleration of gravity"),
-        )
+    class Governor(pk.System):
+        R = pk.parameter("m", "radius of the hoop", positive=True)
+        w = pk.parameter("s-1", "angular velocity of the hoop")
+        wind = pk.parameter("m s-2", "acceleration by the wind", default=0.0)
+        g = pk.parameter("m s-2", "acceleration of gravity", default=9.81)
 
         @staticmethod
         def products(v):
@@ -122,12 +109,12 @@ def test_every_picture_takes_it(Governor):
     ],
 )
 def test_what_is_no_law_is_refused_where_the_class_is_made(law, message):
-    declared = (
-        Parameter(name="l", units="m", long_name="length", positive=True),
-        Parameter(name="tilt", units="rad", long_name="angle of the plane"),
-    )
+    fields = {
+        "l": pk.parameter("m", "length", positive=True),
+        "tilt": pk.parameter("rad", "angle of the plane"),
+    }
     with pytest.raises(pk.ParameterError, match=f"products of Odd: .*{message}"):
-        type("Odd", (Model,), {"declared": declared, "products": staticmethod(law)})
+        type("Odd", (pk.System,), {**fields, "products": staticmethod(law)})
 
 
 def test_a_law_may_be_divided_by_numbers():

@@ -9,8 +9,7 @@ import sympy as sp
 
 import phasekit as pk
 from phasekit.laws.perturbed import Rate
-from phasekit.systems.parameter import Parameter
-from phasekit.systems.system import Model
+from phasekit.systems.system import MODELS
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)
 FULL = pk.Perturbed(
@@ -54,16 +53,18 @@ def test_copies():
         FULL.damping = 1.0
 
 
-class Swing(Model):
+class Swing(pk.System):
     """A pendulum on a carousel, whose torque is a lambda in the class."""
 
-    declared = (Parameter(name="omega", units="s-1", long_name="angular velocity"),)
+    omega = pk.parameter("s-1", "angular velocity", default=3.0)
     frame_rate = Rate("omega", lambda v: (0.0, 0.0, -2.0 * v["omega"]))
-    omega = 3.0
 
     @staticmethod
     def products(v):
         return v["omega"] * v["omega"], 9.81, 0 * v["omega"], 1
+
+
+del MODELS["Swing"]  # other tests count the systems
 
 
 def test_laws_travel_to_worker_processes():

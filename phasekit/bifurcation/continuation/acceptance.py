@@ -13,7 +13,6 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import TIGHT, Curve, Track
 from phasekit.bifurcation.continuation.derivatives import Derivatives
-from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.kernels.newton import RAISED, ROUNDING
 from phasekit.bifurcation.continuation.kernels.trace import BOUND
@@ -39,7 +38,7 @@ def accepted(
     fixed : dict of int to int
         The unknown that keeps its value, of points where one does: at the start and at bounds.
     """
-    bound = ROUNDING if isinstance(curve.field, SymbolicField) else INSIDE
+    bound = ROUNDING if curve.field.exact else INSIDE
     better: dict[int, Array] = {}
     left = np.array(residual)
     vain = 0
@@ -148,7 +147,7 @@ def _said(curve: Curve, points: list[Array], bound: float) -> str:
     where = where if len(where) <= 4 else [*where[:3], "..."]
     noise = np.all(np.abs(curve.at(u)[0]) <= 10.0 * Derivatives(curve, u).noise())
     return (
-        f"{many} points solve f = 0 to {max(sizes):.1e} of its terms, which is more than rounding"
+        f"{many} points solve f = 0 to {max(sizes):.1e} of its terms, which exceeds rounding"
         f"{' of numbers: f itself is not known better' if noise else ''}; the worst at "
         f"{', '.join(where)}"
     )

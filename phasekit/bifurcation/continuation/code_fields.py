@@ -14,20 +14,26 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
 from phasekit.numerics.differences import (
+    BENT,
+    CLOSE,
     COARSE,
+    EDGES,
     EPSILON,
     FINE,
     KNOWN,
+    NEAR,
     PLAIN,
     SHORTER,
     STEP,
     TRIES,
     coarse,
 )
+from phasekit.numerics.wrapped import wrap
 
 Array = npt.NDArray[np.float64]
 
 NUMBERS = np.dtype(float)
+ON_EDGE = 1e-6  # part by which slopes over two steps may differ on the edge of a domain
 
 
 class CompiledField(Field):
@@ -50,12 +56,8 @@ class CompiledField(Field):
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
         """Address of f alone."""
         if self._wrapped is None:
-            self._wrapped = _wrap(
-                self.function,
-                len(self.states),
-                tuple(self.parameters.index(name) for name in self.names),
-                self.less,
-            )
+            places = tuple(self.parameters.index(name) for name in self.names)
+            self._wrapped = wrap(self.function, len(self.states), places, less=self.less)
         return int(self._wrapped.address)
 
     def second(self, active: tuple[int, ...]) -> int:
@@ -68,45 +70,6 @@ class CompiledField(Field):
         places = np.array(active, dtype=np.int64)
         differences.values(self.first(active), len(self.states), par, places, u, out)
         return out
-
-
-def _wrap(function: Any, n: int, order: tuple[int, ...], less: bool) -> Any:
-    """Wrap f as a native function of the state and all parameters."""
-    import numba
-    from numba import types
-
-    carray: Any = numba.carray  # type: ignore[attr-defined]
-    cfunc: Any = numba.cfunc
-
-    arguments = ", ".join(["x", *(f"p[{i}]" for i in order)])
-    result = function.py_func if hasattr(function, "py_func") else function
-    lines = [
-        "def wrapped(x_, p_, z_, out):",
-        f"    x = carray(x_, ({n},))",
-        f"    p = carray(p_, ({max(order, default=0) + 1},))",
-        f"    value = f({arguments})",
-    ]
-    lines += [f"    out[{i}] = value[{i}]" + f" - x[{i}]" * less for i in range(n)]
-    space: dict[str, Any] = {"f": function, "carray": carray}
-    pointer: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-    signature = types.void(pointer, pointer, pointer, pointer)
-    try:
-        exec("\n".join(lines), space)
-        return cfunc(signature)(space["wrapped"])
-    except Exception as first:
-        error = first
-        if n == 1:
-            lines[-1] = "    out[0] = value" + " - x[0]" * less
-            try:
-                exec("\n".join(lines), space)
-                return cfunc(signature)(space["wrapped"])
-            except Exception as again:
-                error = again
-        name = getattr(result, "__name__", "f")
-        raise ParameterError(
-            f"f: got the compiled function {name}, which numba cannot call with a float64 array "
-            f"and floats and index {n} numbers of what it returns: {error}"
-        ) from error
 
 
 class PythonField(Field):
@@ -139,7 +102,7 @@ class PythonField(Field):
         """F as an array of its own; NaN where it has no value. Warnings are the caller's."""
         try:
             result = self.function(x.copy() if self.less else x, **p)
-        except (ArithmeticError, ValueError) as error:
+        except Exception as error:  # whatever a user's function raises, it has no value there
             self.failure = error
             return np.full(len(self.states), np.nan)
         value = numbers_of("f", result, (len(self.states),))
@@ -151,7 +114,7 @@ class PythonField(Field):
         assert self.jacobian is not None
         try:
             result = self.jacobian(x, **p)
-        except (ArithmeticError, ValueError) as error:
+        except Exception as error:  # whatever a user's function raises, it has no value there
             self.failure = error
             return np.full((n, n), np.nan)
         slopes = numbers_of("jac", result, (n, n))
@@ -217,14 +180,23 @@ class PythonField(Field):
                 p[free[j - n]] = values[j]
                 return value
 
+            lines = [functools.partial(at, j) for j in range(begin, m)]
             if sharp:
-                unit = [_power(max(abs(values[j]), self.sizes[j])) for j in range(begin, m)]
-                lines = [functools.partial(at, j) for j in range(begin, m)]
-                slopes[:, begin:] = _slopes(lines, middle, unit)
+                slopes[:, begin:] = sharp_slopes(lines, middle, values[begin:], self.sizes[begin:])
                 return
             for j in range(begin, m):
                 h = COARSE * coarse(values[j], self.sizes[j])
-                slopes[:, j] = (at(j, h) - at(j, -h)) / (2.0 * h)
+                ahead, behind = at(j, h), at(j, -h)
+                slopes[:, j] = (ahead - behind) / (2.0 * h)
+                bent = np.abs(ahead + behind - 2.0 * middle)
+                # Next to an edge of the domain, not where f itself turns within a step.
+                if (
+                    np.any(bent > BENT * np.abs(ahead - behind))
+                    and not np.isfinite(at(j, NEAR * h) + at(j, -NEAR * h)).all()
+                ):
+                    line = lines[j - begin]
+                    slopes[:, j] = _shorter(line, middle, slopes[:, j], bent, h, values[j])
+            _inside(lines, middle, slopes[:, begin:], values[begin:], self.sizes[begin:])
 
         return first
 
@@ -267,6 +239,76 @@ class PythonField(Field):
                         bent[:, j] += k * difference / (4.0 * h * along)
 
         return second
+
+
+def sharp_slopes(
+    lines: Sequence[Callable[[float], Array]], middle: Array, places: list[float],
+    sizes: list[float],
+) -> Array:  # fmt: skip
+    """The slopes of functions at 0 (columns), each along an unknown of some size at some place."""
+    units = [_power(max(abs(x), size)) for x, size in zip(places, sizes, strict=True)]
+    slopes = _slopes(lines, middle, units)
+    _inside(lines, middle, slopes, places, sizes)
+    return slopes
+
+
+def _inside(
+    lines: Sequence[Callable[[float], Array]], middle: Array, slopes: Array, places: list[float],
+    sizes: list[float],
+) -> None:  # fmt: skip
+    """Take slopes that are not finite over shorter steps, next to an edge of the domain."""
+    if not np.isfinite(middle).all():
+        return
+    for j in np.flatnonzero(~np.isfinite(slopes).all(axis=0)).tolist():
+        slopes[:, j] = _beside_edge(lines[j], places[j], sizes[j])
+
+
+def _beside_edge(at: Callable[[float], Array], x: float, size: float) -> Array:
+    """The slope of a function that has no value a usual step away from x."""
+    h = COARSE * coarse(x, size)
+    for _ in range(EDGES):
+        h /= 16.0
+        if not h > 4.0 * EPSILON * abs(x):
+            break
+        if np.isfinite(at(h) - at(-h)).all():
+            h = max(h / 4096.0, 4.0 * _power(4.0 * EPSILON * abs(x)))  # the edge is far beside it
+            return np.asarray((at(h) - at(-h)) / (2.0 * h))
+    return _on_edge(at, COARSE * coarse(x, size))
+
+
+def _on_edge(at: Callable[[float], Array], h: float) -> Array:
+    """The slope of a function on the edge of its domain, from inside; NaN where it has none there.
+
+    Over two steps, which agree unless the function bends without end.
+    """
+    here = at(0.0)
+    for side in (h, -h):
+        wide, near = (
+            (4.0 * at(k) - at(2.0 * k) - 3.0 * here) / (2.0 * k) for k in (side, 0.125 * side)
+        )
+        if np.isfinite(wide).all() and np.isfinite(near).all():
+            noise = ON_EDGE * (np.abs(wide) + np.abs(near)) + 1e3 * EPSILON * np.abs(here) / h
+            return np.where(np.abs(wide - near) <= noise, wide, np.nan)
+    return here * np.nan
+
+
+def _shorter(
+    at: Callable[[float], Array], middle: Array, slope: Array, bent: Array, h: float, x: float
+) -> Array:
+    """The slope of a function that bends within a step, over one that is short enough."""
+    last = np.inf
+    for _ in range(EDGES):
+        size = np.abs(slope) + bent / h
+        h /= 16.0
+        if not h > 4.0 * EPSILON * abs(x):
+            break
+        ahead, behind = at(h), at(-h)
+        found = (ahead - behind) / (2.0 * h)
+        gap = float(np.max(np.abs(found - slope) / np.where(size > 0.0, size, 1.0)))
+        if not CLOSE < gap < 0.5 * last:
+            break  # it is the same, or but rounding
+        last, slope, bent = gap, found, np.abs(ahead + behind - 2.0 * middle)
+    return slope
 
 
 def _power(h: float) -> float:

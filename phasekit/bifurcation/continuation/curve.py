@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -11,23 +12,26 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.fields import Field, SymbolicField
-from phasekit.bifurcation.continuation.functions import Event
+from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.functions import Event, Formula
 from phasekit.bifurcation.continuation.kernels import defining, newton, trace
 from phasekit.bifurcation.continuation.kernels import state as state_places
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVENT
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.rows import largest
+from phasekit.bifurcation.continuation.stops import NOT_BEGUN, said
 from phasekit.bifurcation.continuation.stops import Stop as Stop
-from phasekit.bifurcation.continuation.stops import said
 from phasekit.numerics import differences
+from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
 
 CHUNK = 256
+QUICK = 0.05  # seconds within which a chunk is made before the next is longer
 MOST = 1 << 20  # derivatives at a time, where they are not kept
 KEPT = 16  # states up to which derivatives are kept at each point
+NEUTRAL = 10  # states up to which neutral saddles are looked for unasked
 LAST = 16  # points whose derivatives are remembered
 TIGHT = 1e-13
 
@@ -70,7 +74,7 @@ class Curve:
     field : Field
         The right-hand side.
     kind : int
-        EQUILIBRIUM, FOLD, HOPF or BRANCH; of maps FLIP or TORUS, too.
+        EQUILIBRIUM, FOLD, HOPF, BRANCH or EVENT; of maps FLIP or TORUS, too.
     par : ndarray
         All parameters; those that are free are not used.
     active : tuple of int
@@ -92,6 +96,8 @@ class Curve:
         Names of events, kinds and labels of special points at which the curve ends.
     discrete : bool
         Whether the field is f(x) - x of a map f.
+    held : Event, optional
+        The function that is zero all along a curve of events.
     """
 
     field: Field
@@ -108,11 +114,20 @@ class Curve:
     events: tuple[Event, ...] = ()
     ends: tuple[str, ...] = ()
     discrete: bool = False
+    held: Event | None = None
 
     @functools.cached_property
     def n(self) -> int:
         """Number of states."""
         return len(self.field.states)
+
+    @functools.cached_property
+    def detect(self) -> tuple[str, ...]:
+        """What is looked for: neutral saddles of few states come with Hopf points."""
+        asked = self.options.detect
+        if "hopf" in asked and self.n <= NEUTRAL and "neutral_saddle" not in asked:
+            return (*asked, "neutral_saddle")
+        return asked
 
     @functools.cached_property
     def m(self) -> int:
@@ -137,7 +152,7 @@ class Curve:
     @property
     def knows_slopes(self) -> bool:
         """Whether derivatives by the states are given, and no differences."""
-        return isinstance(self.field, SymbolicField) or bool(getattr(self.field, "jacobian", None))
+        return self.field.exact or bool(getattr(self.field, "jacobian", None))
 
     @functools.cached_property
     def weight(self) -> Array:
@@ -157,15 +172,47 @@ class Curve:
         """Length of a difference of unknowns."""
         return math.sqrt(np.add.reduce(self.weight * difference**2))
 
-    def _kernel(self, kernel: Any) -> Any:
-        return kernel if self.field.compiled else kernel.py_func
+    @property
+    def compiled(self) -> bool:
+        """Whether all that is followed has machine code."""
+        coded = self.kind == EVENT and not isinstance(self._held, Formula)
+        return self.field.compiled and not coded
+
+    @property
+    def _held(self) -> Any:
+        assert self.held is not None
+        return self.held.function
+
+    def _kernel(self, kernel: Any, compiled: bool | None = None) -> Any:
+        compiled = self.field.compiled if compiled is None else compiled
+        return kernel if compiled else kernel.py_func
+
+    def _first(self, sharp: bool) -> tuple[Any, int]:
+        self.field.prepare(self.scale[: self.m])
+        differs = sharp and self.field.mode == differences.PLAIN
+        mode = differences.SHARP if differs else self.field.mode
+        return self.field.first(self.active, sharp=sharp), mode
 
     def _functions(self, *, sharp: bool = False) -> tuple[Any, Any, int]:
-        self.field.prepare(self.scale[: self.m])
-        first = self.field.first(self.active, sharp=sharp)
-        second = first if self.kind == EQUILIBRIUM else self.field.second(self.active)
-        differs = sharp and self.field.mode == differences.PLAIN
-        return first, second, differences.SHARP if differs else self.field.mode
+        first, mode = self._first(sharp)
+        if self.kind == EQUILIBRIUM:
+            return first, first, mode
+        if self.kind != EVENT:
+            return first, self.field.second(self.active), mode
+        held = self._held
+        if self.compiled:
+            return first, held.code(self.active), mode
+        if self.field.compiled:  # where kernels are interpreted
+
+            def first(u: Array, par: Array, z: Array, out: Array) -> None:
+                out[: self.n * (1 + self.m)] = np.append(*self.at(u, sharp=sharp))
+
+            mode = differences.DERIVED
+
+        def event(u: Array, par: Array, z: Array, out: Array) -> None:
+            out[: 1 + self.m] = held.slopes(self, u)
+
+        return first, event, mode
 
     def refine(
         self,
@@ -188,7 +235,7 @@ class Curve:
         row = np.zeros(size) if row is None else row
         w[place + size : place + 2 * size] = row
         aim = float(np.dot(row, u)) if target is None else target
-        kernel = self._kernel(newton.refine)
+        kernel = self._kernel(newton.refine, self.compiled)
         with np.errstate(all="ignore"):
             steps = kernel(
                 *self._functions(sharp=True), self.kind, n, self.par.copy(),
@@ -234,7 +281,7 @@ class Curve:
         spare = out + n + n * m
         w = np.zeros(spare + differences.spare_size(n, m) + n + n * m + 4 * m)
         w[:m], w[m:out] = u, self.scale[:m]
-        first, _, mode = self._functions(sharp=sharp)
+        first, mode = self._first(sharp)
         kernel = self._kernel(defining.first_derivatives)
         with np.errstate(all="ignore"):
             kernel(first, mode, n, w, 0, self.par.copy(), self._places, m, out, spare)
@@ -255,7 +302,7 @@ class Curve:
         n, m = self.n, self.m
         points = np.ascontiguousarray(u[:, :m], dtype=float)
         with np.errstate(all="ignore"):
-            if isinstance(self.field, SymbolicField):
+            if self.field.exact:
                 value, terms = self.field.with_terms(points, self.par.copy(), self.active)
                 value = np.abs(value)
             else:
@@ -266,6 +313,8 @@ class Curve:
                 for k in range(0, len(points), chunk):
                     some = slice(k, k + chunk)
                     terms[some] = np.einsum("kij,kj->ki", np.abs(slopes[some]), sizes[some])
+                if self.field.steps > 1:  # f^n(x) and x themselves, whose slopes may cancel
+                    terms += sizes[:, :n]
             if isinstance(slopes, np.ndarray):  # what Newton's method takes for zero
                 nothing = newton.NOTHING * (np.abs(slopes) @ self.scale[:m])
                 value[value <= nothing] = 0.0
@@ -351,31 +400,64 @@ class Curve:
         fixed = np.concatenate([settings, self.period, self.low, self.high])
         w = np.zeros(defining.work_size(self.kind, n, free))
         w[: state.size] = state
-        kernel = self._kernel(trace.trace)
+        kernel = self._kernel(trace.trace, self.compiled)
         functions = self._functions()
         columns = 2 * size + trace.RECORDED
-        chunk = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
-        records = []
-        kept = []
+        most = CHUNK if self.keeps else max(1, min(CHUNK, MOST // (n * self.m)))
+        chunk = most if self.compiled else 1  # points that an interruption may cost
+        found = [(np.empty((0, columns)), np.empty((0, n * self.m if self.keeps else 0)))]
         reason, which, left = trace.FULL, 0, points
         with np.errstate(all="ignore"):
             while reason == trace.FULL and left > 0:
                 record = np.empty((min(left, chunk), columns))
                 slopes = np.empty((len(record), n * self.m))
-                count, reason, which = kernel(
-                    *functions, self.kind, n, self.par.copy(), self._places, fixed, w, record,
-                    slopes,
-                )  # fmt: skip
-                records.append(record[:count])
-                kept.append(slopes[:count] if self.keeps else slopes[:count, :0])
+                before, began = w[: state.size].copy(), time.monotonic()
+                try:
+                    count, reason, which = kernel(
+                        *functions, self.kind, n, self.par.copy(), self._places, fixed, w, record,
+                        slopes,
+                    )  # fmt: skip
+                except KeyboardInterrupt:
+                    w[: state.size] = before
+                    reason = trace.INTERRUPTED
+                    break
+                found.append((record[:count], slopes[:count] if self.keeps else slopes[:count, :0]))
                 left -= count
-        record = np.concatenate(records) if records else np.empty((0, columns))
-        slopes = np.concatenate([np.empty((0, n * self.m if self.keeps else 0)), *kept])
+                if time.monotonic() - began < QUICK:
+                    chunk = min(2 * chunk, most)
+                stage(f"{points - left:,} points")
+        record, slopes = (np.concatenate(parts) for parts in zip(*found, strict=True))
+        last = record[-1:, : self.m]
+        if reason in (trace.NOT_FINITE, trace.STUCK) and not np.isfinite(self.values(last)).all():
+            # Newton's last step led out of the domain of f.
+            record, slopes = record[:-1], slopes[:-1]
         return Track(record, slopes, w[: state.size].copy(), self.stop_of(reason, which, w))
+
+    def not_begun(self, start: Array, tangent: Array) -> Track:
+        """A track without points, to go on from."""
+        columns = 2 * self.size + trace.RECORDED
+        slopes = np.empty((0, self.n * self.m if self.keeps else 0))
+        return Track(np.empty((0, columns)), slopes, self.start_state(start, tangent), NOT_BEGUN)
 
     def stop_of(self, reason: int, which: int, w: Array) -> Stop:
         """Say why a track ends in the state w."""
+        if reason == trace.NOT_FINITE and self.field.failure is not None:
+            self._fail_beyond(w)
         return said(self, reason, which, w)
+
+    def _fail_beyond(self, w: Array) -> None:
+        """Let the field tell of what f raises next on the way, not of what it raised elsewhere."""
+        known, self.field.failure = self.field.failure, None
+        u, tangent = (
+            w[k * self.size :][: self.m] for k in (state_places.POINT, state_places.TANGENT)
+        )
+        step = self.options.min_step
+        while step <= self.options.max_step:
+            value, slopes = self._at(u + step * tangent, False)
+            if not (np.isfinite(value).all() and np.isfinite(slopes).all()):
+                return
+            step *= 2.0
+        self.field.failure = known
 
     def replace(self, **changes: Any) -> Curve:
         """A copy with changes."""

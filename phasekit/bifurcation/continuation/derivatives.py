@@ -21,7 +21,6 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.fields import SymbolicField
 
 Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
@@ -82,12 +81,13 @@ class Derivatives:
 
     def __init__(self, curve: Curve, u: Array) -> None:
         self.curve, self.u = curve, np.array(u[: curve.m])
-        self.exact = isinstance(curve.field, SymbolicField)
+        self.exact = curve.field.exact
         self.reach = np.maximum(np.abs(self.u), curve.scale[: curve.m])
         self.value, self.slopes = curve.at(self.u)
         # By line: samples by level, and derivatives by order.
         self._lines: dict[bytes, tuple[dict[int, Array], dict[int, Estimate]]] = {}
         self._noise: Array | None = None
+        self._steps: list[Derivatives] | None = None
         self._middle: Array | None = None
         self.widest = WIDEST
 
@@ -98,7 +98,7 @@ class Derivatives:
             return Estimate(one.value + 1j * two.value, one.error + two.error)
         a = self._full(a)
         if self.exact:
-            return _rounded(self.slopes @ a)
+            return self._rounded(self.slopes @ a)
         return self._along(a, 1)
 
     def second(self, a: Vector, b: Vector) -> Estimate:
@@ -107,7 +107,9 @@ class Derivatives:
             return _multilinear(self.second, a, b)
         a, b = self._full(a), self._full(b)
         if self.exact:
-            return _rounded(self.curve.bend(self.u, a) @ b)
+            return self._rounded(self.curve.bend(self.u, a) @ b)
+        if self.curve.field.steps > 1:
+            return self._chained(a, b)
         (a, b), size = self._balanced(a, b)
         if size == 0.0:
             return self._nothing()
@@ -121,7 +123,9 @@ class Derivatives:
             return _multilinear(self.third, a, b, c)
         a, b, c = self._full(a), self._full(b), self._full(c)
         if self.exact:
-            return _rounded(self.curve.twist(self.u, a, b, c))
+            return self._rounded(self.curve.twist(self.u, a, b, c))
+        if self.curve.field.steps > 1:
+            return self._chained(a, b, c)
         (a, b, c), size = self._balanced(a, b, c)
         if size == 0.0:
             return self._nothing()
@@ -154,6 +158,49 @@ class Derivatives:
         full = np.zeros(self.curve.m)
         full[: len(z)] = z
         return full
+
+    def _rounded(self, value: Array) -> Estimate:
+        error = 4.0 * EPSILON * self.curve.field.steps * np.abs(value)
+        return Estimate(np.asarray(value), error)
+
+    def _chained(self, *z: Array) -> Estimate:
+        """The second or third derivative of a map applied many times, by those of its steps."""
+        if self._steps is None:
+            self._steps = self._of_steps()
+        n = self.curve.n
+        lines = [Estimate(one[:n], np.zeros(n)) for one in z]
+        twos = {(i, j): self._nothing() for j in range(len(z)) for i in range(j)}
+        three = self._nothing()
+        for d in self._steps:
+            full = [np.append(line.value, one[n:]) for line, one in zip(lines, z, strict=True)]
+            if len(z) == 3:
+                three = d.turned(three) + d.third(*full)
+                for (i, j), two in twos.items():
+                    (k,) = {0, 1, 2} - {i, j}
+                    three = three + d.second(full[k], two.value)
+            twos = {
+                (i, j): d.turned(two) + d.second(full[i], full[j]) for (i, j), two in twos.items()
+            }
+            lines = [
+                d.turned(line) + Estimate(d.slopes[:, n:] @ one[n:], np.zeros(n))
+                for line, one in zip(lines, z, strict=True)
+            ]
+        return three if len(z) == 3 else twos[0, 1]
+
+    def _of_steps(self) -> list[Derivatives]:
+        """The derivatives of each step of a map that is applied many times."""
+        field: Any = self.curve.field
+        once = self.curve.replace(field=field.base)
+        u, found = self.u, []
+        for _ in range(field.steps):
+            found.append(Derivatives(once, u))
+            u = np.append(found[-1].value, u[self.curve.n :])
+        return found
+
+    def turned(self, z: Estimate) -> Estimate:
+        """The derivative of f along a vector of states that is known within its error."""
+        slopes = self.slopes[:, : self.curve.n]
+        return Estimate(slopes @ z.value, np.abs(slopes) @ z.error)
 
     def _nothing(self) -> Estimate:
         return Estimate(np.zeros(self.curve.n), np.zeros(self.curve.n))
@@ -326,10 +373,6 @@ def _weights(order: int, width: int) -> Array:
     wanted = np.zeros(width)
     wanted[1 if order == 3 else 0] = {1: 1.0, 2: 2.0, 3: 6.0}[order]
     return np.asarray(np.linalg.solve(np.vander(squares, increasing=True).T, wanted))
-
-
-def _rounded(value: Array) -> Estimate:
-    return Estimate(np.asarray(value), 4.0 * EPSILON * np.abs(value))
 
 
 def _multilinear(form: Any, *directions: Vector) -> Estimate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from phasekit.bifurcation.continuation.path import Path, Sample, Slopes, join
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.specials import Specials, find
+from phasekit.bifurcation.continuation.stops import SEARCHED
 from phasekit.bifurcation.special_points import KINDS
 
 FIRST = 32  # points after which a curve is looked at first; then after twice as many each time
@@ -34,11 +36,17 @@ def followed(
     """Follow a curve from a state for so many points, or to where it is to end."""
     track = known
     chunk = FIRST if curve.ends else points
+    known_points = 0 if known is None else len(known.record)
     while True:
         more = curve.follow(state if track is None else track.state, min(chunk, points))
         more = on_bound(curve, more)
-        track = more if track is None else _joined(track, more)
-        ended = _ended(curve, start, track) if curve.ends else None
+        whole = more if track is None else _joined(track, more)
+        try:
+            ended = _ended(curve, start, whole, known_points) if curve.ends else None
+        except KeyboardInterrupt:
+            track = curve.not_begun(start.u, start.tangent) if track is None else track
+            return replace(track, stop=SEARCHED)
+        track = whole
         points -= len(more.record)
         if ended is not None or more.stop.reason != "max_points" or points <= 0:
             return track if ended is None else ended
@@ -50,12 +58,21 @@ def _joined(track: Track, more: Track) -> Track:
     return Track(record, np.concatenate([track.slopes, more.slopes]), more.state, more.stop)
 
 
-def _ended(curve: Curve, start: Sample, track: Track) -> Track | None:
-    """A track up to the point behind that at which it ends; None if it goes on."""
+def _ended(curve: Curve, start: Sample, track: Track, known: int) -> Track | None:
+    """A track up to the point behind that at which it ends; None if it goes on.
+
+    Points that were known before count no more: there it ended, and goes on.
+    """
     path = join(curve, start, None, track)
+    passed: Counter[str] = Counter()
     for one in find(curve, path).placed:
         name = ending_of(curve, one.special)
-        if name is not None and curve.length(_gap(curve, one.special, start)) > START:
+        if name is None or one.index < known:
+            continue
+        if curve.length(_gap(curve, one.special, start)) > START:
+            passed[name] += 1
+            if passed[name] < curve.ends.count(name):
+                continue
             count = one.index + 1
             stop = Stop(name, f"stop = {name!r}: {_said(curve, one.special)}")
             return Track(track.record[:count], track.slopes[:count], track.state, stop)
@@ -77,7 +94,9 @@ def cut(curve: Curve, path: Path, specials: Specials) -> tuple[Path, Specials]:
         ]
         if stop.reason not in curve.ends or not there or path.closed:
             continue
-        one = there[side - 1]  # the one next to the start
+        # Where it ended before, it went on; it ends at the first of those that its wish is for.
+        own = [one for one in there if _beyond(path, one, side)]
+        one = (own or there)[side - 1]
         ends[side] = one.special
         if side:
             last, placed = one.index + 1, placed[: placed.index(one) + 1]
@@ -96,6 +115,11 @@ def cut(curve: Curve, path: Path, specials: Specials) -> tuple[Path, Specials]:
     )  # fmt: skip
     moved = [Placed(one.index - first, one.along, one.special) for one in placed]
     return path, Specials(moved, specials.eigenvalues[kept], specials.messages)
+
+
+def _beyond(path: Path, one: Placed, side: int) -> bool:
+    """Whether a special point lies in the last step of its side."""
+    return one.index >= path.count - 2 if side else one.index <= 0
 
 
 def _gap(curve: Curve, special: Special, start: Sample) -> np.ndarray:

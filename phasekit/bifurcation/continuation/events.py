@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.neutral import is_neutral, said_of
 from phasekit.bifurcation.continuation.path import Path, Sample, between
 from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.spectrum import (
     Tests,
-    is_conservative,
     orientation,
     test_functions,
     unstable_of,
@@ -39,46 +39,58 @@ class Bracket:
     changes: frozenset[str]
     jump: int
     index: int = 0  # of the path's point before it
+    neutral: bool = False  # pairs stay on the axis
 
 
 def brackets(
     curve: Curve, path: Path, detect: tuple[str, ...], conservative: bool
-) -> tuple[list[Bracket], npt.NDArray[np.complex128]]:
-    """All brackets of a path, in order, and the eigenvalues of f_x at its points."""
-    pairs = "hopf" in detect and curve.n > 1
-    tests = _all_tests(curve, path, pairs=pairs)
-    neutral = conservative or is_conservative(tests.eigenvalues, discrete=curve.discrete)
+) -> tuple[list[Bracket], npt.NDArray[np.complex128], tuple[str, ...]]:
+    """All brackets of a path, in order, the eigenvalues of f_x at its points, and doubts."""
+    pairs = bool({"hopf", "neutral_saddle"} & set(detect)) and curve.n > 1
+    saddles = "neutral_saddle" in detect
+    tests = _all_tests(curve, path, pairs=pairs, saddles=saddles)
+    neutral = conservative or is_neutral(curve, tests.eigenvalues)
+    messages: tuple[str, ...] = ()
     if neutral:
+        if pairs and not conservative:
+            messages = said_of(curve, tests.eigenvalues)
         unstable = unstable_of(curve, tests.eigenvalues, neutral=True)
         tests = replace(tests, pair=np.ones(path.count), unstable=unstable)
         pairs = False
     eigenvalues = tests.eigenvalues
     keep = _regular(tests)
     tests = Tests(*(getattr(tests, f.name)[keep] for f in fields(tests)))
-    seek = _Seek(curve, pairs, detect, neutral)
+    seek = _Seek(curve, pairs, neutral, saddles)
     found: list[Bracket] = []
     sample = functools.cache(functools.partial(seek.known, path, keep, tests))
     for i in seek.interesting(tests):
         for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True):
-            found.append(replace(bracket, index=int(keep[i])))
+            found.append(replace(bracket, index=int(keep[i]), neutral=neutral))
     for i in np.flatnonzero(np.diff(keep) > 1).tolist():  # on a point left out there may be one
         a, b = (Sample(path.u[k], path.tangent[k], path.slopes[k]) for k in keep[i] + [0, 1])
         found.append(Bracket(a, b, frozenset({"touch"}), 0, int(keep[i])))
     if not path.closed and len(keep) > 1:
         found += _on_ends(curve, path, keep, tests, found)
-    return found, eigenvalues
+    return found, eigenvalues, messages
 
 
-def _all_tests(curve: Curve, path: Path, *, pairs: bool) -> Tests:
+def _all_tests(curve: Curve, path: Path, *, pairs: bool, saddles: bool) -> Tests:
     """The test functions of all points; of many states, of some at a time."""
     if isinstance(path.slopes, np.ndarray):
         return test_functions(
-            curve, path.tangent, path.slopes, path.eigenvalues, pairs=pairs, neutral=False
-        )
+            curve, path.tangent, path.slopes, path.eigenvalues,
+            pairs=pairs, neutral=False, saddles=saddles,
+        )  # fmt: skip
     parts = [
         test_functions(
-            curve, path.tangent[some], path.slopes[some], None, pairs=pairs, neutral=False
-        )
+            curve,
+            path.tangent[some],
+            path.slopes[some],
+            None,
+            pairs=pairs,
+            neutral=False,
+            saddles=saddles,
+        )  # fmt: skip
         for some in path.slopes.chunks()
     ]
     return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
@@ -134,9 +146,16 @@ def nearest_is_complex(curve: Curve, tests: Tests) -> bool:
     return bool(np.min(above, initial=np.inf) <= abs(float(tests.pair)) * (1.0 + 1e-9))
 
 
+def _complex_unstable(tests: Tests) -> int:
+    """How many conjugate pairs grow."""
+    values = tests.eigenvalues
+    return int(np.sum((values.imag > 0.0) & (values.real > 0.0)))
+
+
 class _Seek:
-    def __init__(self, curve: Curve, pairs: bool, detect: tuple[str, ...], neutral: bool) -> None:
-        self.curve, self.pairs, self.detect, self.neutral = curve, pairs, detect, neutral
+    def __init__(self, curve: Curve, pairs: bool, neutral: bool, saddles: bool) -> None:
+        self.curve, self.pairs, self.neutral = curve, pairs, neutral
+        self.saddles = saddles or curve.discrete
         #: Others are one everywhere.
         self.names = [
             name
@@ -192,7 +211,7 @@ class _Seek:
         if key not in self.seen:
             tests = test_functions(
                 self.curve, sample.tangent, sample.slopes, None, pairs=self.pairs,
-                neutral=self.neutral,
+                neutral=self.neutral, saddles=self.saddles,
             )  # fmt: skip
             self.seen[key] = (sample, tests)
         return self.seen[key][1]
@@ -220,7 +239,11 @@ class _Seek:
         changes = {n for n in self.names if np.sign(getattr(one, n)) != np.sign(getattr(two, n))}
         jump = abs(int(two.unstable) - int(one.unstable))
         simple = len(changes & {"fold", "branch", "flip"})
+        if not self.saddles and jump <= simple:  # half the number of them passed a whole one
+            changes.discard("pair")
         crosses = "pair" in changes and any(nearest_is_complex(self.curve, t) for t in (one, two))
+        if not self.saddles:  # two real ones that cross look the same
+            crosses &= _complex_unstable(one) != _complex_unstable(two)
         explained = simple + 2 * crosses
         pairs = self._sums(one, two, depth)
         odd = (jump - simple) % 2 != 0 and bool(changes or jump)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.long_formulas import long_formulas
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
@@ -29,10 +30,18 @@ class Field:
     mode = DERIVED
     compiled = True
     accuracy = 1e-13  # of its first derivatives, relative
+    exact = False  # whether all its derivatives are those of formulas
+    steps = 1  # of a map: how often it is applied
 
     def __init__(self, states: Sequence[str], parameters: Sequence[str]) -> None:
         self.states, self.parameters = tuple(states), tuple(parameters)
         self.failure: Exception | None = None  # what f raised last, instead of a value
+
+    @property
+    def raised(self) -> str:
+        """What f raised last instead of a value, in words; nothing if it never did."""
+        failure = self.failure
+        return "" if failure is None else f": it raised {type(failure).__name__}: {failure}"
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> Any:
         """F and its derivatives, or f alone where the mode is PLAIN.
@@ -53,6 +62,10 @@ class Field:
         """F at many points, the rows of u; NaN where it has no value."""
         raise NotImplementedError
 
+    def with_terms(self, u: Array, par: Array, active: tuple[int, ...]) -> tuple[Array, Array]:
+        """F at many points, and the sums of the sizes of its terms, of a symbolic field."""
+        raise NotImplementedError
+
     def slopes_along(
         self, par: Array, active: tuple[int, ...], u: Array, z: Array
     ) -> Callable[[Array], Array] | None:
@@ -66,6 +79,8 @@ class Field:
 class SymbolicField(Field):
     """A right-hand side of sympy expressions; its derivatives are exact."""
 
+    exact = True
+
     def __init__(
         self, expressions: Sequence[Any], states: Sequence[str], parameters: Sequence[str]
     ) -> None:
@@ -74,7 +89,7 @@ class SymbolicField(Field):
 
     def first(self, active: tuple[int, ...], *, sharp: bool = False) -> int:
         """Machine code for f and its derivatives."""
-        return _first(self.expressions, self.states, self.parameters, active)
+        return first_of(self.expressions, self.states, self.parameters, active)
 
     def second(self, active: tuple[int, ...]) -> int:
         """Machine code for f, its derivatives and those of f_u z."""
@@ -157,15 +172,18 @@ def _jet(expressions: Sequence[Any], u: Sequence[Any]) -> tuple[dict[int, Any], 
 
 
 @functools.lru_cache(maxsize=256)
-def _first(
+def first_of(
     expressions: tuple[Any, ...],
     states: tuple[str, ...],
     parameters: tuple[str, ...],
     active: tuple[int, ...],
 ) -> int:
+    """Address of machine code for expressions and their derivatives by the unknowns."""
     from phasekit.numerics.machine_code import compile_expressions
 
     u, places = unknowns_of(states, parameters, active)
+    if long := long_formulas(expressions, places, u):
+        return long.first()
     entries, count = _jet(expressions, u)
     return compile_expressions(entries, places, count)
 
@@ -182,6 +200,8 @@ def _second(
     from phasekit.numerics.machine_code import compile_expressions
 
     u, places = unknowns_of(states, parameters, active)
+    if long := long_formulas(expressions, places, u):
+        return long.second()
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(len(u))]
     entries, count = _jet(expressions, u)
     along = [
@@ -202,7 +222,9 @@ def _terms(
 ) -> int:
     from phasekit.numerics.machine_code import compile_expressions
 
-    _, places = unknowns_of(states, parameters, active)
+    u, places = unknowns_of(states, parameters, active)
+    if long := long_formulas(expressions, places, u):
+        return long.terms()
     return compile_expressions([*expressions, *map(magnitude, expressions)], places)
 
 
@@ -245,6 +267,8 @@ def _third(
     from phasekit.numerics.machine_code import compile_expressions
 
     u, places = unknowns_of(states, parameters, active)
+    if long := long_formulas(expressions, places, u):
+        return long.third()
     z = [sympy.Dummy(f"z{i}", real=True) for i in range(3 * len(u))]
     along = list(expressions)
     for k in range(3):

@@ -10,8 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.code_fields import numbers_of
-from phasekit.bifurcation.continuation.fields import magnitude, slopes_of, unknowns_of
+from phasekit.bifurcation.continuation.code_fields import numbers_of, sharp_slopes
+from phasekit.bifurcation.continuation.fields import first_of, magnitude, slopes_of, unknowns_of
+from phasekit.bifurcation.continuation.long_formulas import long_formulas
 from phasekit.numerics import differences
 
 Array = npt.NDArray[np.float64]
@@ -67,6 +68,14 @@ class Formula:
         reach = np.maximum(np.abs(u[:, : curve.m]), curve.scale[: curve.m])
         return np.asarray(EPSILON * (16.0 * found[:, 1] + 4.0 * np.sum(found[:, 2:] * reach, 1)))
 
+    def code(self, active: tuple[int, ...]) -> int:
+        """Address of machine code for the value and its derivatives by the unknowns."""
+        return first_of((self.expression,), self.states, self.parameters, active)
+
+    def slopes(self, curve: Unknowns, u: Array) -> Array:
+        """The value at a point, and its derivatives by the unknowns."""
+        return np.delete(self._jet(curve, u[None])[0], 1)
+
     def bounds(self, curve: Unknowns) -> Callable[[Array, Array], Array] | None:
         """What tells of boxes (lows, highs) whether it may vanish there; None if nothing does."""
         from phasekit.phase.numerical.intervals import Bounds, NoRule
@@ -120,7 +129,7 @@ class Code:
                 p.update(zip(free, point[n : curve.m].tolist(), strict=True))
                 try:
                     value = self.function(point[:n].copy(), **p)
-                except (ArithmeticError, ValueError):
+                except Exception:  # noqa: BLE001 - a user's function, without a value there
                     continue
                 out[k] = _number(value)
         return out
@@ -145,6 +154,19 @@ class Code:
             moved = np.sum(np.abs(ends[:m] - ends[m:])) / (2.0 * STEP)
             found.append(8.0 * EPSILON * moved + 8.0 * np.nan_to_num(hidden))
         return np.array(found)
+
+    def slopes(self, curve: Unknowns, u: Array) -> Array:
+        """The value at a point, and its derivatives by the unknowns."""
+        m, middle = curve.m, self.values(curve, u[None])
+
+        def along(j: int, h: float) -> Array:
+            moved = u[:m].copy()
+            moved[j] += h
+            return self.values(curve, moved[None])
+
+        lines = [functools.partial(along, j) for j in range(m)]
+        sizes = curve.scale[:m].tolist()
+        return np.append(middle, sharp_slopes(lines, middle, u[:m].tolist(), sizes))
 
     def bounds(self, curve: Unknowns) -> None:
         """Nothing is known of code between points."""
@@ -173,6 +195,8 @@ def _compiled(
     from phasekit.numerics.machine_code import compile_expressions
 
     u, places = unknowns_of(tuple(states), tuple(parameters), active)
+    if long := long_formulas([expression], places, u):
+        return long.event()
     entries = {0: expression, 1: magnitude(expression)}
     (row,) = slopes_of([expression], u)
     entries.update({2 + j: slope for j, slope in row.items()})

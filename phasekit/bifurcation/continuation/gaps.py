@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.kernels.newton import RAISED
 from phasekit.bifurcation.continuation.path import Path, Sample, between
 
@@ -23,8 +23,8 @@ SHORT = 1e-5  # steps whose chords are not known well
 
 
 def narrow(curve: Curve, path: Path) -> tuple[str, ...]:
-    """Where a branch of equilibria turns within less than a step, in words."""
-    if curve.kind != EQUILIBRIUM or curve.options.tolerance >= RAISED or path.count < 2:
+    """Where a branch turns within less than a step, in words."""
+    if curve.kind not in REGULAR or curve.options.tolerance >= RAISED or path.count < 2:
         return ()
     unit = np.sqrt(curve.weight[: curve.m])
     u, t = path.u[:, : curve.m] * unit, path.tangent[:, : curve.m] * unit

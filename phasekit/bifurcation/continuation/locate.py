@@ -26,7 +26,11 @@ from phasekit.bifurcation.continuation.points.special import (
     interval_of,
     reach_of,
 )
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.continuation.spectrum import (
+    eigenvalues_of,
+    on_axis,
+    surely_complex,
+)
 from phasekit.bifurcation.special_points import KINDS
 
 Array = npt.NDArray[np.float64]
@@ -63,9 +67,8 @@ def _locate(curve: Curve, bracket: Bracket) -> list[Special]:
     found = _merged(curve, found)
     left = abs(bracket.jump) - sum(_explained(one) for one in found)
     if left > 0 and curve.discrete:
-        found.append(
-            _several(curve, bracket, left, bracket.a.u, hopf=_complex_cross(curve, bracket))
-        )
+        kind = _crossing(curve, bracket, left)
+        found.append(_several(curve, bracket, left, bracket.a.u, kind))
     elif left > 0:
         found += _together(curve, bracket, found, left)
     return found
@@ -97,14 +100,20 @@ def _merged(curve: Curve, found: list[Special]) -> list[Special]:
     return kept
 
 
-def _complex_cross(curve: Curve, bracket: Bracket) -> bool:
-    """Whether pairs of multipliers cross the unit circle."""
-    counts = [
-        np.sum((v.imag > 0.0) & (curve.growth(v) > 0.0))
-        for s in (bracket.a, bracket.b)
-        for v in eigenvalues_of(curve.linear(s.slopes)[None], accuracy=curve.field.accuracy)
-    ]
-    return bool(counts[0] != counts[1])
+def _crossing(curve: Curve, bracket: Bracket, count: int) -> str:
+    """The kind of point at which so many multipliers cross the unit circle together."""
+    scale = curve.scale[: curve.n]
+    outside = []
+    for s in (bracket.a, bracket.b):
+        A = curve.linear(s.slopes)
+        values = eigenvalues_of(A[None], accuracy=curve.field.accuracy)[0]
+        sure = surely_complex(A * scale / scale[:, None], values, curve.field.accuracy)
+        sure &= ~(on_axis(curve, values) & bracket.neutral)
+        outside.append(np.sum((values.imag > 0.0) & sure & (curve.growth(values) > 0.0)))
+    if outside[0] != outside[1]:
+        return "torus"
+    nearest = values[np.argsort(np.abs(np.abs(values) - 1.0))][:count]
+    return "period_doubling" if np.all(nearest.real < 0.0) else "branch_point"
 
 
 def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -> list[Special]:
@@ -114,7 +123,10 @@ def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -
         for s in (bracket.a, bracket.b)
     ]
     real = [int(np.sum((v.imag == 0.0) & (v.real > 0.0))) for v in ends]
-    above = [int(np.sum((v.imag > 0.0) & (v.real > 0.0))) for v in ends]
+    stay = [on_axis(curve, v) & bracket.neutral for v in ends]
+    above = [
+        int(np.sum((v.imag > 0.0) & (v.real > 0.0) & ~on)) for v, on in zip(ends, stay, strict=True)
+    ]
     u = 0.5 * (bracket.a.u + bracket.b.u)
     more: list[Special] = []
     if real[0] != real[1] and not any(one.corank for one in found):
@@ -130,13 +142,13 @@ def _together(curve: Curve, bracket: Bracket, found: list[Special], left: int) -
             left -= 2 * count
         more.append(point_)
     if left > 0 and not any(one.status == GUESS for one in more):
-        more.append(_several(curve, bracket, left, u, hopf=above[0] != above[1]))
+        kind = "hopf" if above[0] != above[1] else "branch_point"
+        more.append(_several(curve, bracket, left, u, kind))
     return more
 
 
-def _several(curve: Curve, bracket: Bracket, count: int, u: Array, *, hopf: bool) -> Special:
+def _several(curve: Curve, bracket: Bracket, count: int, u: Array, kind: str) -> Special:
     """Eigenvalues that cross, and it is not known how: said, not refined."""
-    kind = ("torus" if curve.discrete else "hopf") if hopf else "branch_point"
     return Special(
         kind, u, interval_of(curve, bracket),
         float(np.max(np.abs(curve.at(u)[0]))), GUESS,

@@ -5,6 +5,7 @@ A coefficient whose error hides its digits is NaN.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ Array = npt.NDArray[np.float64]
 Vector = npt.NDArray[Any]  # real or complex
 
 DIGITS = 1e-2  # largest relative error of a coefficient that is said
+ROUNDED = 1e-13  # part of the terms of a coefficient that may be left of them where they cancel
 SMALL = 1e-9  # largest error in units of f and of the states, where a coefficient is next to zero
 
 
@@ -81,6 +83,25 @@ def known(coefficient: Estimate, unit: float) -> float:
     value, error = float(np.real(coefficient.value)), float(np.max(coefficient.error))
     sure = error <= DIGITS * abs(value) or error <= SMALL * unit
     return value if sure else np.nan
+
+
+def signed(terms: Sequence[Estimate], p: Vector, found: float) -> float:
+    """A coefficient that is the sum of terms along p; 0 where its error leaves it no sign.
+
+    The error is that of the terms, and what rounding makes of terms that cancel.
+    """
+    error = sum(float(np.max(np.abs(one.dot(p).error))) for one in terms)
+    size = sum(float(np.abs(p) @ np.abs(one.value)) for one in terms)
+    return 0.0 if abs(found) <= 4.0 * error + ROUNDED * size else found
+
+
+def zero_along(coefficient: str, kind: str) -> str:
+    """What is said of a curve along which a coefficient is zero, so that it has no such points."""
+    of = coefficient or "the test function"
+    return (
+        f"{of} is zero all along the curve but for its error: there are no "
+        f"{kind.replace('_', ' ')} points to tell, and what higher terms do is not known"
+    )
 
 
 def motion(d: Derivatives) -> Array:

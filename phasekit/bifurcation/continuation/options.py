@@ -14,7 +14,8 @@ from phasekit.errors import ParameterError
 from phasekit.inputs import bad, one_of, reals, whole
 
 DIRECTIONS = ("both", "forward", "backward")
-DETECTABLE = ("fold", "branch_point", "hopf")
+DETECTED = ("fold", "branch_point", "hopf")
+DETECTABLE = (*DETECTED, "neutral_saddle")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,10 +51,10 @@ class ContinuationOptions:
         Angle at which a step is refused and shortened. Make it smaller where a branch jumps.
     directions : {"both", "forward", "backward"}
         From the start to both sides, or only towards larger or smaller parameters.
-    detect : sequence of {"fold", "branch_point", "hopf"}
-        What is looked for; neutral saddles come with Hopf points. With nothing asked for and more
-        than 16 states no eigenvalues are computed, which take most of the time then: n_unstable is
-        -1.
+    detect : sequence of {"fold", "branch_point", "hopf", "neutral_saddle"}
+        What is looked for; by default all but neutral saddles, which up to 10 states come with Hopf
+        points: of more there are very many. With nothing asked for and more than 16 states no
+        eigenvalues are computed, which take most of the time then: n_unstable is -1.
     bounds : mapping of str to (float, float), optional
         Limits of states by name (and of other free parameters): the branch ends on them.
     scales : mapping of str to float, optional
@@ -98,7 +99,7 @@ class ContinuationOptions:
     turn: float = 0.15
     max_turn: float = 0.5
     directions: str = "both"
-    detect: tuple[str, ...] = DETECTABLE
+    detect: tuple[str, ...] = DETECTED
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     scales: Mapping[str, float] = field(default_factory=dict)
     degree: int = 4

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.acceptance import accepted
 from phasekit.bifurcation.continuation.curve import MOST, Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
+from phasekit.bifurcation.continuation.kernels.defining import EVENT, HOPF, REGULAR, TORUS
 from phasekit.bifurcation.continuation.rows import across, largest
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
 
@@ -71,7 +71,7 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     behind[:, -trace.RECORDED + trace.ARCLENGTH] *= -1.0
     ahead = forward.record if forward is not None else nothing
     table = np.concatenate([behind, middle, ahead])
-    start_stop = Stop("start", "the start; this direction was not asked for")
+    start_stop = Stop("start", "the start; this direction was not requested")
     stops = (
         backward.stop if backward is not None else start_stop,
         forward.stop if forward is not None else start_stop,
@@ -147,9 +147,11 @@ def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArra
     """
     accuracy = curve.field.accuracy
     values = eigenvalues_of(curve.linear(slopes), accuracy=accuracy)
-    if curve.kind != EQUILIBRIUM:
+    if curve.kind not in REGULAR:
         return slopes, values
     size = largest(values)
+    if curve.kind == EVENT and curve.n == 1:  # f_x alone is no scale of itself
+        size = largest(slopes[:, 0] * (curve.scale[: curve.m] / curve.scale[0]))
     with np.errstate(all="ignore"):
         least = across(np.minimum, np.abs(curve.growth(values)))
         doubtful = least < DOUBTFUL * np.nanmax(size)
@@ -210,16 +212,19 @@ def bracket_root(
     *,
     steps: int = 12,
     width: float = 1e-5,
+    near: float = 0.0,
 ) -> tuple[Sample, Sample, Sample]:
     """Narrow a change of sign of a test function: the best sample, and the two around it.
 
-    Bisection and regula falsi by turns (Illinois), on the chord between two points.
+    Bisection and regula falsi by turns (Illinois), on the chord between two points; to a width, or
+    until the value is ``near`` times those at the ends, from where Newton's method goes on.
     """
     left, right = a, b
     low, high = 0.0, 1.0
     at_low, at_high = test(a), test(b)
     best = a if abs(at_low) < abs(at_high) else b
     least = min(abs(at_low), abs(at_high))
+    enough = near * least
     side = 0
     for step in range(steps):
         s = 0.5 * (low + high)
@@ -235,7 +240,7 @@ def bracket_root(
         value = test(sample)
         if abs(value) < least or not np.isfinite(least):
             best, least = sample, abs(value)
-        if value == 0.0:
+        if value == 0.0 or abs(value) <= enough:
             break
         if (value > 0.0) == (at_high > 0.0):
             high, at_high, right = s, value, sample

@@ -21,6 +21,8 @@ LARGE = 1e8  # a state that grows so many times beyond its scale leaves the pict
 SMALL = 1e-3  # guesses below tell little of the size of a state
 WIDEST = -59  # so many times may a step be doubled where no size is known
 APART = 0.7 * 64.0 ** np.arange(-10.0, 4.0)  # distances of neighbours that may show rounding
+PART = 0.1  # of f, by which a state that was guessed as zero changes it
+AWAY = SMALL * 4.0 ** np.arange(40.0)  # distances at which it is tried
 QUARTERS = 4.0 ** -np.arange(40.0)  # parts of a motion that are tried
 
 
@@ -36,9 +38,25 @@ def guessed(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
     curve = curve.replace(scale=scale)
     small = [i for i in range(n) if abs(u[i]) < SMALL and i not in given and not angle[i]]
     if small and not curve.knows_slopes:  # differences need steps that suit a state
-        for i, size in _natural(curve, u, small).items():
+        natural = _natural(curve, u, small)
+        for i in small:
+            size = natural[i] if i in natural else max(_felt(curve, u, i), scale[i])
             scale[i] = max(size, abs(u[i]))
     return curve
+
+
+def _felt(curve: Curve, u: Array, place: int) -> float:
+    """How far a state moves before f changes by a good part of what it is; 0 if it never does.
+
+    Differences over much less are lost in rounding of f.
+    """
+    near = np.repeat(u[None], len(AWAY), axis=0)
+    near[:, place] += AWAY
+    here = np.abs(curve.values(u[None])[0])
+    with np.errstate(all="ignore"):
+        change = np.abs(curve.values(near) - curve.values(u[None]))
+        felt = np.any((change >= PART * here) & (here > 0.0) & np.isfinite(change), axis=1)
+    return float(AWAY[np.argmax(felt)]) if felt.any() else 0.0
 
 
 def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:

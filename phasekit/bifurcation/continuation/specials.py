@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.acceptance import rounded
+from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED, deficient
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.events import Bracket, brackets
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
@@ -19,6 +20,7 @@ from phasekit.bifurcation.continuation.points.event import events_of
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
 
@@ -34,24 +36,56 @@ class Specials(NamedTuple):
 def find(curve: Curve, path: Path) -> Specials:
     """Special points of a path, those that the curve is asked for."""
     with np.errstate(all="ignore"):
-        placed, eigenvalues = _find(curve, path)
+        placed, eigenvalues, zeros = _find(curve, path)
         events, messages = events_of(curve, path) if curve.events else ([], ())
+    messages = (*zeros, *messages)
+    if _omits_saddles(curve):
+        messages = (
+            *messages,
+            f"neutral saddles were not looked for, of {curve.n} states there may be very many: "
+            f"detect={[*curve.detect, 'neutral_saddle']} looks for them",
+        )
     every = sorted([*placed, *events], key=lambda one: (one.index, one.along))
     return Specials(every, eigenvalues, messages)
 
 
-def _find(curve: Curve, path: Path) -> tuple[list[Placed], npt.NDArray[np.complex128]]:
+#: What is said of a branch where the search was interrupted.
+NOT_SEARCHED = ("special points were not looked for: extend() does it",)
+
+
+def not_searched(path: Path, n: int) -> Specials:
+    """What is said of a path where the search was interrupted."""
+    unknown = np.full((path.count, n), np.nan, dtype=complex)
+    return Specials([], unknown, NOT_SEARCHED)
+
+
+def _omits_saddles(curve: Curve) -> bool:
+    """Whether neutral saddles are left out that come with Hopf points of fewer states."""
+    flow = curve.kind == EQUILIBRIUM and not (curve.discrete or curve.conservative)
+    return flow and "hopf" in curve.detect and "neutral_saddle" not in curve.detect
+
+
+def _find(
+    curve: Curve, path: Path
+) -> tuple[list[Placed], npt.NDArray[np.complex128], tuple[str, ...]]:
     if curve.kind != EQUILIBRIUM:
         assert path.eigenvalues is not None
-        return find_on(curve, path), path.eigenvalues
-    detect = curve.options.detect
+        placed, messages = find_on(curve, path)
+        return placed, path.eigenvalues, messages
+    detect = curve.detect
     if not detect:
         if path.eigenvalues is None:  # nothing is asked for that takes long
-            return [], np.full((path.count, curve.n), np.nan, dtype=complex)
-        return [], path.eigenvalues
-    found, eigenvalues = brackets(curve, path, detect, curve.conservative)
-    placed: list[Placed] = []
-    for bracket in found:
+            return [], np.full((path.count, curve.n), np.nan, dtype=complex), ()
+        return [], path.eigenvalues, ()
+    if _not_isolated(curve, path):
+        unknown = not_searched(path, curve.n).eigenvalues
+        values = unknown if path.eigenvalues is None else path.eigenvalues
+        return [], values, ()
+    stage(f"looking for special points on {path.count:,} points")
+    found, eigenvalues, messages = brackets(curve, path, detect, curve.conservative)
+    placed = []
+    for k, bracket in enumerate(found):
+        stage(f"special point {k + 1} of about {len(found)} on {path.count:,} points")
         for special in locate(curve, bracket):
             if not wanted(special, detect):
                 continue
@@ -62,7 +96,15 @@ def _find(curve: Curve, path: Path) -> tuple[list[Placed], npt.NDArray[np.comple
         first, last = placed[0], placed[-1]
         if first.special.kind == last.special.kind and _distance(curve, first, last) < SAME:
             placed = placed[:-1]
-    return placed, eigenvalues
+    return placed, eigenvalues, messages
+
+
+def _not_isolated(curve: Curve, path: Path) -> bool:
+    """Whether all is singular along a path, which then is one of many: its end says so."""
+    if not any(NOT_ISOLATED in stop.message for stop in path.stops if stop.reason == "stuck"):
+        return False
+    some = {0, path.count // 2, path.count - 1}
+    return all(deficient(curve, path.u[k], path.slopes[k]) for k in some)
 
 
 def _rounded(curve: Curve, special: Special) -> Special:

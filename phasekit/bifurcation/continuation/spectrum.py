@@ -13,11 +13,14 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.rows import across, count, largest, largest_entry
 
 Array = npt.NDArray[np.float64]
+EPSILON = 2.0**-52
+SURE = 10.0  # times an error that tells
 OPPOSITE = 1e-6  # part of a matrix from which on the sign of an entry is no rounding
 ROUNDED = 1e-13  # by how much more than 1 the size of a multiplier is but rounding
 KEPT = 1e-7  # the same where areas are kept: multipliers that meet part with the root of rounding
 SAME = 1e-10  # part of the largest eigenvalue by which two others are told apart
 NEAR = 1e-5  # a spectrum with a pair that sums to more, relative, is not that of such a system
+FEW = 32  # eigenvalues up to which all twos are looked at
 NEUTRAL = 1e-9  # a spectrum whose pairs sum to less, relative, is that of a conservative system
 
 
@@ -99,6 +102,17 @@ def _eigenvalues_of_finite(matrices: Array, accuracy: float) -> npt.NDArray[np.c
     return values
 
 
+def surely_complex(
+    matrix: Array, values: npt.NDArray[np.complex128], accuracy: float
+) -> npt.NDArray[np.bool_]:
+    """Which eigenvalues of a matrix, on scaled axes, are no real ones, as far as entries tell.
+
+    Errors of the entries part a double real one into a pair at the root of their size.
+    """
+    error = SURE * accuracy * np.linalg.norm(matrix, 2)
+    return np.asarray(values.imag**2 > error * np.abs(values))
+
+
 def _symmetric(matrices: Array, accuracy: float) -> npt.NDArray[np.bool_]:
     gap = largest_entry(matrices - matrices.swapaxes(-1, -2))
     return np.asarray(gap <= 4.0 * accuracy * largest_entry(matrices))
@@ -159,6 +173,8 @@ def _eigenvalues_of_two(slopes: Array) -> npt.NDArray[np.complex128]:
     with np.errstate(all="ignore"):
         # The product is the determinant, which is exact next to zero where mean -+ width is not.
         near = np.where(far != 0.0, (a * d - b * c) / far, 0.0)
+    # Where all cancels, as of two that are 0, its rounding over that of the mean says nothing.
+    near = np.where(np.abs(near) > 2.0 * np.abs(far), 2.0 * mean - far, near)
     result = np.empty(slopes.shape[:-2] + (2,), dtype=complex)
     result.real = np.stack([np.where(real, far, mean), np.where(real, near, mean)], axis=-1)
     result.imag = np.stack([np.where(real, 0.0, width), np.where(real, 0.0, -width)], axis=-1)
@@ -189,8 +205,12 @@ def test_functions(
     *,
     pairs: bool,
     neutral: bool,
+    saddles: bool,
 ) -> Tests:
-    """The test functions of points with their tangents, derivatives of f and eigenvalues."""
+    """The test functions of points with their tangents, derivatives of f and eigenvalues.
+
+    Without ``saddles`` the pair function is that of conjugate pairs alone.
+    """
     n = curve.n
     sign, log = orientation(curve, tangent, slopes)
     if values is None:
@@ -198,7 +218,12 @@ def test_functions(
     nothing = np.ones(slopes.shape[:-2])
     pair, below = nothing, np.full(nothing.shape, -1)
     if pairs and n > 1:
-        pair, below = (product_function(values), below) if curve.discrete else pair_sums(values)
+        if curve.discrete:
+            pair = product_function(values)
+        elif saddles:
+            pair, below = pair_sums(values)
+        else:
+            pair = conjugate_function(values)
     return Tests(
         tangent[..., n] / curve.scale[n],
         sign,
@@ -217,11 +242,41 @@ def unstable_of(
 ) -> npt.NDArray[np.int64]:
     """Number of unstable eigenvalues; ``blur`` is the part of the largest that tells no sign.
 
-    The size of a multiplier is a rounded number, and may be exactly 1.
+    The size of a multiplier is a rounded number, and may be exactly 1. Where the spectrum is
+    ``neutral`` pairs that are on the axis but for their errors do not count.
     """
     least = (KEPT if neutral else ROUNDED) if curve.discrete else 0.0
     floor = np.maximum(least, blur) * largest(values)
-    return np.asarray(count(curve.growth(values) > floor[..., None]))
+    grows = curve.growth(values) > floor[..., None]
+    if neutral:
+        grows &= ~on_axis(curve, values)
+    return np.asarray(count(grows))
+
+
+def _error(values: npt.NDArray[np.complex128]) -> Array:
+    """What real parts on the axis may be: rounding of the matrix, and a part of their own sizes."""
+    return np.asarray(NEUTRAL * np.abs(values) + SURE * EPSILON * largest(values)[..., None])
+
+
+def on_axis(curve: Curve, values: npt.NDArray[np.complex128]) -> npt.NDArray[np.bool_]:
+    """Which eigenvalues are of conjugate pairs on the axis, within their errors."""
+    off = np.abs(curve.growth(values))
+    return np.asarray((values.imag != 0.0) & (off <= _error(values)))
+
+
+def twos_on_axis(curve: Curve, values: npt.NDArray[np.complex128]) -> npt.NDArray[np.bool_]:
+    """At which points a pair is on the axis, or two real eigenvalues sum to zero.
+
+    Of a map, two real multipliers whose product is 1.
+    """
+    found = on_axis(curve, values).any(axis=-1)
+    if values.shape[-1] <= FEW:
+        i, j = _twos(values.shape[-1])
+        a, b, error = values[..., i], values[..., j], _error(values)
+        real = (a.imag == 0.0) & (b.imag == 0.0)
+        off = np.abs(a.real * b.real - 1.0) if curve.discrete else np.abs(a.real + b.real)
+        found |= np.any(real & (off <= error[..., i] + error[..., j]), axis=-1)
+    return np.asarray(found)
 
 
 def flip_function(values: npt.NDArray[np.complex128]) -> Array:
@@ -254,6 +309,19 @@ def _twos(n: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
 def pair_function(values: npt.NDArray[np.complex128]) -> Array:
     """Smallest real sum of two eigenvalues with the sign of the product of all such sums."""
     return pair_sums(values)[0]
+
+
+def conjugate_function(values: npt.NDArray[np.complex128]) -> Array:
+    """The least sum of two conjugate eigenvalues, with a sign that changes at Hopf points.
+
+    Pairs with a positive real part are counted with half the number of positive eigenvalues, so
+    that a pair that becomes real, or did, counts as before.
+    """
+    unstable = count(values.real > 0.0)
+    sums = np.where(values.imag > 0.0, 2.0 * np.abs(values.real), np.inf)
+    least = across(np.minimum, sums, initial=np.inf)
+    least = np.where(np.isfinite(least), least, largest(values))
+    return np.asarray(np.where(unstable // 2 % 2 == 1, -least, least))
 
 
 def pair_sums(values: npt.NDArray[np.complex128]) -> tuple[Array, npt.NDArray[np.int64]]:

@@ -2,18 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.acceptance import rounded
-from phasekit.bifurcation.continuation.curve import Curve, Track
+from phasekit.bifurcation.continuation.conserved import deficient, not_isolated
+from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.ending import followed
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
+from phasekit.bifurcation.continuation.stops import UNFINISHED, place_of, wished
 from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
 
 Array = npt.NDArray[np.float64]
+
+STEP = 2.0**-20  # of an unknown, within which f may have no value
 
 
 def settle(curve: Curve, u: Array, names: str) -> Array:
@@ -29,13 +36,28 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
     if not np.isfinite(curve.at(found)[1]).all():
         raise ConvergenceError(
             f"x0: the derivatives of f are not finite at the equilibrium x = "
-            f"{found[: curve.n].tolist()} that {names} leads to; give another x0, or start beside"
+            f"{found[: curve.n].tolist()} that {names} leads to{_edges(curve, found)}; give "
+            "another x0, or start beside"
         )
     return found
 
 
+def _edges(curve: Curve, u: Array) -> str:
+    """Where f has no value right beside a point, in words; nothing if it has one all around."""
+    names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
+    steps = STEP * np.maximum(np.abs(u[: curve.m]), curve.scale[: curve.m])
+    found = [
+        f"{name} {side} {u[j]:.9g}"
+        for side, sign in (("below", -1.0), ("above", 1.0))
+        for j, name in enumerate(names)
+        if not np.isfinite(curve.values(u[None] + sign * steps[j] * np.eye(curve.size)[j])).all()
+    ]
+    return f": f has no value for {' and '.join(found)}" if found else ""
+
+
 def _settled(curve: Curve, u: Array, names: str) -> Array:
     n = curve.n
+    curve.field.failure = None
     value, _ = curve.at(u)
     if not np.isfinite(value).all():
         failure = curve.field.failure
@@ -87,7 +109,8 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
             return guess
     raise ConvergenceError(
         f"x0: no equilibrium was found from {names} (|f| = {np.max(np.abs(value)):.3g} there) by "
-        "Newton's method, Powell's hybrid method or Levenberg-Marquardt; give an x0 that is closer"
+        f"Newton's method, Powell's hybrid method or Levenberg-Marquardt{_edges(curve, u)}; give "
+        "an x0 that is closer"
     )
 
 
@@ -124,11 +147,20 @@ def run(curve: Curve, start: Sample, directions: str) -> tuple[Track | None, Tra
     """Follow a curve from its start, backward and forward; None where it was not asked for."""
     points = curve.options.max_points
     forward = backward = None
+    if curve.kind == EQUILIBRIUM and deficient(curve, start.u, start.slopes):
+        why = not_isolated(curve, start.u[: curve.m], place_of(curve, start.u))
+        if why:  # there is no branch to follow
+            still = replace(curve.not_begun(start.u, start.tangent), stop=Stop("stuck", why))
+            return (None if directions == "forward" else still), (
+                None if directions == "backward" else still
+            )
     if directions != "backward":
         forward = followed(curve, start, curve.start_state(start.u, start.tangent), points)
     closed = forward is not None and forward.stop.reason == "closed"
     if directions != "forward" and not closed:
         start = _turned(start)
+        if forward is not None and forward.stop.reason == "interrupted":
+            return curve.not_begun(start.u, start.tangent), forward
         backward = followed(curve, start, curve.start_state(start.u, start.tangent), points)
     return backward, forward
 
@@ -136,16 +168,36 @@ def run(curve: Curve, start: Sample, directions: str) -> tuple[Track | None, Tra
 def go_on(
     curve: Curve, start: Sample, tracks: tuple[Track | None, Track | None], points: int
 ) -> tuple[Track | None, Track | None]:
-    """More points of tracks that ended for their number, exactly as if they had never stopped."""
+    """More points of tracks that can be longer, exactly as if they had never stopped."""
     backward, forward = (
         track
-        if track is None or track.stop.reason != "max_points"
-        else followed(curve, begin, track.state, points, track)
+        if track is None or not goes_on(curve, track)
+        else followed(curve, begin, *_left(curve, begin, track, points))
         for begin, track in zip((_turned(start), start), tracks, strict=True)
     )
     if forward is not None and forward.stop.reason == "closed":
         backward = None
     return backward, forward
+
+
+def goes_on(curve: Curve, track: Track) -> bool:
+    """Whether a track can be longer: it was cut, or a bound is no longer where it met it."""
+    reason = track.stop.reason
+    if reason != "bound":
+        return reason in UNFINISHED or wished(track.stop, curve.ends)
+    u = track.state[: len(curve.low)]  # vectors of curves in two parameters have bounds as well
+    return bool(np.all((u > curve.low) & (u < curve.high)))
+
+
+def _left(curve: Curve, start: Sample, track: Track, points: int) -> tuple[Array, int, Track]:
+    """What `followed` goes on from: the state behind the last point.
+
+    Where the track was cut at a special point, it is followed again up to there.
+    """
+    if wished(track.stop, curve.ends) and len(track.record):
+        state = curve.start_state(start.u, start.tangent)
+        track = replace(track, state=curve.follow(state, len(track.record)).state)
+    return track.state, points, track
 
 
 def _turned(start: Sample) -> Sample:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.conserved import not_isolated
 from phasekit.bifurcation.continuation.kernels import newton, trace
 from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.numerics import differences
@@ -15,19 +16,30 @@ from phasekit.numerics import differences
 Array = npt.NDArray[np.float64]
 
 
+HARDLY = 1e-3  # part of the span of a parameter
+#: Ends that say nothing of the curve, which goes on from there.
+UNFINISHED = ("max_points", "interrupted")
+
+
 @dataclass(frozen=True)
 class Stop:
-    """Why a curve ends: full, bound, closed, stuck or not_finite; and what says so in words."""
+    """Why a curve ends, such as bound, closed, stuck or not_finite; and what says so in words."""
 
     reason: str
     message: str
 
 
+def place_of(curve: Any, w: Array) -> str:
+    """A point of a curve in words."""
+    names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
+    where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
+    return where + (", ..." if len(names) > 4 else "")
+
+
 def said(curve: Any, reason: int, which: int, w: Array) -> Stop:
     """Say why a track of a `Curve` ends in the state w."""
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
-    where = ", ".join(f"{name} = {w[i]:.9g}" for i, name in enumerate(names[:4]))
-    where += ", ..." if len(names) > 4 else ""
+    where = place_of(curve, w)
     if reason == trace.BOUND and which >= curve.m:
         return Stop("bound", f"branches no longer meet on the curve beyond {where}")
     if reason == trace.BOUND:
@@ -35,6 +47,15 @@ def said(curve: Any, reason: int, which: int, w: Array) -> Stop:
         if not np.isfinite(curve.low[which]) or not np.isfinite(curve.high[which]):
             over = bool(np.isfinite(curve.high[which])) or w[which] > 0.0
         side, bound = ("upper", curve.high) if over else ("lower", curve.low)
+        if which < curve.n and names[which] not in curve.options.bounds:  # nobody gave it
+            passed = f"passed {bound[which]:.3g}, far beyond its size at the start"
+            if _ends_nowhere(curve, w, which):
+                passed = f"grows without end: it {passed}"
+            return Stop(
+                "bound",
+                f"{names[which]} {passed}; ContinuationOptions(bounds={{{names[which]!r}: "
+                "(low, high)}) sets another limit",
+            )
         return Stop("bound", f"{names[which]} met its {side} bound {bound[which]:.9g}")
     if reason == trace.CLOSED:
         return Stop("closed", f"the curve closed on its start at {where}")
@@ -48,12 +69,35 @@ def said(curve: Any, reason: int, which: int, w: Array) -> Stop:
             f"within {step}",
             CROSSES: f"branches cross or pass each other within {step}",
         }
+        why = not_isolated(curve, w[: curve.m], where)
+        if why:
+            return Stop("stuck", why)
         return Stop("stuck", f"{words[which]} at {where}{_differences(curve)}")
     if reason == trace.NOT_FINITE:
-        failure = curve.field.failure
-        said = "" if failure is None else f": it raised {type(failure).__name__}: {failure}"
-        return Stop("not_finite", f"f is not finite beyond {where}{said}")
-    return Stop("max_points", f"max_points were computed, the last at {where}; extend() goes on")
+        return Stop("not_finite", f"f is not finite beyond {where}{curve.field.raised}")
+    if reason == trace.INTERRUPTED:
+        return Stop("interrupted", f"it was interrupted behind {where}")
+    return Stop("max_points", f"max_points were computed, the last at {where}")
+
+
+def _ends_nowhere(curve: Any, w: Array, which: int) -> bool:
+    """Whether the parameters hardly move while an unknown grows, as next to a pole."""
+    free = slice(curve.n, curve.m)
+    moved = np.abs(w[curve.size :][free] * w[which])
+    room = np.where(np.isfinite(curve.high - curve.low), curve.high - curve.low, np.inf)[free]
+    grown = abs(w[curve.size + which])
+    return bool(np.all(moved <= HARDLY * room * grown))
+
+
+def wished(stop: Stop, ends: tuple[str, ...]) -> bool:
+    """Whether a user's ``stop=`` ended it, not the doubling that an orbit of period two ends at."""
+    return stop.reason in ends and stop.message.startswith("stop = ")
+
+
+#: Where special points were not yet looked for.
+SEARCHED = Stop("interrupted", "it was interrupted while special points were looked for")
+#: Where there was no time for a first point.
+NOT_BEGUN = Stop("interrupted", "it was interrupted before its first point")
 
 
 def _differences(curve: Any) -> str:

@@ -1,4 +1,4 @@
-"""Curves of folds, Hopf and branch points in two parameters, and the special points on them."""
+"""Curves of special points and events in two parameters, and the special points on them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, HOPF, TORUS
+from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EVENT, HOPF, TORUS
+from phasekit.bifurcation.continuation.normal_form import zero_along
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.placed import Placed, unique
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
@@ -30,15 +31,15 @@ def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curv
     ``curve`` has both parameters free; None where the curve has no tangent there.
     """
     n, m = curve.n, curve.m
-    assert special.extra is not None
-    extra, aux = special.extra, None
+    extra, aux = np.zeros(0) if special.extra is None else special.extra, None
     if kind in (HOPF, TORUS):
         extra, aux = extra[: n + 1], extra[n + 1 :]
     u = np.concatenate([special.u[: n + 1], [curve.par[curve.active[1]]], extra])
-    made = extended(curve, kind, u, extra, aux)
-    # One of the two parameters is held: that one for which the square system is regular.
+    made = curve.replace(kind=kind) if kind == EVENT else extended(curve, kind, u, extra, aux)
+    # One unknown is held: a parameter for which the square system is regular; a state if there is
+    # none, as at an event that a parameter alone decides.
     best = None
-    for i in (n + 1, n):
+    for i in (n + 1, n, *(range(n) if kind == EVENT else ())):
         row = np.zeros(made.size)
         row[i] = 1.0
         point = made.refine(u, row)
@@ -64,12 +65,19 @@ def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curv
     return made, Sample(point.u, t, point.slopes[:, :m])
 
 
-def find_on(curve: Curve, path: Path) -> list[Placed]:
-    """Cusp, Bogdanov-Takens, zero-Hopf, generalized Hopf and double Hopf points of a curve."""
+def find_on(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
+    """Cusp, Bogdanov-Takens, zero-Hopf, generalized Hopf and double Hopf points of a curve.
+
+    And, in words, what is zero all along it, whose zeros are no points.
+    """
     found: list[Placed] = []
+    messages: list[str] = []
     m = curve.m
     for test in tests_of(curve):
         values = test.values(curve, path.u, path.slopes[:])
+        if _vanishes(values):
+            messages.append(zero_along(test.coefficient, test.kind))
+            continue
         for i in _interesting(values):
             for a, b in _changes(curve, path, values, i, test):
                 special = _locate(curve, a, b, test)
@@ -79,7 +87,13 @@ def find_on(curve: Curve, path: Path) -> list[Placed]:
                     gap = np.dot(ahead, special.u - path.u[i, :m])
                     square = np.dot(ahead, chord[:m])
                     found.append(Placed(i, float(gap / square), special))
-    return _without_echoes(curve, unique(curve, path, found))
+    return _without_echoes(curve, unique(curve, path, found)), tuple(messages)
+
+
+def _vanishes(values: Array) -> bool:
+    """Whether a function is zero along more than half of the curve where it is known."""
+    finite = values[np.isfinite(values)]
+    return len(finite) > 2 and 2 * int(np.sum(finite == 0.0)) > len(finite)
 
 
 def _interesting(values: Array) -> list[int]:
@@ -145,7 +159,7 @@ def _locate(curve: Curve, a: Sample, b: Sample, test: CurveTest) -> Special | No
     sharp = value <= max(1e-6, 1e2 * curve.field.accuracy) * size
     return Special(
         test.kind, best.u[: curve.m], ends, residual, CONVERGED if sharp else GUESS,
-        "" if sharp else "the test function was not brought to zero", tangent=best.tangent,
+        "" if sharp else "the test function did not reach zero", tangent=best.tangent,
         extra=best.u[curve.m :],
     )  # fmt: skip
 

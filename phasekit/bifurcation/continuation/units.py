@@ -17,13 +17,38 @@ def row_sizes(matrix: Array) -> Array:
     return np.asarray(np.where(sizes > 1e-12 * np.max(sizes, initial=0.0), sizes, 1.0))
 
 
-def force_sizes(curve: Curve, u: Array) -> Array:
+#: How many times more than the states a parameter moves f before its scale is made smaller.
+STEEP = 1e6
+
+
+def scale_at(curve: Curve, u: Array) -> Array:
+    """Scales of the unknowns at a point: of a parameter, no more than what moves f as states do.
+
+    The span of a parameter says nothing of where f turns steep in it, as lam exp(u) does for
+    large u; next to such a column all others would vanish.
+    """
+    n, m = curve.n, curve.m
+    scale = np.array(curve.scale[:m])
+    moved = np.abs(curve.at(u)[1] * scale)
+    states = np.zeros(m)
+    states[:n] = scale[:n]
+    by_states = np.max(moved[:, :n], axis=1) + np.max(
+        np.abs(curve.bend(u, states) * states), axis=1
+    )
+    for j in range(n, m):
+        with np.errstate(all="ignore"):
+            ratio = float(np.max(np.where(by_states > 0.0, moved[:, j] / by_states, 0.0)))
+        if np.isfinite(ratio) and ratio > STEEP:
+            scale[j] /= ratio
+    return scale
+
+
+def force_sizes(curve: Curve, u: Array, scale: Array | None = None) -> Array:
     """Sizes of the entries of f near a point: of its first and second derivatives.
 
     The second ones count because all first ones of an entry may vanish at a special point.
     """
-    m = curve.m
-    scale = curve.scale[:m]
+    scale = curve.scale[: curve.m] if scale is None else scale
     sizes = np.max(np.abs(curve.at(u)[1] * scale), axis=1)
     sizes = sizes + np.max(np.abs(curve.bend(u, scale) * scale), axis=1)
     return np.asarray(np.where((sizes > 0.0) & np.isfinite(sizes), sizes, 1.0))

@@ -56,7 +56,7 @@ class Segment(Path):
 
 
 class Jump(NamedTuple):
-    """A fold at which the center is lost: between which steps, and where on the path."""
+    """A fold at which the center disappears: between which steps, and where on the path."""
 
     step: int
     at: float
@@ -128,7 +128,7 @@ class Walk:
 
 
 def _crossed(event: Event, before: Interval, after: Interval, sheet: int) -> tuple[bool, int]:
-    """Whether the center is lost at an event, and the sheet beyond it."""
+    """Whether the center disappears at an event, and the sheet beyond it."""
     was, enters = before.number == 4, after.number == 4
     if was == enters:
         return False, sheet

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.problem import Problem
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -18,7 +18,7 @@ SPREAD = 33
 
 
 def values_between(
-    problem: Problem, parameter: str, span: tuple[float, float], system: Model | None
+    problem: Problem, parameter: str, span: tuple[float, float], system: System | None
 ) -> FloatArray | None:
     """Values of a parameter in a span, between all critical values that are known.
 
@@ -40,7 +40,7 @@ def solvable(problem: Problem) -> bool:
 
 
 def equilibria_at(
-    problem: Problem, parameter: str, values: FloatArray, system: Model | None
+    problem: Problem, parameter: str, values: FloatArray, system: System | None
 ) -> list[tuple[float, float]]:
     """All equilibria at values of a parameter, as (value, state); of an angle in one turn."""
     if system is not None:
@@ -71,7 +71,7 @@ def _roots(problem: Problem, changes: dict[str, float]) -> list[float]:
     return [float(angle) for angle in np.angle(on_circle)]
 
 
-def _critical(system: Model | None, parameter: str, span: tuple[float, float]) -> list[float]:
+def _critical(system: System | None, parameter: str, span: tuple[float, float]) -> list[float]:
     """Values of a system's parameter at which equilibria meet: all of them, by exact arithmetic."""
     if system is None or not issubclass(system.rung, Trigonometric):
         return []

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+import difflib
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from os import PathLike
 from types import MappingProxyType
 from typing import Any, Self, cast
@@ -18,6 +20,7 @@ from phasekit.bifurcation.continuation.gaps import narrow
 from phasekit.bifurcation.continuation.kernels.defining import (
     BRANCH,
     EQUILIBRIUM,
+    EVENT,
     FLIP,
     FOLD,
     HOPF,
@@ -26,16 +29,20 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 from phasekit.bifurcation.continuation.path import Path, Sample, join
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.bifurcation.continuation.specials import find
-from phasekit.bifurcation.continuation.start import go_on
+from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
+from phasekit.bifurcation.continuation.start import go_on, goes_on
+from phasekit.bifurcation.continuation.stops import SEARCHED
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.branch_points import points_of
+from phasekit.labelled.continuation.branch_points import Table, points_of
+from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
+from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
-from phasekit.labels.arguments import bad, whole
-from phasekit.labels.equality import same_fields
+from phasekit.labels.arguments import bad, unknown, whole
+from phasekit.labels.equality import equal, same_fields
+from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -43,14 +50,47 @@ Record = Mapping[str, Any]
 
 KINDS = {
     EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point",
-    FLIP: "period_doubling", TORUS: "torus",
+    FLIP: "period_doubling", TORUS: "torus", EVENT: "event",
 }  # fmt: skip
 NUMBERS = {name: number for number, name in KINDS.items()}
 
 
+#: Usual words for kinds of special points, beside their names and labels.
+_SYNONYMS = {
+    "limit_point": "fold",
+    "saddle_node": "fold",
+    "turning_point": "fold",
+    "andronov_hopf": "hopf",
+    "flip": "period_doubling",
+    "neimark_sacker": "torus",
+    "bautin": "generalized_hopf",
+    "double_hopf": "hopf_hopf",
+    "fold_hopf": "zero_hopf",
+}
+
+
+def _check_kind(label: Any, events: list[str]) -> None:
+    """Refuse what is no kind, label or event, with the name that was probably meant."""
+    labels = {kind.label for kind in SPECIAL.values()}
+    valid = {*SPECIAL, *labels, *events}
+    if isinstance(label, str) and label in valid:
+        return
+    hint = ""
+    if isinstance(label, str):
+        plain = label.strip().lower().replace(" ", "_").replace("-", "_")
+        stem = plain.removesuffix("s").removesuffix("_point")
+        words = (plain, plain.removesuffix("s"), stem, label.upper())
+        meant = [_SYNONYMS.get(word, word) for word in words]
+        meant = [word for word in meant if word in valid]
+        meant = meant or difflib.get_close_matches(plain, [*SPECIAL, *events], n=1)
+        hint = f"did you mean {meant[0]!r}?" if meant else ""
+    names = [f"{kind.name} ({kind.label})" for kind in SPECIAL.values()]
+    raise bad("label", label, f"one of {', '.join([*names, *events])}", hint)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch:
-    """A curve of equilibria (or of folds, Hopf or branch points), with its special points.
+    """A curve of equilibria (or of folds, Hopf or branch points, events), with its special points.
 
     Made by `continuation`, `SpecialPoint.switch`, `SpecialPoint.curve` and `diagram`.
 
@@ -72,7 +112,7 @@ class Branch:
     messages : tuple of str
         What is not certain about the curve as a whole; empty where nothing is in doubt.
     kind : str
-        equilibrium, fold, hopf or branch_point; of maps period_doubling or torus, too.
+        equilibrium, fold, hopf, branch_point or event; of maps period_doubling or torus, too.
     parameter : str
         The free parameter; ``free`` holds all of them.
     problem : Problem
@@ -116,16 +156,21 @@ class Branch:
     curve: Curve
     start: Sample
     tracks: tuple[Track | None, Track | None]
-    _points: xr.Dataset
+    _table: Table
     special_points: tuple[SpecialPoint[Branch], ...]
     stops: tuple[Stop, Stop]
     kind: str
     record: Record
     messages: tuple[str, ...] = ()
 
+    @functools.cached_property
+    def _points(self) -> xr.Dataset:
+        """The points, made when they are first asked for."""
+        return self._table()
+
     @property
     def points(self) -> xr.Dataset:
-        """The points, as a Dataset of its own that shares the (read-only) values."""
+        """The points as a Dataset; its values are read-only."""
         return self._points.copy()
 
     @property
@@ -139,7 +184,7 @@ class Branch:
         return self.stops[1].reason == "closed"
 
     def to_dataset(self) -> xr.Dataset:
-        """The points with the special points beside them, on the dim ``special_point``.
+        """The points, and the special points on the dim ``special_point``.
 
         Returns
         -------
@@ -175,12 +220,12 @@ class Branch:
         return ds
 
     def special(self, label: str) -> tuple[SpecialPoint[Branch], ...]:
-        """The special points of one label (LP, BP, ...), kind (fold, ...) or named event.
+        """Special points of one kind (fold, ...), label (LP, BP, ...) or named event.
 
         Parameters
         ----------
         label : str
-            A label, a kind, or the name of an event.
+            A kind, a label, or the name of an event.
 
         Returns
         -------
@@ -192,10 +237,8 @@ class Branch:
         ParameterError
             If there is no such label, kind or event.
         """
-        labels = dict.fromkeys(kind.label for kind in SPECIAL.values())
         events = [event.name for event in getattr(self.curve, "events", ())]
-        if not isinstance(label, str) or label not in {*SPECIAL, *labels, *events}:
-            raise bad("label", label, f"one of {', '.join([*labels, *events])}")
+        _check_kind(label, events)
         return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
@@ -214,15 +257,26 @@ class Branch:
         """
         return picture("branch")(self, ax=ax, **keywords)
 
-    def extend(self, points: int | None = None) -> Self:
-        """Go on where the curve ended for its number of points; a new branch.
+    def extend(
+        self,
+        points: int | None = None,
+        *,
+        span: Sequence[float] | None = None,
+        bounds: Mapping[str, Sequence[float]] | None = None,
+    ) -> Self:
+        """Continue a curve from its ends; a new branch.
 
-        Its points are, bit for bit, those of a branch that was never interrupted.
+        It goes on where the branch was cut: by ``max_points``, by Ctrl-C, at a ``stop``, or at a
+        bound that is wider now. Its points are, bit for bit, those of a branch that was never cut.
 
         Parameters
         ----------
         points : int, optional
             How many more at most in each direction; default: the option max_points.
+        span : (float, float), optional
+            A wider range of the parameter, for a branch that met its end.
+        bounds : mapping of str to (float, float), optional
+            Wider bounds of states and parameters by name.
 
         Returns
         -------
@@ -232,19 +286,74 @@ class Branch:
         Raises
         ------
         ParameterError
-            If no end can be extended, or the problem is not known.
+            If no end can be extended, bounds are narrower than they were, or the problem is not
+            known.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+        >>> branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1), stop="fold")
+        >>> longer = branch.extend()
+        >>> len(branch.special("fold")), len(longer.special("fold"))
+        (1, 2)
+        >>> round(float(longer.extend(span=(-1, 2)).points.mu.max()), 9)
+        2.0
         """
         curve, _ = self.known()
-        if all(track is None or track.stop.reason != "max_points" for track in self.tracks):
+        most = curve.options.max_points if points is None else points
+        count = whole("points", most, "a whole number >= 1")
+        wider = self._wider(span, bounds)
+        widened = curve.replace(**wider)
+        if not any(track is not None and self._goes_on(widened, track) for track in self.tracks):
             reasons = "; ".join(stop.message for stop in self.stops)
             raise ParameterError(
-                f"extend: the branch ended for other reasons than max_points: {reasons}"
+                f"extend: the branch ended for other reasons than max_points: {reasons}; where it "
+                "met a bound, give a wider span= or bounds="
             )
-        count = curve.options.max_points if points is None else points
-        return self._longer(whole("points", count, "a whole number >= 1"))
+        with said(f"extending the branch along {self.parameter}"):
+            return announced(self._longer(count, wider))
 
-    def _longer(self, count: int) -> Self:
+    def _wider(
+        self, span: Sequence[float] | None, bounds: Mapping[str, Sequence[float]] | None
+    ) -> dict[str, Any]:
+        """Bounds of the curve that are replaced, checked."""
+        curve, _ = self.known()
+        names = self._bounded()
+        asked = dict(check_bounds(bounds))
+        if span is not None:
+            if len(self.free) != 1:
+                raise bad("span", span, f"None: give bounds= of {' and '.join(self.free)}")
+            asked[self.parameter] = span
+        low, high = curve.low.copy(), curve.high.copy()
+        for name, pair in asked.items():
+            if name not in names:
+                raise unknown("bounds: state or parameter", name, names)
+            argument = (
+                "span" if span is not None and name == self.parameter else f"bounds[{name!r}]"
+            )
+            first, last = check_span(pair, None, argument)
+            i = names.index(name)
+            least, most = low[i], high[i]
+            state = name in self.problem_state and curve.period[i] == 0.0
+            if state and name not in curve.options.bounds:  # nobody gave these
+                least, most = np.min(self._points[name]), np.max(self._points[name])
+            if first > least or last < most:
+                raise bad(argument, pair, f"a range that holds {least:.9g} to {most:.9g}")
+            low[i], high[i] = first, last
+        return {"low": low, "high": high}
+
+    def _bounded(self) -> list[str]:
+        """What the bounds of the curve are bounds of."""
+        return [*self.curve.field.states, *self.free]
+
+    @staticmethod
+    def _goes_on(curve: Any, track: Any) -> bool:
+        return goes_on(curve, track)
+
+    def _longer(self, count: int, bounds: Mapping[str, Any]) -> Self:
         curve, problem = self.known()
+        curve = curve.replace(**bounds)
         backward, forward = go_on(curve, self.start, self.tracks, count)
         made = make_branch(problem, curve, self.start, backward, forward, self.record)
         return cast(Self, made)
@@ -321,7 +430,8 @@ class Branch:
         """Whether it is the same curve of an equal problem, traced and recorded alike."""
         if type(self) is not type(other):
             return NotImplemented
-        return same_fields(self, other, NOT_COMPARED)
+        same: bool = same_fields(self, other, (*NOT_COMPARED, "_table"))
+        return same and equal(self._points, other._points)
 
     def __hash__(self) -> int:
         """Hash of what is followed, and how far."""
@@ -334,6 +444,8 @@ class Branch:
         of = {"equilibrium": "fixed points" if self._discrete() else "equilibria"}.get(
             self.kind, f"{self.kind} points"
         )
+        held = getattr(self.curve, "held", None)
+        of = of if held is None else f"points of the event {held.name!r}"
         lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]
@@ -358,16 +470,40 @@ def make_branch(
     record: Record,
 ) -> Branch:
     """A branch of what was traced: special points are looked for, quantities recorded."""
-    path = join(curve, start, backward, forward)
-    path, (placed, eigenvalues, doubts) = cut(curve, path, find(curve, path))
+    try:
+        path = join(curve, start, backward, forward)
+        found, gaps = find(curve, path), narrow(curve, path)
+        return _made(problem, curve, start, (backward, forward), path, found, gaps, record)
+    except KeyboardInterrupt:  # what was followed is kept
+        backward, forward = (
+            None if track is None else replace(track, stop=SEARCHED)
+            for track in (backward, forward)
+        )
+        path = join(curve, start, backward, forward)
+        found, gaps = not_searched(path, curve.n), ()
+        return _made(problem, curve, start, (backward, forward), path, found, gaps, record)
+
+
+def _made(
+    problem: Problem,
+    curve: Curve,
+    start: Sample,
+    tracks: tuple[Track | None, Track | None],
+    path: Path,
+    found: Specials,
+    gaps: tuple[str, ...],
+    record: Record,
+) -> Branch:
+    """A branch of a path and the special points that were found on it."""
+    path, (placed, eigenvalues, doubts) = cut(curve, path, found)
     names = tuple(curve.field.parameters[i] for i in curve.active)
     specials = [*placed, *_ends(curve, path)]
     specials.sort(key=lambda one: (one.index, one.along))
-    points, places, values = points_of(problem, curve, path, specials, eigenvalues, record)
+    table, places, values = points_of(problem, curve, path, specials, eigenvalues, record)
     branch = Branch(
-        problem, names, curve.field.states, curve, start, (backward, forward), points, (),
+        problem, names, curve.field.states, curve, start, tracks, table, (),
         path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
-        (*path.messages, *doubts, *narrow(curve, path)),
+        (*path.messages, *doubts, *gaps),
     )  # fmt: skip
     made = tuple(
         special_point(problem, curve, one.special, own, place, branch)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.bifurcation.continuation.conserved import NOT_ISOLATED
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
+from phasekit.bifurcation.continuation.kernels.defining import HOPF, REGULAR, TORUS
+from phasekit.bifurcation.continuation.neutral import is_neutral
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
-    is_conservative,
     unstable_of,
 )
 from phasekit.bifurcation.special_points import KINDS
@@ -26,6 +27,7 @@ from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Record = Mapping[str, Any]
+Table = Callable[[], xr.Dataset]
 
 
 def wrap(value: FloatArray, period: float) -> FloatArray:
@@ -40,8 +42,11 @@ def points_of(
     specials: list[Placed],
     eigenvalues: npt.NDArray[np.complex128],
     record: Record,
-) -> tuple[xr.Dataset, list[int], npt.NDArray[np.complex128]]:
-    """The points of a path with its special points, the places of these, and their eigenvalues."""
+) -> tuple[Table, list[int], npt.NDArray[np.complex128]]:
+    """The points of a path with its special points, the places of these, and their eigenvalues.
+
+    The points are made when they are called for: labels take longer than a short curve.
+    """
     n, m = curve.n, curve.m
     inner = [one for one in specials if one.special.kind != "end"]
     where = np.array([one.index + 1 for one in inner], dtype=np.int64)
@@ -94,8 +99,19 @@ def points_of(
     residual = np.empty(total)
     residual[own] = path.residual
     residual[mine] = curve.residuals(u[mine], [curve.at(point)[1] for point in u[mine]])
-    ds = _dataset(problem, curve, u, t, info, values, label, record, kappa, residual)
-    return ds, places, there
+    one_of_many = any(NOT_ISOLATED in stop.message for stop in path.stops)
+    table = functools.partial(
+        _dataset, problem, curve, u, t, info, values, label, record, kappa, residual, one_of_many
+    )
+    return made_with(table, record), places, there
+
+
+def made_with(table: Table, record: Record) -> Table:
+    """The table of points, to be made later; at once where functions of the user are recorded."""
+    if not record:
+        return table
+    made = table()
+    return lambda: made
 
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
@@ -133,6 +149,7 @@ def _dataset(
     record: Record,
     kappa: FloatArray,
     residual: FloatArray,
+    one_of_many: bool,
 ) -> xr.Dataset:
     n = curve.n
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
@@ -143,7 +160,7 @@ def _dataset(
         if curve.period[i] > 0.0:
             column = wrap(column, float(curve.period[i]))
         data[names[i]] = (dim, column, attrs_of(problem, names[i]))
-    if problem.conservative and curve.kind == EQUILIBRIUM:
+    if problem.conservative and curve.kind in REGULAR:
         flags = {
             "long_name": "kind of the equilibrium",
             "flag_values": np.array([k.value for k in EquilibriumKind], dtype=np.int8),
@@ -153,8 +170,8 @@ def _dataset(
     else:
         # Where eigenvalues are zero, or multipliers of size 1, but for rounding.
         marked = labels_along("fold", "branch_point", "hopf", "period_doubling", "torus")
-        critical = np.isin(label, marked) | (curve.kind != EQUILIBRIUM)
-        neutral = curve.discrete and is_conservative(values, discrete=True)
+        critical = np.isin(label, marked) | (curve.kind not in REGULAR) | one_of_many
+        neutral = is_neutral(curve, values)
         blur = np.where(critical, 1e-6, 0.0)
         unstable = unstable_of(curve, values, neutral=neutral, blur=blur).astype(np.int64)
         unstable[np.isnan(values).any(axis=1)] = -1
@@ -181,7 +198,7 @@ def _dataset(
     )  # fmt: skip
     data["step"] = (dim, info[:, trace.STEP_LENGTH].copy(), {"long_name": "length of the step"})
     data["residual"] = (
-        dim, residual, {"long_name": "largest size of f beside that of its terms"},
+        dim, residual, {"long_name": "largest f relative to its terms"},
     )  # fmt: skip
     data["newton_steps"] = (dim, info[:, trace.NEWTON_STEPS].astype(np.int64))
     unknown = _unknowns(tuple(names))

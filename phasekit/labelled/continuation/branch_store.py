@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,14 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.errors import StoreError
+from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.branch_stored import ARRAYS, Stored, damaged
 from phasekit.labelled.continuation.cycle_store import made_again
 from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
 from phasekit.maps.netcdf import open_netcdf
+from phasekit.maps.replacing import put_back
 from phasekit.maps.stored_arrays import reason
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
@@ -64,6 +66,8 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
         spec["conditions"] = [event.name for event in curve.events if event.condition]
     elif curve.ends:
         spec["ends"] = list(curve.ends)
+    if curve.held is not None:
+        spec["held"] = written([curve.held])
     ds.attrs = {
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
@@ -115,6 +119,8 @@ def _place(path: Any) -> Path:
     except RuntimeError as error:
         raise bad("path", path, f"a path that can exist: {error}") from None
     if not place.exists():
+        put_back(place.absolute(), "path")
+    if not place.exists():
         raise StoreError(f"path: {place} does not exist")
     return place
 
@@ -124,18 +130,36 @@ def _bytes(place: Path) -> int:
     return sum(file.stat().st_size for file in files if file.is_file())
 
 
-def _open(place: Path) -> xr.Dataset:
+@contextlib.contextmanager
+def _open(place: Path) -> Iterator[xr.Dataset]:
     """Open what is there, without reading its arrays."""
-    ds: xr.Dataset
+    store = None
     try:
         if place.is_dir():
+            from zarr.storage import LocalStore
+
+            from phasekit.maps.seal import sealed  # here: it loads zarr
+
+            folder = LocalStore(place, read_only=True)
+            store = sealed(folder, str(place))
             # Format 2 has codecs that unpickle what they read; branches are of format 3.
-            ds = xr.open_zarr(place, consolidated=False, chunks=None, zarr_format=3)
+            ds: xr.Dataset = xr.open_zarr(
+                store or folder, consolidated=False, chunks=None, zarr_format=3
+            )
         else:
             ds = open_netcdf(place)
     except Exception as error:  # whatever is made of files that are not what they were
         raise StoreError(f"path: {place} cannot be read: {reason(error)}") from error
-    if str(ds.attrs.get(MODEL)) != _NAME or "branch" not in ds.attrs:
-        ds.close()
-        raise StoreError(f"path: {place} holds no branch of phasekit")
-    return ds
+    with ds:
+        if str(ds.attrs.get(MODEL)) != _NAME or "branch" not in ds.attrs:
+            raise StoreError(f"path: {place} holds no branch of phasekit")
+        try:
+            yield ds
+        except StoreError:  # what is asked of any file says more
+            raise
+        except ParameterError:
+            if store is not None:
+                store.refuse_documents()
+            raise
+    if store is not None:
+        store.refuse_documents()

@@ -18,15 +18,16 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, HOPF, TORUS
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVENT, HOPF, TORUS
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS as STATE_NUMBERS
 from phasekit.bifurcation.continuation.kernels.state import VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.continuation.branch import NUMBERS
+from phasekit.labelled.continuation.branch import KINDS, NUMBERS
 from phasekit.labelled.continuation.user_events import events_of
 from phasekit.labels.arguments import bad
+from phasekit.maps.stored_arrays import reason
 from phasekit.systems.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.systems.problem import Problem
 from phasekit.systems.registry import model_named
@@ -35,7 +36,7 @@ Array = npt.NDArray[np.float64]
 
 #: Arrays of a curve, by name.
 ARRAYS = ("par", "scale", "period", "low", "high")
-_REASONS = ("bound", "closed", "max_points", "stuck", "not_finite", "start")
+_REASONS = ("bound", "closed", "max_points", "interrupted", "stuck", "not_finite", "start")
 #: Bytes of an array that any file may hold, and how many times smaller it may be stored.
 _SMALL, _RATIO = 1 << 26, 1000
 
@@ -47,6 +48,8 @@ def damaged(name: str, what: str) -> Iterator[None]:
         yield
     except StoreError:
         raise
+    except MemoryError as error:
+        raise StoreError(f"path: {name} cannot be read: {reason(error)}") from error
     except Exception as error:  # whatever is made of values that are not what they were
         kind = "" if isinstance(error, ParameterError) else f"{type(error).__name__}: "
         why = f"{kind}{error}"
@@ -114,15 +117,21 @@ class Stored:
             ends = tuple(str(name) for name in self.spec.get("ends", ()))
             conditions = list(self.spec.get("conditions", ()))
         events = tuple(replace(one, condition=one.name in conditions) for one in events)
+        held = None
+        if self.spec["kind"] == KINDS[EVENT]:
+            found = self.events(problem, given, events_of, "held")
+            with damaged(self.name, "its event"):
+                (held,) = found
         return {"events": events, "ends": ends, "conservative": problem.conservative,
-                "discrete": problem.map}  # fmt: skip
+                "discrete": problem.map, "held": held}  # fmt: skip
 
     def events(
-        self, problem: Problem, given: Mapping[str, Any] | None, take: Callable[..., Any]
-    ) -> tuple[Any, ...]:
+        self, problem: Problem, given: Mapping[str, Any] | None, take: Callable[..., Any],
+        which: str = "events",
+    ) -> tuple[Any, ...]:  # fmt: skip
         """The events of the branch, with functions that are given again."""
         with damaged(self.name, "its events"):
-            kept = dict(_mapping("events", self.spec.get("events", {})))
+            kept = dict(_mapping(which, self.spec.get(which, {})))
         missing = [n for n, text in kept.items() if text is None and n not in (given or {})]
         if missing:
             raise ParameterError(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
@@ -25,10 +26,19 @@ def check_parameter(problem: Problem, parameter: Any, argument: str = "parameter
     return parameter
 
 
-def check_span(span: Any, units: str | None = None) -> tuple[float, float]:
+def check_span(span: Any, units: str | None = None, argument: str = "span") -> tuple[float, float]:
     """Two numbers, the lower one first."""
     wants = "two numbers (low, high), finite, with low < high"
-    low, high = pair("span", span, wants, units)
+    low, high = pair(argument, span, wants, units)
     if not low < high:
-        raise bad("span", span, wants)
+        raise bad(argument, span, wants)
     return low, high
+
+
+def check_bounds(bounds: Any) -> Mapping[str, Any]:
+    """Bounds by name; none of None."""
+    if bounds is None:
+        return {}
+    if not isinstance(bounds, Mapping):
+        raise bad("bounds", bounds, "a mapping from names to (low, high)")
+    return bounds

@@ -18,11 +18,12 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
+from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.numerics.waits import said
-from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.system import Model
+from phasekit.systems.problem import Problem, as_problem, system_of
+from phasekit.systems.system import System
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -131,10 +132,10 @@ def continuation(
                 "orbits of a map are fixed points of problem.iterated(times)",
             )  # fmt: skip
         with said(f"following periodic orbits along {parameter}"):
-            return continue_orbit(
+            return announced(continue_orbit(
                 problem, parameter, orbit, span, _record(problem, record), options, fix, events,
                 stop,
-            )  # fmt: skip
+            ))  # fmt: skip
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
@@ -142,7 +143,7 @@ def continuation(
     curve = equilibrium_curve(problem, parameter, (low, high), options)
     if events is not None or stop is not None:
         asked = events_of(problem, events, guess)
-        asked, ends = stop_of(problem, stop, asked, options.detect, guess)
+        asked, ends = stop_of(problem, stop, asked, curve.detect, guess)
         curve = curve.replace(events=asked, ends=ends)
     u = np.append(guess, problem.parameters[parameter])
     _check_values(problem, guess)
@@ -160,7 +161,8 @@ def continuation(
     start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
     with said(f"following equilibria along {parameter}"):
         backward, forward = run(curve, start, options.directions)
-        return make_branch(problem, curve, start, backward, forward, _record(problem, record))
+        branch = make_branch(problem, curve, start, backward, forward, _record(problem, record))
+    return announced(branch)
 
 
 def equilibrium_curve(
@@ -213,7 +215,7 @@ def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:
 
 def _start(problem: Problem, x0: Any, given: Any) -> FloatArray:
     n = len(problem.state)
-    system = given if isinstance(given, Model) else problem.system
+    system = system_of(given, problem)
     if system is not None and problem.time is None and (x0 is None or isinstance(x0, str)):
         return np.append(_labelled_start(system, x0), np.zeros(n - 1))  # at rest
     if x0 is None:
@@ -231,7 +233,7 @@ def _start(problem: Problem, x0: Any, given: Any) -> FloatArray:
     return guess
 
 
-def _labelled_start(system: Model, x0: str | None) -> float:
+def _labelled_start(system: System, x0: str | None) -> float:
     """An equilibrium of a system by its label; the first that exists if there is none."""
     from phasekit.cells.evaluate import evaluate
     from phasekit.table.quantities import ROWS
@@ -283,6 +285,11 @@ def _check_values(problem: Problem, guess: FloatArray) -> None:
             value = function(guess.copy(), **problem.parameters)
         except (ArithmeticError, ValueError):
             continue  # not defined there: the start will say so
+        except Exception as error:
+            raise ParameterError(
+                f"{argument}: raised {type(error).__name__} at x0: {error}; wants a function "
+                f"{argument}(x, **parameters) of numbers of shape {shape}"
+            ) from error
         found = np.asarray(value)
         if found.dtype.kind not in "biuf" and found.dtype != object:
             raise bad(argument, value, f"real numbers of shape {shape} to be returned")

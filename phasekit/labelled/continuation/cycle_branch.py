@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import partial
 from os import PathLike
 from types import MappingProxyType
 from typing import Any, Self, cast
@@ -13,19 +14,25 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.ending import cut, go_on, in_order
+from phasekit.bifurcation.continuation.periodic.ending import cut, go_on, goes_on, in_order
 from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, join
 from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.bifurcation.continuation.periodic.vertical import said_of
+from phasekit.bifurcation.continuation.specials import NOT_SEARCHED
+from phasekit.bifurcation.continuation.stops import SEARCHED
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch_points import made_with
+from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.cycle_points import clock_code, orbit_dataset, points_of
 from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
-NO_START = Stop("start", "the start; this direction was not asked for")
+NO_START = Stop("start", "the start; this direction was not requested")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,9 +56,12 @@ class CycleBranch(Branch):
         cycle_branch_point (BPC), event (UZ) and end (EP); along curves of folds cusp (CP) and
         resonance_1 (R1), along those of tori resonance_1 to resonance_4.
     stops : tuple of Stop
-        Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, closed,
+        Why the family ends, on both sides: ``reason`` (bound, hopf, homoclinic, unbounded, closed,
         max_points, stuck, start, period_doubling; of curves of tori resonance_1, resonance_2) and
         ``message``.
+    messages : tuple of str
+        What holds of the family as a whole: that its parameter never moves, that a coefficient is
+        zero all along a curve.
     kind : str
         cycle, or fold_of_cycles, period_doubling, torus: a curve in two parameters.
 
@@ -103,7 +113,7 @@ class CycleBranch(Branch):
             If there is no such point, or the problem is not known.
         """
         count = len(self.path)
-        at = i if isinstance(i, (int, np.integer)) and not isinstance(i, bool) else count
+        at = i if is_whole(i) else count
         if not -count <= at < count:
             raise bad("i", i, f"a whole number from {-count} to {count - 1}")
         cycles, problem = self.known()
@@ -120,7 +130,7 @@ class CycleBranch(Branch):
         return self.curve, self.problem
 
     def to_dataset(self) -> xr.Dataset:
-        """The points with the special points beside them, on the dim ``special_point``.
+        """The points, and the special points on the dim ``special_point``.
 
         Returns
         -------
@@ -133,9 +143,35 @@ class CycleBranch(Branch):
         )  # fmt: skip
         return ds
 
-    def _longer(self, count: int) -> Self:
+    def _bounded(self) -> list[str]:
+        return list(self.free)
+
+    @staticmethod
+    def _goes_on(curve: Any, track: Any) -> bool:
+        return goes_on(curve, track)
+
+    def _wider(
+        self, span: Sequence[float] | None, bounds: Mapping[str, Sequence[float]] | None
+    ) -> dict[str, Any]:
+        rest = dict(check_bounds(bounds))
+        period = rest.pop("period", None)
+        wider = super()._wider(span, rest)
+        if period is not None:
+            options = self.curve.options
+            own = options.bounds.get("period", (-np.inf, np.inf))
+            low, high = check_span(period, None, "bounds['period']")
+            if low > own[0] or high < own[1]:
+                raise bad("bounds['period']", period, f"a range that holds {own}")
+            wider["options"] = replace(options, bounds={**options.bounds, "period": (low, high)})
+        return wider
+
+    def _longer(self, count: int, bounds: Mapping[str, Any]) -> Self:
         cycles, problem = self.known()
-        backward, forward = (go_on(cycles, t, count, self.start) for t in self.tracks)
+        cycles = cycles.replace(**bounds)
+        backward, forward = (
+            go_on(cycles, track, count, self.start, forward)
+            for track, forward in zip(self.tracks, (False, True), strict=True)
+        )
         if forward is not None and forward.stop.reason == "closed":
             backward = None
         made = (backward, forward)
@@ -187,6 +223,7 @@ class CycleBranch(Branch):
             f"  {name}: {stop.reason}, {stop.message}"
             for name, stop in zip(("first", "last"), self.stops, strict=True)
         ]
+        lines += [f"  {message}" for message in self.messages]
         return "\n".join(lines) + ">"
 
 
@@ -201,7 +238,15 @@ def make_cycles(
 ) -> CycleBranch:
     """A branch of what was traced: special points are looked for, quantities recorded."""
     path = join(start, tracks, origin)
-    path, special = cut(cycles, path, in_order(find(cycles, path)))
+    try:
+        special, zeros = find(cycles, path)
+    except KeyboardInterrupt:  # what was followed is kept
+        backward, forward = (
+            None if track is None else replace(track, stop=SEARCHED) for track in tracks
+        )
+        tracks = (backward, forward)
+        path, special, zeros = join(start, tracks, origin), [], NOT_SEARCHED
+    path, special = cut(cycles, path, in_order(special))
     found = in_order([*special, *_ends(path)])
     points, labels, places = list(path.points), [""] * len(path.points), []
     shift = 0
@@ -222,8 +267,9 @@ def make_cycles(
     names = tuple(cycles.field.parameters[i] for i in cycles.active)
     branch = CycleBranch(
         problem, names, cycles.field.states, cycles, start, tracks,
-        points_of(problem, cycles, points, labels, record), (), path.stops, kind,
-        MappingProxyType(dict(record)), path=tuple(points), origin=origin,
+        made_with(partial(points_of, problem, cycles, points, labels, record), record), (),
+        path.stops, kind,
+        MappingProxyType(dict(record)), (*zeros, *said_of(cycles, path)), tuple(points), origin,
     )  # fmt: skip
     made: tuple[CyclePoint[CycleBranch], ...] = tuple(
         cycle_point(problem, cycles, one, place, branch)

@@ -21,10 +21,10 @@ FloatArray = npt.NDArray[np.float64]
 
 _CHECKS = {
     "trivial_error": "distance from 1 of the multiplier that is 1; 0 of a forced system",
-    "liouville_error": "logarithm of the product of the multipliers beside the integral of the "
+    "liouville_error": "logarithm of the product of the multipliers, less the integral of the "
     "divergence",
-    "mesh_error": "estimated error of the states beside their amplitudes",
-    "residual": "largest size of x' - f beside that of f, or of the states at rest",
+    "mesh_error": "estimated error of the states relative to their amplitudes",
+    "residual": "largest x' - f relative to f, or to the states at rest",
 }
 _WHICH = {"min": "least", "max": "largest", "mean": "mean"}
 ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points

@@ -15,6 +15,7 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labelled.continuation.unfinished import announced
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
 
@@ -53,13 +54,13 @@ class CyclePoint(SpecialPoint[Of]):
         """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
         with said(f"following periodic orbits along {self.branch.parameter}"):
             found: Of = onward("orbit.switch")(self, direction, options)
-            return found
+        return announced(found)
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
         """The curve of such orbits in this branch's parameter and a second one."""
         with said(f"following {self.kind} points along {parameter}"):
             found: Of = onward("orbit.curve")(self, parameter, span, options)
-            return found
+        return announced(found)
 
 
 def cycle_point(

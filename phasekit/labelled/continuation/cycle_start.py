@@ -15,7 +15,13 @@ from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.ending import run
 from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.bifurcation.continuation.points.hopf_families import (
+    Family,
+    critical_pairs,
+    families,
+)
 from phasekit.errors import ConvergenceError
+from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
@@ -51,13 +57,15 @@ def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: fl
     the sizes in line with each other: it ends where no state would swing by less than its size.
     """
     with np.errstate(all="ignore"):
-        swing = 2.0 * np.sqrt(np.abs(form["d"] * width / (form["omega"] * form["l1"])))
+        swing = 2.0 * np.sqrt(np.abs(np.divide(form["d"] * width, form["omega"] * form["l1"])))
         most = np.max(scale / q)
     swing = np.fmin(swing, most)
     return np.maximum(scale, swing * q) if np.isfinite(swing) else scale.copy()
 
 
-def from_hopf(point: SpecialPoint[Branch], options: ContinuationOptions | None) -> CycleBranch:
+def from_hopf(
+    point: SpecialPoint[Branch], options: ContinuationOptions | None, direction: int = 0
+) -> CycleBranch:
     """The periodic orbits that a Hopf point gives rise to."""
     if point.kind != "hopf":
         raise bad("point", point.kind, "a Hopf point")
@@ -67,20 +75,44 @@ def from_hopf(point: SpecialPoint[Branch], options: ContinuationOptions | None) 
     options = curve.options if options is None else check_options(options)
     n, name = curve.n, point.branch.parameter
     span = float(curve.low[n]), float(curve.high[n])
-    slopes = curve.at(point.special.u)[1][:, :n]
-    values, vectors = np.linalg.eig(slopes)
+    choice, said = _families(point)
+    if not is_whole(direction) or not 0 <= direction < len(choice):
+        wanted = f"a whole number from 0 to {len(choice) - 1}" if len(choice) > 1 else "0"
+        raise bad("direction", direction, wanted)
+    family = choice[direction]
+    scale = grown(curve.scale[:n], np.abs(family.vector), point.normal_form, span[1] - span[0])
+    cycles = cycles_of(problem, [name], [span], scale, np.zeros(n), options)
+    p = point.parameters[name]
+    found = starts.from_hopf(
+        cycles, point.special.u[:n], p, family.omega, family.vector, family.bend
+    )
+    start = first_point(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
+    message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
+    tracks = (None, run(cycles, start, "forward")[1])
+    return make_cycles(problem, cycles, start, tracks, {}, Stop("hopf", message))
+
+
+def _families(point: SpecialPoint[Branch]) -> tuple[list[Family], list[str]]:
+    """The families at a Hopf point, and of several what is to be said."""
+    curve, _ = point.branch.known()
+    values, vectors = np.linalg.eig(curve.at(point.special.u)[1][:, : curve.n])
     pairs = np.flatnonzero(values.imag > 0.0)
     if not len(pairs):
         raise bad("point", "no pair of complex eigenvalues", "a Hopf point that has converged")
-    k = pairs[np.argmin(np.abs(values.real[pairs]))]
-    scale = grown(curve.scale[:n], np.abs(vectors[:, k]), point.normal_form, span[1] - span[0])
-    cycles = cycles_of(problem, [name], [span], scale, np.zeros(n), options)
-    p = point.parameters[name]
-    found = starts.from_hopf(cycles, point.special.u[:n], p, float(values.imag[k]), vectors[:, k])
-    start = first_point(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
-    origin = Stop("hopf", f"the Hopf point at {name} = {p:.12g}")
-    tracks = (None, run(cycles, start, "forward")[1])
-    return make_cycles(problem, cycles, start, tracks, {}, origin)
+    critical = len(critical_pairs(values))
+    if critical < 2:
+        k = pairs[np.argmin(np.abs(values.real[pairs]))]
+        return [Family(float(values.imag[k]), vectors[:, k], (0.0, 0.0))], []
+    found, said = families(curve, point.special.u)
+    together = f"{critical} pairs of eigenvalues are on the imaginary axis"
+    if not found:
+        raise ConvergenceError(
+            f"switch: no family of periodic orbits can be told at {point!r}: {together}; "
+            f"{'; '.join(said)}"
+        )
+    if len(found) > 1:
+        together += f", and direction=0 to {len(found) - 1} follow {len(found)} families"
+    return found, [together, *said]
 
 
 def continue_orbit(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,9 +19,9 @@ from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.continuation import continuation
 from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labelled.continuation.unfinished import announced, interrupted
 from phasekit.labels.arguments import bad, reals, whole
-from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.system import Model
+from phasekit.systems.problem import Problem, as_problem, system_of
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -35,7 +36,7 @@ def diagram(
     record: Any = None,
     options: ContinuationOptions | None = None,
 ) -> tuple[Branch, ...]:
-    """Follow all branches of equilibria that hang together, each once.
+    """Follow all connected branches of equilibria, each once.
 
     Parameters
     ----------
@@ -89,19 +90,33 @@ def diagram(
     depth = whole("depth", depth, "a whole number >= 0", 0)
     branches: list[Branch] = []
     failures: list[ConvergenceError] = []
-    for start, guess in _starts(problem, parameter, x0, (low, high), given):
-        if branches and _known(branches, start, guess, parameter):
-            continue
-        try:
-            branch = continuation(
-                start, parameter, x0=guess, span=(low, high), record=record, options=options
-            )
-        except ConvergenceError as error:
-            failures.append(error)
-            continue
-        if not _repeats(branches, branch):
-            branches.append(branch)
-            _grow(branches, len(branches) - 1, depth)
+    try:
+        for start, guess in _starts(problem, parameter, x0, (low, high), given):
+            if branches and _known(branches, start, guess, parameter):
+                continue
+            try:
+                branch = continuation(
+                    start, parameter, x0=guess, span=(low, high), record=record, options=options
+                )
+            except ConvergenceError as error:
+                failures.append(error)
+                continue
+            if interrupted(branch) or not _repeats(branches, branch):
+                branches.append(branch)
+                if not interrupted(branch):
+                    _grow(branches, len(branches) - 1, depth)
+            if any(interrupted(one) for one in branches):
+                break  # what is there is kept
+    except KeyboardInterrupt:  # between two branches
+        if not branches:
+            raise
+        warnings.warn(
+            f"the diagram in {parameter} was interrupted behind {len(branches)} "
+            f"branch{'es'[: 2 * (len(branches) != 1)]}: others are missing; point.switch() of its "
+            "branch points follows more, diagram() again follows all",
+            RuntimeWarning,
+            stacklevel=2,
+        )
     if not branches:
         if failures:
             raise failures[0]
@@ -124,8 +139,10 @@ def _grow(branches: list[Branch], first: int, depth: int) -> None:
             for i, tangent in enumerate(point.special.others):
                 if _led(branches, point, tangent):
                     continue
-                other = switch(point, direction=i)
+                other = announced(switch(point, direction=i))
                 branches.append(other)
+                if interrupted(other):
+                    return
                 queue.append((other, level + 1))
 
 
@@ -189,7 +206,7 @@ def _starts(
         return [(problem, row) for row in rows]
     from phasekit.labelled.continuation.all_equilibria import equilibria_at, values_between
 
-    system = given if isinstance(given, Model) and problem.time is None else problem.system
+    system = system_of(given, problem) if problem.time is None else problem.system
     values = values_between(problem, parameter, span, system)
     if values is None:
         return [(problem, np.zeros(n))]

@@ -13,7 +13,8 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import along, starts
+from phasekit.bifurcation.continuation.periodic import along, collocation, starts
+from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.checks import check_options
 from phasekit.labelled.continuation.orbit_guess import (
@@ -36,6 +37,10 @@ TURNS = (0.0, 3.0, 10.0, 40.0)  # times the first return, after which an orbit i
 SAMPLES = 2001
 MOST = 3e6  # values of f that a search for a return takes at once
 STILL = 1e-5  # part of the largest range that is the error of a simulation
+PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31)  # numbers of times an orbit may be run through
+SURE = 30.0  # times the mesh error by which parts of an orbit that are the same may differ
+ROUNDING = 1e-10  # and the error of an orbit on any mesh
+ALIKE = 1e-3  # part by which the period of an orbit differs from that of its guess
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
@@ -187,38 +192,85 @@ def _turns(
 
 
 def _found(problem: Problem, guesses: Iterable[Any], options: Any, where: str) -> xr.Dataset:
-    """The orbit that the first of some guesses leads to."""
-    free = UNFOLDING in problem.parameters
-    name = UNFOLDING if free else next(iter(problem.parameters))
-    value = problem.parameters[name]
+    """The orbit that the first of some guesses leads to, over its least period."""
     said = ""
-    for guess, turns, multiple in guesses:
-        # What unfolds a conservative family is a rate.
-        width = 1.0 / float(guess.y[0]) if free else abs(value) or 1.0
-        cycles = cycles_of(
-            problem, [name], [(value - width, value + width)],
-            scale_of(guess.x, units_of(problem, guess.x[0])), turns, options, multiple,
-        )  # fmt: skip
-        if free:
-            found = starts.kept(cycles, guess, guess.x[0].copy())
-        else:
-            found = starts.settled(cycles, guess)
-        if not found.converged:
-            said = found.message
+    for guess in guesses:
+        cycles, found, said = _solved(problem, guess, options)
+        if said:
             continue
-        size = float(np.max(np.ptp(found.orbit.x, axis=0) / cycles.scale))
-        if size < 1e-6 and not cycles.forced:
-            said = "it led to an equilibrium"
-            continue
-        if not free:
-            found.orbit.y[1] = value
-        elif abs(found.orbit.y[1]) * found.orbit.y[0] > UNCONSERVED:
-            said = f"energy is not conserved along it: it needs a damping of {found.orbit.y[1]:.2g}"
-            continue
+        while (part := _part(problem, cycles, found.orbit)) is not None:
+            shorter, once, failed = _solved(problem, part, options)
+            if failed or abs(once.orbit.y[0] / part[0].y[0] - 1.0) > ALIKE:
+                break
+            cycles, found = shorter, once
         return orbit_of(cycles, problem, found, where)
     raise ConvergenceError(
         f"x0: no periodic orbit was found {where}: {said}; give another x0 or period, or settle="
     )
+
+
+def _solved(problem: Problem, given: Any, options: Any) -> tuple[Any, Any, str]:
+    """The orbit that a guess leads to, and its family; or why there is none."""
+    guess, turns, multiple = given
+    free = UNFOLDING in problem.parameters
+    name = UNFOLDING if free else next(iter(problem.parameters))
+    value = problem.parameters[name]
+    # What unfolds a conservative family is a rate.
+    width = 1.0 / float(guess.y[0]) if free else abs(value) or 1.0
+    cycles = cycles_of(
+        problem, [name], [(value - width, value + width)],
+        scale_of(guess.x, units_of(problem, guess.x[0])), turns, options, multiple,
+    )  # fmt: skip
+    if free:
+        found = starts.kept(cycles, guess, guess.x[0].copy())
+    else:
+        found = starts.settled(cycles, guess)
+    if not found.converged:
+        return cycles, found, found.message
+    size = float(np.max(np.ptp(found.orbit.x, axis=0) / cycles.scale))
+    if size < 1e-6 and not cycles.forced:
+        return cycles, found, "it led to an equilibrium"
+    if not free:
+        found.orbit.y[1] = value
+    elif abs(found.orbit.y[1]) * found.orbit.y[0] > UNCONSERVED:
+        return cycles, found, (
+            f"energy is not conserved along it: it needs a damping of {found.orbit.y[1]:.2g}"
+        )  # fmt: skip
+    return cycles, found, ""
+
+
+def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
+    """A guess of the orbit through which another one runs several times; None if it runs once.
+
+    Parts are the same if they differ by no more than the errors of the mesh.
+    """
+    angle = np.array([problem.periods.get(name, 0.0) for name in problem.state])
+    with np.errstate(all="ignore"):
+        whole = np.where(angle > 0.0, np.round(cycles.turns / angle), 0.0)
+    error = SURE * (cycles.mesh_error(orbit) + ROUNDING)
+    for k in PRIMES:
+        if np.any(whole % k) or (cycles.forced and cycles.multiple % k):
+            continue
+        at = np.linspace(0.0, 1.0 - 1.0 / k, 64 * k)
+        one, next_ = (
+            collocation.interpolate(orbit.mesh, orbit.x, cycles.m, shifted)
+            for shifted in (at, np.minimum(at + 1.0 / k, 1.0))
+        )
+        gap = np.abs(next_ - cycles.turns / k - one) / cycles.amplitudes(orbit)
+        if not np.max(gap) <= error:
+            continue
+        mesh = np.append(orbit.mesh[orbit.mesh < 1.0 / k], 1.0 / k)
+        count = max(len(mesh) - 1, starts.FIRST)
+        mesh = np.interp(np.linspace(0.0, 1.0, count + 1), np.linspace(0.0, 1.0, len(mesh)), mesh)
+        x = collocation.interpolate(
+            orbit.mesh, orbit.x, cycles.m, collocation.times(mesh, cycles.m)
+        )
+        y = orbit.y.copy()
+        y[0] /= k
+        x[-1] = x[0] + cycles.turns / k
+        multiple = cycles.multiple // k if cycles.forced else 1
+        return Orbit(mesh * k, x, y[:2]), cycles.turns / k, multiple
+    return None
 
 
 class _Simulation:
@@ -282,14 +334,11 @@ class _Simulation:
                 raise ConvergenceError(
                     f"x0: the simulation from {x.tolist()} failed: {error}"
                 ) from error
-        if (
-            not solution.success
-            or not np.isfinite(solution.y).all()
-            or solution.y.shape[1] < samples
-        ):
+        states = np.asarray(solution.y)  # an empty list where f has no value at the start
+        if not solution.success or not np.isfinite(states).all() or states.shape[-1] < samples:
             raise ConvergenceError(
                 f"x0: the simulation from {x.tolist()} did not reach the time {length:.6g}: "
-                f"{solution.message}"
+                f"{solution.message}{self.problem.field.raised}"
             )
         if at is None:
             steps = np.arange(PARTS * (len(solution.t) - 1) + 1.0) / PARTS

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, FLIP, FOLD, HOPF, TORUS
+from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BRANCH,
+    EVENT,
+    FLIP,
+    FOLD,
+    HOPF,
+    TORUS,
+)
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.path import Sample, join
+from phasekit.bifurcation.continuation.specials import find
 from phasekit.bifurcation.continuation.start import run
 from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.special_points import KINDS
@@ -18,10 +28,12 @@ from phasekit.labelled.continuation.checks import check_options, check_parameter
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.systems.problem import Problem
 
 #: Defining systems of curves, by what special points say of theirs.
 _CURVES = {
     "fold": FOLD, "hopf": HOPF, "branch_point": BRANCH, "period_doubling": FLIP, "torus": TORUS,
+    "event": EVENT,
 }  # fmt: skip
 
 
@@ -37,8 +49,8 @@ def point_curve(
     Parameters
     ----------
     point : SpecialPoint
-        A fold, Hopf point, neutral saddle or branch point of a branch of equilibria; of fixed
-        points of a map a period doubling or torus point, too.
+        A fold, Hopf point, neutral saddle, branch point or event of a branch of equilibria; of
+        fixed points of a map a period doubling or torus point, too.
     parameter : str
         The second parameter. The first, that of the branch, is free within ten times its span,
         unless `options` bounds it.
@@ -54,7 +66,9 @@ def point_curve(
         zero-Hopf (ZH) and Hopf-Hopf (HH) points. A Hopf curve goes on beyond a Bogdanov-Takens
         point as a curve of neutral saddles; ``points.kind_of_pair`` tells which. Of maps: cusps,
         strong resonances (R1 to R4), fold-flip (LPPD), generalized flip (GPD) and Chenciner
-        (CH) points; a torus curve goes on as a curve of neutral saddles beyond R1 and R2.
+        (CH) points; a torus curve goes on as a curve of neutral saddles beyond R1 and R2. A curve
+        of events has folds, branch points and Hopf points, of maps period doublings and torus
+        points: where the equilibrium on it is one. They have no normal forms.
 
     Raises
     ------
@@ -72,7 +86,7 @@ def point_curve(
     curve, problem = point.branch.known()
     if point.corank > 1:
         raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
-    if point.special.extra is None or point.status != "converged":
+    if (point.special.extra is None and along != "event") or point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     check_parameter(problem, parameter)
     if parameter == point.branch.parameter:
@@ -97,20 +111,43 @@ def point_curve(
         low=np.concatenate([curve.low[:n], [bounds[0], low]]),
         high=np.concatenate([curve.high[:n], [bounds[1], high]]),
         options=options,
+        **_holding(curve, point),
     )
     begun = two_parameter_curve(made, point.special, _CURVES[along])
     if begun is None:
+        why = "without a symmetry, a second parameter destroys a branch point"
+        if point.kind == "event":
+            why = "its function touches zero there, with all derivatives zero, or its curves cross"
         raise ConvergenceError(
             f"curve: no curve of {point.kind} points leads on from {point!r} when {parameter} "
-            "moves; a branch point that no symmetry holds is destroyed by a second parameter"
+            f"moves; {why}"
         )
     made, start = begun
     backward, forward = run(made, start, options.directions)
     return make_branch(problem, made, start, backward, forward, {})
 
 
+def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:
+    """What a curve of events holds at zero, and looks for and ends at no more."""
+    if point.kind != "event":
+        return {}
+    (held,) = (event for event in curve.events if event.name == point.name)
+    if held.condition:
+        raise bad(
+            "point", f"the event {point.name!r}, which says yes or no", "a function that vanishes",
+            "give a difference that changes its sign, such as x[0] - 1, as an event",
+        )  # fmt: skip
+    return {
+        "held": held,
+        "events": tuple(event for event in curve.events if event is not held),
+        "ends": tuple(name for name in curve.ends if name not in (held.name, "event", "UZ")),
+    }
+
+
 def doubled(point: SpecialPoint[Branch], *, options: ContinuationOptions | None = None) -> Branch:
-    """The orbit of period 2 that begins at a period doubling of a map.
+    """The orbit of period 2 that begins at a period doubling of a map, followed to one side.
+
+    The other side is the same orbit from its other point.
 
     Raises
     ------
@@ -126,8 +163,42 @@ def doubled(point: SpecialPoint[Branch], *, options: ContinuationOptions | None 
     tangent = np.append(point.special.extra, 0.0)
     tangent = tangent / curve.length(tangent)
     start = Sample(point.special.u, tangent, curve.at(point.special.u)[1])
-    backward, forward = run(curve, start, options.directions)
-    return make_branch(twice, curve, start, backward, forward, point.branch.record)
+    _, forward = run(curve, start, "forward")
+    assert forward is not None
+    curve, forward = _to_other_end(curve, problem, start, forward)
+    return make_branch(twice, curve, start, None, forward, point.branch.record)
+
+
+def _to_other_end(
+    curve: Curve, problem: Problem, start: Sample, track: Track
+) -> tuple[Curve, Track]:
+    """A track of orbits of period 2 up to where their two points meet again, if they do.
+
+    Beyond it runs back along the other point.
+    """
+    once = curve.replace(field=problem.field)
+    passed = []
+    for one in find(curve, join(curve, start, None, track)).placed:
+        special = one.special
+        away = curve.length(special.u - start.u) > 1e-6
+        if KINDS[special.kind].label != "BP" or not away:
+            continue
+        residual = once.residuals(special.u[None], once.at(special.u)[1][None])
+        if np.max(np.abs(residual)) < 1e-9:
+            name = special.kind
+            at = f"{_free(curve)} = {special.u[curve.n]:.9g}"
+            stop = Stop(name, f"the orbit ends at {at}, at another period doubling")
+            if name not in passed:  # the curve ends on the first of its kind
+                curve = curve.replace(ends=(*curve.ends, name))
+            count = one.index + 1
+            return curve, Track(track.record[:count], track.slopes[:count], track.state, stop)
+        passed.append(special.kind)
+    return curve, track
+
+
+def _free(curve: Curve) -> str:
+    """The free parameter of a branch."""
+    return curve.field.parameters[curve.active[0]]
 
 
 def switch(

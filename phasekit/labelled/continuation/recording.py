@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -87,27 +88,45 @@ def _values(
         at = {key: float(values[i]) for key, values in varying.items()}
         return np.asarray(function(x[:, i].copy(), **fixed, **at), dtype=float)
 
-    try:
-        with np.errstate(all="ignore"):
-            first = one(0)
-    except TypeError as error:
-        raise ParameterError(
-            f"record[{name!r}]: cannot be called as q(x, **parameters): {error}"
-        ) from error
+    failed: list[Exception] = []
+
+    def known(i: int) -> Any:
+        """The value at a point; None where the function raises."""
+        try:
+            return one(i)
+        except TypeError as error:
+            raise ParameterError(
+                f"record[{name!r}]: cannot be called as q(x, **parameters): {error}"
+            ) from error
+        except Exception as error:  # noqa: BLE001 - a user's function, without a value there
+            failed.append(error)
+            return None
+
     values = None
-    try:  # all points at once, if that gives the same
-        with np.errstate(all="ignore"):
+    with np.errstate(all="ignore"):
+        found = known(0)
+        try:  # all points at once, if that gives the same
             whole = np.asarray(function(x.copy(), **fixed, **varying), dtype=float)
             whole = np.moveaxis(whole, -1, 0) if whole.ndim > 1 else whole
-            checked = whole.shape == (count, *first.shape) and all(
+            checked = found is not None and whole.shape == (count, *found.shape)
+            checked = checked and all(
                 np.array_equal(whole[i], one(i), equal_nan=True) for i in {0, count // 2, count - 1}
             )
             values = whole if checked and count > 3 else None
-    except Exception:  # noqa: BLE001 - a function of single points; it is called point by point
-        values = None
-    if values is None:
-        with np.errstate(all="ignore"):
-            values = np.array([one(i) for i in range(count)])
+        except Exception:  # noqa: BLE001 - a function of single points; it is called point by point
+            values = None
+        if values is None:
+            failed.clear()
+            rows = [known(i) for i in range(count)]
+            shape = next((row.shape for row in rows if row is not None), ())
+            values = np.array([np.full(shape, np.nan) if row is None else row for row in rows])
+    if failed:
+        warnings.warn(
+            f"record[{name!r}]: raised {type(failed[0]).__name__} at {len(failed)} of {count} "
+            f"points, which are NaN: {failed[0]}",
+            RuntimeWarning,
+            stacklevel=2,
+        )
     dims = ("point", *(f"{name}_{k}" for k in range(values.ndim - 1)))
     return xr.DataArray(values, dims=dims)
 

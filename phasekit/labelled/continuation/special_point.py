@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.onward import Of, onward
+from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.equality import same_fields
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import Problem
@@ -27,7 +28,7 @@ NOT_COMPARED = ("field", "clock", "branch")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SpecialPoint(Generic[Of]):
-    """A point of a branch where something happens.
+    """A special point of a branch, such as a fold or a Hopf point.
 
     Of a map the kinds are fold, branch_point, period_doubling (PD) and torus (TR).
 
@@ -141,7 +142,7 @@ class SpecialPoint(Generic[Of]):
         return self.parameters[name]
 
     def switch(self, *, direction: int = 0, options: Any = None) -> Of:
-        """Another branch through a branch point, or the orbits that begin at a point.
+        """The other branch through a branch point, or the periodic orbits that begin at a point.
 
         Of a Hopf point the periodic orbits; of a period doubling of a map the orbit of period 2,
         as fixed points of the map applied twice.
@@ -149,7 +150,9 @@ class SpecialPoint(Generic[Of]):
         Parameters
         ----------
         direction : int, default 0
-            Which one where there are several: a row of `directions`.
+            Which one where there are several: a row of `directions`, or one of the families at a
+            Hopf point of several pairs, of which ``stops[0].message`` of each tells how many there
+            are.
         options : ContinuationOptions, optional
             Default: those of the branch.
 
@@ -163,7 +166,7 @@ class SpecialPoint(Generic[Of]):
         ParameterError
             If it is no branch point or Hopf point, or the direction is not known.
         ConvergenceError
-            If no periodic orbit is found near a Hopf point.
+            If no periodic orbit is found near a Hopf point, or which there are is not known.
 
         See Also
         --------
@@ -191,12 +194,12 @@ class SpecialPoint(Generic[Of]):
         """
         if self.kind == "hopf":
             with said(f"following periodic orbits along {self.branch.parameter}"):
-                found: Of = onward("point.orbits")(self, options)
+                found: Of = onward("point.orbits")(self, options, direction)
         elif self.kind == "period_doubling":
             found = onward("point.double")(self, options=options)
         else:
             found = onward("point.switch")(self, direction=direction, options=options)
-        return found
+        return announced(found)
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
         """The curve of such points in this branch's parameter and a second one.
@@ -213,9 +216,9 @@ class SpecialPoint(Generic[Of]):
         Returns
         -------
         Branch
-            Of the kind of the point (fold, hopf, branch_point; of maps period_doubling and torus,
-            too), with cusps, Bogdanov-Takens and other points of codimension two as its special
-            points.
+            Of the kind of the point (fold, hopf, branch_point, event; of maps period_doubling and
+            torus, too), with cusps, Bogdanov-Takens and other points of codimension two as its
+            special points.
 
         Raises
         ------
@@ -230,10 +233,15 @@ class SpecialPoint(Generic[Of]):
         >>> curve = fold.curve("l", (-1.0, 2.0))
         >>> [point.kind for point in curve.special_points]
         ['end', 'cusp', 'end']
+        >>> half = {"half": "x - 1/2"}
+        >>> branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1), events=half)
+        >>> curve = branch.special("half")[0].curve("l", (-1.0, 2.0))
+        >>> bool(abs(curve.points.mu + curve.points.l / 2 - 1 / 8).max() < 1e-14)
+        True
         """
         with said(f"following {self.kind} points along {parameter}"):
             found: Of = onward("point.curve")(self, parameter, span, options=options)
-            return found
+        return announced(found)
 
     def __eq__(self, other: object) -> bool:
         """Whether it is the same point of an equal branch."""

@@ -12,14 +12,15 @@ from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.bifurcation.continuation.functions import Code, Event, Formula
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import bad, unknown
+from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.laws.formulas import NAME, symbols_of, take_formula, write_formula
 from phasekit.systems.problem import Problem
 from phasekit.systems.problem_parts import check_call
 
 #: Why branches end by themselves: no names for events.
 REASONS = (
-    "bound", "closed", "max_points", "stuck", "not_finite", "start", "hopf", "homoclinic",
+    "bound", "closed", "max_points", "interrupted", "stuck", "not_finite", "start", "hopf",
+    "homoclinic",
 )  # fmt: skip
 #: Where a branch may be told to end: of both, of flows, of maps.
 BOTH = ("event", "fold", "branch_point", "pitchfork", "transcritical")
@@ -91,12 +92,21 @@ def ending(
 
     ``kinds`` of special points are there to end at, where ``detect`` looks for them.
     """
-    wants = "the name of an event, a kind or label of special points, or a function"
+    wants = (
+        "the name of an event, a kind or label of special points, or a function; or a pair of it "
+        "and how many of them, such as ('hopf', 3)"
+    )
     given = stop if isinstance(stop, (list, tuple)) else [stop]
+    if _is_counted(stop):
+        given = [stop]
     if not given:
         raise bad("stop", stop, wants)
     names: list[str] = []
     for one in given:
+        count = 1
+        if _is_counted(one):
+            one, count = one
+            count = whole("stop", count, "a whole number >= 1")
         if callable(one):
             name = getattr(one, "__name__", "stop")
             name = name if name.isidentifier() and not is_taken(name) else "stop"
@@ -104,13 +114,23 @@ def ending(
             while name in taken:
                 name += "_"
             events = (*events, made(name, one))
-            names.append(name)
+            names += [name] * count  # the last of so many ends it
             continue
         if not isinstance(one, str):
             raise bad("stop", one, wants)
         _check_name(one, events, kinds, detect)
-        names.append(one)
+        names += [one] * count
     return events, tuple(names)
+
+
+def _is_counted(given: Any) -> bool:
+    """Whether it is what to stop at with how many of it."""
+    return (
+        isinstance(given, (list, tuple))
+        and len(given) == 2
+        and not isinstance(given[0], (list, tuple))
+        and not (isinstance(given[1], (str, list, tuple)) or callable(given[1]))
+    )
 
 
 def _check_name(

@@ -1,7 +1,8 @@
 """One step of the Runge-Kutta method DOP853, of eight motions in the lanes of the processor.
 
 Each lane has its own time, step and error. Component c of lane l stands in place 8 c + l. The
-components come in pairs, the coordinate and its rate, then tangent vectors of the motion.
+components are a coordinate and its rate, or the states of a flow; then tangent vectors of the
+motion, of as many components.
 [HairerNorsettWanner1993] section II.5 and II.10.
 """
 
@@ -36,6 +37,12 @@ def packed(*sums: Array) -> tuple[Array, npt.NDArray[np.int64]]:
 #: Sums for the stages 1 to 11, for the end, for the stages 13 to 15 and for both errors.
 WEIGHTS, PLACES = packed(*DOP853.A[1:], DOP853.B, *DOP853.A_EXTRA, DOP853.E3, DOP853.E5)
 _, MORE, THIRD, FIFTH = 11, 12, 15, 16
+
+#: Rows of limits: errors that are allowed, value from which on a coordinate is held as closely as
+#: there, most steps; for steps by series, whether to take one alone, and to keep its series; and
+#: how often as great the errors of tangent vectors may be. Of a flow two more a state, from `OWN`
+#: on: that value, and the scale of its absolute error.
+RTOL, ATOL, UNIT, MOST, ALONE, KEEP, BESIDE, OWN = range(8)
 
 #: Error of a tangent vector, of its length, below which rounding hides it.
 CLOSEST = 1e-14
@@ -135,6 +142,7 @@ def errors(
     unit: float,
     rtol: float,
     atol: float,
+    beside: float,
     spare: Array,
     error: Array,
     size: Array,
@@ -146,7 +154,7 @@ def errors(
     is below 1: coordinates may be lengths in any unit; of a rate it is what adds up to that in the
     step, if that is longer than a second. A tangent vector is held against its length,
     the more closely the shorter the step is: the logs of lengths add up, so that what counts is the
-    error in a second.
+    error in a second; that may be `beside` times as great.
     """
     third, fifth = spare[0], spare[1]
     add_up(THIRD, k, third)
@@ -174,9 +182,51 @@ def errors(
                 allowed += least / max(1.0, abs(h[lane]))
             else:
                 allowed = max((allowed + atol) * min(1.0, abs(h[lane])), CLOSEST * scale)
+                allowed *= beside
             scale = 1.0 / allowed
             e3 += (third[m] * scale) ** 2
             e5 += (fifth[m] * scale) ** 2
+        below = e5 + 0.01 * e3
+        error[lane] = abs(h[lane]) * e5 / math.sqrt(below * n) if below > 0.0 else below
+
+
+@routine
+def errors_of_flow(
+    h: Array, x: Array, y: Array, k: Array, limits: Array, spare: Array, error: Array, size: Array
+) -> None:
+    """The same of a flow, whose states follow the common limits with a unit and a scale each.
+
+    The absolute error of a state is of its scale; without one (0) of the greatest state so far,
+    where that is below 1.
+    """
+    third, fifth = spare[0], spare[1]
+    add_up(THIRD, k, third)
+    add_up(FIFTH, k, fifth)
+    rtol, atol, beside = limits[RTOL, 0], limits[ATOL, 0], limits[BESIDE, 0]
+    n, states = x.size // LANES, (limits.shape[0] - OWN) // 2
+    for lane in range(LANES):
+        e3 = e5 = 0.0
+        for c in range(states):
+            m = c * LANES + lane
+            size[lane] = max(size[lane], max(abs(x[m]), abs(y[m])))
+        allowed = 1.0
+        for c in range(n):
+            m = c * LANES + lane
+            if c < states:
+                scale = limits[OWN + 2 * c + 1, 0]
+                least = scale if scale > 0.0 else min(size[lane], 1.0)
+                reach = min(max(abs(x[m]), abs(y[m])), limits[OWN + 2 * c, 0])
+                allowed = rtol * reach + max(atol * least, LEAST)
+            elif c % states == 0:
+                before = after = 0.0
+                for i in range(states):
+                    before += x[m + i * LANES] ** 2
+                    after += y[m + i * LANES] ** 2
+                scale = math.sqrt(max(before, after))
+                allowed = max((rtol * scale + atol) * min(1.0, abs(h[lane])), CLOSEST * scale)
+                allowed *= beside
+            e3 += (third[m] / allowed) ** 2
+            e5 += (fifth[m] / allowed) ** 2
         below = e5 + 0.01 * e3
         error[lane] = abs(h[lane]) * e5 / math.sqrt(below * n) if below > 0.0 else below
 

@@ -135,7 +135,8 @@ def motions(
     where a motion did not come to a time.
     """
     size = states.shape[1] * LANES
-    x, y, spare, h = np.zeros(size), np.zeros(size), np.zeros(size), np.zeros(size)
+    # Lanes without a motion hold no state.
+    x, y, spare, h = np.full(size, np.nan), np.zeros(size), np.zeros(size), np.zeros(size)
     k = np.zeros((ROWS, size))
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
     signs = np.zeros(LANES)  # those within the step

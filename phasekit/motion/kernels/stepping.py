@@ -13,8 +13,15 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.motion.kernels.dop853 import (
+    ATOL,
+    BESIDE,
+    MOST,
+    OWN,
+    RTOL,
+    UNIT,
     attempt,
     errors,
+    errors_of_flow,
     next_step,
     rates,
 )
@@ -35,10 +42,6 @@ REALS, KEPT = TERMS, GONE
 #: rejected, tries to end at a turn.
 CELL, STATE, ACCEPTED, STEPS, REJECTED, AIMS = range(6)
 WHOLES = 6
-
-#: Rows of limits: errors that are allowed, value from which on a coordinate is held as closely as
-#: there, most steps; and, for steps by series, whether to take one alone, and to keep its series.
-RTOL, ATOL, UNIT, MOST, ALONE, KEEP = range(6)
 
 #: In place of `ACCEPTED`: its state was changed between steps.
 CHANGED = 2
@@ -207,7 +210,10 @@ def advance(
         h[m] = real[TRY, m % LANES]
     attempt(address, table, real[T], h, x, k, y, p, z)
     rtol, atol, unit, most = limits[RTOL, 0], limits[ATOL, 0], limits[UNIT, 0], limits[MOST, 0]
-    errors(h, x, y, k, unit, rtol, atol, k[13:], real[ERROR], real[SIZE])
+    if limits.shape[0] > OWN:
+        errors_of_flow(h, x, y, k, limits, k[13:], real[ERROR], real[SIZE])
+    else:
+        errors(h, x, y, k, unit, rtol, atol, limits[BESIDE, 0], k[13:], real[ERROR], real[SIZE])
     for lane in range(LANES):
         if whole[STATE, lane] == RUNNING:
             judge(lane, int(most), x, k, y, p, kink, real, whole)

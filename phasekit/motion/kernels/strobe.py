@@ -62,6 +62,51 @@ def box_of(phi: float, dphi: float, period: float, box: Array, boxes: Codes) -> 
     return int(boxes[int(i), int(j)])
 
 
+@inline
+def band_of(phi: float, dphi: float, period: float, spans: Array, bands: Array) -> int:
+    """Number of the attractor within whose borders a state lies; -1: within none.
+
+    Rows of spans: coordinate from, to, attractor. Borders are the least and the greatest rate at
+    equal distances from one to the other.
+    """
+    for row in range(spans.shape[0]):
+        off = phi - spans[row, 0]
+        if period > 0.0:
+            off -= period * math.floor(off / period)
+        last = bands.shape[1] - 1
+        place = off / (spans[row, 1] - spans[row, 0]) * last
+        if 0.0 <= place <= last:
+            i = min(int(place), last - 1)
+            part = place - i
+            low = (1.0 - part) * bands[row, i, 0] + part * bands[row, i + 1, 0]
+            high = (1.0 - part) * bands[row, i, 1] + part * bands[row, i + 1, 1]
+            if low <= dphi <= high:
+                return int(spans[row, 2])
+    return -1
+
+
+@routine
+def grow(lane: int, scale: float, x: Array, sizes: Array) -> None:
+    """Make the tangent vector one unit long, and count by how much errors have grown.
+
+    Each leg adds an error of one unit. Rows of sizes: the error now, the greatest so far, and that
+    when the motion came to the boxes in which it is.
+    """
+    u, w = x[2 * LANES + lane], x[3 * LANES + lane]
+    size = math.hypot(u, w / scale)
+    if size > 0.0:
+        x[2 * LANES + lane], x[3 * LANES + lane] = u / size, w / size
+    sizes[0, lane] = sizes[0, lane] * size + 1.0
+    sizes[1, lane] = max(sizes[0, lane], sizes[1, lane])
+
+
+@routine
+def write(lane: int, x: Array, sizes: Array, out: Array) -> None:
+    """Write the state of a lane, and its tangent vector as long as the error now."""
+    for c in range(out.size):
+        out[c] = x[c * LANES + lane] * (sizes[0, lane] if c > 1 else 1.0)
+
+
 @routine
 def stays(lane: int, inside: int, visits: int, last: Index, same: Index) -> bool:
     """Whether a motion has come to boxes of one attractor so many times in succession."""
@@ -71,10 +116,12 @@ def stays(lane: int, inside: int, visits: int, last: Index, same: Index) -> bool
 
 
 @routine
-def resume(lane: int, done: int, leg: float, again: bool, real: Array, whole: Index) -> None:
+def resume(
+    lane: int, done: int, leg: float, again: bool, anew: bool, real: Array, whole: Index
+) -> None:
     """Let a motion go on through its next leg; where the law repeats itself, time begins anew."""
     whole[STATE, lane] = RUNNING
-    if again:
+    if anew:
         whole[ACCEPTED, lane] = CHANGED
     real[T, lane] = 0.0 if again else done * leg
     real[END, lane] = leg if again else (done + 1) * leg
@@ -96,6 +143,9 @@ def strobe(
     box: Array,
     boxes: Codes,
     visits: int,
+    enough: float,
+    spans: Array,
+    bands: Array,
     legs: Array,
     again: Bools,
     states: Array,
@@ -105,16 +155,20 @@ def strobe(
     out: Array,
     code: Index,
     taken: Index,
+    growth: Array,
     status: Index,
 ) -> None:
     """States after a leg, two legs, ... of each cell: from the one after `skip` on in `out`.
 
-    `out` is of shape (cells, kept, 2), NaN once a motion has ended; the state after no leg is not
+    `out` is of shape (cells, kept, n), NaN once a motion has ended; the state after no leg is not
     written.
 
     Where the law repeats itself after each leg (`again`), time begins anew. A motion ends early
-    near a point of an attractor, in whose number `code` is then, or after so many visits in
-    succession to boxes of the same attractor. `taken` is the number of legs.
+    near a point of an attractor, in whose number `code` is then, within its borders, or after so
+    many visits in succession to boxes of the same attractor. `taken` is the number of legs. Where a
+    tangent vector moves along, as long as the error at first, `growth` is by how much it and an
+    error of every leg have grown at most before the motion came to where it ends. Where that is
+    `enough`, the motion ends as well, and its state is the first of `out`.
     """
     size = states.shape[1] * LANES
     x, y, h = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -124,6 +178,8 @@ def strobe(
     real, whole = np.zeros((REALS + room, LANES)), np.zeros((WHOLES, LANES), np.int64)
     counts = np.zeros((3, LANES), np.int64)
     done, last, same = counts[0], counts[1], counts[2]
+    sizes = np.zeros((3, LANES))
+    measured = states.shape[1] > 2
     cell = first
     left = stop - first
     while left > 0:
@@ -133,32 +189,45 @@ def strobe(
             if state == RUNNING:
                 continue
             own = whole[CELL, lane]
-            ended = state != IDLE and state != ARRIVED
+            ended, grown = state != IDLE and state != ARRIVED, False
             if state == ARRIVED:
                 done[lane] += 1
                 phi, dphi = x[lane], x[LANES + lane]
+                if measured:
+                    grow(lane, scale, x, sizes)
                 if skip <= done[lane] < skip + out.shape[1]:
-                    out[own, done[lane] - skip, 0] = phi
-                    out[own, done[lane] - skip, 1] = dphi
+                    write(lane, x, sizes, out[own, done[lane] - skip])
                 inside = box_of(phi, dphi, period, box, boxes)
                 code[own] = nearest_of(phi, dphi, points, period, scale)
+                if code[own] < 0:
+                    code[own] = band_of(phi, dphi, period, spans, bands)
                 if stays(lane, inside, visits, last, same) and code[own] < 0:
                     code[own] = inside
+                if same[lane] == 1 or 0 <= code[own] != inside:
+                    sizes[2, lane] = sizes[1, lane]
                 ended = code[own] >= 0 or done[lane] >= many
-                if not ended:
-                    resume(lane, done[lane], legs[own], again[own], real, whole)
-                    fresh = fresh or again[own]
-            if ended:
+                grown = not ended and sizes[2, lane] > enough
+                if grown:
+                    write(lane, x, sizes, out[own, 0])
+                if not ended and not grown:
+                    anew = again[own] or measured
+                    resume(lane, done[lane], legs[own], again[own], anew, real, whole)
+                    fresh = fresh or anew
+            if ended or grown:
                 taken[own] = done[lane]
                 status[own] = state
-                for i in range(max(done[lane] + 1 - skip, 0), out.shape[1]):
-                    out[own, i, 0] = out[own, i, 1] = np.nan
+                growth[own] = sizes[2, lane]
+                for i in range(max(done[lane] + 1 - skip, int(grown)), out.shape[1]):
+                    out[own, i] = np.nan
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:
                 load(lane, cell, states, parameters, x, p, kink, real, whole)
                 real[END, lane] = legs[cell]
                 done[lane] = last[lane] = same[lane] = 0
+                sizes[0, lane], sizes[1, lane], sizes[2, lane] = 1.0, 0.0, 0.0
+                if measured:
+                    grow(lane, scale, x, sizes)
                 fresh = True
                 cell += 1
         if address is not None and fresh:

@@ -23,32 +23,68 @@ from phasekit.motion.kernels.stepping import (
     renew,
 )
 from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
-from phasekit.numerics.compile import Array, inline, kernel, routine
+from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.lanes import LANES
 
 Index = npt.NDArray[np.int64]
 
 
 @routine
-def orthonormal(lane: int, x: Array) -> tuple[float, float]:
-    """Make the two tangent vectors of a lane orthonormal; return the logs of their lengths."""
-    a, b = x[2 * LANES + lane], x[3 * LANES + lane]
-    c, d = x[4 * LANES + lane], x[5 * LANES + lane]
-    length = math.hypot(a, b)
-    area = a * d - b * c
-    a, b = a / length, b / length
-    x[2 * LANES + lane], x[3 * LANES + lane] = a, b
-    x[4 * LANES + lane], x[5 * LANES + lane] = -b, a
-    return math.log(length), math.log(abs(area) / length)
+def orthonormal(lane: int, n: int, x: Array, sums: Array) -> None:
+    """Make the tangent vectors of a lane, of n entries, orthonormal; add the logs of their lengths.
+
+    Gram and Schmidt's way, each vector twice where it loses digits.
+    """
+    count = x.size // (n * LANES) - 1
+    for i in range(count):
+        own = (1 + i) * n
+        for again in range(2):
+            before = 0.0
+            for c in range(n):
+                before += x[(own + c) * LANES + lane] ** 2
+            for j in range(i):
+                other, product = (1 + j) * n, 0.0
+                for c in range(n):
+                    product += x[(own + c) * LANES + lane] * x[(other + c) * LANES + lane]
+                for c in range(n):
+                    x[(own + c) * LANES + lane] -= product * x[(other + c) * LANES + lane]
+            after = 0.0
+            for c in range(n):
+                after += x[(own + c) * LANES + lane] ** 2
+            if again == 0 and i > 0 and after < 0.25 * before:
+                continue
+            break
+        length = math.sqrt(after)
+        if length == 0.0:  # a map may put an end to it at once
+            sums[lane, i] = -np.inf
+            continue
+        for c in range(n):
+            x[(own + c) * LANES + lane] /= length
+        sums[lane, i] += math.log(length)
 
 
-@inline
-def is_skewed(lane: int, x: Array) -> bool:
-    """Whether the two tangent vectors of a lane are far from orthonormal."""
-    a, b = x[2 * LANES + lane], x[3 * LANES + lane]
-    c, d = x[4 * LANES + lane], x[5 * LANES + lane]
-    one, two, area = a * a + b * b, c * c + d * d, abs(a * d - b * c)
-    return not (1e-4 < one < 1e4 and 1e-4 < two < 1e4 and area * area > 0.04 * one * two)
+@routine
+def is_skewed(lane: int, n: int, x: Array, gram: Array) -> bool:
+    """Whether tangent vectors of a lane are far from orthonormal.
+
+    By Cholesky's factors of their products: the parts of each that are not in those before it.
+    """
+    for i in range(gram.shape[0]):
+        own = (1 + i) * n
+        for j in range(i + 1):
+            other, product = (1 + j) * n, 0.0
+            for c in range(n):
+                product += x[(own + c) * LANES + lane] * x[(other + c) * LANES + lane]
+            whole = product
+            for k in range(j):
+                product -= gram[i, k] * gram[j, k]
+            if j < i:
+                gram[i, j] = product / gram[j, j]
+            else:
+                if not (1e-4 < whole < 1e4 and product > 0.04 * whole):
+                    return True
+                gram[i, i] = math.sqrt(product)
+    return False
 
 
 @kernel
@@ -67,17 +103,20 @@ def growth(
     out: Array,
     status: Index,
 ) -> None:
-    """Logs of the growth of two orthogonal tangent vectors after each leg, added up.
+    """Logs of the growth of orthogonal tangent vectors after each leg, added up.
 
-    `legs` has a time for each cell, `out` is of shape (cells, legs, 2).
+    `legs` has a time for each cell, `out` is of shape (cells, legs, vectors). The entries of a
+    vector stand behind those of the state and of the vectors before it.
     """
-    x, y, h = np.zeros(6 * LANES), np.zeros(6 * LANES), np.zeros(6 * LANES)
-    k = np.zeros((ROWS, 6 * LANES))
+    size, count = states.shape[1] * LANES, out.shape[2]
+    n = states.shape[1] // (1 + count)
+    x, y, h = np.full(size, np.nan), np.zeros(size), np.zeros(size)
+    k = np.zeros((ROWS, size))
     p = np.zeros(max(parameters.shape[0], 1) * LANES)
     z = np.zeros(3 * LANES)
     real, whole = np.zeros((REALS + room, LANES)), np.zeros((WHOLES, LANES), np.int64)
     done = np.zeros(LANES, np.int64)
-    sums = np.zeros((LANES, 2))
+    sums, gram = np.zeros((LANES, count)), np.zeros((count, count))
     cell = first
     left = stop - first
     while left > 0:
@@ -85,18 +124,16 @@ def growth(
         for lane in range(LANES):
             state = whole[STATE, lane]
             own = whole[CELL, lane]
-            if state == ARRIVED or (state == RUNNING and is_skewed(lane, x)):
-                one, two = orthonormal(lane, x)
-                sums[lane, 0] += one
-                sums[lane, 1] += two
+            if state == ARRIVED or (state == RUNNING and is_skewed(lane, n, x, gram)):
+                orthonormal(lane, n, x, sums)
                 whole[ACCEPTED, lane] = CHANGED
                 fresh = True
             if state == RUNNING:
                 continue
             ended = state != IDLE and state != ARRIVED
             if state == ARRIVED:
-                out[own, done[lane], 0] = sums[lane, 0]
-                out[own, done[lane], 1] = sums[lane, 1]
+                for i in range(count):
+                    out[own, done[lane], i] = sums[lane, i]
                 done[lane] += 1
                 ended = done[lane] == out.shape[1]
                 whole[STATE, lane] = RUNNING
@@ -104,14 +141,15 @@ def growth(
             if ended:
                 status[own] = state
                 for i in range(done[lane], out.shape[1]):
-                    out[own, i, 0] = out[own, i, 1] = np.nan
+                    for j in range(count):
+                        out[own, i, j] = np.nan
                 whole[STATE, lane] = IDLE
                 left -= 1
             if whole[STATE, lane] == IDLE and cell < stop:
                 load(lane, cell, states, parameters, x, p, kink, real, whole)
                 real[END, lane] = legs[cell]
                 done[lane] = 0
-                sums[lane, 0] = sums[lane, 1] = 0.0
+                sums[lane] = 0.0
                 fresh = True
                 cell += 1
         if address is not None and fresh:

@@ -18,20 +18,25 @@ import numpy as np
 import sympy as sp
 from llvmlite import ir
 
-from phasekit.motion.kernels.dop853 import CLOSEST, LEAST, LONGEST
-from phasekit.motion.kernels.stepping import (
+from phasekit.motion.kernels.dop853 import (
     ALONE,
     ATOL,
+    BESIDE,
+    CLOSEST,
+    KEEP,
+    LEAST,
+    LONGEST,
+    MOST,
+    RTOL,
+    UNIT,
+)
+from phasekit.motion.kernels.stepping import (
     COUNT,
     END,
-    KEEP,
     KEPT,
-    MOST,
     OUTCOME,
     REFUSED,
-    RTOL,
     SIZE,
-    UNIT,
     H,
     T,
 )
@@ -222,6 +227,7 @@ class StepWriter(LaneWriter):
         second = self._smaller(self._size(h), self.constant(1.0))
         part = self._mul(self._sum(self._mul(rtol, length), atol), second)
         part = self._larger(part, self._mul(self.constant(CLOSEST), length))
+        part = self._mul(part, self.load(self.arrays[3], BESIDE))
         return part, part
 
     def _part(

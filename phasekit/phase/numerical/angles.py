@@ -72,15 +72,18 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
         low, high = whole * grid[passed], whole * grid[passed + 1]
         time = low + share * (high - low)
         pace = 2.0 * np.pi / orbit.period
+        step, going = np.zeros(size), rows
         for _ in range(_STEPS):
-            here, rate, *_ = at(rows, time)
-            push = -ground.systems.slope(here)
-            off = (pace * (x - here), target - rate)
-            pull = np.hypot(pace * rate, push)  # whose square may not be a double
-            step = off[0] / pull * (pace * rate / pull) + off[1] / pull * (push / pull)
-            step = np.nan_to_num(step)
-            time = np.clip(time + step, low, high)
-            if np.max(np.abs(pace * step)) <= 4e-15:
+            here, rate, *_ = at(going, time[going])
+            push, tempo = -ground.systems.take(going).slope(here), pace[going]
+            off = (tempo * (x[going] - here), target[going] - rate)
+            pull = np.hypot(tempo * rate, push)  # whose square may not be a double
+            step[going] = np.nan_to_num(
+                off[0] / pull * (tempo * rate / pull) + off[1] / pull * (push / pull)
+            )
+            time[going] = np.clip((time + step)[going], low[going], high[going])
+            going = going[np.abs(pace * step)[going] > 4e-15]
+            if not going.size:
                 break
         here, rate, *blurs = at(rows, time)
         left = pace * np.abs(x - here) + np.abs(target - rate)

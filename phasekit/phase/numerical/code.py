@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.laws.formulas import is_name
+from phasekit.laws.nodes import wide
 
 #: Names that sympy gives to common parts, and dummies.
 _GIVEN = re.compile(r"_|x\d+$")
@@ -28,6 +29,55 @@ _SCIPY = {
     "elliptic_e": "ellipe",
     "Ei": "expi",
 }
+
+
+class Literals:
+    """Symbols that stand for the numbers of many digits in formulas, and are written as these.
+
+    sympy would multiply such numbers into sums, where c (x - a) has digits that c x - c a loses.
+    """
+
+    def __init__(self) -> None:
+        self.symbols: dict[str, Any] = {}
+        self._numbers: dict[Any, Any] = {}
+
+    def instead(self, e: Any) -> Any:
+        """A formula with symbols for factors and terms that are such numbers."""
+        own = e.is_Add or e.is_Mul
+        parts = [
+            self._symbol(part) if own and part.is_Rational and wide(part) else self.instead(part)
+            for part in e.args
+        ]
+        same = all(a is b for a, b in zip(parts, e.args, strict=True))
+        return e if same else e.func(*parts)
+
+    def back(self, e: Any) -> Any:
+        """A formula with the numbers again."""
+        return e.xreplace({symbol: symbol.number for symbol in self.symbols.values()})
+
+    def _symbol(self, number: Any) -> Any:
+        size = abs(number)
+        if size not in self._numbers:
+            name = f"_c{len(self._numbers)}"
+            self._numbers[size] = self.symbols[name] = _literal_class()(name, size)
+        return self._numbers[size] if number > 0 else -self._numbers[size]
+
+
+@functools.cache
+def _literal_class() -> Any:
+    import sympy as sp
+
+    class Literal(sp.Dummy):  # type: ignore[misc]
+        """A number > 0 that sympy takes for a symbol."""
+
+        __slots__ = ("number",)
+
+        def __new__(cls, name: str, number: Any) -> Any:
+            made = super().__new__(cls, name, positive=True)
+            made.number = number
+            return made
+
+    return Literal
 
 
 def array_code(symbols: Sequence[Any], expression: Any, cse: Any = True) -> Callable[..., Any]:
@@ -76,6 +126,9 @@ def _printer_class() -> Any:
         def _print_Rational(self, number: Any) -> str:
             large = max(abs(number.p), number.q) >= 2**53
             return repr(float(number)) if large else f"{number.p}/{number.q}"
+
+        def _print_Literal(self, literal: Any) -> str:
+            return repr(float(literal.number))
 
         def _print_special(self, node: Any) -> str:
             name = self._module_format(self._kf[type(node).__name__])

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.phase.numerical.formula import Formula, shape_of
-from phasekit.phase.numerical.intervals import Bounds, NoRule, exact_numbers
+from phasekit.phase.numerical.intervals import Bounds, NoRule
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +24,7 @@ def slope_coefficients(formula: Formula) -> list[Any] | None:
     import sympy as sp
 
     x = sp.Symbol(formula.coordinate, real=True)
-    return shape_of(sp.diff(exact_numbers(formula.expression), x), x, formula.period)[1]
+    return shape_of(sp.diff(formula.expression, x), x, formula.period)[1]
 
 
 def spreads(systems: Systems, coefficients: npt.NDArray[Any]) -> Array:

@@ -18,6 +18,9 @@ Index = npt.NDArray[np.intp]
 Rate = Callable[[Index, Array], Array]
 #: Whether steps may be trusted: rows, and states of shape (problems, stages, components).
 Trust = Callable[[Index, Array], npt.NDArray[np.bool_]]
+#: What goes along with motions, after a step: rows, states at its stages and at its two ends, its
+#: length, and what went along before.
+Carry = Callable[[Index, Array, tuple[Array, Array], Array, Array], Array]
 
 STAGES = 8
 _TAIL = 3e-9  # of the stages' series; the end of a step is known to the square of it
@@ -41,13 +44,22 @@ def _tables() -> tuple[Array, Array, Array]:
 MATRIX, WEIGHTS, TO_TAIL = _tables()
 
 
-class Step(NamedTuple):
-    """Steps of some problems: which, the time before, y before, and how long they are."""
+class Steps(NamedTuple):
+    """Steps that some problems try: which, and what they know when they do."""
 
     rows: Index
     gone: Array
+    """The time before."""
     y: Array
+    lost: Array
+    """What rounding has taken from y."""
     length: Array
+    refused: Array
+    """Tail of the step that was last refused."""
+    reach: Array
+    """How far any step so far would have gone."""
+    carried: Array
+    """What goes along with the motion."""
 
 
 def integrate(
@@ -56,8 +68,11 @@ def integrate(
     time: Array,
     step: Array,
     trusted: Trust | None = None,
-    trail: list[Step] | None = None,
-) -> Array:
+    trail: list[Steps] | None = None,
+    begun: Steps | None = None,
+    carry: Carry | None = None,
+    carried: Array | None = None,
+) -> tuple[Array, Array]:
     """Solve y' = rate(y) from `start` over `time`, which may be negative.
 
     Parameters
@@ -72,26 +87,39 @@ def integrate(
         Whether steps saw all of the rate, for rows and the states at their stages; others are
         halved.
     trail : list, optional
-        Gets the steps that are taken.
+        Gets the steps that are tried.
+    begun : Steps, optional
+        Where to go on instead: one step of each problem.
+    carry : callable, optional
+        Takes what goes along with the motions over steps.
+    carried : array of shape (problems, ...), optional
+        What goes along, at the start.
 
     Returns
     -------
     array of shape (problems, components)
         NaN where the solution grows without bound before the time is over, or takes more than
         20,000 steps.
+    array of shape (problems, ...)
+        What went along.
     """
-    y = np.array(start, dtype=float)
-    lost = np.zeros(y.shape)  # what rounding has taken from y
-    left = np.abs(time)
-    sign = np.sign(time)
-    step = np.array(step, dtype=float)
-    refused = np.full(left.shape, np.inf)  # tail of the step that was last refused
-    rows = np.flatnonzero((left > 0.0) & np.isfinite(y).all(axis=1))
+    whole, sign = np.abs(time), np.sign(time)
+    if begun is None:
+        begun = first_steps(start, step, carried)
+    y, lost, gone = (np.array(x, dtype=float) for x in (begun.y, begun.lost, begun.gone))
+    step, refused, reach = (np.array(x) for x in (begun.length, begun.refused, begun.reach))
+    along = np.array(begun.carried)
+    rows = np.flatnonzero((whole > gone) & np.isfinite(y).all(axis=1))
     y[~(np.isfinite(time) & np.isfinite(y).all(axis=1))] = np.nan
     for _ in range(_MOST_STEPS):
         if not rows.size:
-            return y
-        h = np.minimum(step[rows], left[rows])
+            return y, along
+        if trail is not None:
+            reach[rows] = np.maximum(reach[rows], gone[rows] + step[rows])
+            now = (gone, y, lost, step, refused, reach, along)
+            trail.append(Steps(rows, *(x[rows] for x in now)))
+        left = whole[rows] - gone[rows]
+        h = np.minimum(step[rows], left)
         length = (sign[rows] * h)[:, None]
         f, settled = _stages(rate, rows, y[rows], length)
         size = np.max(np.abs(f), axis=1)
@@ -104,32 +132,43 @@ def integrate(
         # A tail that shorter steps do not shrink is noise of the rate.
         noisy = (tail <= _NOISE) & (tail >= 0.2 * refused[rows])
         good = settled & ((tail <= _TAIL) | noisy)
-        if trusted is not None and good.any():
-            some = np.flatnonzero(good)
+        some = np.flatnonzero(good)
+        if some.size and not (trusted is None and carry is None):
             few = rows[some]
             inner = np.einsum("st,ptc->psc", MATRIX, f[some])
             stages = y[few, None] + length[some, None] * inner
-            seen = trusted(few, stages) | (h[some] <= 1e-12 * np.abs(time[few]))
-            good[some[~seen]] = False
-            settled[some[~seen]] = False
+            if trusted is not None:
+                seen = trusted(few, stages) | (h[some] <= 1e-12 * whole[few])
+                good[some[~seen]] = False
+                settled[some[~seen]] = False
+                some, few, stages = some[seen], few[seen], stages[seen]
         refused[rows] = np.where(good | ~settled, np.inf, tail)
         with np.errstate(all="ignore"):
             factor = 0.9 * (_TAIL / tail) ** (1.0 / STAGES)
         factor = np.where(settled & ~noisy, np.where(np.isnan(factor), 0.5, factor), 0.5)
         factor = np.where(good & noisy, 2.0, factor)
         done = rows[good]
-        if trail is not None:
-            trail.append(Step(done, np.abs(time[done]) - left[done], y[done], h[good]))
         gain = length[good] * np.einsum("s,psc->pc", WEIGHTS, f[good]) + lost[done]
         y[done], before = y[done] + gain, y[done]
         lost[done] = gain - (y[done] - before)
-        left[done] = np.where(h[good] >= left[done], 0.0, left[done] - h[good])
+        if carry is not None and done.size:
+            along[done] = carry(done, stages, (before, y[done]), length[good, 0], along[done])
+        gone[done] = np.where(h[good] >= left[good], whole[done], gone[done] + h[good])
         step[rows] = h * np.clip(factor, 0.2, 3.0)
-        stuck = step[rows] <= 1e-13 * np.abs(time[rows])
+        stuck = step[rows] <= 1e-13 * whole[rows]
         y[rows[stuck & ~good]] = np.nan
-        rows = rows[(left[rows] > 0.0) & np.isfinite(y[rows]).all(axis=1)]
+        rows = rows[(whole[rows] > gone[rows]) & np.isfinite(y[rows]).all(axis=1)]
     y[rows] = np.nan
-    return y
+    return y, along
+
+
+def first_steps(start: Array, step: Array, carried: Array | None = None) -> Steps:
+    """The first steps of problems."""
+    rows, zero = np.arange(step.size), np.zeros(step.shape)
+    y = np.array(start, dtype=float)
+    length = np.array(step, dtype=float)
+    along = np.zeros((rows.size, 0)) if carried is None else carried
+    return Steps(rows, zero.copy(), y, np.zeros(y.shape), length, zero + np.inf, zero, along)
 
 
 def follow(
@@ -139,54 +178,62 @@ def follow(
     time: Array,
     step: Array,
     trusted: Trust | None = None,
-) -> Array:
+    carry: Carry | None = None,
+    carried: Array | None = None,
+) -> tuple[Array, Array]:
     """`integrate` to many times of few motions; times of one owner have one start.
 
-    Each motion is integrated once, as far as it is asked for. Then each time is reached in one
-    step from the last that it has before: the stages between are not as accurate as the ends.
+    Each motion is integrated once, as far as it is asked for. Then each time goes on from the first
+    step that would have passed it: as it would have by itself, to the last bit.
     """
     groups, first, which = np.unique(
         2 * owner + (time < 0.0), return_index=True, return_inverse=True
     )
+    how: dict[str, Any] = {"trusted": trusted, "carry": carry, "carried": carried}
     if 4 * len(groups) > len(time):  # steps of many at once cost less than those of a few
-        return integrate(rate, start, time, step, trusted)
+        return integrate(rate, start, time, step, **how)
     size = np.abs(time)
     far = np.zeros(len(groups))
     np.maximum.at(far, which, np.where(np.isfinite(time), size, 0.0))
     sign = np.where(time[first] < 0.0, -1.0, 1.0)
-    trail: list[Step] = []
-    end = integrate(
+    trail: list[Steps] = []
+    integrate(
         lambda few, y: rate(first[few], y), start[first], sign * far, step[first],
         None if trusted is None else lambda few, stages: trusted(first[few], stages), trail,
+        carry=None if carry is None else lambda few, *rest: carry(first[few], *rest),
+        carried=None if carried is None else carried[first],
     )  # fmt: skip
     if not trail:
-        return integrate(rate, start, time, step, trusted)
-    steps = Step._make(np.concatenate(parts) for parts in zip(*trail, strict=True))
-    # The last step of the same motion that begins before each time.
-    count = len(steps.rows)
+        return integrate(rate, start, time, step, **how)
+    steps = Steps._make(np.concatenate(parts) for parts in zip(*trail, strict=True))
+    found, known = _steps_past(steps, which, size)
+    begun = first_steps(start, step, carried)
+    begun = begun._replace(carried=np.array(begun.carried))
+    for own, tried in zip(begun[1:], steps[1:], strict=True):
+        own[known] = tried[found[known]]
+    return integrate(rate, start, time, step, trusted, begun=begun, carry=carry)
+
+
+def _steps_past(steps: Steps, which: Index, size: Array) -> tuple[Index, npt.NDArray[np.bool_]]:
+    """For each time the first step of its motion that reaches it, else the last; whether any."""
+    count = steps.rows.size
+    reach = steps.reach * (1.0 + 4.0 * _EPS)  # rather one step early than late
     order = np.lexsort((
-        np.repeat([0, 1], [count, len(time)]), np.concatenate([steps.gone, size]),
+        np.repeat([1, 0], [count, size.size]), np.concatenate([reach, size]),
         np.concatenate([steps.rows, which]),
     ))  # fmt: skip
-    place = np.arange(len(order))
-    last = order[np.maximum.accumulate(np.where(order < count, place, 0))]
-    found = np.empty(len(time), dtype=np.intp)
-    asked = order >= count
-    found[order[asked] - count] = last[asked]
-    begun = (found < count) & (steps.rows[np.minimum(found, count - 1)] == which)
-    found = np.where(begun, found, 0)
-    gone = np.where(begun, steps.gone[found], 0.0)
-    before = np.where(begun[:, None], steps.y[found], start)
-    # Nothing comes after the last step of a motion that does not last.
-    ended = np.isnan(end[which]).any(axis=1) & begun
-    before[ended & (size - gone > steps.length[found])] = np.nan
-    return integrate(
-        rate,
-        before,
-        np.where(time < 0.0, gone - size, size - gone),
-        np.where(begun, steps.length[found], step),
-        trusted,
-    )
+    place, own = np.arange(order.size), order < count
+    before = np.maximum.accumulate(np.where(own, place, -1))
+    after = np.minimum.accumulate(np.where(own, place, order.size)[::-1])[::-1]
+    asked = np.flatnonzero(~own)
+    number = order[asked] - count
+    found, known = np.zeros(size.size, np.intp), np.zeros(size.size, dtype=bool)
+    for nearest in (before, after):
+        step = order[np.clip(nearest[asked], 0, order.size - 1)]
+        there = step < count
+        there[there] = steps.rows[step[there]] == which[number[there]]
+        found[number[there]], known[number[there]] = step[there], True
+    return found, known
 
 
 def _stages(

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.equilibria import Equilibria, equilibria
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.noise import noise, slope_noise
@@ -50,6 +51,28 @@ class Ground:
         own = (self.near, self.blur, self.slope)
         return Ground(self.systems.take(rows), points, *(field[rows] for field in own))
 
+    @property
+    def circle(self) -> float | None:
+        """Length of the circle on which the coordinate lies."""
+        return self.systems.formula.period
+
+    def above(self, column: Index) -> Array:
+        """Energy of one equilibrium of each system above all; 0 where rounding hides it."""
+        energy, rows = self.points.energy, np.arange(column.size)
+        if not energy.shape[1]:
+            return energy
+        there = self.points.kind > 0
+        size = np.nanmax(np.abs(energy), axis=1, initial=0.0, where=there)[:, None]
+        rise = energy[rows, column][:, None] - energy
+        return np.where(np.abs(rise) <= 8.0 * np.finfo(float).eps * size, 0.0, rise)
+
+    def place_error(self, column: Index) -> Array:
+        """How far rounding of V' may have moved one equilibrium of each system."""
+        rows = np.arange(column.size)
+        bend = np.abs(self.points.curvature[rows, column])
+        with np.errstate(all="ignore"):
+            return np.where(bend > 0.0, self.slope[rows, column] / bend, 0.0)
+
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
@@ -73,7 +96,7 @@ class Anchor:
         if rows.size:
             few, step = self.take(rows), u[rows]
             bend = few.systems.bend(few.at[:, None] + step[:, None] * NODES)
-            result[rows] = step * step * (bend @ (WEIGHTS * (1.0 - NODES)))
+            result[rows] = step * step * contract(bend, WEIGHTS * (1.0 - NODES))
         return result
 
     def slope(self, u: Array) -> Array:
@@ -82,9 +105,8 @@ class Anchor:
         rows = np.flatnonzero(np.abs(u) < self.near)
         if rows.size:
             few, step = self.take(rows), u[rows]
-            result[rows] = step * (
-                few.systems.bend(few.at[:, None] + step[:, None] * NODES) @ WEIGHTS
-            )
+            bend = few.systems.bend(few.at[:, None] + step[:, None] * NODES)
+            result[rows] = step * contract(bend, WEIGHTS)
         return result
 
     def climb(self, u: Array, d: Array) -> Array:
@@ -94,7 +116,8 @@ class Anchor:
         if rows.size:
             many = self.take(np.repeat(rows, NODES.size))
             inner = (u[rows, None] + d[rows, None] * NODES).reshape(-1)
-            result[rows] = d[rows] * (many.slope(inner).reshape(-1, NODES.size) @ WEIGHTS)
+            slopes = many.slope(inner).reshape(-1, NODES.size)
+            result[rows] = d[rows] * contract(slopes, WEIGHTS)
         return result
 
 
@@ -139,9 +162,9 @@ def _proved(systems: Systems, x: Array, near: Array) -> Array:
         worst = np.zeros(x.shape)
         for sign in (1.0, -1.0):
             u = sign * near[..., None]
-            coarse = systems.bend(x[..., None] + u * NODES) @ (WEIGHTS * (1.0 - NODES))
+            coarse = contract(systems.bend(x[..., None] + u * NODES), WEIGHTS * (1.0 - NODES))
             bend = systems.bend(x[..., None] + u * _FINE_NODES)
-            fine = bend @ (_FINE_WEIGHTS * (1.0 - _FINE_NODES))
+            fine = contract(bend, _FINE_WEIGHTS * (1.0 - _FINE_NODES))
             size = np.max(np.abs(bend), axis=-1)
             worst = np.maximum(worst, np.abs(coarse - fine) / size)
         rough = worst > 2e-15

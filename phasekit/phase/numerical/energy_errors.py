@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
+from phasekit.numerics.contract import row_sums
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.noise import noise
 from phasekit.phase.numerical.turning_points import End, distances
@@ -44,7 +45,7 @@ def errors_of_energies(
     depth = np.min(np.where(center, size, np.inf), axis=1, initial=np.inf)
     regular = np.where(whole > 0.0, whole / depth, 0.0) * period
     regular *= np.where(turned, 1.0, _bent(ground, states.x, left, right))
-    return np.asarray(time.sum(axis=1) + regular), whole * period / (2.0 * np.pi)
+    return np.asarray(row_sums(time) + regular), whole * period / (2.0 * np.pi)
 
 
 def _end_errors(ground: Ground, states: Any, end: End) -> tuple[Array, Array]:

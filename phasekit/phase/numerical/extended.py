@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from phasekit.numerics.double_double import dd_add, dd_divide, dd_multiply
 from phasekit.phase.numerical.formula import Formula
-from phasekit.phase.numerical.intervals import Bounds, NoRule, exact_numbers
+from phasekit.phase.numerical.intervals import Bounds, NoRule
 from phasekit.phase.numerical.rounding import Interval
 from phasekit.phase.numerical.systems import Systems
 
@@ -76,7 +76,6 @@ def extended(formula: Formula, orders: tuple[int, ...]) -> Extended | None:
     if potential is None or any(part.free_symbols for part in potential.atoms(sp.Function)):
         return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
-    potential = exact_numbers(potential)
     found = [derivative(potential, x, order) if order else potential for order in orders]
     try:
         return Extended(found, (x, *parameters))

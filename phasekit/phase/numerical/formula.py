@@ -21,7 +21,7 @@ from phasekit.laws.formulas import short_formula, symbols_of, take_formula, writ
 from phasekit.laws.grammar import FormulaError
 from phasekit.laws.ladder import Conservative, is_turn
 from phasekit.laws.size import derived_nodes, expanded_terms
-from phasekit.phase.numerical.code import array_code
+from phasekit.phase.numerical.code import Literals, array_code
 
 Array = npt.NDArray[np.float64]
 Values = Sequence[npt.ArrayLike]
@@ -61,7 +61,16 @@ class Formula(Conservative):
     values: Callable[..., Array]
     slopes: Callable[..., Array]
     bends: Callable[..., Array]
-    _coefficients: Callable[..., Any] | None
+    coefficients: Callable[..., Any] | None
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Travel as text; the functions are made anew."""
+        own = (self.text, self.coordinate, self.names, self.period, self.interval)
+        return make_formula, own
+
+    def derivative(self, order: int) -> Callable[..., Array]:
+        """A derivative of V of any order, as an array function like `values`."""
+        return _higher(self, order)
 
     def gradient_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V' as a sympy expression of real symbols."""
@@ -120,10 +129,10 @@ class Formula(Conservative):
         Of a polynomial those of its powers; of a Fourier sum the complex c_0 to c_n of
         ``V' = sum of c_k exp(2 pi i k x/period)`` over positive and negative k.
         """
-        if self._coefficients is None:
+        if self.coefficients is None:
             raise ParameterError(f"expression: got {self.text}, wants a polynomial or Fourier sum")
         with np.errstate(all="ignore"):
-            found = self._coefficients(*(np.asarray(value, float) for value in parameters))
+            found = self.coefficients(*(np.asarray(value, float) for value in parameters))
         return np.stack(np.broadcast_arrays(*found), axis=-1)
 
 
@@ -148,7 +157,7 @@ def make_formula(
     period : float or None
         Length of the circle, None for a line.
     interval : (float, float) or None
-        The part of the line that is looked at.
+        The interval of the line that is searched.
 
     Raises
     ------
@@ -158,16 +167,18 @@ def make_formula(
     symbols = symbols_of((coordinate, *names))
     x = symbols[coordinate]
     declare = "a parameter needs a value: parameters={'name': ...}"
-    potential = take_formula(expression, symbols, "expression", declare)
-    slope, bend = _derivatives(potential, x, symbols)
+    potential = take_formula(expression, symbols, "expression", declare, exact=True)
     arguments = [x, *(symbols[name] for name in names)]
-    shape, coefficients = shape_of(slope, x, period)
+    numbers = Literals()
+    written = numbers.instead(potential)
+    slope, bend = _derivatives(written, x, {**symbols, **numbers.symbols})
+    shape, coefficients = shape_of(numbers.back(slope), x, period)
     values, slopes, bends = (
-        array_function(array_code(arguments, f, shared)) for f in (potential, slope, bend)
+        array_function(array_code(arguments, f, shared)) for f in (written, slope, bend)
     )
     series = None if coefficients is None else array_code(arguments[1:], coefficients)
     return Formula(
-        write_formula(potential),
+        write_formula(potential, exact=True),
         coordinate,
         names,
         period,
@@ -179,6 +190,31 @@ def make_formula(
         bends,
         series,
     )
+
+
+@functools.lru_cache(maxsize=128)
+def _higher(formula: Formula, order: int) -> Callable[..., Array]:
+    """The array function of a higher derivative of V.
+
+    Raises
+    ------
+    ParameterError
+        If it holds a function that cannot be computed.
+    """
+    from phasekit.laws.derivatives import DERIVED, derivative
+    from phasekit.laws.nodes import foreign
+
+    symbols = symbols_of((formula.coordinate, *formula.names))
+    arguments = [symbols[name] for name in (formula.coordinate, *formula.names)]
+    numbers = Literals()
+    found = derivative(numbers.instead(formula.expression), arguments[0], order)
+    strange = foreign(found, [*arguments, *numbers.symbols.values()], DERIVED)
+    if strange is not None:
+        raise ParameterError(
+            f"system: got V = {formula.text}, wants a potential of which phasekit can compute the "
+            f"derivative of order {order}; it holds {type(strange).__name__}"
+        )
+    return array_function(array_code(arguments, found, shared))
 
 
 def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[Any, Any]:

@@ -97,25 +97,16 @@ def phase_space(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibri
     return points._replace(energy=energy), found._replace(saddle_energy=height)
 
 
-def most(formula: Formula, *parameters: npt.ArrayLike) -> tuple[int, int, Array]:
-    """Greatest number of equilibria, and of saddles, that any of the systems has.
+def topology(formula: Formula, *parameters: npt.ArrayLike) -> tuple[Equilibria, Separatrices]:
+    """As `phase_space` without areas, constants of V and the systems' shape: one a row."""
+    ground, _ = _survey(formula, parameters)
+    return ground.points, loops.separatrices(ground, measured=False)
 
-    Besides the widest stretch that could not be excluded in the systems where there is such, and
-    the number of these: low, high, number, shape (n, 3).
-    """
+
+def number_of_equilibria(formula: Formula, *parameters: npt.ArrayLike) -> Index:
+    """How many equilibria each system has: one a row."""
     systems, _ = make_systems(reduced(formula), parameters)
-    if systems.size <= _KEPT:
-        points = _survey(formula, parameters)[0].points
-    else:
-        points = find_equilibria(systems, counted=True)
-    saddles = np.sum(points.kind == EquilibriumKind.SADDLE, axis=1)
-    flat = np.flatnonzero(np.any(points.kind == EquilibriumKind.DEGENERATE, axis=1))
-    if flat.size:
-        few = Equilibria._make(field[flat] for field in points)
-        rows, _ = loops.saddles_of(survey(systems.take(flat), few))
-        saddles[flat] = np.bincount(rows, minlength=flat.size)
-    open_ = np.column_stack([points.gaps, points.n_gaps])[points.n_gaps > 0]
-    return points.phi.shape[1], int(saddles.max(initial=0)), open_
+    return np.asarray(find_equilibria(systems, counted=True).n_equilibria, dtype=np.intp)
 
 
 def orbits(formula: Formula, *inputs: npt.ArrayLike) -> Orbits:
@@ -153,8 +144,8 @@ def states_at_energy(
     """States of an energy at a center, by its column; `size` is that of numbers it is made of."""
     points, rows = ground.points, np.arange(h.size)
     excess = h[:, None] - points.energy
-    x = np.where(there, _at(points.phi, rows, column), np.nan)
-    kinetic = np.where(there, _at(excess, rows, column), np.nan)
+    x = np.where(there, column_of(points.phi, rows, column), np.nan)
+    kinetic = np.where(there, column_of(excess, rows, column), np.nan)
     kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
     size = np.maximum(np.maximum(np.abs(h), size)[:, None], np.abs(points.energy))
     error = np.finfo(float).eps * size + ground.blur
@@ -169,7 +160,7 @@ def orbits_at_gap(
     *parameters, level = inputs
     ground, shape, (gap,) = _cells(formula, parameters, (level,))
     column, there = _pick_saddle(ground, saddle)
-    height = _at(ground.points.energy, np.arange(gap.size), column)
+    height = column_of(ground.points.energy, np.arange(gap.size), column)
     states = states_at_gap(ground, gap, column, there, side)
     found = rounds.orbits_of(ground, states, np.sqrt(2.0 * states.kinetic))
     energies = np.where(found.orbit_kind >= 0, height + gap, np.nan)
@@ -178,28 +169,25 @@ def orbits_at_gap(
 
 
 def states_at_gap(
-    ground: Ground, gap: Array, column: Index, there: Any, side: int
+    ground: Ground, gap: Array, column: Index, there: Any, side: npt.ArrayLike
 ) -> rounds.States:
-    """States of an energy above a saddle, by its column, on one side of it."""
+    """States of an energy above a saddle, by its column, on one side of it: 0 left, 1 right."""
     points = ground.points
     rows = np.arange(gap.size)
-    height = _at(points.energy, rows, column)
-    rise = height[:, None] - points.energy
-    size = np.max(np.abs(points.energy), axis=1, initial=0.0, where=points.kind > 0)
-    rise = np.where(np.abs(rise) <= 8.0 * np.finfo(float).eps * size[:, None], 0.0, rise)
-    excess = gap[:, None] + rise
+    excess = gap[:, None] + ground.above(column)
     # Above the saddle an orbit passes it; below, it stays with the nearest center on that side.
-    way = distances(ground, _at(points.phi, rows, column), 1.0 if side else -1.0)
+    ways = np.where(np.asarray(side)[..., None] == 0, -1.0, 1.0)
+    way = distances(ground, column_of(points.phi, rows, column), ways)
     way = np.where((points.kind == EquilibriumKind.CENTER) & (way > 0.0), way, np.inf)
     center = np.argmin(way, axis=1) if way.shape[1] else column
     inside = gap <= 0.0
-    there = there & (~inside | np.isfinite(_at(way, rows, center)))
+    there = there & (~inside | np.isfinite(column_of(way, rows, center)))
     start = np.where(inside, center, column)
-    kinetic = np.where(there, _at(excess, rows, start), np.nan)
+    kinetic = np.where(there, column_of(excess, rows, start), np.nan)
     kinetic = np.where(kinetic >= 0.0, kinetic, np.nan)
-    x = np.where(there, _at(points.phi, rows, start), np.nan)
+    x = np.where(there, column_of(points.phi, rows, start), np.nan)
     own = np.arange(excess.shape[1]) == column[:, None]
-    error = ground.blur + _at(ground.blur, rows, column)[:, None]
+    error = ground.blur + column_of(ground.blur, rows, column)[:, None]
     error = np.where(own, 0.0, error + np.finfo(float).eps * np.abs(excess))
     return rounds.States(x, np.zeros(x.shape), kinetic, excess, np.zeros(excess.shape), error)
 
@@ -307,7 +295,7 @@ def _shaped(found: Orbits, shape: Shape) -> Orbits:
     return Orbits._make(array.reshape(shape) for array in found)
 
 
-def _at(values: Array, rows: Index, column: Index) -> Array:
+def column_of(values: Array, rows: Index, column: Index) -> Array:
     """Entries of an array by row, NaN where it has no columns."""
     return values[rows, column] if values.shape[1] else np.full(rows.shape, np.nan)
 

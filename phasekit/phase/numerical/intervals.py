@@ -29,14 +29,6 @@ def point(x: npt.ArrayLike) -> Interval:
     return x, x
 
 
-def exact_numbers(expression: Any) -> Any:
-    """An expression with the fractions that its doubles are: sympy rounds what it makes of them."""
-    import sympy as sp
-
-    floats = expression.atoms(sp.Float)
-    return expression.xreplace({f: sp.Rational(*float(f).as_integer_ratio()) for f in floats})
-
-
 def constant_bounds(expression: Any) -> Interval:
     """Bounds of an expression without symbols."""
     if expression.is_Float:
@@ -315,7 +307,6 @@ def bounds_of_slopes(potential: Any, names: tuple[str, ...]) -> Bounds | str:
     from phasekit.laws.derivatives import derivative
 
     symbols = [sp.Symbol(name, real=True) for name in names]
-    potential = exact_numbers(potential)
     slopes = [derivative(potential, symbols[0], order) for order in (1, 2)]
     try:
         return Bounds(slopes, symbols)

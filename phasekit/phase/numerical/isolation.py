@@ -324,6 +324,8 @@ def bracketed(systems: Systems, low: Array, high: Array) -> Array:
     """Zeros of V' between points where it has opposite signs: Newton's method, safeguarded."""
     rising = systems.slope(high) > 0.0
     x = 0.5 * (low + high)
+    found = np.full(x.shape, np.nan)
+    rows = np.arange(x.size)
     for _ in range(200):
         slope = systems.slope(x)
         under = (slope < 0.0) == rising
@@ -335,8 +337,11 @@ def bracketed(systems: Systems, low: Array, high: Array) -> Array:
         # Newton's method may creep from one side; then the bracket is halved.
         slow = np.abs(fresh - x) > 0.5 * (high - low)
         fresh = np.where(slow, middle, fresh)
-        still = (fresh == x) | (high - low <= np.spacing(np.abs(x)))
-        if np.all(still | np.isnan(x)):
-            return fresh
-        x = fresh
-    return x
+        still = (fresh == x) | (high - low <= np.spacing(np.abs(x))) | np.isnan(x)
+        found[rows] = fresh
+        going = np.flatnonzero(~still)
+        if not going.size:
+            break
+        rows, systems, x = rows[going], systems.take(going), fresh[going]
+        low, high, rising = low[going], high[going], rising[going]
+    return found

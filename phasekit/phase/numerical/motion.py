@@ -13,14 +13,16 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import OrbitKind
+from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.collocation import follow
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.noise import noise, slope_noise
-from phasekit.phase.numerical.orbits import States, orbits_of, resting_ends, states_of
+from phasekit.phase.numerical.noise import bend_noise, noise
+from phasekit.phase.numerical.orbits import Orbits, States, orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.quadrature import speeds
 from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.separatrices import Branch, branch_of
+from phasekit.phase.numerical.spread import spreading, widths
+from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
@@ -58,79 +60,104 @@ def flow(ground: Ground, x: Array, v: Array, owner: Index, time: Array) -> Motio
     with np.errstate(all="ignore"):
         rounds = np.where(turning, np.round(time / period), 0.0)
     rest = np.where(turning, time - rounds * np.where(turning, period, 0.0), time)
-    still = (kind == OrbitKind.EQUILIBRIUM) | (kind == OrbitKind.NOT_COMPUTED)
     out_x, out_v = states.x[owner], v[owner].astype(float)
     out_x[kind == OrbitKind.NOT_COMPUTED] = np.nan
     out_v[kind == OrbitKind.NOT_COMPUTED] = np.nan
+    factor = np.zeros((time.size, 3))
+    rows = np.flatnonzero((kind != OrbitKind.EQUILIBRIUM) & (kind != OrbitKind.NOT_COMPUTED))
+    if rows.size:
+        own = owner[rows]
+        start = _start_factors(ground, states, v, orbit)[own]
+        (out_x[rows], out_v[rows]), factor[rows] = _integrated(
+            ground.systems.take(own), states.x[own], v[own], own, rest[rows], period[rows], start
+        )
     asymptotic = np.flatnonzero(kind == OrbitKind.ASYMPTOTIC)
     if asymptotic.size:
-        out_x[asymptotic], out_v[asymptotic], known = _asymptotic(
-            ground, states.x, v, owner[asymptotic], time[asymptotic]
-        )
+        cells = owner[asymptotic], time[asymptotic]
+        found_x, found_v, known = _asymptotic(ground, states.x, v, *cells)
         asymptotic = asymptotic[known]
-    moving = ~still
-    moving[asymptotic] = False
-    rows = np.flatnonzero(moving)
-    if rows.size:
-        systems = ground.systems.take(owner[rows])
-
-        def rate(few: Index, y: Array) -> Array:
-            return np.stack([y[..., 1], -systems.take(few).slope(y[..., 0])], axis=-1)
-
-        def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
-            x = stages[..., 0]
-            size = np.max(np.abs(systems.take(few).slope(x)), axis=1)
-            return smooth(systems, few, np.min(x, axis=1), np.max(x, axis=1), size)
-
-        bend = np.abs(systems.bend(out_x[rows]))
-        pace = np.sqrt(bend) + 1.0 / np.where(turning[rows], period[rows], 1e3)
-        start = np.stack([out_x[rows], out_v[rows]], axis=-1)
-        with np.errstate(all="ignore"):
-            end = follow(rate, start, owner[rows], rest[rows], 0.5 / pace, trusted)
-        out_x[rows], out_v[rows] = end.T
-    turn = ground.systems.formula.period or 0.0
-    rotating = kind == OrbitKind.ROTATION
-    shift = states.turns[owner] + np.where(rotating, rounds * turn * np.sign(v[owner]), 0.0)
+        out_x[asymptotic], out_v[asymptotic] = found_x[known], found_v[known]
     out_x, out_v = (np.where(np.isfinite(time), out, np.nan) for out in (out_x, out_v))
     round_error = orbit.period_error[owner] + 2.0 * _EPS * np.where(turning, period, 0.0)
-    late = np.abs(rounds) * np.where(turning, round_error, 0.0) + _late(ground, states, v)[owner]
-    energy = orbit.orbit_energy[owner]
-    errors = _errors(ground, owner, out_x, out_v, rest, late, energy)
+    late = np.abs(rounds) * np.where(turning, round_error, 0.0) + 2.0 * _EPS * np.abs(rest)
+    most = _most(states, orbit, owner)
+    errors = _errors(ground.systems.take(owner), out_x, out_v, late, widths(factor), most)
     lost = np.isnan(out_x) & np.isfinite(time) & (kind != OrbitKind.NOT_COMPUTED)
     lost &= kind != OrbitKind.UNBOUNDED
     phi_error, dphi_error = (np.where(lost, np.inf, error) for error in errors)
+    turn = ground.systems.formula.period or 0.0
+    rotating = kind == OrbitKind.ROTATION
+    shift = states.turns[owner] + np.where(rotating, rounds * turn * np.sign(v[owner]), 0.0)
     return MotionWithErrors(out_x + shift, out_v, phi_error + _EPS * np.abs(shift), dphi_error)
 
 
-def _late(ground: Ground, states: States, v: Array) -> Array:
-    """By how much starts come late because whole turns, which are rounded, were taken away."""
+def _integrated(
+    systems: Systems, x: Array, v: Array, owner: Index, time: Array, period: Array, factor: Array
+) -> tuple[tuple[Array, Array], Array]:
+    """States after times, and factors of the covariances of what rounding does to them."""
+
+    def rate(few: Index, y: Array) -> Array:
+        return np.stack([y[..., 1], -systems.take(few).slope(y[..., 0])], axis=-1)
+
+    def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
+        x = stages[..., 0]
+        size = np.max(np.abs(systems.take(few).slope(x)), axis=1)
+        return smooth(systems, few, np.min(x, axis=1), np.max(x, axis=1), size)
+
+    regular = np.isfinite(period) & (period > 0.0)
+    pace = np.sqrt(np.abs(systems.bend(x))) + 1.0 / np.where(regular, period, 1e3)
+    start = np.stack([x, v], axis=-1)
+    carry = spreading(systems)
     with np.errstate(all="ignore"):
-        slope, bend = ground.systems.slope(states.x), ground.systems.bend(states.x)
-        reach = np.hypot(v, slope / np.sqrt(np.abs(bend)))
-        return np.where(states.turns == 0.0, 0.0, _EPS * np.abs(states.turns) / reach)
+        end, factor = follow(rate, start, owner, time, 0.5 / pace, trusted, carry, factor)
+    return (end[:, 0], end[:, 1]), factor
+
+
+def _start_factors(ground: Ground, states: States, v: Array, orbit: Orbits) -> Array:
+    """How far starts may be off: by wrapping, and where a motion stands for those next to it."""
+    x, points = states.x, ground.points
+    off = np.where(states.turns == 0.0, 0.0, _EPS * np.abs(x))
+    saddle = points.kind != EquilibriumKind.CENTER
+    near = np.where(saddle, np.abs(states.excess) + states.blur + states.error, np.inf)
+    with np.errstate(all="ignore"):
+        energy = np.fmin.reduce(near, axis=1, initial=np.inf)
+        energy = np.where(orbit.orbit_kind == OrbitKind.ASYMPTOTIC, energy, 0.0)
+        slope = np.abs(ground.systems.slope(x))
+        beat = np.sqrt(np.abs(ground.systems.bend(x)))
+        fast = np.abs(v) * beat > slope
+        place = np.where(fast | (energy == 0.0), 0.0, energy / slope)
+        speed = np.where(fast & (energy > 0.0), energy / np.abs(v), 0.0)
+    return np.stack([np.hypot(off, place), np.zeros(x.shape), speed], axis=-1)
+
+
+def _most(states: States, orbit: Orbits, owner: Index) -> tuple[Array, Array]:
+    """By how much states on an orbit differ at most in coordinate, NaN if unbounded, and speed."""
+    speed = np.sqrt(2.0 * np.fmax.reduce(states.excess, axis=1, initial=0.0))
+    speed = np.where(orbit.orbit_kind == OrbitKind.UNBOUNDED, np.nan, speed)
+    libration = orbit.orbit_kind == OrbitKind.LIBRATION
+    return np.where(libration, 2.0 * orbit.amplitude, np.nan)[owner], 2.0 * speed[owner]
 
 
 def _errors(
-    ground: Ground, owner: Index, x: Array, v: Array, time: Array, late: Array, energy: Array
+    systems: Systems,
+    x: Array,
+    v: Array,
+    late: Array,
+    spread: tuple[Array, Array],
+    most: tuple[Array, Array],
 ) -> tuple[Array, Array]:
-    """Estimated errors of states: by how much they come late, and how far their energy is off."""
-    systems = ground.systems.take(owner)
+    """Estimated errors of states that are late by so much, with what rounding does to them."""
     with np.errstate(all="ignore"):
-        height, slope = systems.potential(x), np.abs(systems.slope(x))
-        pace = np.sqrt(np.abs(systems.bend(x))) + 1.0 / (1.0 + np.abs(time))
-        off = np.abs(0.5 * v * v + height - energy) + _EPS * v * v
-        off += noise(systems, x, height) + _EPS * np.abs(height)
-        push = slope_noise(systems, x, slope) / pace
-        size = v * v + (slope / pace) ** 2
-        late = late + np.abs(time) * (off / size + 4.0 * _EPS)
-        late = np.where(np.isfinite(late), late, 0.0)
-        speed = np.abs(v)
-        reach = speed + slope / pace
-        phi = speed * late + 0.5 * slope * late**2 + off / (reach * pace) + 4.0 * _EPS * np.abs(x)
-        dphi = slope * late + off / reach + 4.0 * _EPS * speed + push
-        phi = phi + push / pace
-    rest = (v == 0.0) & (slope == 0.0)
-    return np.where(rest, 4.0 * _EPS * np.abs(x), phi), np.where(rest, 0.0, dphi)
+        speed, slope = np.abs(v), np.abs(systems.slope(x))
+        beat = np.sqrt(np.abs(systems.bend(x)))
+        turn = beat * late
+        sinh = np.where(turn > 0.0, np.sinh(turn) / turn, 1.0)
+        phi = late * (speed * sinh + 0.5 * slope * late * np.cosh(turn))
+        dphi = late * (slope * sinh + beat * beat * speed * late * np.cosh(turn))
+        phi = np.fmin(phi, 0.5 * late * most[1])
+        phi, dphi = phi + spread[0] + 2.0 * _EPS * np.abs(x), dphi + spread[1] + 4.0 * _EPS * speed
+    phi, dphi = np.fmin(phi, most[0]), np.fmin(dphi, most[1])
+    return np.where(np.isnan(x), np.nan, phi), np.where(np.isnan(x), np.nan, dphi)
 
 
 def separatrix_motion(branch: Branch, owner: Index, time: Array) -> MotionWithErrors:
@@ -140,14 +167,34 @@ def separatrix_motion(branch: Branch, owner: Index, time: Array) -> MotionWithEr
     saddle a turn later. NaN for branches that end nowhere.
     """
     x, v = _along(branch, owner, np.zeros(time.shape), time)
-    rows = np.arange(branch.saddle.size)
-    energy = branch.ground.systems.potential(branch.saddle)[rows[owner]]
-    nothing = np.zeros(time.shape)
-    phi_error, dphi_error = _errors(branch.ground, owner, x, v, nothing, nothing, energy)
-    place, bend = branch.place_error, branch.ground.systems.bend(branch.saddle)
-    errors = (phi_error + place[owner], dphi_error + (place * np.sqrt(np.abs(bend)))[owner])
+    part, beat, end = (of_branch[owner] for of_branch in _branch_errors(branch))
+    late, off = (np.abs(time) + 1.0 / beat) * (part + 2.0 * _EPS), branch.place_error[owner]
+    with np.errstate(invalid="ignore"):
+        end = end * np.abs(x - branch.saddle[owner]) / branch.length[owner]
+    off, nothing = off + end, np.full(time.shape, np.nan)
+    systems = branch.ground.systems.take(owner)
+    spread = off, off * beat + 8.0 * _EPS * np.abs(v)
+    errors = _errors(systems, x, v, late, spread, (nothing, nothing))
     lost = np.isnan(x) & np.isfinite(time) & np.isfinite(branch.length[owner])
     return MotionWithErrors(x, v, *(np.where(lost, np.inf, error) for error in errors))
+
+
+def _branch_errors(branch: Branch) -> tuple[Array, Array, Array]:
+    """Errors of paces along branches as parts of them, paces next to saddles, errors of lengths."""
+    systems, side = branch.ground.systems, branch.side
+    with np.errstate(all="ignore"):
+        bend = np.abs(systems.bend(branch.saddle))
+        part = 0.5 * bend_noise(systems, branch.saddle, bend) / bend
+        # Where Gauss' rule does not hold all along, V is taken from V.
+        half = 0.5 * branch.length
+        long = half > np.minimum(branch.near.anchor.near, branch.far.anchor.near)
+        middle = branch.saddle + side * half
+        depth = np.abs(systems.potential(middle) - systems.potential(branch.saddle))
+        rough = sum(noise(systems, x, systems.potential(x)) for x in (branch.saddle, middle))
+        part = part + np.where(long, rough / depth, 0.0)
+        end = systems.slope(branch.saddle + side * branch.length)
+        off = np.where(branch.joins, 0.0, part * depth / np.abs(end))
+    return part, np.sqrt(bend), off
 
 
 def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Array, Array]:
@@ -172,7 +219,7 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
         size = np.max(np.abs(systems.take(own[few]).slope(x)), axis=1)
         return smooth(systems, own[few], np.min(x, axis=1), np.max(x, axis=1), size)
 
-    w = follow(rate, start[rows, None], own, time[rows], step, trusted)[:, 0]
+    w = follow(rate, start[rows, None], own, time[rows], step, trusted)[0][:, 0]
     near, far, slope = _place(branch, own, w[:, None])
     pace = _pace(branch, own, w[:, None])
     u, d = near[:, 0], far[:, 0]

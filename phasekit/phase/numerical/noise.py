@@ -1,4 +1,4 @@
-"""How far rounding may have moved V and V'."""
+"""How far rounding may have moved V, V' and V''."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class _Terms(Bounds):
 
 @functools.lru_cache(maxsize=256)
 def _bounds(formula: Formula, order: int) -> _Terms | None:
-    """Bounds of V or V' of (x, parameters); None where a function has no rule."""
+    """Bounds of V, V' or V'' of (x, parameters); None where a function has no rule."""
     import sympy as sp
 
     from phasekit.laws.derivatives import derivative
@@ -51,7 +51,9 @@ def _bounds(formula: Formula, order: int) -> _Terms | None:
     if formula.expression is None:
         return None
     x, *parameters = (sp.Symbol(n, real=True) for n in (formula.coordinate, *formula.names))
-    expression = derivative(formula.expression, x) if order else formula.expression
+    expression = formula.expression
+    for _ in range(order):
+        expression = derivative(expression, x)
     try:
         return _Terms((expression,), (x, *parameters))
     except NoRule:
@@ -70,6 +72,11 @@ def slope_noise(systems: Systems, x: Array, slope: Array) -> Array:
     """Rounding of V' at x, where it is `slope`, in the same way."""
     rough = 2.0 * _EPS * (np.abs(slope) + np.abs(systems.bend(x) * x))
     return _rounding(systems, x, 1, rough)
+
+
+def bend_noise(systems: Systems, x: Array, bend: Array) -> Array:
+    """Rounding of V'' at x, where it is `bend`, in the same way."""
+    return _rounding(systems, x, 2, 4.0 * _EPS * np.abs(bend))
 
 
 def _rounding(systems: Systems, x: Array, order: int, rough: Array) -> Array:

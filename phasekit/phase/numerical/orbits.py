@@ -8,11 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, OrbitKind
+from phasekit.phase.numerical.circle import wrapped
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.energy_errors import errors_of_energies
 from phasekit.phase.numerical.noise import noise
 from phasekit.phase.numerical.periods import WORST, librations, rotations
 from phasekit.phase.numerical.systems import Systems
+from phasekit.phase.numerical.turning_errors import faint, turning_errors
 from phasekit.phase.numerical.turning_points import End, find_end
 
 Array = npt.NDArray[np.float64]
@@ -36,6 +38,9 @@ class Orbits(NamedTuple):
     period_error: Array
     """Estimated error of the period, by its quadrature; 0 where the period is infinite."""
     action_error: Array
+    phi_min_error: Array
+    """Bound of the error of the least coordinate; infinite where rounding hides where it is."""
+    phi_max_error: Array
 
 
 class States(NamedTuple):
@@ -55,6 +60,7 @@ class States(NamedTuple):
     """What rounding on the way to it may have done."""
 
 
+@np.errstate(all="ignore")  # of energies beyond all doubles
 def states_of(ground: Ground, x: Array, v: Array) -> States:
     """Lay out states; the energy above an equilibrium next to a state keeps its digits."""
     home, turns = _wrapped(ground, x)
@@ -67,7 +73,7 @@ def states_of(ground: Ground, x: Array, v: Array) -> States:
     blur = 2.0 * _EPS * (2.0 * kinetic + slope)[:, None] + 4.0 * _EPS * np.maximum(
         np.abs(height)[:, None], np.abs(points.energy)
     )
-    away = noise(systems, home, height) + _EPS * np.abs(turns) * np.abs(systems.slope(home))
+    away = noise(systems, home, height) + _EPS * np.where(turns == 0.0, 0.0, slope)
     error = (away + _EPS * kinetic)[:, None] + _EPS * np.abs(excess) + ground.blur
     if points.phi.shape[1]:
         offset = home[:, None] - points.phi
@@ -91,8 +97,7 @@ def _wrapped(ground: Ground, x: Array) -> tuple[Array, Array]:
     if period is None:
         low, high = ground.systems.formula.ends
         return np.where((x >= low) & (x <= high), x, np.nan), np.zeros(x.shape)
-    turns = np.where(np.abs(x) <= 0.5 * period, 0.0, period * np.round(x / period))
-    return x - turns, turns
+    return wrapped(x, period)
 
 
 def orbits(ground: Ground, x: Array, v: Array) -> Orbits:
@@ -107,6 +112,7 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
         left = find_end(ground, x, states.kinetic, states.excess, -1.0)
         right = find_end(ground, x, states.kinetic, states.excess, 1.0)
         valid = np.isfinite(x) & np.isfinite(v) & (points.n_equilibria >= 0)
+        valid &= ~faint(ground, states, v)
         at_rest = (v == 0.0) & (
             (ground.systems.slope(x) == 0.0) | np.any(points.phi == x[:, None], axis=1)
         )
@@ -169,13 +175,16 @@ def orbits_of(ground: Ground, states: States, v: Array) -> Orbits:
             states.turns + _turning_point(x, side * np.where(at_rest, 0.0, reach), end, systems)
             for side, reach, end in ((-1.0, low, left), (1.0, high, right))
         )
+        columns = [(rest, column) for rest, (column, _) in zip(rests, ends, strict=True)]
+        errors = turning_errors(ground, states, kind, (left, right), columns)
         round_ = (kind == OrbitKind.ROTATION) | ~valid
         low, high = np.where(round_, np.nan, low), np.where(round_, np.nan, high)
         frequency = 2.0 * np.pi / period
     reach = 0.5 * (high - low)
     return Orbits(
-        kind, energy, period, frequency, action, low, high, reach, period_error, action_error
-    )
+        kind, energy, period, frequency, action, low, high, reach, period_error, action_error,
+        *errors,
+    )  # fmt: skip
 
 
 def _turning_point(x: Array, way: Array, end: End, systems: Systems) -> Array:

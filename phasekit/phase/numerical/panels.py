@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.differences import Anchor, Ground
 from phasekit.phase.numerical.quadrature import Pieces
 from phasekit.phase.numerical.regions import smooth
@@ -134,8 +135,8 @@ class _Halves:
         u = (self.u[half, None] + way * y).reshape(-1)
         slope = self.anchor.take(rows).slope(u).reshape(s.shape)
         force = -way * slope
-        series = force @ _TO_SERIES.T
-        tail = np.max(np.abs(series[:, -2:]), axis=1)
+        series = contract(force, _TO_SERIES[-2:])
+        tail = np.max(np.abs(series), axis=1)
         return _Panels(half, low, high, force, tail, before, self._rough(half, y, force))
 
     def _rough(self, half: Index, y: Array, force: Array) -> Flags:
@@ -198,15 +199,15 @@ def _sums(halves: _Halves, panels: _Panels, timed: bool) -> tuple[Array, Array, 
     turning = halves.turning[panels.half]
     rate = np.where(turning[:, None], 2.0 * s, 1.0)  # dy/ds
     force = panels.force * rate
-    series = force @ _TO_SERIES.T
-    tail = np.max(np.abs(series[:, -2:]), axis=1) * width
-    gain = width * (force @ _WEIGHTS)
+    series = contract(force, _TO_SERIES[-2:])
+    tail = np.max(np.abs(series), axis=1) * width
+    gain = width * contract(force, _WEIGHTS)
     before, blur = (_running(panels.half, values, count) for values in (gain, tail))
     start = halves.start[panels.half] + before
-    kinetic = start[:, None] + width[:, None] * (force @ _CUMULATIVE.T)
+    kinetic = start[:, None] + width[:, None] * contract(force, _CUMULATIVE)
     # Next to a turning point v and s go to 0 together: 1/v dy/ds is a root of the mean of -V'.
     first = turning & (panels.low == 0.0)
-    means = panels.force @ _MEANS.T
+    means = contract(panels.force, _MEANS)
     kinetic[first] = (s * s * means)[first]
     with np.errstate(all="ignore"):
         speed = np.sqrt(2.0 * kinetic)
@@ -228,13 +229,13 @@ def _sums(halves: _Halves, panels: _Panels, timed: bool) -> tuple[Array, Array, 
         for k, values in ((0, slowness), (1, flow)):
             if k == 0 and not timed:
                 continue
-            part = width * (values @ _WEIGHTS)
+            part = width * contract(values, _WEIGHTS)
             most = np.max(np.abs(values), axis=1)
-            rest = np.max(np.abs((values @ _TO_SERIES.T)[:, -2:]), axis=1)
+            rest = np.max(np.abs(contract(values, _TO_SERIES[-2:])), axis=1)
             # The rule errs by terms of twice the order, a series of which the first is as the
             # square of the last here.
             error = 4.0 * width * rest * np.minimum(rest / most, 1.0)
-            error += width * ((values * 0.5 * unsure) @ _WEIGHTS)
+            error += width * contract(values * 0.5 * unsure, _WEIGHTS)
             error += 0.5 * part * halves.blur[panels.half] / scale
             poor |= ~(rest <= _LOOSE * most) & ~stuck
             np.add.at(sums[k], panels.half, part)

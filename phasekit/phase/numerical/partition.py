@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
+from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.series import companion_roots, degrees
 from phasekit.phase.numerical.systems import Systems
@@ -168,7 +169,7 @@ def _zeros(system: Systems, low: float, high: float) -> tuple[Array, Array]:
                 f"{system.formula.text} is not smooth and finite between {low:.6g} and {high:.6g}; "
                 "take an interval on which it is"
             )
-        series = bend @ _TO_SERIES.T
+        series = contract(bend, _TO_SERIES)
         tail = np.max(np.abs(series[:, -4:]), axis=1)
         good = tail <= 1e-13 * np.max(np.abs(series), axis=1)
         sizes = np.maximum(np.max(np.abs(slope), axis=1), np.max(np.abs(bend), axis=1) * half)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.differences import Ground
 from phasekit.phase.numerical.formula import Shape
 from phasekit.phase.numerical.panels import Integrals, integrate
@@ -73,14 +74,14 @@ def librations(ground: Ground, x: Array, excess: Array, left: End, right: End) -
         nodes, y, matrix, to_series = _mean_of_bend(count, points)
         few = ground.systems.take(rows)
         bend = few.bend(middle[rows, None] + half[rows, None] * nodes)
-        root = np.sqrt(2.0 * (bend @ matrix.T))
+        root = np.sqrt(2.0 * contract(bend, matrix))
         fine = (
             2.0 * np.pi * np.mean(1.0 / root, axis=1),
             half[rows] ** 2 * np.mean((1.0 - y**2) * root, axis=1),
         )
         if coarse is not None:
             # Rules that differ in their points alone say nothing of how well V'' is known.
-            tail = np.max(np.abs(bend @ to_series[-4:].T), axis=1)
+            tail = np.max(np.abs(contract(bend, to_series[-4:])), axis=1)
             least = np.min(root, axis=1) ** 2
             rounding = _EPS * np.max(np.abs(bend), axis=1) / least
             rows, fine = _settle(found, rows, fine, coarse, tail / least, rounding)

@@ -18,8 +18,9 @@ from phasekit.phase.numerical.turning_points import End, distances, find_end
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-_EPS = np.finfo(float).eps
 SIDES = (-1.0, 1.0)
+#: Saddles: their rows and columns, their places on the axis of saddles, and its length.
+Placed = tuple[npt.NDArray[np.intp], npt.NDArray[np.intp], npt.NDArray[np.intp], int]
 
 
 class Separatrices(NamedTuple):
@@ -77,16 +78,21 @@ def saddles_of(ground: Ground) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.int
     return rows, columns
 
 
+def numbered(rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]) -> Placed:
+    """Saddles in places from left to right."""
+    # Rows rise, so the place of a saddle in its row counts from where the row begins.
+    slot = np.arange(rows.size) - np.searchsorted(rows, rows)
+    return rows, columns, slot, int(slot.max(initial=-1)) + 1
+
+
 def branch_of(ground: Ground, column: npt.NDArray[np.intp], side: float) -> Branch:
     """Follow the level of a saddle to one side; one row of `ground` for each saddle."""
     points, systems = ground.points, ground.systems
     rows = np.arange(column.size)
-    saddle, height = points.phi[rows, column], points.energy[rows, column]
+    saddle = points.phi[rows, column]
     with np.errstate(all="ignore"):
-        excess = height[:, None] - points.energy
-        size = np.nanmax(np.abs(points.energy), axis=1, initial=0.0, where=points.kind > 0)
-        level = np.abs(excess) <= 8.0 * _EPS * size[:, None]
-        excess = np.where(level, 0.0, excess)
+        excess = ground.above(column)
+        level = excess == 0.0
         # Not at rest, though as slow as can be: the level leaves the saddle.
         far = find_end(ground, saddle, np.full(saddle.shape, 1e-300), excess, side)
         way = distances(ground, saddle, side)
@@ -104,14 +110,15 @@ def branch_of(ground: Ground, column: npt.NDArray[np.intp], side: float) -> Bran
     zero = np.zeros(saddle.shape)
     own = Anchor(systems, saddle, ground.near[rows, column])
     near = End(zero, far.turned, own, zero, zero)
-    bend = np.abs(points.curvature[rows, column])
-    with np.errstate(all="ignore"):
-        off = np.where(bend > 0.0, ground.slope[rows, column] / bend, 0.0)
+    off = ground.place_error(column)
     return Branch(ground, saddle, side, length, joins, winds, near, end, excess, off)
 
 
-def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
-    """Integral of v over the finite branches of some rows, NaN if not known; and its error."""
+def areas(branch: Branch, rows: npt.NDArray[np.intp], worst: float) -> tuple[Array, Array]:
+    """Integral of v over the finite branches of some rows, and its error.
+
+    NaN where the error may be more than the worst part of it.
+    """
     ground, length = branch.ground.take(rows), branch.length[rows]
     near, far = branch.near.take(rows), branch.far.take(rows)
     start = branch.saddle[rows] - (length if branch.side < 0.0 else 0.0)
@@ -122,23 +129,25 @@ def areas(branch: Branch, rows: npt.NDArray[np.intp]) -> tuple[Array, Array]:
         # Either end may lie beside where V' is 0; the area goes with the square of the length.
         off = branch.place_error[rows] / length
         error = found.area_error + 4.0 * found.area * np.where(length > 0.0, off, 0.0)
-        known = error <= WORST * found.area
+        known = error <= worst * found.area
     return np.where(known, found.area, np.nan), error
 
 
-def separatrices(ground: Ground) -> Separatrices:
-    """Topology, turning points and areas; saddles from left to right on their axis.
+def separatrices(
+    ground: Ground,
+    *,
+    measured: bool = True,
+    placed: Placed | None = None,
+    worst: float = WORST,
+) -> Separatrices:
+    """Topology, turning points and, if measured, areas; saddles from left to right on their axis.
 
     The level of a saddle is followed to either side until V rises to it again: at a turning
     point (a lobe), at a saddle of the same energy within rounding (heteroclinic; on a circle the
     saddle itself: winding), or not at all.
     """
-    systems = ground.systems
-    period = systems.formula.period
-    rows, columns = saddles_of(ground)
-    # Rows rise, so the place of a saddle in its row counts from where the row begins.
-    slot = np.arange(rows.size) - np.searchsorted(rows, rows)
-    most = int(slot.max(initial=-1)) + 1
+    systems, period = ground.systems, ground.circle
+    rows, columns, slot, most = numbered(*saddles_of(ground)) if placed is None else placed
     shape = (systems.size, most)
     few = ground.take(rows)
     found = np.full((len(rows), 4, 2), np.nan)  # offset, angle, area, its error
@@ -150,11 +159,11 @@ def separatrices(ground: Ground) -> Separatrices:
         finite = np.flatnonzero(np.isfinite(branch.length))
         area = np.full(len(rows), np.inf)
         error = np.zeros(len(rows))
-        area[finite], error[finite] = areas(branch, finite)
+        area[finite], error[finite] = areas(branch, finite, worst) if measured else (np.nan, np.nan)
         place = branch.far.anchor.at + branch.far.u
         place = np.where(np.isfinite(branch.length), place, side * np.inf)
         if period is not None:
-            place = 0.5 * period - (0.5 * period - place) % period
+            place[finite] = 0.5 * period - (0.5 * period - place[finite]) % period
         found[:, 0, k] = side * branch.length
         found[:, 1, k] = place
         found[:, 2, k] = 2.0 * area

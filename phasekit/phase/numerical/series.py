@@ -20,7 +20,6 @@ import numpy.typing as npt
 
 from phasekit.phase.numerical.coefficients import slope_coefficients, spreads
 from phasekit.phase.numerical.formula import Formula
-from phasekit.phase.numerical.intervals import exact_numbers
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]
@@ -296,7 +295,7 @@ def exact_base(formula: Formula, parameters: tuple[float, ...]) -> Fraction:
             (formula.coordinate, *formula.names), (0.0, *parameters), strict=True
         )
     }
-    base = exact_numbers(formula.expression).xreplace(values)
+    base = formula.expression.xreplace(values)
     base = base if base.is_Rational else sp.Rational(base.evalf(60))
     return Fraction(int(base.p), int(base.q))
 

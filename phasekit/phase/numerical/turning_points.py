@@ -46,7 +46,7 @@ class End:
         )
 
 
-def distances(ground: Ground, x: Array, side: float) -> Array:
+def distances(ground: Ground, x: Array, side: float | Array) -> Array:
     """How far each equilibrium lies from x on one side; on a circle in (0, period]."""
     way = side * (ground.points.phi - x[:, None])
     period = ground.systems.formula.period
@@ -129,11 +129,12 @@ def _beyond(anchor: Anchor, above: Array, side: float, low: Array, x: Array, pla
         [np.abs(place), swing],
         0.125 * (1.0 + np.abs(low)),
     )
+    going = np.ones(low.shape, dtype=bool)
     for number in range(_EXPANSIONS):
         there = np.minimum(low + step, limit)
         rise = anchor.rise(side * there)
-        high = np.where(np.isnan(high) & (rise > above), there, high)
-        going = np.isnan(high) & (there < limit) & np.isfinite(rise)
+        high = np.where(going & (rise > above), there, high)
+        going &= np.isnan(high) & (there < limit) & np.isfinite(rise)
         if number >= _ENOUGH:
             going &= side * anchor.slope(side * there) > 0.0
         if not going.any():
@@ -151,7 +152,8 @@ def _solve(anchor: Anchor, above: Array, side: float, low: Array, high: Array) -
     guess = np.sqrt(2.0 * np.abs(above) / bend)
     guess = np.where(high <= 0.0, -guess, guess)
     u = np.where((guess > low) & (guess < high), guess, 0.5 * (low + high))
-    still = np.zeros(u.shape, dtype=bool)
+    found = np.full(u.shape, np.nan)
+    rows = np.arange(u.size)
     for _ in range(_EXPANSIONS):
         over = anchor.rise(side * u) - above
         outside = over > 0.0
@@ -161,9 +163,12 @@ def _solve(anchor: Anchor, above: Array, side: float, low: Array, high: Array) -
         good = (step >= low) & (step <= high) & (np.abs(step - u) <= 0.5 * (high - low))
         small = np.abs(step - u) <= 2.0 * np.spacing(np.abs(u))
         fresh = np.where(over == 0.0, u, np.where(good | small, step, middle))
-        # Rounding may turn steps of two units to and fro.
+        # Rounding may turn steps of two units to and fro, as often as others still move.
         still = small | (np.abs(fresh - u) <= np.spacing(np.abs(u))) | np.isnan(fresh)
-        u = fresh
-        if still.all():
+        found[rows[still]] = fresh[still]
+        going = np.flatnonzero(~still)
+        if not going.size:
             break
-    return np.where(still, u, np.nan)
+        rows, anchor, u = rows[going], anchor.take(going), fresh[going]
+        low, high, above = low[going], high[going], above[going]
+    return found

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 import matplotlib.pyplot as plt
@@ -17,6 +18,8 @@ from phasekit.labels.arguments import bad, flag
 
 #: Axes that are narrower than this (inches) have short names in their legends.
 NARROW = 4.0
+#: More than ticks and labels beside Axes ever take (inches).
+BESIDE = 1.5
 #: Axes that are lower than this (inches) lose a good part of their height to a legend.
 LOW = 3.0
 #: Part of the height of a panel that a legend may take before names become short.
@@ -112,23 +115,42 @@ def legend_below(
     known = {**SHORT, **(short or {})}
     brief = [known.get(name, name.removeprefix("from ")) for name in names]  # of a start its state
     tried: dict[float, tuple[list[str], int]] = {}
-    box, figure = ax.get_window_extent(), ax.figure
-    width, height = float(box.width), float(box.height)
-    if [*figure.axes] == [ax]:
-        # Before the layout these are narrower than after it, if no color bar stands beside them.
-        tight = ax.get_tightbbox()
-        beside = 0.0 if tight is None else max(box.x0 - tight.x0, 0) + max(tight.x1 - box.x1, 0)
-        width, height = 0.98 * float(figure.bbox.width - beside), float(figure.bbox.height)
+    alone = [*ax.figure.axes] == [ax]  # no color bar beside them: the layout will widen them
+    height = float((ax.figure.bbox if alone else ax.get_window_extent()).height)
+    room = functools.cache(_room if alone else _width)
     for texts in [names, brief] if brief != names else [names]:
         for columns in range(min(3, len(handles)), 0, -1):
             own = _legend(ax, handles, texts, columns).get_window_extent()
-            if own.width <= width or columns == 1:
+            if columns == 1 or _fits(ax, own.width, room):
                 tried.setdefault(float(own.height), (texts, columns))
                 break
-        if own.height <= TALL * height and own.width <= width:
+        if own.height <= TALL * height and _fits(ax, own.width, room):
             break
     texts, columns = tried[min(tried)]
     return _legend(ax, handles, texts, columns)
+
+
+def _fits(ax: Axes, width: float, room: Callable[[Axes], float]) -> bool:
+    """Whether a legend of a width has room, which is measured only where that is not plain."""
+    figure = ax.figure
+    if [*figure.axes] == [ax] and width <= figure.bbox.width - BESIDE * figure.dpi:
+        return True
+    return width <= room(ax)
+
+
+def _width(ax: Axes) -> float:
+    """Return the width of Axes."""
+    return float(ax.get_window_extent().width)
+
+
+def _room(ax: Axes) -> float:
+    """Return the width that the layout will leave; this takes longer than the whole picture."""
+    legend = ax.get_legend()
+    if legend is not None:
+        legend.set_in_layout(False)  # it is being tried
+    box, tight = ax.get_window_extent(), ax.get_tightbbox()
+    beside = 0.0 if tight is None else max(box.x0 - tight.x0, 0) + max(tight.x1 - box.x1, 0)
+    return 0.98 * float(ax.figure.bbox.width - beside)
 
 
 def _legend(ax: Axes, handles: list[Artist], texts: list[str], columns: int) -> Legend:

@@ -14,7 +14,7 @@ from phasekit.labels.arguments import bad, unknown
 from phasekit.plot.parts.units import SYMBOLS, Angles, Units, as_units
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION
 from phasekit.systems.registry import models
-from phasekit.systems.system import Model
+from phasekit.systems.system import System
 
 #: Names of quantities where there is no room for their meaning, if they are not plain words.
 BRIEF = {"n_equilibria": "number of equilibria"}
@@ -106,7 +106,7 @@ def dataset(
     return value
 
 
-def model_in(ds: xr.Dataset) -> type[Model] | None:
+def model_in(ds: xr.Dataset) -> type[System] | None:
     """Return the model that a Dataset names, if all that it needs is there."""
     model = models().get(str(ds.attrs.get(MODEL)))
     if model is None or ds.attrs.get(SCHEMA) != SCHEMA_VERSION:
@@ -115,7 +115,7 @@ def model_in(ds: xr.Dataset) -> type[Model] | None:
     return model if all(name in ds.variables for name in needed) else None
 
 
-def system_of(motion: xr.Dataset, argument: str, instead: str) -> Model:
+def system_of(motion: xr.Dataset, argument: str, instead: str) -> System:
     """Return the system whose motion a Dataset holds."""
     model = model_in(motion)
     if model is None:

@@ -11,8 +11,10 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from numpy.typing import ArrayLike, NDArray
 
 from phasekit.errors import Loop
+from phasekit.labels.arguments import bad, reals
 from phasekit.phase.level_curves import Arc, LevelCurves
 from phasekit.plot.parts import style
 from phasekit.plot.parts.circle import Circle
@@ -132,3 +134,24 @@ def orbit_look(number: int) -> style.Look:
         "linestyle": style.ORBIT_DASHES[number % len(style.ORBIT_DASHES)],
         "linewidth": 1.8,
     }
+
+
+def starts_of_pairs(orbits: ArrayLike) -> list[State]:
+    """Return pairs of numbers as pairs of floats."""
+    pairs = finite(orbits, "orbits", "rad and rad/s")
+    if not pairs.size:
+        return []
+    if pairs.ndim == 1:
+        pairs = pairs[np.newaxis]
+    if pairs.ndim != 2 or pairs.shape[1] != 2:
+        raise bad("orbits", orbits, "pairs (phi0, dphi0), of shape (2,) or (n, 2)")
+    return [(float(phi), float(speed)) for phi, speed in pairs]
+
+
+def finite(values: ArrayLike, argument: str, unit: str) -> NDArray[np.float64]:
+    """Return finite numbers as an array."""
+    wants = f"finite numbers in {unit}"
+    array = reals(argument, getattr(values, "values", values), wants)
+    if not np.isfinite(array).all():
+        raise bad(argument, values, wants)
+    return array

@@ -15,7 +15,7 @@ from matplotlib.colors import ListedColormap, to_rgba
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 
 from phasekit.bifurcation.special_points import KINDS
-from phasekit.errors import EquilibriumKind, Topology
+from phasekit.errors import EquilibriumKind, FlowEquilibriumKind, Topology
 from phasekit.plot.parts.circle import circle_axis as circle_axis
 from phasekit.plot.parts.circle import unwrapped_axis as unwrapped_axis
 from phasekit.plot.parts.frame import axes_for as axes_for
@@ -62,6 +62,29 @@ POINTS: Mapping[EquilibriumKind, Look] = {
         "markerfacecolor": PURPLE,
         "markeredgecolor": BLACK,
         "label": "degenerate",
+    },
+}
+
+# Those of flows; stable ones are full, unstable ones empty.
+FLOW_POINTS: Mapping[FlowEquilibriumKind, Look] = {
+    FlowEquilibriumKind.CENTER: POINTS[EquilibriumKind.CENTER],
+    FlowEquilibriumKind.SADDLE: POINTS[EquilibriumKind.SADDLE],
+    FlowEquilibriumKind.DEGENERATE: POINTS[EquilibriumKind.DEGENERATE],
+    **{
+        kind: {
+            "marker": marker,
+            "markersize": size,
+            "markerfacecolor": BLACK if stable else "white",
+            "markeredgecolor": "white" if stable else BLACK,
+            "markeredgewidth": 0.8 if stable else 1.5,
+            "label": kind.name.lower().replace("_", " "),
+        }
+        for kind, marker, size, stable in (
+            (FlowEquilibriumKind.STABLE_NODE, "s", 7, True),
+            (FlowEquilibriumKind.UNSTABLE_NODE, "s", 6, False),
+            (FlowEquilibriumKind.STABLE_FOCUS, "o", 7.5, True),
+            (FlowEquilibriumKind.UNSTABLE_FOCUS, "o", 6.5, False),
+        )
     },
 }
 
@@ -145,6 +168,11 @@ LOCI: Mapping[tuple[str, int], Look] = {
         "label": "centers of equal energy",
     },
 }
+
+STABLE: Look = {"color": BLUE, "linestyle": (0, (5, 1.5)), "linewidth": 1.6}
+UNSTABLE: Look = {"color": VERMILLION, "linestyle": "-", "linewidth": 1.6}
+#: Short names of manifolds, for narrow legends.
+MANIFOLDS = {"stable manifold": "stable", "unstable manifold": "unstable"}
 
 LEVEL: Look = {"color": GRAY, "linestyle": "-", "linewidth": 0.8}
 ROTATION: Look = {"color": GRAY, "linestyle": (0, (1, 1.5)), "linewidth": 1.1}

@@ -8,6 +8,8 @@ The unknowns are u = (x, p, ...) with the state x, the free parameters p and wha
   so a Hopf point where k = omega^2 > 0 and a neutral saddle where k < 0; l is held fixed.
 - BRANCH: f + b w = 0, w f_x = 0, w f_q = 0, w.w = 1 with u = (x, p, w, b), q the first free
   parameter: a branch point where b = 0.
+- EVENT: f = 0, g = 0 with u = (x, p), g a function of the user's, which comes with its derivatives
+  as ``second``.
 
 Of a map A the field is f = A - x, so that multipliers -1 and exp(+-i theta) are
 
@@ -16,9 +18,9 @@ Of a map A the field is f = A - x, so that multipliers -1 and exp(+-i theta) are
   A^2 - (2 - k) A + 1, so k = 2 - 2 cos theta between 0 and 4, and two real multipliers with the
   product 1 elsewhere.
 
-Norms of v and w are taken in units of their scales. With one free parameter all but the first are
-square and define a point; with two they define a curve ([Govaerts2000] chapters 4 and 6,
-[Kuznetsov2004] chapters 9 and 10).
+Norms of v and w are taken in units of their scales. With one free parameter all but
+EQUILIBRIUM are square and define a point; with two they define a curve ([Govaerts2000] chapters 4
+and 6, [Kuznetsov2004] chapters 9 and 10).
 
 Everything lies in one flat work array: what `places` returns is where each piece begins.
 """
@@ -32,18 +34,23 @@ import numpy as np
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, SCALE, VECTORS
 from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.differences import DERIVED, bend, jet, spare_size
+from phasekit.numerics.native import call
 
-EQUILIBRIUM, FOLD, HOPF, BRANCH, FLIP, TORUS = range(6)
+EQUILIBRIUM, FOLD, HOPF, BRANCH, FLIP, TORUS, EVENT = range(7)
+#: Curves on which no eigenvalue is critical all along.
+REGULAR = (EQUILIBRIUM, EVENT)
 
 
 def unknowns(kind: int, n: int, free: int) -> int:
     """Number of unknowns of a defining system."""
-    return n + free + (0, n, n + 1, n + 1, n, n + 1)[kind]
+    return n + free + (0, n, n + 1, n + 1, n, n + 1, 0)[kind]
 
 
 def equations(kind: int, n: int) -> int:
     """Number of equations of a defining system."""
-    return n if kind == EQUILIBRIUM else 2 * n + (1, 2)[kind not in (FOLD, FLIP)]
+    if kind in REGULAR:
+        return n + (kind == EVENT)
+    return 2 * n + (1, 2)[kind not in (FOLD, FLIP)]
 
 
 def work_size(kind: int, n: int, free: int) -> int:
@@ -77,6 +84,8 @@ def places(kind: int, n: int, free: int) -> tuple[int, ...]:
     if kind == FOLD or kind == FLIP:
         size = m + n
         rows = 2 * n + 1
+    elif kind == EVENT:
+        rows = n + 1
     elif kind != EQUILIBRIUM:
         size = m + n + 1
         rows = 2 * n + 2
@@ -109,6 +118,14 @@ def evaluate(
     f = base
     if kind == EQUILIBRIUM:
         jet(first, mode, n, w, u, par, active, scale, f, spare)
+        return
+    if kind == EVENT:
+        jet(first, mode, n, w, u, par, active, scale, f, spare)
+        call(second, w, u, par, u, spare)
+        for i in range(rows):
+            w[g + i] = w[f + i] if i < n else w[spare]
+            for j in range(m):
+                w[jac + i * m + j] = w[base + n + i * m + j] if i < n else w[spare + 1 + j]
         return
     for i in range(m):
         w[z + i] = w[v + i] if i < n and kind != BRANCH else 0.0

@@ -26,7 +26,7 @@ from phasekit.numerics.compile import Array, kernel, routine
 from phasekit.numerics.native import copy, inner, keep
 
 # Reasons to stop, beside those of a step.
-FULL, BOUND, CLOSED, STUCK, NOT_FINITE = range(5)
+FULL, BOUND, CLOSED, STUCK, NOT_FINITE, INTERRUPTED = range(6)
 # What is recorded of a step, after unknowns and tangent.
 STEP_LENGTH, NEWTON_STEPS, ANGLE, ARCLENGTH, RECORDED = range(5)
 

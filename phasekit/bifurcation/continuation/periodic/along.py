@@ -64,6 +64,32 @@ def inner(mesh: Array, weights: Array, value: Array, a: Array, b: Array, scale: 
 
 
 @kernel
+def product(
+    mesh: Array, weights: Array, value: Array, scale: Array, width: Array, a: Array, b: Array,
+    dy_a: Array, dy_b: Array,
+) -> float:  # fmt: skip
+    """Inner product of two directions: `inner` of the states, and the free parameters."""
+    total = 0.0
+    for k in range(width.size):
+        total += dy_a[1 + k] * dy_b[1 + k] / width[k] ** 2
+    return inner(mesh, weights, value, a, b, scale) + total
+
+
+@kernel
+def largest(x: Array, scale: Array, counts: Any) -> float:
+    """Largest size of the states that count, on scaled axes; NaN where one is."""
+    most = 0.0
+    for c in range(scale.size):
+        if counts[c]:
+            for i in range(x.shape[0]):
+                size = abs(x[i, c]) / scale[c]
+                if np.isnan(size):
+                    return np.nan
+                most = max(most, size)
+    return most
+
+
+@kernel
 def interpolate(mesh: Array, x: Array, places: Array, at: Array, out: Array) -> None:
     """Values of a piecewise polynomial at times in ascending order.
 
@@ -170,6 +196,32 @@ def mean(mesh: Array, x: Array, weights: Array, value: Array, out: Array) -> Non
 
 
 @kernel
+def place(
+    mesh: Array, x: Array, y: Array, turns: Array, scale: Array, width: Array, own: int,
+    weights: Array, value: Array, out: Array,
+) -> None:  # fmt: skip
+    """Fill the parameters, the period, and of each state, less its turns, mean and deviation."""
+    m, n, a = weights.size, x.shape[1], width.size
+    flat, at = np.empty_like(x), np.empty(x.shape[0])
+    middle, square = np.empty(n), np.empty(n)
+    times(mesh, m, at)
+    for i in range(x.shape[0]):
+        for c in range(n):
+            flat[i, c] = x[i, c] - at[i] * turns[c]
+    mean(mesh, flat, weights, value, middle)
+    for i in range(x.shape[0]):
+        for c in range(n):
+            flat[i, c] = (flat[i, c] - middle[c]) ** 2
+    mean(mesh, flat, weights, value, square)
+    for k in range(a):
+        out[k] = y[1 + k] / width[k]
+    out[a] = np.log(y[0])
+    for c in range(own):
+        out[a + 1 + c] = middle[c] / scale[c]
+        out[a + 1 + own + c] = np.sqrt(abs(square[c])) / scale[c]
+
+
+@kernel
 def highest(
     mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Array, out: Array
 ) -> None:
@@ -245,6 +297,44 @@ def even(
             j += 1
             part = (density[j] + 0.2 * whole) * (mesh[j + 1] - mesh[j])
         new[k] = mesh[j] + (mesh[j + 1] - mesh[j]) * min((k * step - reached) / part, 1.0)
+
+
+@kernel
+def parts(
+    mesh: Array, jet_: Array, scale: Array, period: float, m: int, reach: float, counts: Any
+) -> float:
+    """Count the parts of each interval in which rate times length is at most ``reach``.
+
+    There are two at least. Returns how many it takes by the rates alone; NaN if one is not finite.
+    """
+    n = scale.size
+    wide = jet_.shape[1] // n - 1
+    total = 0.0
+    for j in range(mesh.size - 1):
+        rate = 0.0
+        for i in range(m):
+            for c in range(n):
+                size = 0.0
+                for d in range(n):
+                    size += abs(jet_[j * m + i, n + c * wide + d] * scale[d] / scale[c])
+                if not np.isfinite(size):
+                    return np.nan
+                rate = max(rate, size)
+        count = np.ceil((mesh[j + 1] - mesh[j]) * period * rate / reach)
+        total += count
+        counts[j] = max(2, int(min(count, 2.0**62)))
+    return total
+
+
+@kernel
+def divided(mesh: Array, counts: Any, new: Array) -> None:
+    """Fill a mesh whose intervals are parts of those of another one."""
+    place = 0
+    for j in range(counts.size):
+        for k in range(counts[j]):
+            new[place] = mesh[j] + (mesh[j + 1] - mesh[j]) * (k / counts[j])
+            place += 1
+    new[place] = 1.0
 
 
 @kernel

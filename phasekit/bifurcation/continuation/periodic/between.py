@@ -11,12 +11,13 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic.criteria import determinant, fold_test
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.point import Point, point_of
+from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
 Array = npt.NDArray[np.float64]
-Value = Callable[[Point, bool], float]
+Value = Callable[[Any, bool], float]
 
 SPLIT = 1e-2  # part of a step between the zeros into which rounding parts a double one
+STILL = 1e-11  # part of a stretch, as far as orbits are known, within which roots settle
 NODES = 9  # points of the family through which a branch point is interpolated
 
 
@@ -25,7 +26,7 @@ class Stretch:
     """The family between two of its points, by the distance s along the tangent of the first."""
 
     cycles: Cycles
-    a: Point
+    a: Point | State
     b: Point
 
     def __post_init__(self) -> None:
@@ -95,7 +96,7 @@ def root(stretch: Stretch, test: Value) -> Point | None:
         value = test(point, forced)
         if abs(value) <= least:  # of what jumps, the last one
             best, least = point, abs(value)
-        if value == 0.0 or abs(s - before) <= 1e-14 * stretch.length:
+        if value == 0.0 or abs(s - before) <= STILL * stretch.length:
             break
         before = s
         if (value >= 0.0) == (left >= 0.0):

@@ -86,6 +86,23 @@ def basis(m: int, at: Array) -> tuple[Array, Array]:
     return value, slope
 
 
+@functools.cache
+def integrals(m: int) -> tuple[Array, Array]:
+    """From values at Gauss points to integrals from 0 up to these, and up to the even places."""
+    nodes = scheme(m).nodes
+    whole = [
+        np.polynomial.Polynomial.fromroots(np.delete(nodes, k))
+        / np.prod(node - np.delete(nodes, k))
+        for k, node in enumerate(nodes)
+    ]
+    found = [one.integ(lbnd=0.0) for one in whole]
+    places = np.arange(m + 1.0) / m
+    return (
+        np.stack([one(nodes) for one in found], axis=1),
+        np.stack([one(places) for one in found], axis=1),
+    )
+
+
 def times(mesh: Array, m: int) -> Array:
     """The times of all places of a mesh."""
     out = np.empty((len(mesh) - 1) * m + 1)

@@ -13,6 +13,8 @@ from phasekit.bifurcation.continuation.periodic.point import Point
 
 Complex = npt.NDArray[np.complex128]
 
+ROUNDED = 1e-14  # least relative error of a matrix of multipliers
+SURE = 10.0  # times an error that tells
 CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
 
 
@@ -62,6 +64,23 @@ def torus_test(point: Point, forced: bool) -> float:
     """Product of 1 - mu_i mu_j over pairs, each beside its size."""
     mu = nontrivial(point.multipliers, forced)
     return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
+
+
+def conjugate(point: Point, forced: bool) -> bool:
+    """Whether the two multipliers whose product is next to 1 are no real ones."""
+    pairs = combinations(nontrivial(point.multipliers, forced), 2)
+    one, _ = min(pairs, key=lambda pair: abs(1.0 - pair[0] * pair[1]))
+    return complex_pair(point, one)
+
+
+def complex_pair(point: Point, one: complex) -> bool:
+    """Whether a multiplier is one of a conjugate pair, for all that its error lets one say.
+
+    Errors of the matrix part a double real one into a pair at the root of their size.
+    """
+    error = max(point.trivial_error, point.liouville_error, ROUNDED)
+    largest = max(1.0, float(np.max(np.abs(point.multipliers))))
+    return one.imag**2 > SURE * error * largest * abs(one)
 
 
 def second_doubling(point: Point, forced: bool) -> float:

@@ -19,6 +19,8 @@ from phasekit.bifurcation.continuation.periodic.multipliers import across, multi
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
+LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale of its own
+MARGIN = 6.0  # that scale beside the orbit, where it is much larger
 REST = 1e-12  # amplitude, beside the size of a state, that is rounding
 MOST = 20_000  # intervals of a mesh that resolves them
 
@@ -143,6 +145,11 @@ class Cycles:
         """Number of free parameters and the period."""
         return 1 + len(self.active)
 
+    @property
+    def moving(self) -> int:
+        """Number of states with a part in tangents; those behind follow from them."""
+        return self.n
+
     @cached_property
     def closure(self) -> Array:
         """By what each state is multiplied after a period."""
@@ -166,6 +173,41 @@ class Cycles:
         """A copy with some attributes changed."""
         return replace(self, **changes)
 
+    @cached_property
+    def tolerance(self) -> float:
+        """Size of the last of Newton's steps, on these scales."""
+        return self.options.tolerance
+
+    @cached_property
+    def _growing(self) -> npt.NDArray[np.bool_]:
+        """States whose scale grows with the orbit."""
+        free: npt.NDArray[np.bool_] = self.period == 0.0
+        free[self.own :] = False
+        for i, name in enumerate(self.field.states[: self.own]):
+            free[i] &= name not in self.options.scales
+        return free
+
+    def sized(self, orbit: Orbit) -> Cycles:
+        """These orbits on the scales of one of them, where it is much larger than the first.
+
+        The scales depend on that orbit alone, so that a family goes on as if it had never stopped.
+        They are so much larger than it that its amplitude changes by half of itself in the longest
+        of steps. Angles, and states whose scales the user has set, keep theirs.
+        """
+        ratio = along.largest(orbit.x, self.scale, self._growing)
+        if not LARGE < ratio < math.inf:
+            return self
+        grown = 1.0 + MARGIN * (ratio - LARGE)  # from 1 on, so that steps do not jump
+        made = self.replace(scale=np.where(self._growing, grown * self.scale, self.scale))
+        for name in ("jets", "closure", "_growing"):  # which know no scales
+            made.__dict__[name] = getattr(self, name)
+        made.__dict__["tolerance"] = self.options.tolerance / MARGIN  # beside the orbit itself
+        return made
+
+    def length(self, mesh: Array, dx: Array, dy: Array) -> float:
+        """Length of a direction."""
+        return math.sqrt(self.inner(mesh, dx, dx, dy, dy))
+
     def own_period(self, y: Array) -> tuple[float, Array]:
         """The period of the forcing, times the multiple, and its derivatives."""
         k = len(self.active)
@@ -177,13 +219,13 @@ class Cycles:
 
     def vertical(self, dy: Array) -> bool:
         """Whether a tangent has no part along the parameter, as in conservative families."""
-        return bool(np.all(np.abs(dy[1:]) <= 1e-9 * self.width))
+        pairs = zip(dy[1:].tolist(), self.width.tolist(), strict=False)
+        return all(abs(one) <= 1e-9 * width for one, width in pairs)
 
     def inner(self, mesh: Array, a: Array, b: Array, dy_a: Array, dy_b: Array) -> float:
         """Inner product of two directions: the mean over states and time, and the parameters."""
         c = collocation.scheme(self.m)
-        states = along.inner(mesh, c.weights, c.value, a, b, self.scale)
-        return float(states + np.sum(dy_a[1:] * dy_b[1:] / self.width**2))
+        return along.product(mesh, c.weights, c.value, self.scale, self.width, a, b, dy_a, dy_b)
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
         """Bordering rows, phase or period first, direction last; with their values at the orbit."""
@@ -212,23 +254,25 @@ class Cycles:
         c = collocation.scheme(self.m)
         mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
         n, q, jets = self.n, self.q, self.jets
+        local = self.sized(guess)
         if x.shape != ((len(mesh) - 1) * self.m + 1, n) or y.shape != (q,):
             raise ValueError(f"an orbit of shape {x.shape} with {y.shape} on {len(mesh)} points")
         W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
         dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
         most = iterations or self.options.max_iterations
         sign, divergence = 0.0, np.nan
+        self.field.failure = None
         values, size, step = np.empty((0, 0)), np.inf, 0
         if not jets.given:
             values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
         while True:
             if jets.given:
-                values = jets(mesh, x, y, self.m, self.sizes)
+                values = jets(mesh, x, y, self.m, local.sizes)
             end, steps, side, residual, trace, size, length = newton.newton(
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
-                self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, self.scale,
-                self.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
-                dx, dy, values, self.options.tolerance, 1 if jets.given else most, damped, size,
+                self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, local.scale,
+                local.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
+                dx, dy, values, local.tolerance, 1 if jets.given else most, damped, size,
             )  # fmt: skip
             step += steps
             if steps:  # else the last ones stand
@@ -238,9 +282,10 @@ class Cycles:
         orbit = Orbit(mesh, x, y)
         if end in (newton.FOUND, newton.CHECKED):
             found = (step, residual, sign, divergence, W)
-            return Solution(orbit, dx[1], dy[1], *found, length=length)
+            part = 1.0 if local is self else self.length(mesh, dx[1], dy[1])
+            return Solution(orbit, dx[1] / part, dy[1] / part, *found, length=length * part)
         message = {
-            newton.NOT_FINITE: "f or its derivatives are not finite",
+            newton.NOT_FINITE: f"f or its derivatives are not finite{self.field.raised}",
             newton.SINGULAR: "the equations are singular",
         }.get(end, "Newton's method did not converge")
         return Solution(orbit, dx[1], dy[1], 0, residual, sign, divergence, W, message)
@@ -282,19 +327,19 @@ class Cycles:
 
         On each of its intervals rate times length is at most ``reach``.
         """
-        n = self.n
         found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-        slopes = found[:, n:].reshape(orbit.intervals, self.m, n, -1)[:, :, :, :n]
-        rates = np.abs(slopes * self.scale / self.scale[:, None]).sum(axis=3).max(axis=(1, 2))
-        if not np.isfinite(rates).all():
+        counts = np.empty(orbit.intervals, dtype=np.int64)
+        period = float(orbit.y[0])
+        total = along.parts(orbit.mesh, found, self.scale, period, self.m, reach, counts)
+        if not total <= MOST:
             return None
-        parts = np.ceil(np.diff(orbit.mesh) * orbit.y[0] * rates / reach)
-        if np.sum(parts) > MOST:
-            return None
-        counts = np.maximum(2, parts).astype(int)
-        first, length = (np.repeat(a, counts) for a in (orbit.mesh[:-1], np.diff(orbit.mesh)))
-        within = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return np.append(first + length * (within / np.repeat(counts, counts)), 1.0)
+        mesh = np.empty(int(np.sum(counts)) + 1)
+        along.divided(orbit.mesh, counts, mesh)
+        return mesh
+
+    def on_finer(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+        """An orbit that was brought to a finer mesh for the sake of its multipliers."""
+        return self.correct(orbit, *self.rows(orbit, dx, dy))
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x over a period, of what `kernels.condense` found."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
+
+import numpy as np
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
@@ -10,6 +13,7 @@ from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Path, Tracks
 from phasekit.bifurcation.continuation.periodic.point import Point, State
 from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow
+from phasekit.bifurcation.continuation.stops import NOT_BEGUN, SEARCHED, UNFINISHED
 from phasekit.bifurcation.special_points import KINDS
 
 FIRST = 8  # points after which a family is looked at first; then after twice as many each time
@@ -25,14 +29,35 @@ def run(cycles: Cycles, start: Point, directions: str) -> Tracks:
     closed = forward is not None and forward.stop.reason == "closed"
     if directions != "forward" and not closed:
         state = begin(cycles, start, False)
+        if forward is not None and forward.stop.reason == "interrupted":
+            return Track((), state, NOT_BEGUN), forward
         backward = _followed(cycles, state, most, start, start.flipped())
     return backward, forward
 
 
-def go_on(cycles: Cycles, track: Track | None, points: int, start: Point) -> Track | None:
-    """More points of a track that ended for their number, exactly as if it had never stopped."""
-    if track is None or track.stop.reason != "max_points":
+def goes_on(cycles: Cycles, track: Track) -> bool:
+    """Whether a track can be longer: it was cut, or a bound is no longer where it met it."""
+    reason = track.stop.reason
+    if reason != "bound":
+        return reason in UNFINISHED or reason in cycles.ends
+    y = track.state.orbit.y
+    p = y[1 : 1 + len(cycles.low)]
+    low, high = cycles.options.bounds.get("period", (-np.inf, np.inf))
+    return bool(np.all((p > cycles.low) & (p < cycles.high)) and low < y[0] < high)
+
+
+def go_on(
+    cycles: Cycles, track: Track | None, points: int, start: Point, forward: bool
+) -> Track | None:
+    """More points of a track that can be longer, exactly as if it had never stopped."""
+    if track is None or not goes_on(cycles, track):
         return track
+    if track.stop.reason in cycles.ends and track.points:
+        # The state behind the last point, which is followed again.
+        known = len(track.points)
+        track = replace(
+            track, state=follow(cycles, begin(cycles, start, forward), known, start).state
+        )
     last = track.points[-1] if track.points else start
     more = _followed(cycles, track.state, points, start, last)
     return Track((*track.points, *more.points), more.state, more.stop)
@@ -43,10 +68,14 @@ def _followed(cycles: Cycles, state: State, points: int, start: Point, last: Poi
     if not cycles.ends:
         return follow(cycles, state, points, start)
     found: tuple[Point, ...] = ()
+    passed: Counter[str] = Counter()
     chunk = FIRST
     while True:
         track = follow(cycles, state, min(chunk, points), start)
-        ended = _ended(cycles, last, track)
+        try:
+            ended = _ended(cycles, last, track, passed)
+        except KeyboardInterrupt:
+            return Track(found, state, SEARCHED)
         track = track if ended is None else ended
         found = (*found, *track.points)
         points -= len(track.points)
@@ -55,12 +84,15 @@ def _followed(cycles: Cycles, state: State, points: int, start: Point, last: Poi
         state, last, chunk = track.state, found[-1], 2 * chunk
 
 
-def _ended(cycles: Cycles, last: Point, track: Track) -> Track | None:
+def _ended(cycles: Cycles, last: Point, track: Track, passed: Counter[str]) -> Track | None:
     """A track up to the point behind that at which it ends; None if it goes on."""
     path = Path((last, *track.points), 0, (track.stop, track.stop))
-    for one in in_order(find(cycles, path)):
+    for one in in_order(find(cycles, path)[0]):
         name = _ending_of(cycles, one)
-        if name is not None:
+        if name is None:
+            continue
+        passed[name] += 1
+        if passed[name] >= cycles.ends.count(name):
             stop = Stop(name, f"stop = {name!r}: {_said(cycles, one)}")
             return Track(track.points[: one.index + 1], track.state, stop)
     return None
@@ -85,7 +117,10 @@ def cut(cycles: Cycles, path: Path, found: list[Found]) -> tuple[Path, list[Foun
         ]
         if stop.reason not in cycles.ends or not there:
             continue
-        one = there[side - 1]  # the one next to the start
+        # Where it ended before, it went on; it ends at the first of those that its wish is for.
+        edge = len(path.points) - 2 if side else 0
+        own = [one for one in there if (one.index >= edge if side else one.index <= edge)]
+        one = (own or there)[side - 1]
         k = found.index(one)
         ends[side] = one
         if side:

@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, homoclinic, starts
+from phasekit.bifurcation.continuation.periodic import along, collocation, homoclinic, starts
+from phasekit.bifurcation.continuation.periodic.between import Stretch, root
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import TORUS, Extended
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
@@ -16,16 +17,20 @@ from phasekit.bifurcation.continuation.periodic.point import Point, State, point
 Array = npt.NDArray[np.float64]
 
 MEETING = 1e-5  # half turns between multipliers that are said to meet, and where they do
+SHRUNK = 0.01  # size of orbits, beside their scale and the first one, that shrink to a point
 FEW = 5  # points before which a family is not asked whether it closes
 NEAR = 0.2  # how near its start it has to come by, beside its step
 SAME = 1e-6
+UNBOUNDED = 1e6  # size of a state, beside its first scale, of orbits that are said to grow for ever
+OVERFLOW = 1e100  # the same, whatever the parameter does
+STILL = 1e-6  # how far a parameter moves, in units of its span, while such orbits grow e-fold
 
 
 def end_of(
     cycles: Cycles, before: State, made: Point, start: Point
 ) -> tuple[Point | None, Stop] | None:
     """The last point and the reason, if the family ends between two points."""
-    sizes = (cycles.amplitudes(made.orbit) / cycles.scale).tolist()
+    sizes = (cycles.amplitudes(made.orbit) / cycles.scale)[: cycles.own].tolist()
     small = sum(sizes) < 4.0 * made.step * len(sizes)
     if small and not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
         return _at_hopf(cycles, before, made)
@@ -56,10 +61,36 @@ def end_of(
             return last, Stop("bound", f"period met its {side} bound {value:.9g}")
     if homoclinic.near(cycles, made, start) and not homoclinic.awaited(cycles, made.orbit):
         return made, homoclinic.stop(cycles, made.orbit)
+    grown = _without_bound(cycles, made)
+    if grown is not None:
+        return made, grown
     if _closes(cycles, before, made, start):
         last = replace(start, arclength=made.arclength, step=made.step)
         return last, Stop("closed", "the family closed on its start")
     return None
+
+
+def when_stuck(cycles: Cycles, state: State, start: Point, stuck: Stop) -> Stop:
+    """Why no step succeeds: orbits that have shrunk, or a homoclinic orbit that is near.
+
+    Folds meet Hopf points of equilibria where the multiplier no longer tells small orbits apart.
+    """
+    if len(cycles.active) < 2 or cycles.forced:
+        return homoclinic.when_stuck(cycles, state, start, stuck)
+    own, scale = slice(cycles.own), cycles.scale[: cycles.own]
+    size, first = (
+        float(np.max(np.ptp(orbit.x[:, own] - np.outer(
+            collocation.times(orbit.mesh, cycles.m), cycles.turns[own]), axis=0) / scale))
+        for orbit in (state.orbit, start.orbit)
+    )  # fmt: skip
+    if not size < SHRUNK * min(first, 1.0):
+        return stuck
+    name = cycles.field.parameters[cycles.active[0]]
+    return Stop(
+        "hopf",
+        f"the orbits shrink to an equilibrium, a Hopf point near {name} = "
+        f"{state.orbit.y[1]:.9g}; {stuck.message}",
+    )
 
 
 def _resonance(cycles: Cycles, before: State, made: Point) -> tuple[Point | None, Stop] | None:
@@ -84,6 +115,28 @@ def _resonance(cycles: Cycles, before: State, made: Point) -> tuple[Point | None
             break
         period = last.orbit.y[0]
     return last, Stop(kind, f"the multipliers of the tori meet at {value}")
+
+
+def _without_bound(cycles: Cycles, made: Point) -> Stop | None:
+    """The end of a family of ever larger orbits, as round a linear center, if it comes to it.
+
+    Where it was told to end by the period or at a special point, it goes on as far as numbers do.
+    """
+    own, orbit = cycles.own, made.orbit
+    free = cycles.period[:own] == 0.0
+    size = float(np.max(np.abs(orbit.x[:, :own] / cycles.scale[:own])[:, free], initial=0.0))
+    if not size > UNBOUNDED or not np.sum((orbit.x * made.dx / cycles.scale**2)[:, :own]) > 0.0:
+        return None
+    told = "period" in cycles.options.bounds or cycles.ends
+    moves = np.max(np.abs(made.dy[1:] / cycles.width)) * size > STILL
+    if (told or moves) and not size > OVERFLOW:
+        return None
+    name = cycles.field.parameters[cycles.active[0]]
+    return Stop(
+        "unbounded",
+        f"the orbits grow beyond {size:.2g} times the scales of the first ones while {name} = "
+        f"{orbit.y[1]:.9g} stands still: larger scales among the options lead on",
+    )
 
 
 def _period_bounds(cycles: Cycles, period: float) -> list[tuple[float, str, bool]]:
@@ -215,6 +268,22 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
     a, (dx,) = cycles.on(mesh, a, before.dx)
     part = (value - a.y[1 + k]) / (b.y[1 + k] - a.y[1 + k])
     guess = Orbit(mesh, a.x + part * (b.x - a.x), a.y + part * (b.y - a.y))
+    point = _from(cycles, before, made, guess, dx, part, k, value)
+    if point is None:
+        # Next to a fold, or a long way off: along the family, which is no function of the value.
+        near = root(Stretch(cycles, before, made), lambda p, _: float(p.orbit.y[1 + k] - value))
+        if near is not None:
+            guess, (dx,) = cycles.on(near.orbit.mesh, near.orbit, near.dx)
+            part = (near.arclength - before.arclength) / made.step
+            point = _from(cycles, before, made, guess, dx, part, k, value)
+    return point
+
+
+def _from(
+    cycles: Cycles, before: State, made: Point, guess: Orbit, dx: Array, part: float, k: int,
+    value: float,
+) -> Point | None:  # fmt: skip
+    """The point where a free parameter has a value, by Newton's method from a guess."""
     for _ in range(4):
         rows, rows_y, target = cycles.rows(guess, np.zeros_like(guess.x), np.zeros(cycles.q))
         rows_y[-1, 1 + k], target[-1] = 1.0, value
@@ -235,15 +304,14 @@ def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -
 
 def place(cycles: Cycles, orbit: Orbit) -> Array:
     """Numbers that tell orbits apart, whatever their phase."""
-    n, m = cycles.own, cycles.m
-    flat = orbit.x - np.outer(collocation.times(orbit.mesh, m), cycles.turns)
-    middle = collocation.mean(orbit.mesh, flat, m)
-    square = collocation.mean(orbit.mesh, (flat - middle) ** 2, m)
+    own, c = cycles.own, collocation.scheme(cycles.m)
     width = cycles.width[: len(cycles.active)]
-    return np.concatenate([
-        orbit.y[1 : 1 + len(width)] / width, [np.log(orbit.y[0])],
-        (middle / cycles.scale)[:n], (np.sqrt(np.abs(square)) / cycles.scale)[:n],
-    ])  # fmt: skip
+    out = np.empty(len(width) + 1 + 2 * own)
+    along.place(
+        orbit.mesh, orbit.x, orbit.y, cycles.turns, cycles.scale, width, own, c.weights, c.value,
+        out,
+    )  # fmt: skip
+    return out
 
 
 def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:

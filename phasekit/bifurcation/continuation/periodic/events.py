@@ -3,17 +3,22 @@
 Each is bracketed by the sign of a test function and refined on it to rounding: folds by the
 tangent's part along the parameter, period doublings by det(M + 1), tori by the product of
 1 - mu_i mu_j, in which real pairs are no bifurcation, branch points by the determinant of the
-bordered equations and det(M - 1) ([Kuznetsov2004] 10.3).
+bordered equations and det(M - 1) ([Kuznetsov2004] 10.3). Where two pass at once no sign may change:
+what is left then is counted (`together`).
 """
 
 from __future__ import annotations
 
 import cmath
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from itertools import combinations
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.normal_form import zero_along
 from phasekit.bifurcation.continuation.periodic.between import (
     Stretch,
     Value,
@@ -21,6 +26,8 @@ from phasekit.bifurcation.continuation.periodic.between import (
     root,
 )
 from phasekit.bifurcation.continuation.periodic.criteria import (
+    conjugate,
+    determinant,
     doubling_test,
     fold_test,
     none_passes,
@@ -28,8 +35,10 @@ from phasekit.bifurcation.continuation.periodic.criteria import (
     torus_test,
     unstable,
 )
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
+from phasekit.bifurcation.continuation.periodic.divergence import single
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
+from phasekit.bifurcation.continuation.periodic.folds import settled
 from phasekit.bifurcation.continuation.periodic.linear import Linear
 from phasekit.bifurcation.continuation.periodic.normal_forms import (
     VERTICAL,
@@ -40,21 +49,36 @@ from phasekit.bifurcation.continuation.periodic.normal_forms import (
     known,
 )
 from phasekit.bifurcation.continuation.periodic.on_curves import SAME, CurveTest, tests_of
-from phasekit.bifurcation.continuation.periodic.point import Point, vertical
+from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of, still, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector, other_tangent
+from phasekit.bifurcation.continuation.periodic.together import together
 from phasekit.bifurcation.special_points import KINDS
+
+Array = npt.NDArray[np.float64]
 
 DEPTH = 6  # halvings of a step whose multipliers change more than its special points explain
 ASTRAY = 1e-2  # distance from 1 or -1 of all multipliers at what is no such special point
+ROUNDED = 1e-10  # part of a tangent along the parameter, beside its span, that is rounding
+CRITICAL = 1e-7  # distance from 1 of the multiplier of a fold, beyond which it is looked for by it
 JUMP = 1e-3  # part of the values at both ends above which a number has no zero between them
 
 
-def find(cycles: Cycles, path: Path) -> list[Found]:
-    """All special points of a path, refined, in order."""
+def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
+    """All special points of a path, refined, in order.
+
+    And, in words, what is zero all along it, whose zeros are no points.
+    """
     found: list[Found] = []
     critical = len(cycles.active) == 1
     signs = [_signs(cycles, point) if critical else None for point in path.points]
     values = [_values(cycles, point) for point in path.points]
+    said = []
+    for k, test in enumerate(_looked_for(cycles)):
+        column = np.array([row[k] for row in values])
+        if isinstance(test, CurveTest) and test.vanishes(cycles, path.points, column):
+            said.append(zero_along(test.coefficient, test.kind))
+            for row in values:
+                row[k] = math.nan
     for test, value in zip(_looked_for(cycles), values[0], strict=True):
         if isinstance(test, CurveTest) and test.blurred and value == 0.0:  # what the curve ends for
             p = float(path.points[0].orbit.y[1])
@@ -63,6 +87,7 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
         here: list[Found] = []
         if signs[i] is not None and signs[i + 1] is not None and signs[i] != signs[i + 1]:
             here = _between(cycles, a, b, DEPTH)
+            here += together(Stretch(cycles, a, b), here)
         if values[i]:
             # A special point between them parts the stretch: at a fold a parameter turns back.
             inside = [one.point for one in here if one.status == "converged"]
@@ -71,7 +96,7 @@ def find(cycles: Cycles, path: Path) -> list[Found]:
             for k in range(len(stops) - 1):
                 here += _events(cycles, stops[k], stops[k + 1], at[k], at[k + 1])
         found += [replace(one, index=i) for one in here]
-    return found
+    return found, tuple(said)
 
 
 def _values(cycles: Cycles, point: Point) -> list[float]:
@@ -98,7 +123,7 @@ def _events(
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
         if isinstance(event, CurveTest) and not (
-            event.signed(cycles, a, before) or event.signed(cycles, b, after)
+            event.signed(cycles, a) or event.signed(cycles, b)
         ):
             continue  # a coefficient that is zero all along
 
@@ -137,10 +162,15 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     changed = [
         test for test in TESTS if (test.value(a, forced) >= 0.0) != (test.value(b, forced) >= 0.0)
     ]
-    if vertical(cycles, a) and vertical(cycles, b):
+    if (vertical(cycles, a) and vertical(cycles, b)) or still(cycles, a, b):
         # Conservative: a second multiplier is always 1, and the parameter never moves.
         changed = [test for test in changed if test is DOUBLING]
         return [one for one in (refined(Stretch(cycles, a, b), test) for test in changed) if one]
+    if blurred(cycles, a, b):
+        # Rounding has no sign: where no families cross, a multiplier passes 1 at folds alone.
+        passes = (determinant(a, forced) >= 0.0) != (determinant(b, forced) >= 0.0)
+        changed = [test for test in changed if test is not FOLD]
+        changed += [FOLD] * (passes != (BRANCHING in changed))
     if FOLD in changed and BRANCHING not in changed and none_passes(a, b, forced):
         changed.remove(FOLD)  # the parameter stands still to rounding, and no multiplier passes 1
     gap = unstable(b.multipliers, forced) - unstable(a.multipliers, forced)
@@ -167,13 +197,22 @@ def refined(stretch: Stretch, test: CycleTest) -> Found | None:
     point = test.root(stretch, test.value)
     p = stretch.a.orbit.y[1], stretch.b.orbit.y[1]
     interval = (float(min(p)), float(max(p)))
+    forced = stretch.cycles.forced
     if point is None:
+        if not any(test.may_be(end, forced) for end in (stretch.a, stretch.b)):
+            return None
         return Found(
             test.kind, stretch.b, -1, interval, "guess",
             "Newton's method did not converge between the points", {},
         )  # fmt: skip
-    if not test.holds(nontrivial(point.multipliers, stretch.cycles.forced)):
+    if not test.holds(point, forced):
         return None
+    if test is FOLD and point.trusted and not _near(1.0)(point, forced):
+        mu = min(nontrivial(point.multipliers, forced), key=lambda one: abs(one - 1.0))
+        return Found(
+            test.kind, point, -1, interval, "guess",
+            f"the parameter stands still to rounding, but the nearest multiplier is {mu:.3g}", {},
+        )  # fmt: skip
     form, message = test.normal_form(stretch.cycles, point)
     return Found(test.kind, point, -1, interval, "converged", message, form)
 
@@ -200,6 +239,8 @@ class CycleTest:
         Coefficients at the point, and what is to be said of them.
     holds : callable
         Whether it is such a point, by its multipliers but for the one that is always 1.
+    may_be : callable
+        Whether there can be such a point beside one, by its multipliers.
     root : callable
         The point of a stretch at which the test function vanishes.
     """
@@ -207,7 +248,8 @@ class CycleTest:
     kind: str
     value: Value
     normal_form: Callable[[Cycles, Point], tuple[dict[str, float], str]]
-    holds: Callable[[list[complex]], bool] = lambda multipliers: True
+    holds: Callable[[Point, bool], bool] = lambda point, forced: True
+    may_be: Callable[[Any, bool], bool] = lambda point, forced: True
     root: Callable[[Stretch, Value], Point | None] = root
 
 
@@ -215,22 +257,28 @@ Form = tuple[dict[str, float], str]
 
 
 def _form_of_fold(cycles: Cycles, point: Point) -> Form:
-    line = Linear(cycles, point.orbit)
-    return known(line, lambda line: at_fold(line, point.dx, point.dy), {"a": 1, "b": -1})
+    def way(growth: float) -> Callable[[Point | Solution], Callable[[Linear], dict[str, float]]]:
+        return lambda one: lambda line: at_fold(line, one.dx, growth=growth)
+
+    ways = (math.inf, -math.inf) if single(cycles) else (math.inf,)
+    return known(cycles, point, {"a": 1, "b": -1}, *map(way, ways))
 
 
 def _form_of_branching(cycles: Cycles, point: Point) -> Form:
-    own = point.dx, point.dy
-    W = cycles.looked_at(point.orbit, *own).W
-    other = other_tangent(cycles, point.orbit, W, own)
-    line = Linear(cycles, point.orbit)
-    return known(line, lambda line: at_branching(line, own, other), {"a": 1, "c": 2})
+    def way(one: Point | Solution) -> Callable[[Linear], dict[str, float]]:
+        own = one.dx, one.dy
+        other = other_tangent(cycles, one.orbit, _condensed(cycles, one), own)
+        return lambda line: at_branching(line, own, other)
+
+    return known(cycles, point, {"a": 1, "c": 2}, way, crossing=True)
 
 
 def _form_of_doubling(cycles: Cycles, point: Point) -> Form:
-    W = cycles.looked_at(point.orbit, point.dx, point.dy).W
-    v = null_vector(cycles, point.orbit, W, -1.0)
-    return known(Linear(cycles, point.orbit), lambda line: at_doubling(line, v), {"c": 2})
+    def way(one: Point | Solution) -> Callable[[Linear], dict[str, float]]:
+        v = null_vector(cycles, one.orbit, _condensed(cycles, one), -1.0)
+        return lambda line: at_doubling(line, v)
+
+    return known(cycles, point, {"c": 2}, way)
 
 
 def _form_of_torus(cycles: Cycles, point: Point) -> Form:
@@ -238,27 +286,58 @@ def _form_of_torus(cycles: Cycles, point: Point) -> Form:
     if not pairs:
         return {}, ""
     angle = cmath.phase(min(pairs, key=lambda mu: abs(abs(mu) - 1.0)))
-    line = Linear(cycles, point.orbit)
-    return known(line, lambda line: at_torus(line, angle), {"d": 2, "d_imag": 2})
+    return known(
+        cycles, point, {"d": 2, "d_imag": 2}, lambda one: lambda line: at_torus(line, angle)
+    )
 
 
-def _near(critical: float) -> Callable[[list[complex]], bool]:
+def _condensed(cycles: Cycles, one: Point | Solution) -> Array:
+    """The condensed equations of an orbit."""
+    return one.W if isinstance(one, Solution) else cycles.looked_at(one.orbit, one.dx, one.dy).W
+
+
+def blurred(cycles: Cycles, a: Point | State, b: Point) -> bool:
+    """Whether the parameter stands still to rounding, as where orbits explode along canards."""
+    limit = ROUNDED * float(cycles.width[0])
+    return bool(min(abs(a.dy[1]), abs(b.dy[1])) <= limit)
+
+
+def _fold(stretch: Stretch, value: Value) -> Point | None:
+    """The fold of a stretch: where the parameter turns back or, for rounding, the multiplier is 1.
+
+    The parameter says where it is to the root of rounding; a single multiplier is zero of an
+    integral there, which says more.
+    """
+    cycles = stretch.cycles
+    point = root(stretch, determinant if blurred(cycles, stretch.a, stretch.b) else value)
+    if point is None or not single(cycles):
+        return point
+    mu = nontrivial(point.multipliers, cycles.forced)[0]
+    if abs(mu - 1.0) <= CRITICAL:
+        return point
+    found = settled(cycles, point)
+    moved = cycles.on(point.orbit.mesh, found.orbit)[0].x - point.orbit.x
+    nothing = np.zeros(cycles.q)
+    if not found.converged or cycles.length(point.orbit.mesh, moved, nothing) > stretch.length:
+        return point
+    return point_of(cycles, found, point.arclength, point.step)
+
+
+def _near(critical: float) -> Callable[[Point, bool], bool]:
     """Whether a multiplier is next to a critical one."""
-    return lambda multipliers: min(abs(one - critical) for one in multipliers) <= ASTRAY
+
+    def holds(point: Point, forced: bool) -> bool:
+        mu = nontrivial(point.multipliers, forced)
+        return min(abs(one - critical) for one in mu) <= ASTRAY
+
+    return holds
 
 
-def _conjugate(multipliers: list[complex]) -> bool:
-    """Whether the two multipliers whose product is 1 are no real ones."""
-    pairs = combinations(multipliers, 2)
-    one, _ = min(pairs, key=lambda pair: abs(1.0 - pair[0] * pair[1]))
-    return abs(one.imag) > 1e-9 * abs(one)
-
-
-FOLD = CycleTest("fold_of_cycles", fold_test, _form_of_fold)
+FOLD = CycleTest("fold_of_cycles", fold_test, _form_of_fold, root=_fold)
 DOUBLING = CycleTest("period_doubling", doubling_test, _form_of_doubling, _near(-1.0))
-TORUS = CycleTest("torus", torus_test, _form_of_torus, _conjugate)
+TORUS = CycleTest("torus", torus_test, _form_of_torus, conjugate, conjugate)
 BRANCHING = CycleTest(
     "cycle_branch_point", lambda point, forced: point.sign, _form_of_branching, _near(1.0),
-    branching,
+    root=branching,
 )  # fmt: skip
 TESTS = (FOLD, DOUBLING, TORUS, BRANCHING)

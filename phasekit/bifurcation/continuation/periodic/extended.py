@@ -13,21 +13,24 @@ omega. Derivatives of f_x v by x are differences of f_x along v.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation, lines
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic import collocation, folds, lines
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.divergence import across, function, single
 from phasekit.bifurcation.continuation.periodic.jets import Jets
+from phasekit.bifurcation.continuation.periodic.linear import Linear
 from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
+GROWN = 1e5  # factor by which a critical function changes, above which digits run short
 FOLD, DOUBLING, TORUS = "fold_of_cycles", "period_doubling", "torus"
 
 
@@ -73,6 +76,93 @@ class Extended(Cycles):
         par[self.active[1]] = second
         return Cycles(**{**kept, "par": par, "clock": 0, "events": (), "ends": ()})
 
+    @property
+    def moving(self) -> int:
+        """Number of states with a part in tangents."""
+        return self.n if self.folds is None else self.own
+
+    @cached_property
+    def folds(self) -> Cycles | None:
+        """The orbits alone over both parameters, of folds whose multiplier is a single one."""
+        if self.kind != FOLD or not single(self):
+            return None
+        n = self.own
+        kept = {f.name: getattr(self, f.name) for f in fields(Cycles)}
+        for name in ("turns", "period", "scale"):
+            kept[name] = kept[name][:n]
+        for name in ("width", "low", "high"):
+            kept[name] = kept[name][:2]
+        made = Cycles(**{**kept, "events": (), "ends": ()})
+        made.__dict__["jets"] = self.jets.jets
+        return made
+
+    def correct(
+        self, guess: Orbit, rows: Array, rows_y: Array, target: Array, *,
+        iterations: int | None = None, damped: bool = False,
+    ) -> Solution:  # fmt: skip
+        """Newton's method, as of `Cycles`.
+
+        Folds with a single multiplier are found by that; their function follows from the orbit.
+        """
+        if self.folds is None:
+            solved = super().correct(
+                guess, rows, rows_y, target, iterations=iterations, damped=damped
+            )
+            return (
+                solved if solved.converged else replace(solved, message=self._lost(solved, guess))
+            )
+        n, y = self.own, guess.y
+        alone = Orbit(guess.mesh, np.ascontiguousarray(guess.x[:, :n]), y[:3].copy())
+        one = self.folds.sized(alone)
+        held = target - np.einsum("rkn,kn->r", rows[:, :, n:], guess.x[:, n:])
+        kept = [0, 1, len(y) - 1]
+        found = folds.correct(
+            one, alone, np.ascontiguousarray(rows[kept][:, :, :n]), rows_y[kept][:, :3],
+            held[kept], iterations or self.options.max_iterations, damped,
+        )  # fmt: skip
+        if not found.converged:
+            return replace(found, orbit=guess)
+        orbit = found.orbit
+        line = Linear(self.folds, orbit)
+        beside = line.at(np.ascontiguousarray(guess.x[:, n:]))
+        near, v, rate = function(across(line), self.scale[n:])
+        was, now = (
+            float(line.weights @ np.sum((one / self.scale[n:]) ** 2, axis=1))
+            for one in (beside, near)
+        )
+        part = np.sqrt(was / now)
+        whole = Orbit(
+            orbit.mesh, np.hstack([orbit.x, part * v]),
+            np.append(orbit.y, np.full(len(y) - 3, -part * rate)),
+        )  # fmt: skip
+        # Its tangent is that of the orbits: the function has no part in how far they are apart.
+        dx, dy = np.zeros_like(whole.x), np.zeros_like(y)
+        dx[:, :n], dy[:3] = found.dx, found.dy
+        length = self.length(orbit.mesh, dx, dy) or 1.0
+        return replace(
+            found, orbit=whole, dx=dx / length, dy=dy / length, length=length,
+            divergence=found.divergence * self.n / n,
+        )  # fmt: skip
+
+    def _lost(self, found: Solution, guess: Orbit) -> str:
+        """Why there is no orbit: its equations lose as many digits as its function grows by."""
+        n, parts = self.own, guess.x[:, self.own :] / self.scale[self.own :]
+        if not self.forced:
+            flow = np.gradient(guess.x[:, :n], collocation.times(guess.mesh, self.m), axis=0)
+            flow /= self.scale[:n]
+            flow /= np.sqrt(np.sum(flow**2, axis=1, keepdims=True))
+            for k in range(0, parts.shape[1], n):
+                here = parts[:, k : k + n]
+                parts[:, k : k + n] = here - np.sum(here * flow, axis=1, keepdims=True) * flow
+        sizes = np.sqrt(np.sum(parts**2, axis=1))
+        ratio = float(np.max(sizes) / np.min(sizes)) if np.min(sizes) > 0.0 else np.inf
+        if not GROWN < ratio:
+            return found.message
+        return (
+            f"{found.message}: the critical function changes by a factor of {ratio:.1g} or more "
+            "along the orbit, as along canards, and its equations lose as many digits"
+        )
+
     def own_period(self, y: Array) -> tuple[float, Array]:
         """The period of the forcing, and its derivatives by all of y after the period."""
         k = len(self.active)
@@ -81,8 +171,12 @@ class Extended(Cycles):
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
         """Bordering rows: phase or period, those of the function, direction."""
-        rows, rows_y, _ = super().rows(orbit, dx, dy)
         n, m = self.own, self.m
+        if self.folds is not None and np.any(dx[:, n:]):  # of a curve whose function was solved for
+            dx = np.hstack([dx[:, :n], np.zeros_like(dx[:, n:])])
+            length = self.length(orbit.mesh, dx, dy)
+            dx, dy = dx / length, dy / length
+        rows, rows_y, _ = super().rows(orbit, dx, dy)
         # The phase is that of the orbit alone; its function follows.
         rows[0, :, n:] = 0.0
         v = np.zeros_like(orbit.x)
@@ -104,13 +198,39 @@ class Extended(Cycles):
 
     def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
         """Floquet multipliers of the orbit itself."""
+        if self.folds is not None:
+            n = self.own
+            alone = Orbit(orbit.mesh, np.ascontiguousarray(orbit.x[:, :n]), orbit.y[:3].copy())
+            return self.folds.multipliers(W, alone)
         n, last = self.own, (self.m - 1) * self.n
         values, log = multipliers(W[:, last : last + n, :n])
         return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
-        """The orbit has no other mesh than its function."""
-        return None
+        """As of `Cycles`; an orbit that is solved for with its function has no other mesh."""
+        if self.folds is None:
+            return None
+        n = self.own
+        alone = Orbit(orbit.mesh, np.ascontiguousarray(orbit.x[:, :n]), orbit.y[:3].copy())
+        return self.folds.resolving(alone, reach)
+
+    def on_finer(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+        """As of `Cycles`; folds go as orbits of a family whose tangent is their function."""
+        if self.folds is None:
+            return super().on_finer(orbit, dx, dy)
+        n = self.own
+        x, v = (np.ascontiguousarray(part) for part in (orbit.x[:, :n], orbit.x[:, n:]))
+        one, y = self.folds, orbit.y[:3].copy()
+        if not self.forced:
+            one, y = self.plain(float(y[2])), y[:2]
+        alone, along = Orbit(orbit.mesh, x, y), np.zeros(len(y))
+        found = one.looked_at(alone, v, along)
+        if not self.forced:
+            solved = one.correct(alone, *one.rows(alone, v, along))
+            found = solved if solved.converged else found
+        whole = Orbit(orbit.mesh, found.orbit.x, orbit.y[:3].copy())
+        whole.y[:2] = found.orbit.y[:2]
+        return replace(found, orbit=whole, divergence=found.divergence * self.n / n)
 
     def divergence(self, found: float) -> float:
         """Integral of the trace of f_x, of which each part of the function has its own."""

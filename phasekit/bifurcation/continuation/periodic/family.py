@@ -66,7 +66,7 @@ def join(start: Point, tracks: Tracks, first: Stop) -> Path:
     ahead = [] if forward is None else list(forward.points)
     stops = (
         first if backward is None else backward.stop,
-        Stop("start", "the start; this direction was not asked for")
+        Stop("start", "the start; this direction was not requested")
         if forward is None
         else forward.stop,
     )

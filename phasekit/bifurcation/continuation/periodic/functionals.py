@@ -67,7 +67,7 @@ class OfOrbit:
         with np.errstate(all="ignore"):
             try:
                 return self.function(x, **parameters, **given)
-            except (ArithmeticError, ValueError):
+            except Exception:  # noqa: BLE001 - a user's function, without a value there
                 return np.nan
 
 

@@ -33,8 +33,10 @@ def near(cycles: Cycles, made: Point, start: Point) -> bool:
     still = abs(made.dy[1]) / cycles.width[0] / rate
     if cycles.vertical(start.dy) and cycles.vertical(made.dy):
         # A conservative family: the parameter always stands still.
-        return bool(made.orbit.y[0] > FAR * start.orbit.y[0])
-    if not (still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0]):
+        long = made.orbit.y[0] > FAR * start.orbit.y[0]
+    else:
+        long = still < STILL and made.orbit.y[0] > LONG * start.orbit.y[0]
+    if not long:
         return False
     return _rests(cycles, made.orbit, made.dx, rate)
 

@@ -22,6 +22,7 @@ class Linear:
 
     def __init__(self, cycles: Cycles, orbit: Orbit, variant: int = 0) -> None:
         self.variant = variant
+        self.size = 0.0
         self.cycles, self.orbit, self.m = cycles, orbit, cycles.m
         n = self.n = cycles.n
         whole = self._jets(orbit.x)
@@ -40,7 +41,7 @@ class Linear:
         """
         found = self.slopes[:, :, -1] + stretch * self.f
         if self.cycles.forced:
-            time = stretch * self.orbit.y[0] * self._times[:, None]
+            time = stretch * self.orbit.y[0] * self.times[:, None]
             found = found + time * self.slopes[:, :, self.n]
         return np.asarray(found)
 
@@ -78,16 +79,34 @@ class Linear:
         out = np.zeros((len(self.A), self.slopes.shape[2]))
         out[:, : self.n] = self.at(v)
         if self.cycles.forced:
-            out[:, self.n] = y[0] * self._times
+            out[:, self.n] = y[0] * self.times
         out[:, out.shape[1] - len(y) + 1 :] = y[1:]
         return out
 
     @cached_property
-    def _times(self) -> Array:
+    def times(self) -> Array:
         """Gauss points."""
         mesh = self.orbit.mesh
         inside = np.diff(mesh)[:, None] * collocation.scheme(self.m).nodes
         return np.asarray((mesh[:-1, None] + inside).ravel())
+
+    @cached_property
+    def weights(self) -> Array:
+        """Weights of all Gauss points, of which the whole is 1."""
+        return np.asarray(
+            np.outer(np.diff(self.orbit.mesh), collocation.scheme(self.m).weights).ravel()
+        )
+
+    def total(self, v: Array, *terms: Array) -> Array:
+        """The sum of the terms that give a coefficient of v.
+
+        ``size`` is that of the coefficient, did they not cancel.
+        """
+        scale = np.tile(self.cycles.scale, v.shape[1] // self.n)
+        sizes = (float(np.sqrt(np.mean((one / scale) ** 2))) for one in (self.at(v), *terms))
+        whole = next(sizes)
+        self.size = sum(sizes) / whole if whole > 0.0 else 0.0
+        return np.asarray(sum(terms))
 
     def times_A(self, v: Array) -> Array:
         """A v at all Gauss points."""

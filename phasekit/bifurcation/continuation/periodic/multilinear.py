@@ -113,6 +113,8 @@ class _Whole:
     points: Array
     sizes: Array
     blocks: Array
+    #: Derivatives are differences.
+    exact, steps = False, 1
 
     @property
     def m(self) -> int:

@@ -23,62 +23,123 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.normal_form import DIGITS, SMALL, unknown
+from phasekit.bifurcation.continuation.periodic import divergence, starts
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
+from phasekit.bifurcation.continuation.periodic.divergence import single
 from phasekit.bifurcation.continuation.periodic.linear import Linear, wave
 from phasekit.bifurcation.continuation.periodic.multilinear import VARIANTS
+from phasekit.bifurcation.continuation.periodic.point import Point
 
 Array = npt.NDArray[np.float64]
+Form = Callable[[Linear], dict[str, float]]
 
+GROWTH = 10.0  # logarithm of the ratio of sizes of a critical function from which on digits cancel
 CLEAR = 1e-6  # relative error of a coefficient up to which nothing is said of it
+UNTRIED = "how coefficients go with the mesh is not known: on a finer one there is no orbit"
 VERTICAL = 1e-5  # part along the parameter, beside its span, of a tangent that does not move it
 
 
 def known(
-    line: Linear, form: Callable[[Linear], dict[str, float]], powers: dict[str, int]
+    cycles: Cycles,
+    point: Point,
+    powers: dict[str, int],
+    *ways: Callable[[Point | Solution], Form],
+    crossing: bool = False,
 ) -> tuple[dict[str, float], str]:
     """Coefficients, NaN where their errors hide them, and what is to be said of their errors.
 
-    ``powers`` are those of the states with which coefficients of xi' go, where they have errors.
+    Errors are what changes with the derivatives of f, and on intervals of half the length. Each of
+    the ``ways`` gives the form of an orbit with its tangent; one after another is tried for a
+    better one. ``powers`` are those of the states with which coefficients of xi' go. At branch
+    points families are ``crossing``.
     """
+    size = float(np.sqrt(np.mean(cycles.scale**2)))
+    fine = _halved(cycles, point, crossing)
+    best: tuple[dict[str, float], dict[str, float], dict[str, float]] = {}, {}, {}
+    least, worst = {}, np.inf
+    for way in ways:
+        found, errors, by_mesh = _with_errors(cycles, point, fine, way)
+        # Such a coefficient moves xi by its size in a period.
+        least = {name: SMALL / (point.orbit.y[0] * size ** powers.get(name, 0)) for name in found}
+        sizes = ((abs(one), least[name] / CLEAR, name) for name, one in found.items())
+        parts = [(errors[name] + by_mesh[name]) / max(one, other) for one, other, name in sizes]
+        part = float(np.max(parts, initial=0.0))
+        if not best[0] or part < worst:
+            best, worst = (found, errors, by_mesh), part if np.isfinite(part) else np.inf
+        if worst <= CLEAR:
+            break
+    found, errors, by_mesh = best
+    said, coarse = [] if fine is not None else [UNTRIED], []
+    for name, value in list(found.items()):
+        error = float(np.maximum(errors[name], by_mesh[name]))
+        if error <= max(CLEAR * abs(value), least[name]):
+            continue
+        if error <= DIGITS * abs(value):
+            said.append(f"{name} is known to {error:.1g} only")
+            continue
+        found[name] = np.nan
+        if errors[name] <= max(DIGITS * abs(value), least[name]):
+            coarse.append(name)
+            said.append(f"{name} not known: on intervals of half the length it is not the same")
+    missing = unknown({name: one for name, one in found.items() if name not in coarse})
+    return found, "; ".join([*said, *([missing] if missing else [])])
+
+
+def _with_errors(
+    cycles: Cycles, point: Point, fine: Solution | None, way: Callable[[Point | Solution], Form]
+) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
+    """Coefficients, their errors by the derivatives of f, and by the mesh."""
+    line = Linear(cycles, point.orbit)
+    form = way(point)
     found = form(line)
     errors = dict.fromkeys(found, 0.0)
     # Those of matrices have one other variant.
-    for variant in range(1, 2 if line.cycles.jets.exact else VARIANTS):
+    for variant in range(1, 2 if cycles.jets.exact else VARIANTS):
         line.variant = variant
         other = form(line)
         for name in found:
             errors[name] = max(errors[name], abs(other.get(name, np.nan) - found[name]))
-    size = float(np.sqrt(np.mean(line.cycles.scale**2)))
-    said = []
-    for name, value in list(found.items()):
-        # Such a coefficient moves xi by its size in a period.
-        unit = 1.0 / (line.orbit.y[0] * size ** powers.get(name, 0))
-        if errors[name] <= max(CLEAR * abs(value), SMALL * unit):
-            continue
-        if errors[name] <= DIGITS * abs(value):
-            said.append(f"{name} is known to {errors[name]:.1g} only")
-        else:
-            found[name] = np.nan
-    missing = unknown(found)
-    return found, "; ".join([*said, *([missing] if missing else [])])
+    if fine is None:
+        return found, errors, dict.fromkeys(found, 0.0)
+    other = way(fine)(Linear(cycles, fine.orbit))
+    return found, errors, {k: abs(other.get(k, np.nan) - one) for k, one in found.items()}
 
 
-def at_fold(line: Linear, dx: Array, dy: Array, stretch: float | None = None) -> dict[str, float]:
+def _halved(cycles: Cycles, point: Point, crossing: bool) -> Solution | None:
+    """The orbit on a mesh of intervals of half the length; None if it is not found."""
+    mesh = point.orbit.mesh
+    fine = np.sort(np.concatenate([mesh, 0.5 * (mesh[1:] + mesh[:-1])]))
+    orbit, (dx,) = cycles.on(fine, point.orbit, point.dx)
+    if crossing:
+        return starts.crossing(cycles, orbit, (dx, point.dy))
+    found = cycles.correct(orbit, *cycles.rows(orbit, dx, point.dy))
+    return found if found.converged else None
+
+
+def at_fold(
+    line: Linear, dx: Array, stretch: float | None = None, growth: float = GROWTH
+) -> dict[str, float]:
     """The coefficients a and b of a fold, from the tangent of its family.
 
-    Of a forced system ``stretch`` is the part by which its period grows with the parameter.
+    Of a forced system ``stretch`` is the part by which its period grows with the parameter. Of a
+    single multiplier they are integrals from a ``growth`` of the critical function on; equations
+    leave less out as long as they keep their digits.
     """
     cycles, orbit = line.cycles, line.orbit
+    if cycles.forced and stretch is None:
+        stretch = float(cycles.own_period(orbit.y)[1][0]) / orbit.y[0]
+    stretch = stretch if stretch and cycles.forced else 0.0
+    if single(cycles) and (it := divergence.across(line)).growth > growth:
+        return divergence.fold_form(it, dx, stretch)
     if cycles.forced:
         v, alpha = line.unit(dx), 0.0
-        if stretch is None:
-            stretch = float(cycles.own_period(orbit.y)[1][0]) / orbit.y[0]
     else:
         # A part along the flow, which depends on how phases are compared, would count in its size.
         v, alpha = line.across(dx)
-        stretch = 0.0
     at = line.at(v)
     columns = rows = [at] if cycles.forced else [at, line.f]
-    a = line.solve(0.5 * line.second(v, v) - alpha * line.times_A(v), columns, rows)[1][0]
+    bent = line.total(v, 0.5 * line.second(v, v), -alpha * line.times_A(v))
+    a = line.solve(bent, columns, rows)[1][0]
     b = line.solve(line.by_parameter(stretch), columns, rows)[1][0]
     return {"a": float(a), "b": float(b)}
 
@@ -135,8 +196,8 @@ def at_doubling(line: Linear, v: Array) -> dict[str, float]:
     else:
         h, unknown = line.solve(g, [line.f], [line.f])
         a1 = 0.5 * float(unknown[0])
-    cubic = line.third(v, v) + 3.0 * line.second(v, h) - 6.0 * a1 * line.times_A(v)
-    c = line.solve(cubic, [at], [at], sigma=-1.0)[1][0] / 6.0
+    terms = line.third(v, v) / 6.0, 0.5 * line.second(v, h), -a1 * line.times_A(v)
+    c = line.solve(line.total(v, *terms), [at], [at], sigma=-1.0)[1][0]
     return {"c": float(c)}
 
 
@@ -161,12 +222,15 @@ def at_torus(line: Linear, angle: float, v: Array | None = None) -> dict[str, fl
     g = np.hstack([second(u, u) - second(w, w), 2.0 * second(u, w)])
     double, _ = line.solve(g, [], [], turn=2.0 * omega)
     p, q = np.ascontiguousarray(double[:, :n]), np.ascontiguousarray(double[:, n:])
-    real = line.third(u, u) + line.third(w, u) + 2.0 * second(u, h) + second(u, p) + second(w, q)
-    imaginary = line.third(u, w) + line.third(w, w) + 2.0 * second(w, h)
-    imaginary += second(u, q) - second(w, p)
-    real -= 2.0 * a1 * (line.times_A(u) + omega * line.at(w))
-    imaginary -= 2.0 * a1 * (line.times_A(w) - omega * line.at(u))
+    terms = [
+        np.hstack([line.third(u, u) + line.third(w, u), line.third(u, w) + line.third(w, w)]),
+        np.hstack([2.0 * second(u, h), 2.0 * second(w, h)]),
+        np.hstack([second(u, p) + second(w, q), second(u, q) - second(w, p)]),
+        np.hstack([line.times_A(u) + omega * line.at(w), line.times_A(w) - omega * line.at(u)]),
+    ]
+    terms[3] *= -2.0 * a1
+    cubic = line.total(v, *(0.5 * one for one in terms))
     at = line.at(v)
     around = np.hstack([-at[:, n:], at[:, :n]])  # i v
-    _, d = line.solve(np.hstack([real, imaginary]), [at, around], [at, around], turn=omega)
-    return {"d": 0.5 * float(d[0]), "d_imag": 0.5 * float(d[1]), "angle": angle}
+    _, d = line.solve(cubic, [at, around], [at, around], turn=omega)
+    return {"d": float(d[0]), "d_imag": float(d[1]), "angle": angle}

@@ -10,8 +10,10 @@ cubic coefficient vanishes; a fold doubles where multipliers are 1 and -1 ([Kuzn
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,9 +35,11 @@ from phasekit.bifurcation.continuation.periodic.normal_forms import (
 from phasekit.bifurcation.continuation.periodic.point import Point
 
 Array = npt.NDArray[np.float64]
+Sized = tuple[float, float]
 
 RESONANT = 0.05  # distance of half the angle from resonances 1 and 2 below which d says nothing
 NOTHING = 1e-9  # size of a function of the multipliers that is rounding
+LARGE = 1e-2  # part of its terms from which on a coefficient is not zero by their errors
 SAME = 2e-5  # half the angle within which multipliers meet, at ends of curves
 
 
@@ -45,24 +49,45 @@ class CurveTest:
 
     kind: str
     of: str
-    function: Callable[..., float]
+    function: Callable[..., Any]
     name: str = ""
     #: Whether the equations are singular there, so that it is known to `SAME` alone.
     blurred: bool = False
-    #: Whether it goes with second or third derivatives, of which there are variants.
+    #: Whether it goes with second or third derivatives, of which there are variants; then the
+    #: function gives its size, too, did its terms not cancel.
     bent: bool = False
+    #: What messages call the number.
+    coefficient: str = ""
 
     def value(self, cycles: Cycles, point: Point) -> float:
         """The number of an orbit with its critical function."""
         assert isinstance(cycles, Extended)
-        return float(self.function(cycles, point))
+        return float(self.function(cycles, point)[0] if self.bent else self.function(cycles, point))
 
-    def signed(self, cycles: Cycles, point: Point, value: float) -> bool:
-        """Whether a value has a sign, and is not zero but for rounding."""
+    def signed(self, cycles: Cycles, point: Point) -> bool:
+        """Whether the number has a sign, and is not zero but for its error."""
         if not self.bent:
-            return abs(value) >= NOTHING
-        variants = (float(self.function(cycles, point, k)) for k in range(1, VARIANTS))
-        return max(abs(one - value) for one in variants) < abs(value)
+            return abs(self.value(cycles, point)) >= NOTHING
+        assert isinstance(cycles, Extended)
+        value, size = self.function(cycles, point)
+        # Derivatives have errors, and the orbit has, along which terms cancel.
+        error = max(point.mesh_error, NOTHING) * size
+        if abs(value) <= error or abs(value) > LARGE * size:
+            return bool(abs(value) > error)
+        count = 2 if cycles.jets.jets.exact else VARIANTS
+        variants = (float(self.function(cycles, point, k)[0]) for k in range(1, count))
+        return bool(abs(value) > error + max(abs(one - value) for one in variants))
+
+    def vanishes(self, cycles: Cycles, points: Sequence[Point], values: Array) -> bool:
+        """Whether it is zero, but for its error, along more than half of a curve."""
+        known = np.flatnonzero(np.isfinite(values))
+        if len(known) < 3:
+            return False
+        for some in (known[[0, len(known) // 2, -1]], known):  # three points speak first
+            zero = sum(not self.signed(cycles, points[i]) for i in some.tolist())
+            if 2 * zero <= len(some):
+                return False
+        return True
 
 
 def _parted(cycles: Extended, point: Point) -> tuple[Cycles, Orbit, Array]:
@@ -72,42 +97,44 @@ def _parted(cycles: Extended, point: Point) -> tuple[Cycles, Orbit, Array]:
     return cycles.plain(orbit.y[2]), alone, orbit.x[:, n:].copy()
 
 
-def _coefficients(cycles: Extended, point: Point, variant: int) -> tuple[float, float]:
-    """Those of a fold, xi' = b + a xi^2, as xi and the parameter change by their scales.
+@lru_cache(maxsize=2)  # two tests ask for those of one point
+def _coefficients(cycles: Extended, point: Point, variant: int) -> tuple[float, float, float]:
+    """Those of a fold, xi' = b + a xi^2, as xi and the parameter change by their scales; a's size.
 
     Their signs go with that of the critical function; both are infinite where it resonates.
     """
     n, orbit = cycles.own, point.orbit
     one, alone, v = _parted(cycles, point)
-    dy = np.zeros(2)
-    if not cycles.forced:
-        dy[0] = orbit.y[-1] * orbit.y[0]
     stretch = 0.0
     if cycles.forced:
         stretch = float(cycles.own_period(orbit.y)[1][0]) / float(orbit.y[0])
-    form = at_fold(Linear(one, alone, variant), v, dy, stretch)
+    line = Linear(one, alone, variant)
+    form = at_fold(line, v, stretch)
     nothing = np.zeros(2)
     parts = one.inner(orbit.mesh, v, v, nothing, nothing)
     whole = one.replace(scale=np.ones(n)).inner(orbit.mesh, v, v, nothing, nothing)
-    return form["a"] * whole / parts, form["b"] * float(one.width[0])
+    ratio = float(whole / parts)
+    return form["a"] * ratio, form["b"] * float(one.width[0]), line.size * ratio
 
 
-def _bend(cycles: Extended, point: Point, variant: int = 0) -> float:
+def _bend(cycles: Extended, point: Point, variant: int = 0) -> Sized:
     """The quadratic coefficient beside both."""
-    a, b = _coefficients(cycles, point, variant)
-    return a / math.hypot(a, b)
+    a, b, size = _coefficients(cycles, point, variant)
+    return a / math.hypot(a, b), size / math.hypot(a, b)
 
 
-def _meet(cycles: Extended, point: Point, variant: int = 0) -> float:
+def _meet(cycles: Extended, point: Point, variant: int = 0) -> Sized:
     """The product of the left and the right critical function, with the sign of a."""
-    a, b = _coefficients(cycles, point, variant)
-    return math.copysign(1.0 / math.hypot(a, b), a)
+    a, b, _ = _coefficients(cycles, point, variant)
+    return math.copysign(1.0 / math.hypot(a, b), a), 0.0
 
 
-def _doubled(cycles: Extended, point: Point, variant: int = 0) -> float:
+def _doubled(cycles: Extended, point: Point, variant: int = 0) -> Sized:
     """The cubic coefficient of a period doubling."""
     one, alone, v = _parted(cycles, point)
-    return at_doubling(Linear(one, alone, variant), v)["c"] * _unit(cycles, point)
+    line = Linear(one, alone, variant)
+    unit = _unit(cycles, point)
+    return at_doubling(line, v)["c"] * unit, line.size * unit
 
 
 def _unit(cycles: Extended, point: Point) -> float:
@@ -120,13 +147,15 @@ def _angle(cycles: Extended, point: Point) -> float:
     return float(point.orbit.y[-1] * point.orbit.y[0])
 
 
-def _torus(cycles: Extended, point: Point, variant: int = 0) -> float:
+def _torus(cycles: Extended, point: Point, variant: int = 0) -> Sized:
     """The cubic coefficient of a torus; none next to resonances, where it is infinite."""
     angle = _angle(cycles, point)
     if min(abs(math.sin(0.5 * angle)), abs(math.cos(0.5 * angle))) < RESONANT:
-        return math.nan
+        return math.nan, math.nan
     one, alone, v = _parted(cycles, point)
-    return at_torus(Linear(one, alone, variant), angle, v)["d"] * _unit(cycles, point)
+    line = Linear(one, alone, variant)
+    unit = _unit(cycles, point)
+    return at_torus(line, angle, v)["d"] * unit, line.size * unit
 
 
 def _at(turn: float) -> Callable[[Extended, Point], float]:
@@ -145,24 +174,27 @@ def _of(test: Callable[[Point, bool], float]) -> Callable[[Extended, Point], flo
     return lambda cycles, point: test(point, cycles.forced) if point.trusted else math.nan
 
 
+_A, _C, _D = "the coefficient a", "the coefficient c", "the coefficient d"
+_PAIR = "the distance of the pair of multipliers from that angle"
+_OTHER = "the distance of another multiplier from 1 or -1"
 TESTS = (
-    CurveTest("cusp", FOLD, _bend, bent=True),
+    CurveTest("cusp", FOLD, _bend, bent=True, coefficient=_A),
     CurveTest("resonance_1", FOLD, _meet, bent=True),
-    CurveTest("fold_flip", FOLD, _of(doubling_test)),
-    CurveTest("generalized_flip", DOUBLING, _doubled, bent=True),
-    CurveTest("fold_flip", DOUBLING, _of(determinant)),
-    CurveTest("resonance_2", DOUBLING, _of(second_doubling)),
+    CurveTest("fold_flip", FOLD, _of(doubling_test), coefficient=_OTHER),
+    CurveTest("generalized_flip", DOUBLING, _doubled, bent=True, coefficient=_C),
+    CurveTest("fold_flip", DOUBLING, _of(determinant), coefficient=_OTHER),
+    CurveTest("resonance_2", DOUBLING, _of(second_doubling), coefficient=_OTHER),
     CurveTest(
         "resonance_1", TORUS, lambda cycles, p: _zero(math.sin(0.5 * _angle(cycles, p))),
-        blurred=True,
+        blurred=True, coefficient=_PAIR,
     ),
     CurveTest(
         "resonance_2", TORUS, lambda cycles, p: _zero(math.cos(0.5 * _angle(cycles, p))),
-        blurred=True,
+        blurred=True, coefficient=_PAIR,
     ),
-    CurveTest("resonance_3", TORUS, _at(1.0 / 3.0)),
-    CurveTest("resonance_4", TORUS, _at(0.25)),
-    CurveTest("chenciner", TORUS, _torus, bent=True),
+    CurveTest("resonance_3", TORUS, _at(1.0 / 3.0), coefficient=_PAIR),
+    CurveTest("resonance_4", TORUS, _at(0.25), coefficient=_PAIR),
+    CurveTest("chenciner", TORUS, _torus, bent=True, coefficient=_D),
 )  # fmt: skip
 
 

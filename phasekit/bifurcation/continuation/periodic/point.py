@@ -20,6 +20,7 @@ UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are
 SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
 FINER = 3  # meshes that are tried for it
 ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
+STILL = 1e-12  # part of its span by which a parameter has moved between two points, or has not
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
 
@@ -51,7 +52,9 @@ class Point:
     @property
     def trusted(self) -> bool:
         """Whether the multipliers pass their checks."""
-        if not (self.trivial_error <= NEAR and self.liouville_error <= ALIKE):
+        # A mesh that is coarser than its tolerance, as one that was asked for, may be off by more.
+        near = max(NEAR, min(UNRESOLVED * self.mesh_error, ALIKE))
+        if not (self.trivial_error <= near and self.liouville_error <= ALIKE):
             return False
         sizes = [abs(one) for one in self.multipliers.tolist()]
         if not all(map(math.isfinite, sizes)):
@@ -67,8 +70,17 @@ def vertical(cycles: Cycles, point: Point) -> bool:
 
     Where cycles explode along canards the parameter hardly moves either.
     """
-    if not cycles.vertical(point.dy):
-        return False
+    return cycles.vertical(point.dy) and neutral(cycles, point)
+
+
+def still(cycles: Cycles, a: Point, b: Point) -> bool:
+    """Whether a family is vertical between two points, even where one is too small to tell."""
+    moved = bool(np.all(np.abs(b.orbit.y[1:] - a.orbit.y[1:]) > STILL * cycles.width))
+    return not moved and neutral(cycles, a) and neutral(cycles, b)
+
+
+def neutral(cycles: Cycles, point: Point) -> bool:
+    """Whether one multiplier is 1 besides that which always is."""
     near = np.sum(np.abs(point.multipliers - 1.0) < NEUTRAL)
     return bool(near > (0 if cycles.forced else 1))
 
@@ -105,6 +117,7 @@ class State:
         r = step / back
         # By the gap, the last tangent and this one.
         g, t, u = r * r * (3.0 - 2.0 * r), step * r * (r - 1.0) / along, step * (1.0 - r) ** 2
+        gap_x[:, cycles.moving :] = 0.0
         return Orbit(
             orbit.mesh,
             orbit.x + (g * gap_x + t * ex + u * dx),
@@ -126,7 +139,7 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
         if mesh is None:
             break
         orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
-        fine = cycles.correct(orbit, *cycles.rows(orbit, dx, s.dy))
+        fine = cycles.on_finer(orbit, dx, s.dy)
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
         values, log, trivial = cycles.multipliers(fine.W, fine.orbit)

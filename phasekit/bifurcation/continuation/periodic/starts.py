@@ -17,6 +17,8 @@ from phasekit.bifurcation.continuation.periodic.point import Point
 Array = npt.NDArray[np.float64]
 
 FIRST = 40  # intervals of a first mesh
+CLOSER = 3  # Newton steps from one mesh to a finer one
+SETTLED = 1e-7  # the last of them, on scaled axes
 SMALL = 0.1  # part of the first step that is the amplitude of orbits near a Hopf point
 
 
@@ -90,38 +92,48 @@ def finer(cycles: Cycles, orbit: Orbit) -> Array | None:
 
 
 def from_hopf(
-    cycles: Cycles, x: Array, p: float, omega: float, vector: npt.NDArray[np.complex128]
-) -> Solution:
-    """A small orbit near a Hopf point, in the plane of its critical eigenvector."""
+    cycles: Cycles, x: Array, p: float, omega: float, vector: npt.NDArray[np.complex128],
+    bend: tuple[float, float] = (0.0, 0.0),
+) -> Solution:  # fmt: skip
+    """A small orbit near a Hopf point, in the plane of its critical eigenvector.
+
+    ``bend`` is by what p and omega change with the square of half the amplitude along it. With
+    several pairs Newton's method needs it: at the point itself the equations are singular.
+    """
     m = cycles.m
     mesh = np.linspace(0.0, 1.0, (cycles.options.intervals or 2 * LEAST) + 1)
     angle = 2.0 * np.pi * collocation.times(mesh, m)
     wave = np.real(np.exp(1j * angle)[:, None] * vector)
     middle = Orbit(mesh, np.tile(x, (len(wave), 1)), np.array([2.0 * np.pi / omega, p]))
-    return off(cycles, middle, wave, SMALL * cycles.options.initial_step)
+    s, sigma = bend
+    dy = 0.25 * np.array([-2.0 * np.pi / omega**2 * sigma, s])
+    return off(cycles, middle, wave, SMALL * cycles.options.initial_step, dy)
 
 
-def off(cycles: Cycles, middle: Orbit, direction: Array, size: float) -> Solution:
+def off(
+    cycles: Cycles, middle: Orbit, direction: Array, size: float, bend: Array | None = None
+) -> Solution:
     """An orbit at a distance from another one, in a direction in which the states leave it.
 
     The distance is held and the parameter free: at a fixed parameter Newton's method finds the
-    family that is left.
+    family that is left. With the square of the part of the direction y changes by ``bend``.
     """
     nothing = np.zeros(cycles.q)
     length = np.sqrt(cycles.inner(middle.mesh, direction, direction, nothing, nothing))
     dx = direction / length
-    found = _held(cycles, middle, dx, size)
+    bend = nothing if bend is None else bend / length**2
+    found = _held(cycles, middle, dx, size, bend)
     for _ in range(8):
         if found.converged:
             break
         size *= 0.3
-        found = _held(cycles, middle, dx, size)
+        found = _held(cycles, middle, dx, size, bend)
     for _ in range(6):
         mesh = finer(cycles, found.orbit) if found.converged else None
         if mesh is None:
             break
         middle, (dx, x) = cycles.on(mesh, middle, dx, found.orbit.x)
-        found = _held(cycles, middle, dx, size, Orbit(mesh, x, found.orbit.y))
+        found = _held(cycles, middle, dx, size, bend, Orbit(mesh, x, found.orbit.y))
     side = (
         np.sign(cycles.inner(middle.mesh, dx, found.dx, nothing, nothing))
         if found.converged
@@ -133,11 +145,11 @@ def off(cycles: Cycles, middle: Orbit, direction: Array, size: float) -> Solutio
 
 
 def _held(
-    cycles: Cycles, middle: Orbit, dx: Array, size: float, guess: Orbit | None = None
+    cycles: Cycles, middle: Orbit, dx: Array, size: float, bend: Array, guess: Orbit | None = None
 ) -> Solution:
     """The orbit whose part along a direction is given, near a guess."""
     nothing = np.zeros(cycles.q)
-    away = Orbit(middle.mesh, middle.x + size * dx, middle.y)
+    away = Orbit(middle.mesh, middle.x + size * dx, middle.y + size**2 * bend)
     # The phase is that of the guess: the orbit that is left may have none.
     rows, rows_y, target = cycles.rows(away if guess is None else guess, dx, nothing)
     target[-1] = np.sum(rows[-1] * away.x)
@@ -191,6 +203,38 @@ def other_tangent(
 ) -> tuple[Array, Array]:
     """Where two families cross, the solution of their equations orthogonal to a tangent of one."""
     return _null_vector(cycles, orbit, W, 1.0, tangent)
+
+
+def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution | None:
+    """An orbit at which two families cross, on its mesh, with a tangent of one of them.
+
+    The equations are singular along the other one: that part stays, and an arbitrary column takes
+    up what is left of them then.
+    """
+    n, q = cycles.n, cycles.q
+    found = cycles.looked_at(orbit, *own)
+    ex, ey = other_tangent(cycles, orbit, found.W, own)
+    column = np.random.default_rng(7).standard_normal(found.W.shape[:2]) / orbit.intervals
+    rows, rows_y = np.zeros((q + 1, *orbit.x.shape)), np.zeros((q + 1, q + 1))
+    target = np.zeros(q + 1)
+    rows[:q], rows_y[:q, :q], target[:q] = cycles.rows(orbit, *own)
+    others, others_y, at = cycles.rows(orbit, ex, ey)
+    rows[q], rows_y[q, :q], target[q] = others[-1], others_y[-1], at[-1]
+    dx, dy = np.empty((2, *orbit.x.shape)), np.empty((2, q + 1))
+    for _ in range(CLOSER):
+        x, y = orbit.x, orbit.y
+        V = np.insert(found.W, n + q, column, axis=2)
+        border = rows_y.copy()
+        right = target - np.einsum("rkn,kn->r", rows, x) - rows_y[:, :q] @ y
+        if cycles.forced:
+            period, slope = cycles.own_period(y)
+            border[0, 0], border[0, 1:q], right[0] = 1.0, -slope, period - y[0]
+        gap = cycles.closure * x[0] + cycles.turns - x[-1]
+        if kernels.solve(V, rows, border, right, gap, cycles.closure, cycles.m, dx, dy) == 0.0:
+            return None
+        orbit = Orbit(orbit.mesh, x + dx[0], y + dy[0, :q])
+        found = cycles.looked_at(orbit, *own)
+    return found if np.max(np.abs(dx[0]) / cycles.scale) < SETTLED else None
 
 
 def _null_vector(

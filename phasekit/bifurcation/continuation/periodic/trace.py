@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic import collocation, ends, homoclinic
+from phasekit.bifurcation.continuation.periodic import collocation, ends
 from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
+from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -40,14 +41,18 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
     """Follow a family from a state for at most so many points."""
     found: list[Point] = []
     while len(found) < points:
-        made, state_or_stop = advance(cycles, state)
-        if made is None:
-            assert isinstance(state_or_stop, Stop)
-            return Track(
-                tuple(found), state, homoclinic.when_stuck(cycles, state, start, state_or_stop)
-            )
-        assert isinstance(state_or_stop, State)
-        end = ends.end_of(cycles, state, made, start)
+        try:
+            made, state_or_stop = advance(cycles, state)
+            if made is None:
+                assert isinstance(state_or_stop, Stop)
+                return Track(
+                    tuple(found), state, ends.when_stuck(cycles, state, start, state_or_stop)
+                )
+            assert isinstance(state_or_stop, State)
+            end = ends.end_of(cycles, state, made, start)
+        except KeyboardInterrupt:
+            why = f"it was interrupted behind {_where(cycles, state.orbit)}"
+            return Track(tuple(found), state, Stop("interrupted", why))
         if end is not None:
             last, stop = end
             if last is not None:
@@ -55,46 +60,76 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
             return Track(tuple(found), state_or_stop, stop)
         found.append(made)
         state = state_or_stop
-    return Track(tuple(found), state, Stop("max_points", f"max_points = {points} were reached"))
+        stage(f"{len(found):,} points")
+    why = f"max_points = {points} were computed, the last at {_where(cycles, state.orbit)}"
+    return Track(tuple(found), state, Stop("max_points", why))
 
 
 def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
     """The next point, and the state from which to go on."""
     o = cycles.options
-    step = min(state.step, o.max_step)
+    local = cycles.sized(state.orbit)
+    here, unit = _measured(cycles, local, state)
+    step = min(here.step, o.max_step)
     reason = "the branch turns ever more, or Newton's method takes ever more iterations"
     while step >= o.min_step:
-        made = attempt(cycles, state, step)
+        made = attempt(local, here, step)
         if isinstance(made, str):
             reason = made
             step *= 0.5
             continue
         solution, cosine = made
+        solution, own = _unscaled(cycles, local, solution)
         angle = math.acos(min(cosine, 1.0))
         if angle > o.max_turn:
             reason = f"the branch turns by more than max_turn = {o.max_turn:g}"
             step *= 0.5
             continue
-        point = point_of(cycles, solution, state.arclength + step, step)
+        point = point_of(cycles, solution, state.arclength + step * unit, step * unit)
         grow = min(max(o.turn / max(angle, 1e-3), 0.5), 2.0)
         if solution.steps > 5:
             grow = min(grow, 0.7)
         after = State(
-            solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step),
-            state.arclength + step, state.since + 1, state.since_start + 1,
+            solution.orbit, solution.dx, solution.dy, min(step * grow, o.max_step) * own,
+            state.arclength + step * unit, state.since + 1, state.since_start + 1,
             (state.orbit, state.dx, state.dy),
         )  # fmt: skip
         return point, _meshed(cycles, after)
-    where = ", ".join(f"{name} = {v:.9g}" for name, v in _named(cycles, state.orbit).items())
+    where = _where(cycles, state.orbit)
     return None, Stop(
         "stuck", f"no step longer than min_step = {o.min_step:g} succeeded at {where}: {reason}"
     )
 
 
-def _named(cycles: Cycles, orbit: Orbit) -> dict[str, float]:
-    names = [cycles.field.parameters[i] for i in cycles.active]
+def _measured(cycles: Cycles, local: Cycles, state: State) -> tuple[State, float]:
+    """A state on the scales of its own orbit, and how long a unit of these is on the first ones."""
+    if local is cycles:
+        return state, 1.0
+    length = local.length(state.orbit.mesh, state.dx, state.dy)
+    s = state
+    dx, dy, step = s.dx / length, s.dy / length, s.step * length
+    made = State(s.orbit, dx, dy, step, s.arclength, s.since, s.since_start, s.behind)
+    return made, 1.0 / length
+
+
+def _unscaled(cycles: Cycles, local: Cycles, found: Solution) -> tuple[Solution, float]:
+    """A solution with a tangent of unit length on the scales of the start, and its length there."""
+    if local is cycles:
+        return found, 1.0
+    length = cycles.length(found.orbit.mesh, found.dx, found.dy)
+    f = found
+    made = Solution(
+        f.orbit, f.dx / length, f.dy / length, f.steps, f.residual, f.sign, f.divergence, f.W,
+        f.message, f.length,
+    )  # fmt: skip
+    return made, length
+
+
+def _where(cycles: Cycles, orbit: Orbit) -> str:
+    """The period and the free parameters, in words."""
+    names = ["period", *(cycles.field.parameters[i] for i in cycles.active)]
     # On curves of folds and tori kappa or omega follows.
-    return dict(zip(["period", *names], orbit.y.tolist(), strict=False))
+    return ", ".join(f"{n} = {v:.9g}" for n, v in zip(names, orbit.y.tolist(), strict=False))
 
 
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:
@@ -152,6 +187,8 @@ def _meshed(cycles: Cycles, state: State) -> State:
 def _moved(cycles: Cycles, state: State, mesh: Array) -> State:
     """The state on a mesh, with the point behind it."""
     orbit, dx, behind = state.orbit, state.dx, state.behind
+    if orbit.mesh is mesh and (behind is None or behind[0].mesh is mesh):
+        return state
     if orbit.mesh is not mesh:
         orbit, (dx,) = cycles.on(mesh, orbit, dx)
     if behind is not None and behind[0].mesh is not mesh:

@@ -23,7 +23,7 @@ from phasekit.bifurcation.continuation.points.special import (
     reach_of,
 )
 from phasekit.bifurcation.continuation.spectrum import orientation
-from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
+from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes, scale_at
 
 Array = npt.NDArray[np.float64]
 
@@ -154,7 +154,8 @@ def _degenerate(curve: Curve, bracket: Bracket, best: Sample) -> Special:
 def null_spaces(curve: Curve, u: Array, tolerance: float = 1e-7) -> Singular:
     """Null spaces of f_u at a point as it stands, by its singular values."""
     n, m = curve.n, curve.m
-    scale, rows = curve.scale[:m], force_sizes(curve, u)
+    scale = scale_at(curve, u)
+    rows = force_sizes(curve, u, scale)
     f, slopes = curve.at(u)
     left, values, right = np.linalg.svd(slopes * scale / rows[:, None])
     k = max(1, int(np.sum(values <= tolerance * max(1.0, values[0]))))
@@ -167,7 +168,7 @@ def null_spaces(curve: Curve, u: Array, tolerance: float = 1e-7) -> Singular:
 def directions_at(curve: Curve, u: Array) -> list[Array]:
     """Unit tangents of the branches through a point of a branch; at a regular point one tangent."""
     point = null_spaces(curve, u, 1e-9)
-    scaled = curve.at(u)[1] * curve.scale[: curve.m] / point.rows[:, None]
+    scaled = curve.at(u)[1] * scale_at(curve, u) / point.rows[:, None]
     if np.linalg.svd(scaled, compute_uv=False)[-1] > 1e-9:
         t = point.right[:, -1]
         return [t / curve.length(t)]

@@ -32,6 +32,8 @@ class CurveTest:
         Whether a zero is such a point.
     of : tuple of bool
         Whether there are such points of flows (False), of maps (True), or of both.
+    coefficient : str
+        What messages call the function.
     """
 
     kind: str
@@ -40,6 +42,7 @@ class CurveTest:
     states: int = 1
     holds: Callable[[Curve, Sample], bool] = lambda curve, s: True
     of: tuple[bool, ...] = (False,)
+    coefficient: str = ""
 
     def value(self, curve: Curve, s: Sample) -> float:
         """The function at one point."""

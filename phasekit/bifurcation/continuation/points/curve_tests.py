@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels.defining import EVENT
 from phasekit.bifurcation.continuation.points import (
     bogdanov_takens,
     cusp,
     generalized_hopf,
     hopf_hopf,
     of_maps,
+    on_events,
     zero_hopf,
 )
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
@@ -16,7 +18,7 @@ from phasekit.bifurcation.special_points import KINDS
 
 TESTS: list[CurveTest] = [
     *cusp.TESTS, *bogdanov_takens.TESTS, *generalized_hopf.TESTS, *zero_hopf.TESTS,
-    *hopf_hopf.TESTS, *of_maps.TESTS,
+    *hopf_hopf.TESTS, *of_maps.TESTS, *on_events.TESTS,
 ]  # fmt: skip
 
 
@@ -45,5 +47,8 @@ def tests_of(curve: Curve) -> list[CurveTest]:
     return [
         test
         for test in TESTS
-        if test.curve == curve.kind and curve.n >= test.states and curve.discrete in test.of
+        if test.curve == curve.kind
+        and curve.n >= test.states
+        and curve.discrete in test.of
+        and (curve.kind != EVENT or KINDS[test.kind].detected in (None, *curve.detect))
     ]

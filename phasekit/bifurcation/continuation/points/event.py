@@ -330,7 +330,7 @@ class _Seek:
         special = Special(
             "event", s.u[:m].copy(), (ends[0], ends[1]), max(abs(value), residual),
             CONVERGED if sharp else GUESS,
-            message if sharp else "the function was not brought to zero within rounding",
+            message if sharp else "the function did not reach zero within rounding",
             tangent=s.tangent, name=self.event.name,
         )  # fmt: skip
         return Placed(i, along, special)

@@ -49,7 +49,7 @@ def fold(curve: Curve, bracket: Bracket) -> Special:
     v = best.tangent[:n] / np.linalg.norm(best.tangent[:n] / curve.scale[:n])
     u, v, residual, message = polish(curve, FOLD, best.u, v, reach)
     if not message and not _turns(curve, u, v):
-        message = "Newton's method on the defining system came to no end"
+        message = "Newton's method on the defining system did not converge"
     width = max(curve.length(right.u - left.u), 1e-4) if message else ON
     point = singular_point(curve, 0.5 * (left.u + right.u) if message else u, width, reach)
     if point is not None and meets(curve, point):

@@ -25,4 +25,6 @@ def lyapunov(curve: Curve, u: Array, slopes: Array) -> Array:
     return found
 
 
-TESTS = (CurveTest("generalized_hopf", HOPF, lyapunov),)
+TESTS = (
+    CurveTest("generalized_hopf", HOPF, lyapunov, coefficient="the first Lyapunov coefficient l1"),
+)

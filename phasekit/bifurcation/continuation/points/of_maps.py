@@ -69,6 +69,6 @@ TESTS = (
     *(_resonance(kind, k) for kind, k in RESONANT.items()),
     _together(FOLD, 2.0),
     _together(FLIP, 0.0),
-    CurveTest("generalized_flip", FLIP, flip, of=MAPS),
-    CurveTest("chenciner", TORUS, torus, holds=away, of=MAPS),
+    CurveTest("generalized_flip", FLIP, flip, of=MAPS, coefficient="the coefficient c"),
+    CurveTest("chenciner", TORUS, torus, holds=away, of=MAPS, coefficient="the coefficient d"),
 )

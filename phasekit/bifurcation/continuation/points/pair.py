@@ -21,11 +21,17 @@ from phasekit.bifurcation.continuation.points.special import (
     reach_of,
     tangent_at,
 )
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, pair_function
+from phasekit.bifurcation.continuation.spectrum import (
+    conjugate_function,
+    eigenvalues_of,
+    pair_function,
+)
 from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
 
+SAME = 1e-6  # part by which frequencies of pairs that cross together differ by rounding
+NEAR = 1e-4  # part of the pair function at both ends from which Newton's method goes on
 ON = 1e-6  # distance on scaled axes within which a point of larger corank is looked for
 
 
@@ -35,12 +41,16 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
     A Hopf point where the two eigenvalues are conjugate, a neutral saddle where they are real; a
     branch point, unless it is known, or a Bogdanov-Takens point where both vanish.
     """
+    saddles = "neutral_saddle" in curve.detect
+    function = pair_function if saddles else conjugate_function
 
     def test(s: Sample) -> float:
-        return float(pair_function(_values(curve, s.slopes)))
+        return float(function(_values(curve, s.slopes)))
 
-    best, left, right = bracket_root(curve, bracket.a, bracket.b, test, steps=10, width=1e-4)
-    u, extra, aux, residual, message = _refined(curve, bracket, best)
+    best, left, right = bracket_root(
+        curve, bracket.a, bracket.b, test, steps=10, width=1e-4, near=NEAR
+    )
+    u, extra, aux, residual, message = _refined(curve, bracket, best, saddles=saddles)
     if message:
         best, left, right = bracket_root(curve, left, right, test, steps=60, width=1e-14)
         u = best.u
@@ -52,7 +62,7 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
         return [described(curve, bracket, best, point)]
     slopes = curve.at(u)[1]
     values = _values(curve, slopes)
-    i, j = _nearest_pair(values)
+    i, j = _nearest_pair(values, saddles=saddles)
     kappa = float((values[i] * values[j]).real)
     size = float(np.max(np.abs(values)))
     accuracy = curve.field.accuracy
@@ -63,6 +73,8 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
         )  # fmt: skip
         return [double]
     kind = "hopf" if values[i].imag != 0.0 else "neutral_saddle"
+    if kind == "neutral_saddle" and not saddles:
+        return []
     if not message and (extra[-1] > 0.0) != (kind == "hopf"):
         message = "the defining system led to another pair of eigenvalues"
     form: dict[str, float] = {}
@@ -85,24 +97,41 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
 
 
 def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
-    """A point at which several conjugate pairs cross the imaginary axis together."""
+    """A point at which several conjugate pairs cross the imaginary axis together.
 
-    def test(s: Sample) -> float:
+    Pairs that stay on it, as those of a conserved energy, are none of them.
+    """
+    noise = 1e2 * curve.field.accuracy
+
+    def nearest(s: Sample) -> npt.NDArray[np.complex128]:
         values = _values(curve, s.slopes)
         above = values[values.imag > 0.0]
-        return float(np.sum(above.real[np.argsort(np.abs(above.real))][:count]))
+        return np.asarray(above[np.argsort(np.abs(above.real))] / np.max(np.abs(values)))
+
+    stay = min(int(np.sum(np.abs(nearest(s).real) <= noise)) for s in (bracket.a, bracket.b))
+
+    def crossing(s: Sample) -> npt.NDArray[np.complex128]:
+        return nearest(s)[stay : stay + count]
+
+    def test(s: Sample) -> float:
+        return float(np.sum(crossing(s).real))
 
     best, _, _ = bracket_root(curve, bracket.a, bracket.b, test, steps=60, width=1e-14)
-    values = _values(curve, best.slopes)
-    above = values[values.imag > 0.0]
-    close = above[np.argsort(np.abs(above.real))][:count]
-    size = float(np.max(np.abs(values)))
+    close = crossing(best)
     # Multiple eigenvalues are known to the root of rounding only; their mean is known better.
-    sharp = len(close) == count and abs(np.mean(close.real)) <= 1e2 * curve.field.accuracy * size
-    omega = float(np.mean(close.imag)) if len(close) else np.nan
+    sharp = len(close) == count and abs(np.mean(close.real)) <= noise
+    omegas = np.sort(close.imag * np.max(np.abs(_values(curve, best.slopes))))
+    words = "a pair of eigenvalues crosses" if count == 1 else f"{count} pairs of eigenvalues cross"
+    message = f"{words} together" if count > 1 else f"{words} beside those that stay on the axis"
+    alike = len(omegas) > 0 and np.ptp(omegas) <= SAME * omegas[-1]
+    if len(omegas) and not alike:
+        message += f", with the frequencies {', '.join(f'{one:.9g}' for one in omegas)}"
+    if count > 1:
+        message += ": switch(direction=...) follows one of their families, if these are isolated"
+    omega = float(np.mean(omegas) if alike else np.min(omegas, initial=np.inf))
     return Special(
         "hopf", best.u, interval_of(curve, bracket), float(np.max(np.abs(curve.at(best.u)[0]))),
-        CONVERGED if sharp else GUESS, f"{count} pairs of eigenvalues cross together",
+        CONVERGED if sharp else GUESS, message,
         {"l1": np.nan, "omega": omega, "d": np.nan}, tangent=best.tangent,
     )  # fmt: skip
 
@@ -112,14 +141,14 @@ def _values(curve: Curve, slopes: Array) -> npt.NDArray[np.complex128]:
 
 
 def _refined(
-    curve: Curve, bracket: Bracket, best: Sample
+    curve: Curve, bracket: Bracket, best: Sample, *, saddles: bool
 ) -> tuple[Array, Array, Array, float, str]:
     """Newton's method on the defining system: unknowns, extra ones, l, residual, message."""
     n = curve.n
     scale = curve.scale[:n]
     A = best.slopes[:, :n]
     values, vectors = np.linalg.eig(A)
-    i, j = _nearest_pair(values)
+    i, j = _nearest_pair(values, saddles=saddles)
     kappa = float((values[i] * values[j]).real)
     q = vectors[:, i] / scale
     if values[i].imag != 0.0:
@@ -150,10 +179,15 @@ def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
     return abs(kappa) <= max(changes)
 
 
-def _nearest_pair(values: npt.NDArray[np.complex128]) -> tuple[int, int]:
-    """The two eigenvalues, both real or conjugate, whose sum is least in size."""
+def _nearest_pair(values: npt.NDArray[np.complex128], *, saddles: bool) -> tuple[int, int]:
+    """The two eigenvalues, both real or conjugate, whose sum is least in size.
+
+    Without ``saddles`` conjugate ones, if there are any.
+    """
     sums = np.abs(values[:, None] + values)
     real = values.imag == 0.0
+    if not (saddles or real.all()):
+        sums[real] = np.inf
     alike = (real[:, None] & real) | (values[:, None] == np.conj(values))
     sums[~alike | np.eye(len(values), dtype=bool)] = np.inf
     i, j = np.unravel_index(np.argmin(sums), sums.shape)
@@ -182,12 +216,13 @@ def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
     third = forms.fed(
         d, bar, np.linalg.solve(matrix, double.value), np.linalg.inv(matrix), double.error
     )
-    total = (d.third(q, q, bar) - 2.0 * second + third).dot(p) * (0.5 / omega)
+    terms = [one * (0.5 / omega) for one in (d.third(q, q, bar), -2.0 * second, third)]
+    total = (terms[0] + terms[1] + terms[2]).dot(p)
     rows = force_sizes(d.curve, d.u)
     motion = forms.motion(d)
     length = float(np.max(np.abs(motion) / d.curve.scale[: n + 1]))
     return {
-        "l1": forms.known(total, forms.unit_of(d, rows, p, q, 3) / omega),
+        "l1": forms.signed(terms, p, forms.known(total, forms.unit_of(d, rows, p, q, 3) / omega)),
         "omega": float(omega),
         "d": forms.known(d.second(q, motion).dot(p), forms.unit_of(d, rows, p, q, 1) * length),
     }

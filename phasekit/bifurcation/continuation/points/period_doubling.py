@@ -81,8 +81,9 @@ def normal_form(d: forms.Derivatives) -> dict[str, float]:
     bent = d.second(q, q)
     inverse = np.linalg.inv(-d.slopes[:, :n])
     fed = forms.fed(d, q, inverse @ bent.value, inverse, bent.error)
-    total = (1.0 / 6.0) * d.third(q, q, q) + 0.5 * fed
-    c = forms.known(total.dot(p), forms.unit_of(d, rows, p, q, 3))
+    terms = [(1.0 / 6.0) * d.third(q, q, q), 0.5 * fed]
+    c = forms.known((terms[0] + terms[1]).dot(p), forms.unit_of(d, rows, p, q, 3))
+    c = forms.signed(terms, p, c)
     # Where two multipliers are -1, `null_vectors` makes another product 1.
     return {"c": c if abs(float(p @ q) - 1.0) < 1e-9 else np.nan}
 

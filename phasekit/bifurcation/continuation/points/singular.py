@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes
+from phasekit.bifurcation.continuation.units import accuracy_of, force_sizes, scale_at
 
 Array = npt.NDArray[np.float64]
 
@@ -62,8 +62,9 @@ class Singular:
 
 def candidates(curve: Curve, u: Array, reach: float) -> int:
     """How many singular values of f_u may vanish within a distance of a point, by their slopes."""
-    n, m = curve.n, curve.m
-    scale, rows = curve.scale[:m], force_sizes(curve, u)
+    n = curve.n
+    scale = scale_at(curve, u)
+    rows = force_sizes(curve, u, scale)
     scaled = curve.at(u)[1] * scale / rows[:, None]
     if not np.isfinite(scaled).all():
         return 0
@@ -83,9 +84,9 @@ def candidates(curve: Curve, u: Array, reach: float) -> int:
 def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     """The point of corank k next to a point; None if there is none within reach."""
     n, m = curve.n, curve.m
-    scale = curve.scale[:m]
     u = np.array(start[:m])
-    rows = force_sizes(curve, u)
+    scale = scale_at(curve, u)
+    rows = force_sizes(curve, u, scale)
     accuracy = accuracy_of(curve)
     scaled = curve.at(u)[1] * scale / rows[:, None]
     if not np.isfinite(scaled).all():

@@ -19,7 +19,11 @@ from phasekit.bifurcation.continuation.points.special import (
     solved,
     tangent_at,
 )
-from phasekit.bifurcation.continuation.spectrum import eigenvalues_of, product_function
+from phasekit.bifurcation.continuation.spectrum import (
+    eigenvalues_of,
+    product_function,
+    surely_complex,
+)
 from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +42,8 @@ def torus(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]
     best, left, right = bracket_root(curve, bracket.a, bracket.b, test, steps=10, width=1e-4)
     A = curve.linear(best.slopes) * scale / scale[:, None]
     values, vectors = np.linalg.eig(A)
-    above = np.flatnonzero(values.imag > 0.0)
+    sure = surely_complex(A, values, curve.field.accuracy)
+    above = np.flatnonzero((values.imag > 0.0) & sure)
     near = above[np.argsort(np.abs(np.abs(values[above]) - 1.0))]
     if not len(near) or abs(abs(values[near[0]]) ** 2 - 1.0) > 2.0 * abs(test(best)) + 1e-9:
         return []
@@ -117,9 +122,10 @@ def normal_form(d: forms.Derivatives, angle: float) -> dict[str, float]:
     back, twice = np.linalg.inv(np.eye(n) - A), np.linalg.inv(turn**2 * np.eye(n) - A)
     second = forms.fed(d, q, (back @ still.value).real, back, still.error)
     third = forms.fed(d, bar, twice @ double.value, twice, double.error)
-    total = (d.third(q, q, bar) + 2.0 * second + third) * (0.5 * np.conj(turn))
+    terms = [one * (0.5 * np.conj(turn)) for one in (d.third(q, q, bar), 2.0 * second, third)]
     unit = forms.unit_of(d, force_sizes(d.curve, d.u), p, q, 3)
-    return {"d": forms.known(total.dot(p), unit), "angle": float(angle)}
+    total = forms.known((terms[0] + terms[1] + terms[2]).dot(p), unit)
+    return {"d": forms.signed(terms, p, total), "angle": float(angle)}
 
 
 PAIR = PathTest("pair", torus, discrete=True)

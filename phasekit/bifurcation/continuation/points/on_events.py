@@ -1,0 +1,104 @@
+"""Points on curves of events: where the equilibrium that the event holds at is a special point."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels.defining import EVENT
+from phasekit.bifurcation.continuation.neutral import FEW, is_neutral
+from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.points.curve_test import CurveTest
+from phasekit.bifurcation.continuation.rows import largest_entry
+from phasekit.bifurcation.continuation.spectrum import (
+    SURE,
+    eigenvalues_of,
+    flip_function,
+    pair_function,
+    product_function,
+)
+
+Array = npt.NDArray[np.float64]
+
+RANK = 1e-6  # of a matrix, beside its size
+MAPS = (True,)
+_LEAST = "an eigenvalue of f_x"
+_PAIR = "the product of two multipliers less 1"
+
+
+def _values(curve: Curve, slopes: Array) -> npt.NDArray[np.complex128]:
+    return eigenvalues_of(curve.linear(slopes), accuracy=curve.field.accuracy)
+
+
+def _unless_zero(curve: Curve, u: Array, slopes: Array, values: Array) -> Array:
+    """Values along a path; zeros if most are no more than their errors, as of f_x where it is 0."""
+    if len(u) < FEW:
+        return values
+    n, scale = curve.n, curve.scale[: curve.n]
+    size = largest_entry(curve.linear(slopes) * scale / scale[:, None])
+    if n == 1:  # terms may cancel in f_x itself
+        moved = np.maximum(np.abs(u[:, : curve.m]), curve.scale[: curve.m])
+        bent = curve.bend_all(u, np.pad(np.ones((len(u), 1)), ((0, 0), (0, curve.m - 1))))
+        size = np.maximum(size, np.sum(np.abs(bent[:, 0]) * moved, axis=1))
+    zero = np.abs(values) <= SURE * curve.field.accuracy * size
+    return np.where(np.mean(zero) > 0.5, 0.0, values)
+
+
+def singular(curve: Curve, u: Array, slopes: Array) -> Array:
+    """The least eigenvalue of f_x in size, with the sign of the determinant."""
+    values = flip_function(eigenvalues_of(slopes, accuracy=curve.field.accuracy) - 1.0)
+    return _unless_zero(curve, u, slopes, values)
+
+
+def crossing(curve: Curve, u: Array, slopes: Array) -> Array:
+    """The same, unknown where it is zero all along, which is said once."""
+    values = singular(curve, u, slopes)
+    return np.where(np.any(values), values, np.nan)
+
+
+def flip(curve: Curve, u: Array, slopes: Array) -> Array:
+    """1 + mu of the multiplier next to -1, with the sign of the product of all."""
+    return _unless_zero(curve, u, slopes, flip_function(_values(curve, slopes)))
+
+
+def pair(curve: Curve, u: Array, slopes: Array) -> Array:
+    """The pair function of a flow, or of a map; one where each spectrum is its mirror image."""
+    values = _values(curve, slopes)
+    if curve.conservative or (len(values) >= FEW and is_neutral(curve, values)):
+        return np.ones(len(values))
+    sums = product_function(values) if curve.discrete else pair_function(values)
+    return _unless_zero(curve, u, slopes, sums)
+
+
+def complex_pair(curve: Curve, s: Sample) -> bool:
+    """Whether the pair that crosses is none of real eigenvalues."""
+    values = _values(curve, s.slopes[None])[0]
+    above = values[values.imag > 0.0]
+    if curve.discrete:
+        off = np.abs(np.abs(above) ** 2 - 1.0)
+        least = product_function(values)
+    else:
+        off, least = np.abs(2.0 * above.real), pair_function(values)
+    return bool(np.min(off, initial=np.inf) <= abs(float(least)) * (1.0 + 1e-9))
+
+
+def _crosses(curve: Curve, s: Sample) -> bool:
+    """Whether other branches cross here: neither parameter moves the equilibrium off f_x v = 0."""
+    scaled = s.slopes * curve.scale[: curve.m]
+    rows = np.max(np.abs(scaled), axis=1, keepdims=True)
+    sizes = np.linalg.svd(scaled / np.where(rows > 0.0, rows, 1.0), compute_uv=False)
+    return bool(sizes[-1] <= RANK * sizes[0])
+
+
+def _turns(curve: Curve, s: Sample) -> bool:
+    return not _crosses(curve, s)
+
+
+TESTS = (
+    CurveTest("fold", EVENT, singular, holds=_turns, of=(False, True), coefficient=_LEAST),
+    CurveTest("branch_point", EVENT, crossing, holds=_crosses, of=(False, True)),
+    CurveTest("hopf", EVENT, pair, 2, complex_pair, coefficient="a sum of two eigenvalues"),
+    CurveTest("period_doubling", EVENT, flip, of=MAPS, coefficient="1 + mu of a multiplier mu"),
+    CurveTest("torus", EVENT, pair, 2, complex_pair, of=MAPS, coefficient=_PAIR),
+)

@@ -1,0 +1,37 @@
+"""Branches that are not complete, which their user has to know."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any, TypeVar
+
+from phasekit.bifurcation.continuation.stops import UNFINISHED
+
+Of = TypeVar("Of", bound=Any)
+
+
+def interrupted(branch: Any) -> bool:
+    """Whether Ctrl-C ended it."""
+    return any(stop.reason == "interrupted" for stop in branch.stops)
+
+
+def announced(branch: Of) -> Of:
+    """The branch, with a warning if it ended for its number of points, or by Ctrl-C."""
+    ends = [
+        f"{name}: {stop.message}"
+        for name, stop in zip(("first point", "last point"), branch.stops, strict=True)
+        if stop.reason in UNFINISHED
+    ]
+    if ends:
+        more = (
+            ""
+            if interrupted(branch)
+            else ", ContinuationOptions(max_points=...) allows more points"
+        )
+        warnings.warn(
+            f"the branch in {branch.parameter} is not complete, {'; '.join(ends)}; extend() "
+            f"continues it{more}",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    return branch

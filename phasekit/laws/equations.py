@@ -1,0 +1,69 @@
+"""Laws that are stated as they are: the rates of any number of states, or the step of a map."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from phasekit.laws.ladder import Flow, Lawful, Map
+
+
+@dataclass(frozen=True)
+class Equations:
+    """Equations of states by name.
+
+    Attributes
+    ----------
+    states : tuple of str
+        Names of the states.
+    names : tuple of str
+        Names of the parameters, in the order of the values.
+    f : tuple of sympy.Expr, or callable
+        Formulas of real symbols, one a state, or a function ``f(x, **parameters)``.
+    periods : mapping of str to float
+        States that are angles, with their periods.
+    time : str, optional
+        What f calls the time, if it depends on it.
+    window : mapping of str to (float, float)
+        Where to look for what the states do; the widths are what errors are measured by.
+    units : mapping of str to str
+        Units of states, where they are known.
+    times : int
+        How often a map is applied in each step.
+    period : sympy.Expr, optional
+        The period of f in time, a formula of the parameters.
+    """
+
+    states: tuple[str, ...]
+    names: tuple[str, ...]
+    f: Any
+    periods: Mapping[str, float] = field(default_factory=dict, hash=False)
+    time: str | None = None
+    window: Mapping[str, tuple[float, float]] = field(default_factory=dict, hash=False)
+    units: Mapping[str, str] = field(default_factory=dict, hash=False)
+    times: int = 1
+    period: Any = None
+
+    @property
+    def kind(self) -> str:
+        """How f was given: "symbolic", "compiled" or "python"."""
+        if isinstance(self.f, tuple):
+            return "symbolic"
+        return "compiled" if hasattr(self.f, "signatures") else "python"
+
+
+class Rates(Equations, Flow):
+    """A flow ``x' = f(x; p)``, or ``x' = f(t, x; p)``."""
+
+
+class Step(Equations, Map):
+    """A map ``x -> f(x; p)``."""
+
+    called: ClassVar[str] = "a map x -> f(x; p)"
+
+
+def equations_of(system: Lawful) -> Equations | None:
+    """The equations of a system that states its rates or step; None for others."""
+    law = system.law if issubclass(system.rung, (Flow, Map)) else None
+    return law if isinstance(law, Equations) else None

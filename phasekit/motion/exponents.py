@@ -1,0 +1,257 @@
+"""Lyapunov exponents of flows and maps of any number of states."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import ConvergenceError
+from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
+from phasekit.motion.flow import ATOL, RTOL
+from phasekit.motion.flows import limits_of, pointwise, slopes_at
+from phasekit.motion.lost import ARRIVED, FAILED, MOST, judged, tell
+from phasekit.motion.method import WEIGHT, cells_of, run
+from phasekit.motion.rates import Rates
+from phasekit.motion.steps import InitialValue, steps
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+
+#: Parts of the time, and how many at first are not counted.
+PARTS, SKIPPED = 20, 2
+#: Steps of a Python function's motion between which tangent vectors are made orthonormal, in parts
+#: of the time.
+FINE = 50
+
+
+def exponents(
+    law: Equations,
+    *arrays: npt.ArrayLike,
+    count: int,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    threads: int | None = None,
+) -> dict[str, Array]:
+    """The greatest exponents of motions, with their errors, sum and dimension.
+
+    Parameters
+    ----------
+    law : Equations
+        The law.
+    *arrays : array_like
+        Its parameters, states at t = 0, and times, or counts of steps of a map; they broadcast.
+    count : int
+        How many exponents.
+
+    Returns
+    -------
+    dict
+        ``lyapunov_exponent``, ``lyapunov_error`` (on a last axis), ``lyapunov_sum``,
+        ``lyapunov_dimension``; NaN where a motion came to no end.
+
+    Notes
+    -----
+    Tangent vectors move along by the variational equation, and are made orthonormal whenever they
+    are no longer nearly so. The first tenth of the time is not counted. The error is that of the
+    mean over the parts of the time, or the trend in them.
+    """
+    given = [np.asarray(array, dtype=float) for array in arrays]
+    shape = np.broadcast_shapes(*(array.shape for array in given))
+    flat = [x.reshape(()) if x.size == 1 else np.broadcast_to(x, shape).ravel() for x in given]
+    values = dict(zip(law.names, flat, strict=False))
+    cells = int(np.prod(shape, dtype=int))
+    columns = [np.broadcast_to(x, (cells,)) for x in flat[len(law.names) :]]
+    times, states = columns[-1], np.stack(columns[:-1], axis=-1)
+    states = np.where((np.isfinite(times) & (times > 0.0))[:, None], states, np.nan)
+    legs = np.where(np.isfinite(times) & (times > 0.0), times, 1.0) / PARTS
+    if isinstance(law, Map):
+        legs = np.maximum(np.floor(legs), 1.0) * law.times
+    if law.kind == "python":
+        grown, status = _one_by_one(law, values, states, legs, count, rtol, atol)
+    else:
+        grown, status = _growth(law, values, states, legs, count, rtol, atol, threads)
+    tell("lyapunov_exponent", status, states)
+    ended = np.isneginf(grown[:, -1])  # where the derivative of a map vanishes
+    with np.errstate(invalid="ignore"):
+        means = np.diff(grown[:, SKIPPED - 1 :], axis=1) / legs[:, None, None]
+    means = np.where(ended[:, None], 0.0, means) * law.times
+    found = means.mean(axis=1)
+    number = PARTS - SKIPPED
+    spread = means.std(axis=1, ddof=1) / np.sqrt(number)
+    trend = np.abs(means[:, number // 2 :].mean(axis=1) - found)
+    found = np.where(ended, -np.inf, found)
+    order = np.argsort(-found, axis=1)
+    error = np.take_along_axis(np.maximum(spread, trend), order, axis=1)
+    found = np.take_along_axis(found, order, axis=1)
+    whole = np.full(len(found), np.nan)
+    total = found.sum(axis=1) if count == len(law.states) else whole
+    dimension = _dimension(found, whole_space=count == len(law.states))
+
+    def back(x: Array) -> Array:
+        return np.asarray(x.reshape(shape + x.shape[1:]))
+
+    return {
+        "lyapunov_exponent": back(found), "lyapunov_error": back(error),
+        "lyapunov_sum": back(total), "lyapunov_dimension": back(dimension),
+    }  # fmt: skip
+
+
+def _dimension(found: Array, whole_space: bool) -> Array:
+    """Kaplan and Yorke's dimension; NaN where the exponents do not add up to less than 0."""
+    sums = np.cumsum(found, axis=1)
+    k = np.sum(sums >= 0.0, axis=1)
+    rows, n = np.arange(len(found)), found.shape[1]
+    inside = (k > 0) & (k < n)
+    last, next_ = np.clip(k - 1, 0, n - 1), np.clip(k, 0, n - 1)
+    with np.errstate(all="ignore"):
+        part = sums[rows, last] / np.abs(found[rows, next_])
+    full = np.where((k == n) & whole_space, float(n), np.nan)
+    full = np.where(np.isnan(found).any(axis=1), np.nan, full)
+    return np.where(inside, k + part, np.where((k == 0) & np.isfinite(found[:, 0]), 0.0, full))
+
+
+def _growth(
+    law: Equations, values: Mapping[str, Array], states: Array, legs: Array, count: int,
+    rtol: float, atol: float, threads: int | None,
+) -> tuple[Array, Index]:  # fmt: skip
+    """Logs of the growth of tangent vectors after each part of the time, added up."""
+    cells, n = states.shape
+    address = _compiled(law.states, law.names, law.f, law.time, count)
+    columns = [np.atleast_1d(np.asarray(values[name], float)) for name in law.names] or [
+        np.zeros(1)
+    ]
+    parameters = np.stack(np.broadcast_arrays(*columns))
+    parameters = np.array(np.broadcast_to(parameters, (len(parameters), cells)))
+    first = np.concatenate([states, np.tile(np.eye(n)[:count].ravel(), (cells, 1))], axis=1)
+    out, status = np.full((cells, PARTS, count), np.nan), np.zeros(cells, np.int64)
+    if isinstance(law, Map):
+        from phasekit.motion.kernels.iterates import growth as of_map
+        from phasekit.numerics.launch import launch
+
+        work = WEIGHT + int(legs.max(initial=0.0)) * PARTS // 4
+        given = legs.astype(np.int64), np.array(first), parameters
+        groups: Any = (out, status)
+        launch(of_map, (address, *given), cells, groups, threads, work)
+    else:
+        from phasekit.motion.kernels.tangents import growth
+
+        code = Rates(address, law.names, -1, 0, 0)
+        shared = np.zeros((0, 3)), limits_of(law, rtol, atol, MOST), code.kink
+        own = np.array(legs), np.array(first)
+        run(growth, code, shared, own, parameters, (out, status), status, threads)
+    judged(status, parameters)
+    return out, status
+
+
+@functools.lru_cache(maxsize=128)
+def _compiled(
+    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, count: int
+) -> int:
+    """Machine code of the states and so many tangent vectors."""
+    if not isinstance(f, tuple):
+        return int(_wrapped(states, names, f, time, count).address)
+    import sympy as sp
+
+    from phasekit.laws.formulas import symbols_of
+    from phasekit.numerics.lanes import compile_lanes
+
+    symbols = symbols_of([*states, *names, *([] if time is None else [time])])
+    x = [symbols[name] for name in states]
+    places = {symbol: (0, i) for i, symbol in enumerate(x)}
+    places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
+    if time is not None:
+        places[symbols[time]] = (2, 0)
+    slopes = [[one.diff(symbol) for symbol in x] for one in f]
+    expressions = list(f)
+    for i in range(count):
+        u = sp.symbols(f"_u{i}_:{len(x)}", real=True)
+        places |= {symbol: (0, (1 + i) * len(x) + j) for j, symbol in enumerate(u)}
+        expressions += [sp.Add(*(a * b for a, b in zip(row, u, strict=True))) for row in slopes]
+    return compile_lanes(expressions, places)
+
+
+@functools.cache  # the code lives as long as it may be called
+def _wrapped(
+    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, count: int
+) -> Any:
+    import inspect
+
+    from phasekit.numerics.lanes import LANES
+    from phasekit.numerics.wrapped import wrap
+
+    arguments = list(inspect.signature(f.py_func).parameters)[1:]
+    order = tuple(None if name == time else names.index(name) for name in arguments)
+    return wrap(f, len(states), order, lanes=LANES, tangents=count)
+
+
+def _one_by_one(
+    law: Equations, values: Mapping[str, Array], states: Array, legs: Array, count: int,
+    rtol: float, atol: float,
+) -> tuple[Array, Index]:  # fmt: skip
+    """The same of Python functions, one motion after the other."""
+    from phasekit.numerics.waits import stage
+
+    cells, n = states.shape
+    out, status = np.full((cells, PARTS, count), np.nan), np.full(cells, ARRIVED)
+    grow = _of_map if isinstance(law, Map) else _of_flow
+    for cell in range(cells):
+        one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
+        x, vectors = states[cell], np.eye(n)[:, :count]
+        total, at = np.zeros(count), 0.0
+        for part in range(PARTS if np.isfinite(x).all() else 0):
+            for _ in range(1 if isinstance(law, Map) else FINE):
+                leg = legs[cell] if isinstance(law, Map) else legs[cell] / FINE
+                x, vectors, logs = grow(law, one, x, vectors, at, leg, rtol, atol)
+                total, at = total + logs, at + leg
+            out[cell, part] = total
+            stage(f"{cell + 1:,} of {cells:,} motions")
+        if np.isnan(out[cell]).any():
+            out[cell], status[cell] = np.nan, FAILED
+    return out, status
+
+
+def _of_flow(
+    law: Equations, values: Mapping[str, float], x: Array, vectors: Array, start: float,
+    leg: float, rtol: float, atol: float,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    n, f = len(x), pointwise(law, values)
+
+    def rates(t: float, y: Array) -> Array:
+        tangents = y[n:].reshape(n, -1)
+        return np.concatenate([f(t, y[:n]), (slopes_at(law, values, y[:n], t) @ tangents).ravel()])
+
+    state = np.concatenate([x, vectors.ravel()])
+    problem = InitialValue(
+        rates, list(state), start=start, rtol=rtol, atol=atol, unit=np.inf, most=100_000
+    )
+    try:
+        for step in steps(problem, start + leg):
+            state = step.after
+    except (ConvergenceError, ValueError):
+        state = np.full(state.shape, np.nan)
+    return _orthonormal(state[:n], state[n:].reshape(n, -1))
+
+
+def _of_map(
+    law: Equations, values: Mapping[str, float], x: Array, vectors: Array, start: float,
+    leg: float, *_: float,
+) -> tuple[Array, Array, Array]:  # fmt: skip
+    f, total = pointwise(law, values), np.zeros(vectors.shape[1])
+    for i in range(int(leg)):
+        moved = slopes_at(law, values, x, start + i) @ vectors
+        x, vectors, logs = _orthonormal(f(start + i, x), moved)
+        total = total + logs
+    return x, vectors, total
+
+
+def _orthonormal(x: Array, vectors: Array) -> tuple[Array, Array, Array]:
+    if not (np.isfinite(vectors).all() and np.isfinite(x).all()):
+        return x * np.nan, vectors * np.nan, np.full(vectors.shape[1], np.nan)
+    q, r = np.linalg.qr(vectors)
+    with np.errstate(divide="ignore"):
+        return x, q, np.log(np.abs(np.diag(r)))

@@ -1,0 +1,381 @@
+"""Attractors of driven systems that damping rules: by the order of their slow motions.
+
+Where damping is much faster than all else, every motion comes to a slow one, whose speed is a
+function of time and place. Slow motions do not pass each other, so that the coordinate
+after a period grows with that before: between two orbits that repel lies one that attracts. They
+are found by the slow law, and then solved for as Fourier series of the full one: no step is as
+short as the time in which damping acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import AttractorKind
+from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
+from phasekit.motion.attractor import LONGEST, Attractor, Search
+from phasekit.motion.method import circle
+from phasekit.motion.rates import rates_of
+from phasekit.motion.strobe import NO_TARGETS, Targets, strobe
+
+Array = npt.NDArray[np.float64]
+
+#: Damping times in a leg from which on damping rules, if its square is so many times the slopes.
+FAST, STRONG = 300.0, 100.0
+#: How often as great as all frequencies damping is then.
+QUICK = 10.0
+#: Damping times after which a motion is a slow one.
+SPENT = 40.0
+#: Points at which slow motions start, and their steps in the shortest period of the drive.
+STARTS, STEPS, MOST_STEPS = 400, 64, 20_000
+#: Steps in the time in which slow motions come together.
+STEEP = 8.0
+#: How often the range of a line is made wider, and by which part.
+WIDER, ROOM = 12, 0.5
+#: Coefficients of an orbit at first and at most, steps of Newton's method, and its last change.
+FEW, MANY, TRIES, ENOUGH = 65, 513, 60, 1e-13
+#: Part of the greatest force that may be missing where Newton's method converges slowly.
+MISSING = 1e-14
+#: Part of the coefficients that are next to nothing at the end, and how small these are.
+TAIL, NOTHING = 4, 1e-9
+#: Parts of the size within which borders decide; displacement that is rounding.
+BORDER, ROUNDING = 1e-6, 1e-14
+#: States that are kept of a motion which does not repeat itself.
+KEPT = 4000
+#: A rate that counts as without bound.
+BOUNDLESS = 1e300
+#: Why it is not seen where a motion ends.
+AWAY = "creep out of the range in which attractors were looked for, or next to a border"
+
+
+class Orbit(NamedTuple):
+    """A periodic orbit at equal times, q legs in all."""
+
+    x: Array
+    v: Array
+    x_spent: float
+    """Where it is when other motions have become slow."""
+    exponent: float
+
+
+def fastest(law: PerturbedConservative, values: Mapping[str, Array], leg: float) -> float:
+    """Greatest frequency of all that varies."""
+    names = [forcing_names(i)[1] for i in range(law.harmonics)]
+    names += [modulation_names(name)[1] for name in law.modulated]
+    return max([float(values[name]) for name in names] + [2.0 * np.pi / leg])
+
+
+def is_overdamped(
+    law: PerturbedConservative, values: Mapping[str, Array], leg: float, states: Array
+) -> bool:
+    """Whether damping is linear and rules the motions from states."""
+    damping = float(values["damping"])
+    if float(values["quadratic"]) != 0.0 or law.prescribed is not None or damping * leg < FAST:
+        return False
+    if damping < QUICK * fastest(law, values, leg):
+        return False
+    turn = circle(law)
+    low, high = (-0.5 * turn, 0.5 * turn) if turn else _reach(states, damping)
+    return _rules(law, values, leg, low, high)
+
+
+def _reach(states: Array, damping: float) -> tuple[float, float]:
+    """Coordinates to which motions slide before they are slow."""
+    ends = np.concatenate([states[:, 0], states[:, 0] + states[:, 1] / damping])
+    return float(ends.min()), float(ends.max())
+
+
+def _rules(
+    law: PerturbedConservative, values: Mapping[str, Array], leg: float, low: float, high: float
+) -> bool:
+    """Whether damping is much faster than all else between two coordinates."""
+    x, t = np.meshgrid(np.linspace(low, high, 65), leg * np.arange(16) / 16.0)
+    _, slope, damping = partials(law, values, t.ravel(), x.ravel(), np.zeros(x.size))
+    rules = (-damping > 0.0) & (-damping * leg >= FAST) & (damping**2 >= STRONG * np.abs(slope))
+    return bool(rules.all())
+
+
+def partials(
+    law: PerturbedConservative, values: Mapping[str, Array], t: Array, x: Array, v: Array
+) -> tuple[Array, Array, Array]:
+    """Accelerations, and their derivatives by the coordinate and the rate."""
+    from phasekit.motion.kernels.motions import rates_at
+    from phasekit.motion.prescribed import table_of
+
+    code, parameters = rates_of(law, values, 2)
+    count = len(x)
+    states = np.zeros((count, 6))
+    states[:, 0], states[:, 1], states[:, 2], states[:, 5] = x, v, 1.0, 1.0
+    own = np.array(np.broadcast_to(parameters, (len(parameters), count)))
+    out = np.empty((count, 6))
+    cells = np.array(t, float), states, own, np.sign(v)
+    rates_at(code.address, table_of(None, 0.0, 0.0), *cells, code.kink, 0, count, out)
+    return out[:, 1], out[:, 3], out[:, 5]
+
+
+@dataclass
+class OverdampedSearch(Search):
+    """A search for the attractors of one driven system that damping rules."""
+
+    spans: list[tuple[float, float, Attractor]] = field(default_factory=list)
+    """Where motions are that come to an attractor, once they are slow."""
+    ends: tuple[float, float] = (0.0, 0.0)
+    """Of the range in which they are."""
+    relaxation: float = 0.0
+    """Greatest rate of slow motions towards each other."""
+
+    @property
+    def step(self) -> float:
+        """Time after which motions are slow."""
+        return SPENT / float(self.values["damping"])
+
+    def rounds(self, legs: int) -> list[tuple[int, float]]:
+        """Once motions are slow it is known where they go."""
+        return [(1, self.step)]
+
+    def look(self, states: Array) -> None:
+        """Find the attractors to which motions from states come."""
+        low, high = self._range(states)
+        self.ends = low, high
+        grid = np.linspace(low, high, STARTS + 1)
+        _, slope, damping = partials(self.law, self.values, 0.0 * grid, grid, 0.0 * grid)
+        self.relaxation = float(np.abs(slope / damping).max())
+        x = np.linspace(low, high, STARTS + 1)
+        if self.period:
+            x += 0.2360679775 * (x[1] - x[0])
+        else:
+            x[1:-1] += 0.2360679775 * (x[1] - x[0])
+        ends = self._slow(x)
+        for q in range(1, LONGEST + 1):
+            if self._take(q, x, self._again(q, x, ends)):
+                break
+            if not self.period:
+                break
+        else:
+            self._take_rotation(x, ends)
+        self._keep_reached(states)
+
+    def _range(self, states: Array) -> tuple[float, float]:
+        """The turn; or of a line what motions do not leave, if there is such a range."""
+        if self.period:
+            return -0.5 * self.period, 0.5 * self.period
+        low, high = _reach(states, float(self.values["damping"]))
+        wide = ROOM * max(high - low, self.size)
+        low, high = low - wide, high + wide
+        for _ in range(WIDER):
+            ends = self._slow(np.array([low, high]))
+            if not (ends[0] < low or ends[1] > high):
+                break
+            new = low - wide if ends[0] < low else low, high + wide if ends[1] > high else high
+            if not _rules(self.law, self.values, self.leg, *new):
+                break
+            (low, high), wide = new, 2.0 * wide
+        return low, high
+
+    def _speed(self, t: float, x: Array) -> Array:
+        """Rate of slow motions, up to the third power of the time in which damping acts."""
+        h, rest = 1e-3 / fastest(self.law, self.values, self.leg), np.zeros(x.size)
+
+        def first(t: float, x: Array) -> Array:
+            force, _, damping = partials(self.law, self.values, np.full(x.size, t), x, rest)
+            with np.errstate(all="ignore"):
+                return -force / damping
+
+        rate = first(t, x)
+        change = (first(t + h, x + h * rate) - first(t - h, x - h * rate)) / (2.0 * h)
+        return np.asarray(rate - change / float(self.values["damping"]))
+
+    def _slow(self, x: Array) -> Array:
+        """Where slow motions are after a leg."""
+        return np.asarray(self._path(x, 1)[-1])
+
+    def _path(self, x: Array, legs: int) -> Array:
+        """Slow motions at equal times, of shape (times, motions)."""
+        per = max(
+            fastest(self.law, self.values, self.leg) / (2.0 * np.pi),
+            self.relaxation / STEPS * STEEP,
+        )
+        count = legs * int(min(STEPS * self.leg * per, MOST_STEPS))
+        h, path = legs * self.leg / count, [np.array(x, float)]
+        for i in range(count):
+            t, at = i * h, path[-1]
+            a = self._speed(t, at)
+            b = self._speed(t + 0.5 * h, at + 0.5 * h * a)
+            c = self._speed(t + 0.5 * h, at + 0.5 * h * b)
+            d = self._speed(t + h, at + h * c)
+            path.append(at + h / 6.0 * (a + 2.0 * b + 2.0 * c + d))
+        return np.array(path)
+
+    def _map(self, x: Array, ends: Array) -> Callable[[Any], Any]:
+        """Where slow motions on a circle are after a leg, by those from some coordinates."""
+        from scipy.interpolate import CubicSpline
+
+        shift = ends - x
+        shift[-1] = shift[0]
+        curve = CubicSpline(x, shift, bc_type="periodic")
+        return lambda at: at + curve(x[0] + np.mod(at - x[0], self.period))
+
+    def _again(self, q: int, x: Array, ends: Array) -> Array:
+        """Where slow motions are after q legs."""
+        now = ends
+        for _ in range(q - 1):
+            now = self._map(x, ends)(now)
+        return now
+
+    def _take(self, q: int, x: Array, ends: Array) -> bool:
+        """Keep the orbits that close after q legs; whether there are any."""
+        shift = ends - x
+        turn = self.period
+        turns = int(np.ceil(shift.min() / turn)) if turn else 0
+        off = shift - turns * turn
+        kept = np.isfinite(off) & (np.abs(off) > ROUNDING * (self.size + np.abs(x)))
+        x, off = x[kept], off[kept]
+        change = np.flatnonzero(np.sign(off[1:]) != np.sign(off[:-1]))
+        rows = []
+        for i in change:
+            at = x[i] - off[i] * (x[i + 1] - x[i]) / (off[i + 1] - off[i])
+            orbit = self._solved(float(at), q, turns * turn)
+            if orbit is None:
+                self.open[AWAY] += 1
+            else:
+                rows.append((orbit, bool(off[i] > 0.0)))
+        if not rows:
+            return len(change) > 0
+        self._divide(rows, q, turns)
+        return True
+
+    def _divide(self, rows: list[tuple[Orbit, bool]], q: int, turns: int) -> None:
+        """Divide the coordinates among the orbits that attract, at those that repel."""
+        kept: list[Attractor] = []
+        rows.sort(key=lambda row: row[0].x_spent)
+        for i, (orbit, attracts) in enumerate(rows):
+            if not attracts:
+                continue
+            if self.period:
+                left, right = rows[i - 1], rows[(i + 1) % len(rows)]
+                low = left[0].x_spent - (self.period if i == 0 else 0.0)
+                high = right[0].x_spent + (self.period if i == len(rows) - 1 else 0.0)
+            else:
+                low = rows[i - 1][0].x_spent if i else self.ends[0]
+                high = rows[i + 1][0].x_spent if i + 1 < len(rows) else self.ends[1]
+            one = self._attractor(orbit, q, turns)
+            near = BORDER * self.size
+            same = [k for k in kept if self.apart(k.points, one.points[0]).min() < near]
+            if not same:
+                kept.append(one)
+            self.spans.append((low, high, same[0] if same else one))
+
+    def _attractor(self, orbit: Orbit, q: int, turns: int) -> Attractor:
+        part = len(orbit.x) // q
+        points = np.stack([orbit.x[::part][:q], orbit.v[::part][:q]], axis=-1)
+        multiplier = float(np.exp(orbit.exponent * q * self.leg))
+        turned = turns / q if self.period else 0.0
+        return Attractor(AttractorKind.CYCLE, points, turned, orbit.exponent, 0.0, multiplier)
+
+    def _solved(self, at: float, q: int, way: float) -> Orbit | None:
+        """The periodic orbit that begins near a coordinate, by a Fourier series."""
+        path = self._path(np.array([at]), q)[:, 0]
+        span = q * self.leg
+        count = FEW
+        while count <= MANY:
+            number = count * q
+            t = span * np.arange(number) / number
+            x = np.interp(t, np.linspace(0.0, span, len(path)), path) - way * t / span
+            found = self._newton(t, x, span, way / span)
+            if found is not None:
+                return found
+            count = 2 * count - 1
+        return None
+
+    def _newton(self, t: Array, x: Array, span: float, drift: float) -> Orbit | None:
+        """A Fourier series of the full law, and the exponent; None where it is too short."""
+        number, unit = len(t), 2.0 * np.pi / span
+        waves = np.fft.fftfreq(number, 1.0 / number) * 1j * unit
+        basis = np.fft.fft(np.eye(number), axis=0)
+        one, two = (np.fft.ifft(waves[:, None] ** k * basis, axis=0).real for k in (1, 2))
+        for _ in range(TRIES):
+            v = one @ x + drift
+            force, slope, damping = partials(self.law, self.values, t, x + drift * t, v)
+            missing = two @ x - force
+            matrix = two - np.diag(slope) - damping[:, None] * one
+            try:
+                step = np.linalg.solve(matrix, -missing)
+            except np.linalg.LinAlgError:
+                return None
+            if not np.isfinite(step).all():
+                return None
+            x = x + step
+            if np.abs(step).max() < ENOUGH * (self.size + np.abs(x).max()):
+                break
+        else:
+            # So it does at a degenerate rest, which the sign of the force shows to attract.
+            if not np.abs(missing).max() < MISSING * np.abs(damping * v).max():
+                return None
+        parts = np.abs(np.fft.fft(x))[1 : (number + 1) // 2] / number
+        tail = parts[-(len(parts) // TAIL) :].max()
+        if tail > max(NOTHING * parts.max(), ENOUGH * self.size):
+            return None
+        # The growth w of what lies beside it: w' = slope + damping w - w^2.
+        w: Array = np.zeros(number)
+        matrix = one - np.diag(damping)
+        for _ in range(20):
+            w = np.asarray(np.linalg.solve(matrix, slope - w**2), float)
+        there = float(np.real(np.fft.fft(x) @ np.exp(waves * self.step)) / number)
+        v = one @ x + drift
+        return Orbit(x + drift * t, v, there + drift * self.step, float(w.mean()))
+
+    def _take_rotation(self, x: Array, ends: Array) -> None:
+        """Keep the rotation of which no orbit closes soon."""
+        if not (np.abs(ends - x) > ROUNDING * self.size).any():
+            self.open[AWAY] += 1
+            return
+        image = self._map(x, ends)
+        states, now = np.empty((KEPT, 2)), x[0]
+        for i in range(KEPT):
+            states[i, 0] = now
+            now = image(now)
+        states[:, 1] = self._speed(0.0, states[:, 0])
+        turned = np.abs(states[:, 0] - states[0, 0]) / self.period
+        # After whole turns, that the place in a turn does not count.
+        whole = float(np.floor(turned[-1])) or 1.0
+        if turned[-1] >= 1.0:
+            legs = float(np.interp(whole, turned, np.arange(KEPT)))
+        else:  # so slow that it is a flow
+            legs = float(np.mean(1.0 / np.abs(ends - x)[1:])) * self.period
+        turns = float(np.sign(now - x[0])) * whole / legs
+        error = 1.0 / (KEPT * self.leg)
+        one = Attractor(AttractorKind.TORUS, states, turns, 0.0, error)
+        self.spans.append((-0.5 * self.period, 0.5 * self.period, one))
+
+    def _keep_reached(self, states: Array) -> None:
+        """Keep the attractors to which states come, and count those that come to none."""
+        every: list[Attractor] = []
+        for *_, one in self.spans:
+            if not any(one is other for other in every):
+                every.append(one)
+        self.found = every
+        ends = strobe(
+            self.law, self.values, states, self.step, 1, 1, targets=self.targets(),
+            most_legs=1, **self.tolerances,
+        )  # fmt: skip
+        self.open[AWAY] += int(np.sum((ends.code < 0) & np.isfinite(ends.states[:, 0, 0])))
+        self.found = [one for i, one in enumerate(every) if (ends.code == i).any()]
+
+    def targets(self) -> Targets:
+        """Where motions are that come to an attractor, once they are slow."""
+        place = {id(one): i for i, one in enumerate(self.found)}
+        edge = BORDER * self.size
+        rows = []
+        for low, high, one in self.spans:
+            if id(one) in place:
+                whole = self.period and high - low > self.period * (1.0 - 1e-9)
+                gap = 0.0 if whole else edge
+                rows.append([low + gap, high - gap, place[id(one)]])
+        spans = np.array(rows).reshape(-1, 3)
+        bands = np.tile(np.array([-BOUNDLESS, BOUNDLESS]), (len(spans), 2, 1))
+        return NO_TARGETS._replace(scale=self.scale, spans=spans, bands=bands)

@@ -1,0 +1,83 @@
+"""Extremes of V': the torques beyond which no equilibrium exists.
+
+They are zeros of V'', which is V' of another system: with phi = theta + pi/4,
+``V''(phi; A, B, C) = V'(theta; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``. Between two neighboring
+ones V' is monotone, so that it takes each value once or not at all.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.phase.exact.equilibria import equilibria
+from phasekit.phase.exact.potential import gradient
+
+Array = npt.NDArray[np.float64]
+
+
+class CriticalTorque(NamedTuple):
+    """Least and greatest V'; the last axis is the direction (minus, plus)."""
+
+    critical_torque: Array
+    critical_phi: Array
+
+
+def inflections(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:
+    """Zeros of V'' in ascending order on a last axis of length 4, NaN where there are fewer.
+
+    Examples
+    --------
+    >>> inflections(0.0, 1.0, 0.0).round(6).tolist()
+    [-1.570796, 1.570796, nan, nan]
+    """
+    A, B, C = (np.asarray(x, float) for x in (A, B, C))
+    half = np.sqrt(0.5)
+    theta = equilibria(-2.0 * A, (C - B) * half, -(B + C) * half).phi
+    phi = theta + 0.25 * np.pi
+    return np.sort(np.where(phi > np.pi, phi - 2.0 * np.pi, phi), axis=-1)
+
+
+def critical_torque(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> CriticalTorque:
+    """Smallest and largest constant torque for which an equilibrium exists.
+
+    Parameters
+    ----------
+    A, B, C : array_like
+        Coefficients in 1/s^2; they broadcast.
+
+    Returns
+    -------
+    CriticalTorque
+        Signed torques, and the angles where the equilibria merge; 0 and NaN without force.
+
+    Examples
+    --------
+    >>> critical_torque(0.0, 2.0, 0.0).critical_torque.tolist()
+    [-2.0, 2.0]
+    """
+    A, B, C = (np.asarray(x, float)[..., None] for x in (A, B, C))
+    at = inflections(A[..., 0], B[..., 0], C[..., 0])
+    with np.errstate(all="ignore"):
+        slope = np.where(np.isnan(at), np.nan, gradient(A, B, C, at))
+        known = np.isfinite(slope).any(axis=-1, keepdims=True)
+        low = np.where(known, np.where(np.isnan(slope), np.inf, slope), 0.0)
+        high = np.where(known, np.where(np.isnan(slope), -np.inf, slope), 0.0)
+    ends = [
+        np.take_along_axis(slope, which[..., None], -1)[..., 0]
+        for which in (low.argmin(-1), high.argmax(-1))
+    ]
+    places = [
+        np.take_along_axis(at, which[..., None], -1)[..., 0]
+        for which in (low.argmin(-1), high.argmax(-1))
+    ]
+    free = ((A == 0.0) & (B == 0.0) & (C == 0.0))[..., 0]
+    torque = np.stack(np.broadcast_arrays(*(np.where(free, 0.0, end) for end in ends)), axis=-1)
+    return CriticalTorque(torque, np.stack(places, axis=-1))
+
+
+def extremes(A: Any, B: Any, C: Any) -> Array:
+    """The critical torques alone; the last axis is the direction (minus, plus)."""
+    return critical_torque(A, B, C).critical_torque

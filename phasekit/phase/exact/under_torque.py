@@ -1,0 +1,175 @@
+"""Equilibria under a constant torque N, where V' = N.
+
+Between two neighboring extremes of V' it is monotone, so that it takes each value once or not at
+all. Seen from a saddle, at theta = phi - phi_s, the height left to its energy is
+
+``[k^2 - (A/2) (c cos 2 phi_s + sin theta sin 2 phi_s)] c + N (theta - sin theta)``,
+``c = 1 - cos theta``,
+
+which cancels neither next to the saddle nor next to a fold.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import EquilibriumKind
+from phasekit.phase.exact.equilibria import Equilibria, equilibria
+from phasekit.phase.exact.inflections import inflections
+from phasekit.phase.exact.potential import curvature, gradient, potential
+
+Array = npt.NDArray[np.float64]
+
+HALVINGS = 64
+ROUNDINGS = 4.0 * 2.0**-52
+#: Taylor's coefficients of (sin x - x)/x^3 by x^2.
+EXCESS = [(-1.0) ** (n + 1) / math.factorial(2 * n + 3) for n in range(9)]
+
+
+def equilibria_under(A: Array, B: Array, C: Array, N: Array) -> Equilibria:
+    """Equilibria of cells in a row, with the labels that they have without a torque."""
+    points = equilibria(A, B, C)
+    fields = [np.array(x) for x in points]
+    cells = np.flatnonzero((N != 0.0) | np.isnan(N))
+    if cells.size:
+        bent = _under_torque(A[cells], B[cells], C[cells], N[cells], points.phi[cells])
+        invalid = (points.n_equilibria[cells] < 0) | np.isnan(N[cells])
+        bent = bent._replace(n_equilibria=np.where(invalid, -1, bent.n_equilibria))
+        parts: tuple[Any, ...] = bent
+        for field, one in zip(fields, parts, strict=True):
+            field[cells] = one
+    return Equilibria._make(fields)
+
+
+def _under_torque(A: Array, B: Array, C: Array, N: Array, still: Array) -> Equilibria:
+    """Equilibria of cells in a row, where V' = N; `still` are those of N = 0."""
+    ends = inflections(A, B, C)
+    number = np.isfinite(ends).sum(axis=-1)
+    following = np.where(
+        np.arange(4) == np.maximum(number, 1)[:, None] - 1,
+        ends[:, :1] + 2.0 * np.pi,
+        np.concatenate([ends[:, 1:], ends[:, :1]], axis=1),
+    )
+    a, b, c, n = (x[:, None] for x in (A, B, C, N))
+    low, high = ends, following
+    at_low, at_high = gradient(a, b, c, low) - n, gradient(a, b, c, high) - n
+    crossed = np.sign(at_low) * np.sign(at_high) < 0.0  # their product may underflow
+    # A torque at an end of what V' takes, within rounding, merges both neighbors there.
+    size = np.abs(a) + np.abs(b) + np.abs(c) + np.abs(n)
+    touches = np.abs(at_low) <= ROUNDINGS * size
+    rises = at_high > at_low
+    x = 0.5 * (low + high)
+    for _ in range(HALVINGS):
+        value = gradient(a, b, c, x) - n
+        above = (value > 0.0) == rises
+        low, high = np.where(above, low, x), np.where(above, x, high)
+        step = x - value / curvature(a, b, c, x)
+        x = np.where((step > low) & (step < high), step, 0.5 * (low + high))
+    after = np.roll(touches, -1, axis=1)
+    last = np.arange(4) == number[:, None] - 1
+    after = np.where(last, touches[:, :1], after)
+    there = crossed & ~touches & ~after & np.isfinite(x)
+    phi = np.where(x > np.pi, x - 2.0 * np.pi, x)
+    return _labelled((A, B, C, N), ends, following, phi, there, touches, rises, still)
+
+
+def _labelled(
+    system: tuple[Array, ...], start: Array, stop: Array, phi: Array, there: Any, touches: Any,
+    rises: Any, still: Array,
+) -> Equilibria:  # fmt: skip
+    """Put the equilibrium of each arc where the arc's own at torque 0 stands."""
+    A, B, C, N = system
+    cells = np.arange(len(A))
+    slot = np.full(phi.shape, -1)
+    turn = 2.0 * np.pi
+    for label in range(4):
+        own = still[:, label, None]
+        inside = np.mod(own - start, turn) < (stop - start)
+        inside &= (rises == (label % 2 == 0)) & (slot < 0)
+        found = inside.any(axis=1)
+        slot[cells[found], inside.argmax(axis=1)[found]] = label
+    for kind in (0, 1):  # arcs that hold none at torque 0 take the labels that are left
+        order = (0, 2) if kind == 0 else (3, 1)
+        for arc in range(4):
+            open_ = (slot[:, arc] < 0) & np.isfinite(phi[:, arc]) & (rises[:, arc] == (kind == 0))
+            for label in order:
+                free = open_ & ~(slot == label).any(axis=1)
+                slot[cells[free], arc] = label
+                open_ &= ~free
+    out = np.full((len(A), 4), np.nan)
+    kinds = np.zeros((len(A), 4), np.int8)
+    for arc in range(4):
+        good = there[:, arc] & (slot[:, arc] >= 0)
+        rows, labels = cells[good], slot[good, arc]
+        out[rows, labels] = phi[good, arc]
+        kinds[rows, labels] = np.where(
+            labels % 2 == 0, EquilibriumKind.CENTER, EquilibriumKind.SADDLE
+        )
+        merged = touches[:, arc] & (slot[:, arc] >= 0)  # stands once, in the place of the saddle
+        pair = np.where(rises[:, arc], (arc - 1) % 4, arc)
+        last = np.isfinite(start).sum(axis=1) - 1
+        pair = np.where(rises[:, arc] & (arc == 0), last, pair)
+        rows = cells[merged]
+        labels = slot[rows, pair[merged]]
+        out[rows, labels] = start[merged, arc]
+        kinds[rows, labels] = EquilibriumKind.DEGENERATE
+    a, b, c, n = (x[:, None] for x in (A, B, C, N))
+    with np.errstate(all="ignore"):
+        bend = np.where(kinds == EquilibriumKind.DEGENERATE, 0.0, curvature(a, b, c, out))
+        bend = np.where(np.isnan(out), np.nan, bend)
+        energy = potential(a, b, c, out) - n * out
+        frequency = np.sqrt(np.where(kinds == EquilibriumKind.CENTER, bend, np.nan))
+        exponent = np.sqrt(np.where(kinds == EquilibriumKind.SADDLE, -bend, np.nan))
+    count = (kinds > 0).sum(axis=1).astype(np.int8)
+    margin = np.full(len(A), np.nan)
+    return Equilibria(out, kinds, energy, bend, frequency, exponent, count, margin)
+
+
+class Saddle(NamedTuple):
+    """A saddle, and the potential as it is seen from there; fields broadcast."""
+
+    phi: Array
+    square: Array
+    """k^2."""
+    level: Array
+    """(A/2) cos 2 phi_s."""
+    slope: Array
+    """(A/2) sin 2 phi_s."""
+    torque: Array
+
+    def spread(self) -> Saddle:
+        """With one more axis at the end."""
+        return Saddle._make(x[..., None] for x in self)
+
+    def depth(self, theta: Any) -> Array:
+        """Energy of the saddle less the potential at an angle from it."""
+        c = 2.0 * np.sin(0.5 * theta) ** 2
+        bend = self.square - self.level * c - self.slope * np.sin(theta)
+        return np.asarray(bend * c - self.torque * sine_excess(theta))
+
+
+def saddle_at(A: Any, phi: Any, k: Any, torque: Any) -> Saddle:
+    """The saddle of an angle and an exponent."""
+    level, slope = (0.5 * A * f(2.0 * phi) for f in (np.cos, np.sin))
+    return Saddle(*np.broadcast_arrays(phi, k * k, level, slope, torque))
+
+
+def sine_excess(x: Any) -> Array:
+    """Sin x - x, by its series where that cancels.
+
+    >>> abs(float(sine_excess(1e-5)) / (-1e-15 / 6 + 1e-25 / 120) - 1.0) < 1e-15
+    True
+    """
+    x = np.asarray(x, float)
+    small = np.abs(x) < 1.0
+    square = np.where(small, x * x, 0.0)
+    total = np.full(x.shape, EXCESS[-1])
+    for coefficient in EXCESS[-2::-1]:
+        total *= square
+        total += coefficient
+    total *= square * x
+    return np.asarray(np.where(small, total, np.sin(x) - x))

@@ -1,0 +1,98 @@
+"""`periodic_orbit` returns an orbit over its least period, whatever the guess."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import phasekit as pk
+
+ROESSLER = pk.Problem(
+    ["-y - z", "x + a*y", "b + z*(x - c)"], ("x", "y", "z"), {"c": 2.5, "a": 0.2, "b": 0.2}
+)
+VAN_DER_POL = pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 1.0})
+
+
+def simulated(f, x, length, samples):
+    at = np.linspace(0.0, length, samples)
+    return solve_ivp(f, (0.0, length), x, t_eval=at, rtol=1e-10, atol=1e-12, method="LSODA").y.T
+
+
+def roessler(t, x):
+    return [-x[1] - x[2], x[0] + 0.2 * x[1], 0.2 + x[2] * (x[0] - 2.5)]
+
+
+def van_der_pol(t, x):
+    return [x[1], (1 - x[0] ** 2) * x[1] - x[0]]
+
+
+@pytest.mark.slow
+def test_the_orbit_of_roessler_is_run_through_once():
+    x = simulated(roessler, [1.0, 1.0, 0.1], 300.0, 2)[-1]
+    t = np.linspace(0.0, 60.0, 60001)
+    y = simulated(roessler, x, 60.0, len(t))[:, 1]
+    up = np.flatnonzero((y[:-1] < 0.0) & (y[1:] >= 0.0))
+    crossings = t[up] - y[up] * np.diff(t)[up] / (y[up + 1] - y[up])
+    assert len(crossings) > 8
+    period = np.diff(crossings)
+    assert np.ptp(period) < 1e-3
+    for start in ([1.0, 1.0, 0.1], [2.0, -1.0, 0.2], [0.5, 3.0, 0.1]):
+        orbit = pk.periodic_orbit(ROESSLER, start)
+        assert orbit.period == pytest.approx(period.mean(), rel=1e-5)
+    family = pk.continuation(ROESSLER, "c", orbit=orbit, span=(2.0, 3.5))
+    assert [point.kind for point in family.special_points if point.kind != "end"] == [
+        "period_doubling"
+    ]
+    assert family.special("BPC") == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("times", [2, 3, 6])
+def test_a_guess_of_several_turns_leads_to_one(times):
+    once = pk.periodic_orbit(VAN_DER_POL, [2.0, 0.0])
+    period = float(once.period)
+    x = np.array([float(once[name][0]) for name in ("x", "y")])
+    again = pk.periodic_orbit(VAN_DER_POL, x, period=times * period)
+    assert again.period == pytest.approx(period, rel=1e-9)
+    samples = simulated(van_der_pol, x, times * period, 400 * times)
+    again = pk.periodic_orbit(VAN_DER_POL, samples, period=times * period)
+    assert again.period == pytest.approx(period, rel=1e-9)
+    assert np.ptp(again.x.values) == pytest.approx(np.ptp(once.x.values), rel=1e-4)
+
+
+def test_rotations_and_forced_orbits():
+    pendulum = pk.Problem(
+        ["v", "I - al*v - sin(phi)"], ("phi", "v"), {"I": 1.2, "al": 0.5},
+        periods={"phi": 2 * np.pi},
+    )  # fmt: skip
+    once = pk.periodic_orbit(pendulum, [0.0, 2.0])
+    x = [float(once.phi[0]), float(once.v[0])]
+    for times in (2, 3):
+        again = pk.periodic_orbit(pendulum, x, period=times * float(once.period))
+        assert again.period == pytest.approx(float(once.period), rel=1e-9)
+        assert abs(int(again.winding.max())) == 1
+    duffing = pk.Problem(
+        ["v", "F*cos(w*t) - d*v - x - x**3"], ("x", "v"), {"d": 0.3, "F": 0.2, "w": 1.3},
+        time="t", period="2*pi/w",
+    )  # fmt: skip
+    swing = pk.periodic_orbit(duffing, [0.0, 0.0], settle=100.0)
+    x = [float(swing.x[0]), float(swing.v[0])]
+    for times in (2, 3):
+        again = pk.periodic_orbit(duffing, x, period=times * 2 * np.pi / 1.3)
+        assert again.period == pytest.approx(2 * np.pi / 1.3, rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("beyond", [1e-3, 1e-5])
+def test_orbits_beside_a_doubling_keep_their_two_turns(beyond):
+    """Their halves differ by the root of the distance, which is more than any error."""
+    orbit = pk.periodic_orbit(ROESSLER, [1.0, 1.0, 0.1])
+    family = pk.continuation(ROESSLER, "c", orbit=orbit, span=(2.0, 3.5))
+    (doubling,) = family.special("PD")
+    doubled = doubling.switch(options=pk.ContinuationOptions(max_step=0.05, max_points=12))
+    at = doubled.points.c.values - doubling["c"]
+    i = int(np.flatnonzero(at > beyond)[0])
+    two = doubled.orbit(i)
+    problem = ROESSLER.replace(c=float(doubled.points.c[i]))
+    again = pk.periodic_orbit(problem, two)
+    assert again.period == pytest.approx(float(two.period), rel=1e-9)
+    assert again.period == pytest.approx(2 * doubling["period"], rel=0.02)

@@ -1,0 +1,105 @@
+"""What was raised as other libraries word it says which argument it was, and what is wanted."""
+
+import errno
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import phasekit as pk
+from phasekit.errors import ArgumentError
+from phasekit.inputs import describe
+from phasekit.mechanics.general.body import RigidBody
+
+DISK = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5, m=2.0, half_span=0.1)
+DURATIONS = [
+    np.timedelta64(3, "s"), np.timedelta64(3, "ns"), np.timedelta64(3), np.timedelta64("NaT"),
+    np.datetime64("2020-01-01"), np.array([1, 2], "m8[s]"), np.array(5, "m8[ns]"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("made", [pk.equilibria, pk.separatrices])
+@pytest.mark.parametrize("of", ["bearing_forces", "rotators"])
+@pytest.mark.parametrize("argument", ["phi0", "dphi0"])
+@pytest.mark.parametrize("selected", [False, True])
+def test_states_on_a_dim_of_the_map_take_its_labels_or_are_refused_by_name(
+    made, of, argument, selected
+):
+    ds = made(DISK)
+    dim = "equilibrium" if made is pk.equilibria else "saddle"
+    labels = ds[dim].values
+    values = np.linspace(0.1, 0.4, labels.size)
+    given = {"phi0": 0.2, "dphi0": 0.3}
+
+    def loads(state):
+        found = ds.isel({dim: 0}) if selected else ds
+        return getattr(found.phasekit, of)(on="orbit", **{**given, argument: state})
+
+    labelled = loads(xr.DataArray(values, {dim: labels}, dim))
+    name = next(iter(labelled))
+    assert labelled[name].size > 1
+    assert np.isfinite(labelled[name].values).any()
+    plain = xr.DataArray(values, dims=dim)
+    if selected:
+        with pytest.raises(pk.ParameterError, match=f"^{argument}: got .* labels along {dim}"):
+            loads(plain)
+    else:
+        xr.testing.assert_equal(loads(plain), labelled)
+        turned = loads(xr.DataArray(values[::-1], {dim: labels[::-1]}, dim))
+        np.testing.assert_array_equal(turned[name].values, labelled[name].values)
+    for wrong in (
+        xr.DataArray(np.append(values, 0.5), dims=dim),
+        xr.DataArray(values, {dim: [f"{label}?" for label in labels]}, dim),
+    ):
+        with pytest.raises(pk.ParameterError, match=f"^{argument}: got .* labels along {dim}"):
+            loads(wrong)
+
+
+@pytest.mark.parametrize("value", DURATIONS, ids=repr)
+def test_durations_and_dates_are_no_numbers_and_named_as_what_they_are(value, tmp_path):
+    said = describe(value)
+    assert "date" in said or "duration" in said
+    reduced = pk.Reduced(0.3, 0.1)
+    calls = [
+        lambda: pk.Reduced(value, 0.1),
+        lambda: pk.flow(reduced, 0.1, 0.0, value),
+        lambda: pk.Potential(value, "x"),
+        lambda: pk.Perturbed(reduced, damping=value),
+        lambda: pk.branches(reduced, "lam", (0.0, value)),
+        lambda: pk.sweep(reduced, lam=[0.1, 0.2], store=tmp_path / "a.zarr", chunks=value),
+        lambda: pk.sweep(reduced, lam=[0.1, 0.2], store=tmp_path / "b.zarr", chunks={"lam": value}),
+        lambda: pk.sweep(reduced, lam=[0.1, 0.2], store=tmp_path / "c.zarr", workers=value),
+    ]
+    for call in calls:
+        with pytest.raises(pk.ParameterError, match="got"):
+            call()
+
+
+@pytest.mark.parametrize("code", [errno.EROFS, errno.EACCES, errno.ENOSPC, errno.EIO])
+def test_a_page_that_cannot_be_written_says_so(monkeypatch, tmp_path, code):
+    page = pk.explore(pk.Pendulum(length=0.5))
+
+    def fail(self, *args, **kwargs):
+        raise OSError(code, "it is so", str(self))
+
+    monkeypatch.setattr(Path, "write_text", fail)
+    with pytest.raises(pk.StoreError, match=r"^path: .*pendulum\.html cannot be written: it is so"):
+        page.save(tmp_path / "pendulum.html")
+
+
+@pytest.mark.parametrize(
+    ("args", "keywords", "said"),
+    [
+        ((), {"nonsense": 1}, "unexpected keyword argument 'nonsense'"),
+        ((1.0,), {"centre": 0}, "'centre'; did you mean 'center'"),
+        ((1.0,), {}, "missing a required argument: 'center'"),
+        ((1, 2, 3, 4), {}, "too many positional arguments"),
+        ((1.0,), {"mass": 1}, "multiple values for argument 'mass'"),
+    ],
+)
+def test_a_body_names_its_arguments(args, keywords, said):
+    with pytest.raises(ArgumentError) as caught:
+        RigidBody(*args, **keywords)
+    assert said in str(caught.value)
+    assert str(caught.value).endswith("its arguments are mass, center, inertia")

@@ -1,0 +1,169 @@
+"""Attractors of driven systems: strong damping in any unit, and kinds, by other integrators."""
+
+import warnings
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import phasekit as pk
+from phasekit.motion.attractors import DrivenSearch
+
+PENDULUM = pk.Coefficients(0.0, 1.0, 0.0)
+WELL = pk.Potential("x^4/4 - x^2/2", "x")
+KIND = pk.AttractorKind
+
+
+def quietly(system, phi, dphi, **how):
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "basin: .* too coarse", RuntimeWarning)
+        return pk.basins(system, phi=phi, dphi=dphi, **how)
+
+
+def after(force, damping, state, time, start=0.0):
+    """Where a motion of x'' = force(t, x) - damping x' is, by SciPy."""
+
+    def rates(t, x):
+        return [x[1], force(t, x[0]) - damping * x[1]]
+
+    how = {"method": "DOP853", "rtol": 1e-11, "atol": 1e-12}
+    return solve_ivp(rates, (start, start + time), state, **how).y[:, -1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("damping", "torque", "drive"), [(80.0, 0.1, 10.0), (150.0, -0.2, 30.0)])
+def test_orbits_of_strongly_damped_systems_close_as_another_integrator_says(damping, torque, drive):
+    frequency = 1.1
+    leg = 2.0 * np.pi / frequency
+    for base, slope in ((WELL, lambda x: x**3 - x), (PENDULUM, np.sin)):
+        system = pk.Perturbed(
+            base, damping=damping, torque=torque, forcing=pk.Harmonic(drive, frequency)
+        )
+        ds = pk.attractors(system, phi=[-1.5, 1.5], dphi=[0.0, 0.1 * damping])
+        assert ds.attractor_kind.values.tolist() == [KIND.CYCLE] * (2 if base is WELL else 1)
+
+        def force(t, x, slope=slope):
+            return torque + drive * np.cos(frequency * t) - slope(x)
+
+        for row in range(ds.sizes["attractor"]):
+            start = np.array([ds.attractor_phi.values[row, 0], ds.attractor_dphi.values[row, 0]])
+            end = after(force, damping, start, leg)
+            assert np.abs(end - start).max() < 1e-9
+            beside = after(force, damping, start + [1e-4, 0.0], leg) - end
+            grown = np.log(beside[0] / 1e-4) / leg
+            assert ds.attractor_exponent.values[row] == pytest.approx(grown, rel=1e-2)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("damping", [1e3, 1e4, 1e5])
+def test_strong_damping_decides_where_a_drive_shakes_but_does_not_carry(damping, unit):
+    well = pk.Potential("k*(x^4/4 - x^2/2)", "x", {"k": unit**2})
+    system = pk.Perturbed(well, damping=damping * unit, forcing=pk.Harmonic(0.2 * unit**2, unit))
+    # A motion slides by dphi/damping before it creeps.
+    slides = damping * unit * np.array([-0.5, 0.0, 0.5])
+    ds = quietly(system, [-1.0, -0.3, 0.3, 1.0], slides)
+    assert ds.attractor_kind.values.tolist() == [KIND.CYCLE] * 2
+    assert ds.attractor_phi.values[:, 0] == pytest.approx([-1.0, 1.0], abs=1e-6)
+    assert ds.attractor_exponent.values == pytest.approx([-2.0 * unit / damping] * 2, rel=1e-3)
+    assert ds.basin.values.tolist() == [[0, 0, 0], [0, 0, 1], [0, 1, 1], [1, 1, 1]]
+    assert ds.basin_decided.values.all()
+
+
+@pytest.mark.parametrize("damping", [1e2, 1e4])
+def test_an_overdamped_driven_rotation_by_its_closed_form(damping):
+    system = pk.Perturbed(PENDULUM, damping=damping, torque=1.5, forcing=pk.Harmonic(0.3, 1.0))
+    ds = quietly(system, np.linspace(-3.0, 3.0, 5), [-1.0, 1.0])
+    assert ds.attractor_kind.values.tolist() == [KIND.TORUS]
+    assert ds.basin_fraction.values.tolist() == [1.0]
+    # phi' = (N - sin phi)/d: mean speed sqrt(N^2 - 1)/d; a turn in one over that.
+    want = 1.25**0.5 / damping
+    assert ds.attractor_rotation.item() == pytest.approx(want, rel=3e-3)
+
+
+@pytest.mark.parametrize("power", [4, 6])
+def test_a_degenerate_rest_attracts_under_a_drive(power):
+    well = pk.Potential(f"x^{power}/{power}", "x")
+    system = pk.Perturbed(well, damping=1e3, forcing=pk.Harmonic(0.3, 1.0))
+    ds = pk.basins(system, phi=np.linspace(-1.0, 1.0, 4), dphi=[-1.0, 1.0])
+    assert ds.attractor_kind.values.tolist() == [KIND.CYCLE]
+    assert ds.basin_fraction.values.tolist() == [1.0]
+    # Rounding of the force hides a flatter bottom.
+    assert abs(ds.attractor_phi.values.item()) < 1e-14 ** (1.0 / (power - 1))
+
+
+DUFFING = pk.Perturbed(WELL, damping=0.15, forcing=pk.Harmonic(0.2, 1.0))
+CHAOTIC = pk.Perturbed(WELL, damping=0.25, forcing=pk.Harmonic(0.4, 1.0))
+ROTOR = pk.Perturbed(PENDULUM, damping=0.1, torque=1.5, forcing=pk.Harmonic(0.2, 0.61803))
+
+
+def duffing(drive):
+    return lambda t, x: x - x**3 + drive * np.cos(t)
+
+
+@pytest.mark.slow
+def test_a_periodic_motion_by_scipy():
+    ds = pk.attractors(DUFFING, phi=np.linspace(-2.0, 2.0, 4), dphi=[-1.0, 1.0])
+    assert ds.attractor_kind.values.tolist() == [KIND.CYCLE] * 2
+    for row in range(2):
+        state = np.array([ds.attractor_phi.values[row, 0], ds.attractor_dphi.values[row, 0]])
+        flow = [
+            after(duffing(0.2), 0.15, state + off, 2.0 * np.pi)
+            for off in ([0.0, 0.0], [1e-5, 0.0], [-1e-5, 0.0], [0.0, 1e-5], [0.0, -1e-5])
+        ]
+        assert np.abs(flow[0] - state).max() < 1e-9
+        slope = np.stack([flow[1] - flow[2], flow[3] - flow[4]], -1) / 2e-5
+        multiplier = np.abs(np.linalg.eigvals(slope)).max()
+        assert ds.attractor_multiplier.values[row] == pytest.approx(multiplier, rel=1e-6)
+        exponent = np.log(multiplier) / (2.0 * np.pi)
+        assert ds.attractor_exponent.values[row] == pytest.approx(exponent, rel=1e-6)
+
+
+@pytest.mark.slow
+def test_a_chaotic_motion_by_scipy():
+    ds = pk.attractors(CHAOTIC, phi=np.linspace(-1.0, 1.0, 3), dphi=[-0.5, 0.5])
+    assert ds.attractor_kind.values.tolist() == [KIND.CHAOTIC]
+    exponent, error = ds.attractor_exponent.item(), ds.attractor_exponent_error.item()
+    assert exponent > 3.0 * error > 0.0
+
+    def rates(t, x):
+        return [x[1], x[0] - x[0] ** 3 - 0.25 * x[1] + 0.4 * np.cos(t),
+                x[3], (1.0 - 3.0 * x[0] ** 2) * x[2] - 0.25 * x[3]]  # fmt: skip
+
+    state, total = np.array([0.1, 0.1, 1.0, 0.0]), 0.0
+    for leg in range(260):
+        state = solve_ivp(
+            rates, (0.0, 2.0 * np.pi), state, "DOP853", rtol=1e-7, atol=1e-8
+        ).y[:, -1]  # fmt: skip
+        size = np.hypot(*state[2:])
+        state[2:] /= size
+        total += np.log(size) if leg >= 20 else 0.0
+    assert exponent == pytest.approx(total / (240 * 2.0 * np.pi), rel=0.25)
+
+
+@pytest.mark.slow
+def test_a_quasi_periodic_motion_by_scipy():
+    ds = pk.attractors(ROTOR, phi=[0.0, 1.0], dphi=[15.0])
+    assert ds.attractor_kind.values.tolist() == [KIND.TORUS]
+    assert abs(ds.attractor_exponent.item()) < 1e-3
+    leg = 2.0 * np.pi / 0.61803
+    state = np.array([ds.attractor_phi.values[0, 0], ds.attractor_dphi.values[0, 0]])
+
+    def force(t, x):
+        return 1.5 + 0.2 * np.cos(0.61803 * t) - np.sin(x)
+
+    end = after(force, 0.1, state, 60.0 * leg)
+    turns = (end[0] - state[0]) / (2.0 * np.pi * 60.0)
+    assert ds.attractor_rotation.item() == pytest.approx(turns, abs=0.5 / 60.0)
+    # No state of the motion comes back to itself soon: it fills a curve.
+    again = [after(force, 0.1, state, n * leg)[0] - state[0] for n in (1, 2, 3, 5, 8)]
+    assert np.abs(np.sin(0.5 * np.array(again))).min() > 1e-4
+
+
+def test_what_is_not_sure_is_unknown_and_has_no_error_of_its_share(monkeypatch):
+    monkeypatch.setattr(DrivenSearch, "_exponent", lambda self, state: (0.01, 0.01))
+    monkeypatch.setattr(DrivenSearch, "_is_closed", lambda self, found, turns: False)
+    with pytest.warns(RuntimeWarning, match="nor have an exponent that is surely positive"):
+        ds = quietly(CHAOTIC, np.linspace(-1.0, 1.0, 3), [-0.5, 0.5])
+    assert ds.attractor_kind.values.tolist() == [KIND.UNKNOWN]
+    assert ds.basin_fraction.values.tolist() == [1.0]
+    assert np.isnan(ds.basin_fraction_error.values).tolist() == [True]

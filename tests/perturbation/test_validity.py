@@ -1,0 +1,156 @@
+"""Results of first order say where they do not hold: NaN, with a code for the reason."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+EIGHT = pk.Coefficients(1.0, 0.35, 0.12)
+PENDULUM = pk.Pendulum(length=1.0, g=1.0)
+WELL = pk.Potential("x**4/4 - x**2/2", "x")
+CIRCLE = pk.Potential("-cos(x)", "x", period="2*pi")
+TILTABLE = pk.Potential("cos(x)^2/2 - 7/20*cos(x) - 3/25*sin(x)", "x", period="2*pi")  # EIGHT
+DISK = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.01, r=0.1, omega1=15.0, m=2.0)
+FREE = pk.FreeGyroRotor(DISK, carrier_inertia=0.02)
+FORCED = pk.Harmonic(0.1, 1.0)
+
+
+def code(ds, name):
+    return {pk.Validity(int(value)).name for value in np.unique(ds[name])}
+
+
+@pytest.mark.parametrize(
+    "system", [EIGHT, TILTABLE, WELL, FREE], ids=["eight", "any", "line", "free"]
+)
+@pytest.mark.parametrize(
+    ("terms", "reason"),
+    [
+        ({"damping": [1e3, 1e12]}, "NOT_WEAK"),
+        ({"damping": 0.01, "forcing": FORCED}, "FORCED"),
+        ({"damping": 0.01, "forcing": [pk.Harmonic(0.0, 1.0), FORCED]}, "FORCED"),
+        ({"damping": 0.01, "kT": 0.1}, "NOISY"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_capture_beyond_its_theory_has_no_odds(system, terms, reason):
+    ds = pk.capture(pk.Perturbed(system, **terms))
+    assert np.isnan(ds.capture_probability).all()
+    assert np.isnan(ds.capture_flux).all()
+    assert np.isnan(ds.capture_error).all()
+    assert code(ds, "capture_validity") == {reason}
+
+
+@pytest.mark.parametrize("system", [EIGHT, TILTABLE])
+def test_capture_from_rotation_ends_where_the_equilibria_do(system):
+    critical = float(pk.critical_torque(EIGHT).critical_torque.sel(direction="plus"))
+    torque = critical * np.array([0.01, 1.001, 5.0])
+    ds = pk.capture(pk.Perturbed(system, damping=0.05, torque=torque), start="rotation")
+    names = [pk.Validity(int(value)).name for value in ds.capture_validity]
+    assert names == ["HOLDS", "NO_EQUILIBRIUM", "NO_EQUILIBRIUM"]
+    known = np.isfinite(ds.capture_probability).all("region").values.tolist()
+    assert known == [True, False, False]
+
+
+def test_cells_that_hold_are_left_alone_by_those_that_do_not():
+    ds = pk.capture(pk.Perturbed(EIGHT, damping=[0.003, 1e3, 0.01]))
+    alone = pk.capture(pk.Perturbed(EIGHT, damping=0.01))
+    np.testing.assert_array_equal(ds.capture_probability[2], alone.capture_probability)
+    assert np.isnan(ds.capture_probability[1]).all()
+    assert np.all(np.diff(ds.capture_error[[0, 2]]) > 0.0)
+    assert pk.capture(pk.Perturbed(EIGHT, damping=1e-12)).capture_error < 1e-10
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("damping", [0.02, 0.08, 0.2])
+def test_the_error_of_the_odds_covers_simulated_shares(damping):
+    damped = pk.Perturbed(EIGHT, damping=damping)
+    odds = pk.capture(damped)
+    loops = pk.separatrices(EIGHT)
+    low, high = loops.saddle_energy.values
+    rng = np.random.default_rng(3)
+    phi, dphi = rng.uniform(-np.pi, np.pi, 20_000), rng.uniform(-2.0, 2.0, 20_000)
+    height = (pk.energy(EIGHT, phi, dphi).energy_integral.values - low) / (high - low)
+    kept = np.flatnonzero((height > 0.2) & (height < 0.6))[:1500]
+    assert len(kept) == 1500
+    ends = pk.flow(damped, phi[kept], dphi[kept], 20.0 / damping).motion_phi.values
+    share = np.mean(ends > loops.saddle_phi.sel(saddle="lower").item())
+    noise = 3.0 * np.sqrt(share * (1.0 - share) / len(kept))
+    off = abs(share - odds.capture_probability.sel(region="right").item())
+    assert off <= odds.capture_error.item() + noise
+
+
+@pytest.mark.parametrize("length", [1e-3, 1.0, 1e4])
+def test_the_retrapping_torque_ends_at_the_critical_one(length):
+    pendulum = pk.Pendulum(length=length, g=1.0)
+    k = 1.0 / np.sqrt(length)
+    ds = pk.retrapping_torque(pk.Perturbed(pendulum, damping=np.array([0.1, 0.7, 0.8, 10.0]) * k))
+    torque, critical = ds.retrapping_torque.values, 1.0 / length
+    np.testing.assert_allclose(
+        torque[:2, 1] / critical, np.array([0.1, 0.7]) * 4.0 / np.pi, rtol=1e-12
+    )
+    assert np.isnan(torque[2:]).all()
+    assert code(ds.isel(damping=slice(2, None)), "retrapping_validity") == {"NO_EQUILIBRIUM"}
+
+
+@pytest.mark.parametrize("system", [PENDULUM, CIRCLE, EIGHT], ids=["pendulum", "circle", "eight"])
+def test_thresholds_need_equilibria_and_weak_damping(system):
+    driven = pk.Perturbed(system, damping=[0.1, 100.0], forcing=FORCED)
+    ds = pk.melnikov(driven)
+    there = np.isfinite(ds.melnikov_mean)
+    assert there.isel(damping=0).any()
+    assert np.isfinite(ds.chaos_threshold.isel(damping=0)).any()
+    assert np.isnan(ds.chaos_threshold.isel(damping=1)).all()
+    assert np.isnan(ds.turnstile_area.isel(damping=1)).all()
+    assert code(ds.isel(damping=1), "threshold_validity") <= {"NOT_WEAK", "ABSENT"}
+    tilted = pk.melnikov(pk.Perturbed(system, damping=0.1, torque=5.0, forcing=FORCED))
+    assert np.isnan(tilted.chaos_threshold).all()
+    assert "NO_EQUILIBRIUM" in code(tilted, "threshold_validity")
+
+
+def sech(x):
+    return 2.0 * np.exp(-np.abs(x)) / (1.0 + np.exp(-2.0 * np.abs(x)))
+
+
+LINE = pk.Potential("x**2/2 - x**4/4", "x", interval=(-1.5, 1.5))
+HIGH = np.concatenate(
+    [np.linspace(0.5, 40.0, 80), [60.0, 62.8, 87.3, 100.0, 174.5, 200.0, 1e3, 1e6]]
+)
+
+
+@pytest.mark.parametrize(
+    ("system", "closed"),
+    [
+        (WELL, lambda nu: np.sqrt(2.0) * np.pi * nu * sech(0.5 * np.pi * nu)),
+        (CIRCLE, lambda nu: 2.0 * np.pi * sech(0.5 * np.pi * nu)),
+        (LINE, lambda nu: np.sqrt(2.0) * np.pi * nu * np.exp(-np.pi * nu / np.sqrt(2.0))
+            * 2.0 / (1.0 - np.exp(-np.sqrt(2.0) * np.pi * nu))),
+    ],
+    ids=["homoclinic", "rotation", "heteroclinic"],
+)  # fmt: skip
+def test_high_frequencies_have_their_response_or_none(system, closed):
+    driven = pk.Perturbed(system, damping=0.1, forcing=pk.Harmonic(1.0, HIGH))
+    ds = pk.melnikov(driven)
+    found = ds.melnikov_amplitude.max("saddle").isel(side=0).values
+    known = np.isfinite(found)
+    assert known[:16].all()
+    np.testing.assert_allclose(found[known], closed(HIGH)[known], rtol=2e-6)
+    assert not known[HIGH > 30.0].any()
+    threshold = ds.chaos_threshold.max("saddle").isel(side=0).values
+    assert not np.isfinite(threshold[~known]).any()
+
+
+def test_high_frequencies_of_a_free_rotor_have_their_response_or_none():
+    k = (
+        float(np.nanmax(pk.equilibria(FREE).exponent))
+        if "exponent" in pk.equilibria(FREE)
+        else 10.0
+    )
+    nu = k * np.linspace(1.0, 120.0, 60)
+    free = pk.Perturbed(FREE, damping=0.3, forcing=pk.Harmonic(1.5, nu))
+    amplitude = pk.melnikov(free).melnikov_amplitude
+    size = float(amplitude.isel(forcing_frequency=0).max())
+    later = amplitude.isel(forcing_frequency=slice(30, None)).values
+    assert np.isfinite(amplitude.isel(forcing_frequency=0)).any()
+    assert np.nanmax(np.nan_to_num(later)) < 1e-6 * size

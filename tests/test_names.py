@@ -1,0 +1,114 @@
+"""Wrong guesses are answered with the right name."""
+
+import dataclasses
+
+import pytest
+
+import phasekit as pk
+
+DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.02, r=0.2, omega1=30.0)
+PROBLEM = pk.Problem("mu - x**2", state="x", parameters={"mu": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("guess", "name"),
+    [
+        ("phase_portrait", "pk.plot.phase_portrait"),
+        ("bifurcation_diagram", "pk.plot.bifurcation_diagram"),
+        ("simulate", "pk.flow"),
+        ("limit_cycle", "pk.periodic_orbit"),
+        ("fixed_points", "pk.equilibria"),
+    ],
+)
+def test_names_of_other_programs_lead_to_those_of_phasekit(guess, name):
+    with pytest.raises(AttributeError, match=f"has no attribute '{guess}'; use '{name}'"):
+        getattr(pk, guess)
+
+
+def test_every_name_that_is_recommended_exists():
+    assert len(pk._ELSEWHERE) > 20
+    for guess, target in pk._ELSEWHERE.items():
+        place = pk
+        for part in target.format(guess).split("."):
+            place = getattr(place, part)
+        assert callable(place)
+
+
+@pytest.mark.parametrize(
+    ("formula", "message"),
+    [
+        ("np.sin(x) + mu", r"np\.sin at character 1; write sin\(\.\.\.\)"),
+        ("mu + math.cos(x)", r"math\.cos at character 6; write cos\(\.\.\.\)"),
+        ("np.pi*x + mu", r"np\.pi at character 1; write pi$"),
+        ("mu*x.real", r"x\.real at character 4; write real$"),
+    ],
+)
+def test_a_function_of_a_module_is_answered_by_its_plain_name(formula, message):
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.Problem(formula, state="x", parameters={"mu": 1.0})
+
+
+@pytest.mark.parametrize(("word", "other"), [("lambda", "lam"), ("class", "class_")])
+def test_a_keyword_of_python_is_answered_by_another_name(word, other):
+    message = f"{word} is a keyword of Python: use {other}$"
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.Problem(lambda x, **p: x, state="x", parameters={word: 1.0})
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.Problem(f"{word} - x", state="x", parameters={"mu": 1.0})
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.Potential("k*cos(x)", "x", {"k": 1.0, word: 1.0})
+
+
+@pytest.mark.parametrize(
+    ("thing", "name"),
+    [
+        (DISK, "beta"),
+        (PROBLEM, "mu"),
+        (pk.Perturbed(DISK, damping=0.1), "damping"),
+        (pk.Potential("a*cos(x)", "x", {"a": 1.0}), "a"),
+        (pk.Coefficients(1.0, 2.0, 3.0), "A"),
+        (pk.Pendulum(length=1.0), "length"),
+    ],
+    ids=lambda thing: thing if isinstance(thing, str) else type(thing).__name__,
+)
+def test_a_frozen_system_says_what_to_write(thing, name):
+    with pytest.raises(AttributeError, match=rf"frozen; use \.replace\({name}=\.\.\.\)"):
+        setattr(thing, name, 3.0)
+    if dataclasses.is_dataclass(thing):
+        with pytest.raises(AttributeError):
+            delattr(thing, name)
+
+
+@pytest.mark.parametrize(
+    ("word", "name"),
+    [
+        ("folds", "fold"),
+        ("Fold", "fold"),
+        ("limit point", "fold"),
+        ("saddle-node", "fold"),
+        ("lp", "LP"),
+        ("Neimark-Sacker", "torus"),
+        ("period doublings", "period_doubling"),
+        ("hopf_point", "hopf"),
+        ("crossings", "crossing"),
+    ],
+)
+def test_words_for_special_points_are_answered_by_their_kinds(word, name):
+    branch = pk.continuation(PROBLEM, "mu", x0=[1.0], span=(-1, 1), events={"crossing": "x - 1/2"})
+    assert len(branch.special("fold")) == len(branch.special("LP")) == 1
+    message = rf"wants one of fold \(LP\), branch_point \(BP\), .*; did you mean '{name}'\?"
+    with pytest.raises(pk.ParameterError, match=message):
+        branch.special(word)
+
+
+def test_explore_names_only_what_it_takes():
+    with pytest.raises(pk.ParameterError, match="wants one of ") as caught:
+        pk.explore(3)
+    assert "Potential" in str(caught.value)
+    assert "Perturbed" not in str(caught.value)
+    assert "FreeGyroRotor" not in str(caught.value)
+
+
+def test_a_problem_is_answered_by_what_takes_it():
+    with pytest.raises(pk.ParameterError, match="pk.periodic_orbit .* take a Problem"):
+        pk.orbits(PROBLEM, 1.0, 1.0)
