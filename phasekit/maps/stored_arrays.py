@@ -64,11 +64,11 @@ def read_plan(store: Any) -> Plan | None:
         If it is damaged, or gone.
     """
     data = files.read(store, PLAN_KEY)
-    if data is not None:
-        return plan_from(data)
-    if GROUP in zarr_group(store) or files.sizes(store, f"{GROUP}/part0"):
-        raise ParameterError("its plan, sweep/zarr.json, is gone")
-    return None
+    if data is None and (GROUP in zarr_group(store) or files.sizes(store, f"{GROUP}/part0")):
+        data = files.read(store, PLAN_KEY)  # it may have been written between the two looks
+        if data is None:
+            raise ParameterError("its plan, sweep/zarr.json, is gone")
+    return None if data is None else plan_from(data)
 
 
 def write_plan(place: Place, plan: Plan) -> None:

@@ -171,7 +171,8 @@ def _whole(source: Any, name: str, chunks: Any) -> xr.Dataset:
             f"store: {name} is damaged: its group sweep is gone, which says what is computed; put "
             "it back, or pass overwrite=True to sweep"
         )
-    if not ds.variables:
+    # A sweep that began after the look for a plan has written coordinates by now, and no data yet.
+    if not ds.variables or read_plan(source) is not None:
         raise StoreError(
             f"store: {name} cannot be opened: its arrays are being created, or their creation was "
             f"interrupted; wait, or repeat the call of sweep"

@@ -1,6 +1,7 @@
 """Stored maps come back as they were, and nothing is overwritten unasked."""
 
 import os
+import shutil
 
 import numpy as np
 import pytest
@@ -235,3 +236,30 @@ def test_paths_that_cannot_be_are_refused(store):
         pk.open_map(store)
     with pytest.raises(pk.ParameterError, match="store: got"):
         pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2], store=store)
+
+
+def test_a_map_that_appears_while_it_is_opened_is_not_taken_for_a_finished_one(
+    tmp_path, monkeypatch
+):
+    """Its coordinates are there before its data, and its plan after the reader looked for one."""
+    from phasekit.maps import whole
+
+    there, early = tmp_path / "there.zarr", tmp_path / "early.zarr"
+    pk.sweep(pk.Reduced(lam=0.5, psi=0.2), {"lam": [0.5, 1.5]}, store=there, chunks={"lam": 1})
+    shutil.copytree(there, early)
+    shutil.rmtree(early / "sweep")
+    for folder in early.iterdir():
+        if folder.is_dir() and folder.name not in ("lam", "psi"):
+            shutil.rmtree(folder)
+    look = whole.read_plan
+
+    def looked_too_early(store):
+        if (early / "sweep").exists():
+            return look(store)
+        assert look(store) is None
+        shutil.copytree(there / "sweep", early / "sweep")
+        return None
+
+    monkeypatch.setattr(whole, "read_plan", looked_too_early)
+    with pytest.raises(pk.StoreError, match="are being created"):
+        pk.open_map(early)
