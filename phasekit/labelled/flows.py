@@ -18,6 +18,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.motion import flows
+from phasekit.motion.equation_rates import pointwise
 from phasekit.motion.events import Event
 from phasekit.motion.integrate import Solution, integrate
 from phasekit.motion.prescribed import span
@@ -27,7 +28,7 @@ from phasekit.systems.system import System
 from phasekit.table.row import Pass, Quantity
 
 #: Methods of integration by name.
-METHODS = ("dop853", "radau")
+METHODS = ("taylor", "dop853", "radau")
 
 
 def rung_of(law: Equations) -> type[Law]:
@@ -185,7 +186,7 @@ def _with_events(
         raise bad("events", list(named), "nothing, or one motion: a single state and system")
     values = {name: float(ds[name]) for name in law.names}
     watched = {name: _event(law, values, name, event) for name, event in named.items()}
-    rates = flows.pointwise(law, values)
+    rates = pointwise(law, values)
     start = [float(one) for one in starts]
     data = {name: ds[f"motion_{name}"].values.copy() for name in law.states}
     found: list[tuple[str, float, Any]] = []

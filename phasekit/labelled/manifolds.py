@@ -15,7 +15,7 @@ from phasekit.labels.arguments import bad, call_checked, number, whole
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Map
-from phasekit.motion.flows import pointwise, slopes_at
+from phasekit.motion.equation_rates import pointwise, slopes_at
 from phasekit.motion.manifold import Strand, strand
 from phasekit.numerics.waits import said
 from phasekit.systems.problem import as_problem

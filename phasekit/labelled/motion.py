@@ -74,8 +74,9 @@ def flow(
         has a direction; zeros that lie closer together than a quarter of a step may be missed. A
         stretch on which one vanishes counts once, with a RuntimeWarning. Of a `Problem` they are
         formulas of its states, parameters and time, or functions of (t, x).
-    method : {"dop853", "radau"}, optional
-        Of a `Problem`; by default Radau's where the motion is stiff, and DOP853 otherwise.
+    method : {"taylor", "dop853", "radau"}, optional
+        Of a `Problem`; by default Radau's where the motion is stiff, Taylor series where the
+        formulas are short (up to 48 operations, shared parts counted once), else DOP853.
     **states
         The states of a `Problem` by name, one argument each, in place of `x0`.
 
@@ -100,7 +101,7 @@ def flow(
     Solves [Veljovic2015] (12) in elliptic functions, on a separatrix in elementary ones. Damped
     and driven motions are integrated in compiled code, eight at a time, on all cores: by their
     Taylor series, of an order from 6 to 20 by rtol [JorbaZou2005], where the law is made of sums,
-    products, whole powers up to 16, sin, cos, exp, sinh, cosh and tanh. Otherwise, with quadratic
+    products, powers, sin, cos, exp, log, sinh, cosh and tanh. Otherwise, with quadratic
     damping, and where series would take too many steps, the Runge-Kutta method DOP853 of order 8
     is used ([HairerNorsettWanner1993] II.5), whose steps are interpolated to the seventh order.
     Quadratic damping is not smooth where the motion turns: steps end there. Motions that linear

@@ -13,7 +13,7 @@ from phasekit.labels.arguments import bad, call_checked, whole
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.equations import Equations, equations_of
 from phasekit.laws.ladder import Map
-from phasekit.motion.flows import rates_on, slopes_at
+from phasekit.motion.equation_rates import rates_on, slopes_at
 from phasekit.systems.problem import as_problem
 from phasekit.systems.system import as_system
 

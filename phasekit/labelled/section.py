@@ -22,8 +22,8 @@ from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations, equations_of
 from phasekit.laws.ladder import Map, Routhian
 from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.motion.equation_rates import pointwise as pointwise_of
 from phasekit.motion.flow import pointwise
-from phasekit.motion.flows import pointwise as pointwise_of
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.sections import Section, passages
 from phasekit.motion.steps import InitialValue

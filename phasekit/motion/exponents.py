@@ -12,11 +12,12 @@ import numpy.typing as npt
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
+from phasekit.motion.equation_rates import pointwise, series_of, slopes_at, varied
 from phasekit.motion.flow import ATOL, RTOL
-from phasekit.motion.flows import limits_of, pointwise, slopes_at
+from phasekit.motion.flows import limits_of
 from phasekit.motion.lost import ARRIVED, FAILED, MOST, judged, tell
 from phasekit.motion.method import WEIGHT, cells_of, run
-from phasekit.motion.rates import Rates
+from phasekit.motion.rates import Rates, order_of
 from phasekit.motion.steps import InitialValue, steps
 
 Array = npt.NDArray[np.float64]
@@ -140,7 +141,7 @@ def _growth(
     else:
         from phasekit.motion.kernels.tangents import growth
 
-        code = Rates(address, law.names, -1, 0, 0)
+        code = Rates(address, law.names, -1, series_of(law, order_of(rtol), count), 0)
         shared = np.zeros((0, 3)), limits_of(law, rtol, atol, MOST), code.kink
         own = np.array(legs), np.array(first)
         run(growth, code, shared, own, parameters, (out, status), status, threads)
@@ -155,23 +156,15 @@ def _compiled(
     """Machine code of the states and so many tangent vectors."""
     if not isinstance(f, tuple):
         return int(_wrapped(states, names, f, time, count).address)
-    import sympy as sp
-
     from phasekit.laws.formulas import symbols_of
     from phasekit.numerics.lanes import compile_lanes
 
     symbols = symbols_of([*states, *names, *([] if time is None else [time])])
-    x = [symbols[name] for name in states]
-    places = {symbol: (0, i) for i, symbol in enumerate(x)}
+    expressions, order = varied(states, symbols, f, count)
+    places = {symbol: (0, i) for symbol, i in order.items()}
     places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
     if time is not None:
         places[symbols[time]] = (2, 0)
-    slopes = [[one.diff(symbol) for symbol in x] for one in f]
-    expressions = list(f)
-    for i in range(count):
-        u = sp.symbols(f"_u{i}_:{len(x)}", real=True)
-        places |= {symbol: (0, (1 + i) * len(x) + j) for j, symbol in enumerate(u)}
-        expressions += [sp.Add(*(a * b for a, b in zip(row, u, strict=True))) for row in slopes]
     return compile_lanes(expressions, places)
 
 

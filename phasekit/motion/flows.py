@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import functools
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
+from phasekit.inputs import bad
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
+from phasekit.motion.equation_rates import (
+    LONG,
+    parameters_of,
+    pointwise,
+    rates_of,
+    series_of,
+    slopes_at,
+)
 from phasekit.motion.flow import ATOL, RTOL, Laid
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, tell
 from phasekit.motion.method import WEIGHT, both_ways, cells_of, run, some
-from phasekit.motion.rates import Rates
+from phasekit.motion.rates import order_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -47,8 +56,13 @@ def flow(
         Error of a step that is allowed, relative and absolute.
     threads : int, optional
         Default: all cores where there are many motions.
-    method : {"dop853", "radau"}, optional
-        Default: Radau's where the motion is stiff.
+    method : {"taylor", "dop853", "radau"}, optional
+        Default: Radau's where the motion is stiff; else series where formulas are short.
+
+    Raises
+    ------
+    ParameterError
+        If series are asked for, and the law has none.
 
     Returns
     -------
@@ -70,10 +84,18 @@ def _flows(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     method: str | None, threads: int | None, how: dict[str, float],
 ) -> tuple[Array, Index]:  # fmt: skip
+    order = order_of(how["rtol"])
+    if method == "taylor" and not series_of(law, order, longest=np.inf):
+        why = "f has functions whose series are not known, or is no formula"
+        raise bad("method", method, "dop853 or radau", why)
     if law.kind == "python" or method == "radau":
         return _one_by_one(law, values, states, times, method, how)
-    few = MOST if method == "dop853" else TRIED
-    found, status = motions(law, values, states, times, **how, threads=threads, most=few)
+    few = TRIED if method is None else MOST
+
+    def move(cells: tuple[Any, Array, Array], most: int) -> tuple[Array, Index]:
+        return motions(law, *cells, how["rtol"], how["atol"], threads, most, method)
+
+    found, status = move((values, states, times), few)
     lost = np.flatnonzero(status == EXHAUSTED)
     if few == MOST or not lost.size:
         return found, status
@@ -86,7 +108,7 @@ def _flows(
     if ended[0] == ARRIVED:
         found[lost], status[lost] = _one_by_one(law, *part(lost), "radau", how)
     else:
-        found[lost], status[lost] = motions(law, *part(lost), how["rtol"], how["atol"], threads)
+        found[lost], status[lost] = move(part(lost), MOST)
     return found, status
 
 
@@ -130,154 +152,46 @@ def motions(
     atol: float = ATOL,
     threads: int | None = None,
     most: int = MOST,
+    method: str | None = None,
 ) -> tuple[Array, Index]:
     """Integrate a flow from t = 0 to times of either sign; states at them, and how it ended."""
     from phasekit.motion.kernels.motions import motions as kernel
 
     count, n = states.shape
-    code, parameters = rates_of(law), parameters_of(law, values, count)
-    shared = np.zeros((0, 3)), limits_of(law, rtol, atol, most), 0.0, code.kink
+    longest = LONG if method is None else np.inf
+    code = rates_of(law, 0 if method == "dop853" else order_of(rtol), longest)
+    parameters = parameters_of(law, values, count)
+    limits = limits_of(law, rtol, atol, most, keep=True)
+    shared = np.zeros((0, 3)), limits, 0.0, code.kink
 
     def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
         cells = rising, np.array(states)
         run(kernel, code, shared, cells, parameters, groups, groups[1], threads)
 
     result, status, _ = both_ways(times, count, n, integrate)
+    failed = np.flatnonzero((status == FAILED) & np.isfinite(states).all(axis=1))
+    if code.series and failed.size:  # as those of a root do where it vanishes
+        part = cells_of(values, failed), states[failed], some(times, failed)
+        again = motions(law, *part, rtol, atol, threads, most, "dop853")
+        result[failed], status[failed] = again
     judged(status, parameters)
     return result, status
 
 
-def limits_of(law: Equations, rtol: float, atol: float, most: int, beside: float = 1.0) -> Array:
-    """What bounds the steps of the kernels: common limits, then unit and scale of each state."""
+def limits_of(law: Equations, rtol: float, atol: float, most: int, *, keep: bool = False) -> Array:
+    """What bounds the steps of the kernels: common limits, then unit and scale of each state.
+
+    Steps by series are taken one at a time; they are kept where states within them are asked for.
+    """
     from phasekit.numerics.lanes import LANES
 
-    rows = [rtol, atol, np.inf, float(most), 0.0, 0.0, beside]
+    rows = [rtol, atol, np.inf, float(most), 1.0, float(keep), 1.0]
     for name in law.states:
         low, high = law.window.get(name, (0.0, 0.0))
         # Without a window an angle is measured by radians.
         unit = law.periods[name] / (2.0 * np.pi) if name in law.periods else np.inf
         rows += [unit, min(high - low, unit)]
     return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
-
-
-def rates_of(law: Equations) -> Rates:
-    """Machine code of the rates of eight states."""
-    return Rates(_compiled(law.states, law.names, law.f, law.time), law.names, -1, 0, 0)
-
-
-def parameters_of(law: Equations, values: Mapping[str, Any], count: int) -> Array:
-    """Parameters of the machine code in so many cells, of shape (parameters, cells)."""
-    columns = [np.asarray(values[name], float) for name in law.names] or [np.zeros(())]
-    return np.array([np.broadcast_to(column, (count,)) for column in columns])
-
-
-@functools.lru_cache(maxsize=128)
-def _compiled(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> int:
-    from phasekit.laws.formulas import symbols_of
-    from phasekit.numerics.lanes import compile_lanes
-
-    if not isinstance(f, tuple):
-        return int(_wrapped(states, names, f, time).address)
-    symbols = symbols_of([*states, *names, *([] if time is None else [time])])
-    places = {symbols[name]: (0, i) for i, name in enumerate(states)}
-    places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
-    if time is not None:
-        places[symbols[time]] = (2, 0)
-    return compile_lanes(f, places)
-
-
-@functools.cache  # the code lives as long as it may be called
-def _wrapped(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> Any:
-    import inspect
-
-    from phasekit.numerics.lanes import LANES
-    from phasekit.numerics.wrapped import wrap
-
-    arguments = list(inspect.signature(f.py_func).parameters)[1:]
-    order = tuple(None if name == time else names.index(name) for name in arguments)
-    return wrap(f, len(states), order, lanes=LANES)
-
-
-def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
-    """The rates of one system as a function of time and state."""
-    if law.kind == "python":
-        return _called(law, values)
-    from phasekit.motion.kernels.motions import rates_at
-
-    code, parameters = rates_of(law), parameters_of(law, values, 1)
-    n, table = len(law.states), np.zeros((0, 3))
-
-    def rates(t: float, x: Any) -> Array:
-        state = np.array(x, float).reshape(1, n)
-        out, sign = np.empty((1, n)), np.zeros(1)
-        rates_at(code.address, table, np.array([t]), state, parameters, sign, -1, 0, 1, out)
-        return np.asarray(out[0])
-
-    return rates
-
-
-def rates_on(law: Equations, values: Mapping[str, float], x: Array) -> Array:
-    """The rates at many states, the rows of x, at time 0."""
-    if law.kind == "python":
-        f = _called(law, values)
-        return np.array([f(0.0, row) for row in x]).reshape(x.shape)
-    from phasekit.motion.kernels.motions import rates_at
-
-    code, count = rates_of(law), len(x)
-    given = np.zeros(count), np.array(x), parameters_of(law, values, count), np.zeros(count)
-    out = np.empty(x.shape)
-    rates_at(code.address, np.zeros((0, 3)), *given, -1, 0, count, out)
-    return out
-
-
-def _called(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
-    """A Python function as the rates, NaN where it raises or has no value."""
-    given = {name: float(x) for name, x in values.items()}
-
-    def rates(t: float, x: Any) -> Array:
-        more = {} if law.time is None else {law.time: t}
-        try:
-            found = np.asarray(law.f(np.array(x, float), **given, **more), dtype=float)
-            return found.reshape(len(law.states))
-        except (ArithmeticError, ValueError):
-            return np.full(len(law.states), np.nan)
-
-    return rates
-
-
-def slopes_at(law: Equations, values: Mapping[str, float], x: Array, t: float = 0.0) -> Array:
-    """Derivatives of the rates, or of a step, by the states at one state."""
-    n = len(law.states)
-    if law.kind == "symbolic":
-        function = _slopes(law.states, law.names, law.f, law.time)
-        return np.array(function(x, values, t), float).reshape(n, n)
-    f = pointwise(law, values)
-    size = np.maximum(np.abs(x), 1e-3 * max(float(np.abs(x).max(initial=0.0)), 1e-300))
-    found = np.empty((n, n))
-    for i in range(n):
-        h = np.zeros(n)
-        h[i] = np.finfo(float).eps ** (1.0 / 3.0) * size[i]
-        found[:, i] = (f(t, x + h) - f(t, x - h)) / (2.0 * h[i])
-    return found
-
-
-@functools.lru_cache(maxsize=128)
-def _slopes(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> Any:
-    import sympy as sp
-
-    from phasekit.laws.formulas import symbols_of
-
-    given = [*states, *names, *([] if time is None else [time])]
-    symbols = symbols_of(given)
-    entries = [one.diff(symbols[name]) for one in f for name in states]
-    function = sp.lambdify([symbols[name] for name in given], entries, "numpy", cse=True)
-
-    def slopes(x: Array, values: Mapping[str, float], t: float) -> Any:
-        more = [] if time is None else [t]
-        with np.errstate(all="ignore"):
-            return function(*map(float, x), *(float(values[n]) for n in names), *more)
-
-    return slopes
 
 
 def _one_by_one(

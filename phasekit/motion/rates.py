@@ -211,26 +211,27 @@ def _compiled(
     series = room = 0
     if order and not (quadratic or form.prescribed):
         parameters = {symbol: i for i, symbol in enumerate(used.values())}
-        series = _series(order, t, pairs, expressions[1::2], parameters)
+        series = series_of(order, t, pairs, expressions[1::2], parameters)
         room = len(pairs) * (order + 1)
     return Rates(address, tuple(used), kink, series, room)
 
 
-def _series(
+def series_of(
     order: int,
     time: Any,
-    pairs: Sequence[tuple[Any, Any]],
+    chains: Sequence[tuple[Any, ...]],
     forces: Sequence[Any],
     parameters: Mapping[Any, int],
+    width: int = 1,
 ) -> int:
-    """Machine code of steps by series, of a law that has them."""
+    """Machine code of steps by series, of a law that has them; 0 of others."""
     from phasekit.motion.kernels.taylor import Law, compile_steps
     from phasekit.numerics.series import has_series
 
-    varying = {time, *(symbol for pair in pairs for symbol in pair)}
+    varying = {time, *(symbol for chain in chains for symbol in chain)}
     if not all(has_series(force, varying) for force in forces):
         return 0
-    return compile_steps(Law(time, pairs, forces, parameters), order)
+    return compile_steps(Law(time, chains, forces, parameters, width), order)
 
 
 def _euler(form: _Form, rate: Any, parameter: Any, harmonic: Any, x: Any, t: Any, dw: Any) -> Any:

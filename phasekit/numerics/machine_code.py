@@ -224,7 +224,7 @@ class Writer:
         if e.is_Mul:
             return self._product(e)
         if e.is_Pow:
-            return self._power(self.write(e.base), e)
+            return self.power(self.write(e.base), e)
         name = type(e).__name__
         if name in LIBRARY:
             return self.library(LIBRARY[name], self.write(e.args[0]))
@@ -298,7 +298,8 @@ class Writer:
             value = b.fdiv(value, divisor)
         return b.fneg(value) if minus else value
 
-    def _power(self, base: Any, e: Any) -> Any:
+    def power(self, base: Any, e: Any) -> Any:
+        """The value of a power whose base has a value."""
         b, exponent = self.builder, e.exp
         if exponent.is_Integer and 0 < abs(int(exponent)) <= LONGEST_POWER:
             value = self._repeated(base, abs(int(exponent)))

@@ -1,6 +1,6 @@
 """Taylor coefficients of expressions along a motion, as instructions on eight doubles.
 
-Sums, products, whole powers, and functions that solve a differential equation of their own have
+Sums, products, powers, and functions that solve a differential equation of their own have
 recurrences: a coefficient follows from those of the arguments, and its own of lower orders.
 [HairerNorsettWanner1993] section I.8, [JorbaZou2005] section 2.
 """
@@ -22,8 +22,8 @@ _PARTNERS = {
     sp.sinh: (sp.cosh, 1),
     sp.cosh: (sp.sinh, 1),
 }
-#: Functions with a recurrence: they are analytic wherever they are real.
-FUNCTIONS = {*_PARTNERS, sp.tanh}
+#: Functions with a recurrence.
+FUNCTIONS = {*_PARTNERS, sp.tanh, sp.log}
 #: Greatest power that is a product.
 POWER = 16
 
@@ -37,7 +37,8 @@ def has_series(expression: Any, varying: set[Any]) -> bool:
         return True
     if expression.is_Pow:
         power = expression.exp
-        if not (power.is_Integer and 2 <= power <= POWER):
+        # Products alone hold at zeros of the base.
+        if power.free_symbols & varying or (power.is_Integer and power > POWER):
             return False
     elif not (expression.is_Add or expression.is_Mul or type(expression) in FUNCTIONS):
         return False
@@ -66,6 +67,7 @@ class Series:
     ) -> None:
         self.writer, self.varying = writer, dict(varying)
         self.known: dict[Any, Term] = {}
+        self.moving: dict[Any, bool] = {}  # whether expressions vary
         for symbol, expression in shared:
             if self._varies(expression):
                 self.varying[symbol] = lambda k, e=expression: self.term(e, k)
@@ -82,7 +84,9 @@ class Series:
         return self.known[name, k]
 
     def _varies(self, e: Any) -> bool:
-        return not self.varying.keys().isdisjoint(e.free_symbols)
+        if e not in self.moving:
+            self.moving[e] = not self.varying.keys().isdisjoint(e.free_symbols)
+        return self.moving[e]
 
     def _term(self, e: Any, k: int) -> Term:
         if e in self.varying:
@@ -94,6 +98,8 @@ class Series:
         if e.is_Mul:
             return self._product(e, k)
         if e.is_Pow:
+            if not (e.exp.is_Integer and e.exp > 0):
+                return self._power(e, k)
             if e.exp % 2:
                 return self._convolved(e.base ** (e.exp - 1), e.base, k)
             return self._square(e.base ** (e.exp / 2), k)
@@ -109,13 +115,38 @@ class Series:
     def _function(self, e: Any, k: int) -> Term:
         (u,) = e.args
         if k == 0:
-            return self.writer.library(type(e).__name__, self.term(u, 0))
+            return self.writer.library(type(e).__name__, self._value(u))
+        if type(e) is sp.log:  # u times its slope is u'
+            rest = self.over(self._integrated(e, lambda j: self.term(u, j), k, k - 1), k)
+            change = self.total([self.term(u, k), self.negative(rest)])
+            return self.scaled(change, self._reciprocal(u))
         if type(e) is sp.tanh:  # its slope is 1 - tanh(u)^2
             first, rest = self._slope(u, k), self._integrated(u, lambda j: self._square(e, j), k)
             return self.over(self.total([first, self.negative(rest)]), k)
         partner, sign = _PARTNERS[type(e)]
         found = self.over(self._integrated(u, lambda j: self.term(partner(u), j), k), k)
         return found if sign > 0 else self.negative(found)
+
+    def _power(self, e: Any, k: int) -> Term:
+        """A coefficient of p = u^a, whose slope times u is a p u'."""
+        u, writer = e.base, self.writer
+        if k == 0:
+            return writer.power(self._value(u), e)
+        terms = []
+        for j in sorted(range(1, k + 1), key=lambda j: max(j, k - j)):
+            factor = writer.write((e.exp * j - (k - j)) / sp.Integer(k))
+            terms.append(self.scaled(factor, self.scaled(self.term(u, j), self.term(e, k - j))))
+        return self.scaled(self.total(terms), self._reciprocal(u))
+
+    def _value(self, u: Any) -> Term:
+        value = self.term(u, 0)
+        return self.writer.constant(0.0) if value is None else value
+
+    def _reciprocal(self, u: Any) -> Term:
+        one = self.writer.constant(1.0)
+        return self._once(
+            ("reciprocal", u), 0, lambda: self.writer.builder.fdiv(one, self._value(u))
+        )
 
     # Coefficients for which others wait come last in the sums.
 
@@ -132,9 +163,11 @@ class Series:
 
         return self._once(("square", f), k, make)
 
-    def _integrated(self, u: Any, rate: Callable[[int], Term], k: int) -> Term:
-        """K times the coefficient of what changes at a rate times u'."""
-        order = sorted(range(1, k + 1), key=lambda j: max(j, k - j))
+    def _integrated(
+        self, u: Any, rate: Callable[[int], Term], k: int, last: int | None = None
+    ) -> Term:
+        """K times the coefficient of what changes at a rate times u', of its terms up to a last."""
+        order = sorted(range(1, (k if last is None else last) + 1), key=lambda j: max(j, k - j))
         return self.total([self.scaled(self._slope(u, j), rate(k - j)) for j in order])
 
     def _slope(self, u: Any, j: int) -> Term:

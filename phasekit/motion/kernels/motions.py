@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.motion.kernels.dop853 import ROWS, densify, rates, within
+from phasekit.motion.kernels.dop853 import OWN, ROWS, densify, rates, within
 from phasekit.motion.kernels.stepping import (
     ACCEPTED,
     CELL,
@@ -79,24 +79,27 @@ def write(
 
 
 @routine
-def write_series(lane: int, times: Array, done: int, x: Array, real: Array, out: Array) -> int:
-    """The same of a step by series that was taken."""
+def write_series(
+    lane: int, times: Array, done: int, degree: int, x: Array, real: Array, out: Array
+) -> int:
+    """The same of a step by series, whose chains are coordinates with their rates, or states."""
     start, step, end = real[START, lane], real[GONE, lane], real[T, lane]
     sense = 1.0 if step > 0.0 else -1.0
-    pairs = out.shape[1] // 2
-    terms = (real.shape[0] - TERMS) // pairs
+    chains = out.shape[1] // degree
+    terms = (real.shape[0] - TERMS) // chains
     per = 1.0 / real[SCALE, lane]
     while done < times.size and sense * (times[done] - end) <= 0.0:
         s = (times[done] - start) * per
-        for i in range(pairs):
+        for i in range(chains):
             value = slope = 0.0
             for row in range(TERMS + (i + 1) * terms - 1, TERMS + i * terms - 1, -1):
                 slope = slope * s + value
                 value = value * s + real[row, lane]
-            out[done, 2 * i] = value
-            out[done, 2 * i + 1] = slope * per
+            out[done, degree * i] = value
+            if degree == 2:
+                out[done, 2 * i + 1] = slope * per
         if times[done] == end:
-            for c in range(2 * pairs):
+            for c in range(out.shape[1]):
                 out[done, c] = x[c * LANES + lane]
         done += 1
     return done
@@ -143,6 +146,7 @@ def motions(
     z = np.zeros(3 * LANES)
     real, whole = np.zeros((REALS + room, LANES)), np.zeros((WHOLES, LANES), np.int64)
     written = np.zeros(LANES, np.int64)
+    degree = 1 if limits.shape[0] > OWN else 2
     cell = first
     while True:
         fresh = 0
@@ -178,7 +182,8 @@ def motions(
                 if real[GONE, lane] != 0.0:
                     own = out[whole[CELL, lane]]
                     row = whole[CELL, lane] if times.shape[0] > 1 else 0
-                    written[lane] = write_series(lane, times[row], written[lane], x, real, own)
+                    done = written[lane]
+                    written[lane] = write_series(lane, times[row], done, degree, x, real, own)
             continue
         for lane in range(LANES if kink >= 0 else 0):
             signs[lane] = p[kink * LANES + lane]

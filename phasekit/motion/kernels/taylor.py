@@ -1,9 +1,10 @@
 """Steps of eight motions by their Taylor series in time, written as machine code for each law.
 
-A motion x'' = f(t, x, x') has the coefficients x_(k+2) = f_k/((k + 1)(k + 2)), in units of the
-step before, so that no power of a time over- or underflows. The step is as long as the last two
-coefficients allow [JorbaZou2005]; whether the series holds at its end, the law says there: the
-series' own x'' must be f, to what the error of the state allows. [JorbaZou2005] section 3.
+A motion x'' = f(t, x, x') has the coefficients x_(k+2) = f_k/((k + 1)(k + 2)), each state of a
+flow x' = f(t, x) the coefficients x_(k+1) = f_k/(k + 1), in units of the step before, so that no
+power of a time over- or underflows. The step is as long as the last two coefficients allow
+[JorbaZou2005]; whether the series holds at its end, the law says there: the series' own x'' or x'
+must be f, to what the error of the state allows. [JorbaZou2005] section 3.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from phasekit.motion.kernels.dop853 import (
     LEAST,
     LONGEST,
     MOST,
+    OWN,
     RTOL,
     UNIT,
 )
@@ -56,18 +58,21 @@ _FACTOR = float(np.log2(LONGEST))
 class Law:
     """The law of a motion, and where its symbols stand.
 
-    Pairs of symbols are a coordinate and its rate, then tangent vectors; each has its force.
+    Chains of symbols are a coordinate and its rate, or single states of a flow, then those of
+    tangent vectors, of as many chains; each chain has the formula of its last derivative.
     Parameters have a place each in the array p.
     """
 
     def __init__(
         self,
         time: Any,
-        pairs: Sequence[tuple[Any, Any]],
+        chains: Sequence[tuple[Any, ...]],
         forces: Sequence[Any],
         parameters: Mapping[Any, int],
+        width: int = 1,
     ) -> None:
-        self.time, self.pairs = time, pairs
+        self.time, self.chains, self.width = time, chains, width
+        self.degree = len(chains[0])
         self.inputs = {symbol: (1, place) for symbol, place in parameters.items()}
         symbols = sp.numbered_symbols("_c")
         self.shared, self.forces = sp.cse(list(forces), symbols=symbols, list=True)
@@ -101,7 +106,7 @@ class StepWriter(LaneWriter):
     def step(self, law: Law, order: int) -> Any:
         """Try a step of every lane; return whether to go on with all of them."""
         b, (x, _, real, limits) = self.builder, self.arrays
-        start = [self.load(x, i) for i in range(2 * len(law.pairs))]
+        start = [self.load(x, i) for i in range(law.degree * len(law.chains))]
         t, end, count, state, refused = (
             self.load(real, row) for row in (T, END, COUNT, OUTCOME, REFUSED)
         )
@@ -111,11 +116,10 @@ class StepWriter(LaneWriter):
         running = b.fcmp_ordered("==", state, self.constant(RUNNING))
         per = b.fdiv(self.constant(1.0), h)
         curves = self._curves(law, order, t, start, h, per)
-        rtol, atol, unit = (self.load(limits, row) for row in (RTOL, ATOL, UNIT))
-        size = self._larger(self.load(real, SIZE), self._larger(*map(self._size, start[:2])))
+        own = map(self._size, start[: law.degree * law.width])
+        size = functools.reduce(self._larger, own, self.load(real, SIZE))
         b.store(size, self.place(real, SIZE), align=8)
-        allowed = [self._allowed(curves[0], per, size, rtol, atol, unit)]
-        allowed += [self._allowed_beside(curve, h, per, rtol, atol) for curve in curves[1:]]
+        allowed = self._allowed(law, curves, size, h, per)
         next_ = self._mul(self._part(order, curves, allowed, per, refused), h)
         far, long = self._size(rest), self._size(next_)
         last = b.fcmp_ordered(">=", long, far)
@@ -173,8 +177,11 @@ class StepWriter(LaneWriter):
         self, law: Law, order: int, t: Any, start: Sequence[Any], h: Any, per: Any
     ) -> list[list[Any]]:
         """Coefficients of the coordinates in powers of the time over h."""
-        pairs = range(len(law.pairs))
-        curves = [[start[2 * i], self._mul(start[2 * i + 1], h)] for i in pairs]
+        degree = law.degree
+        curves = [[x] for x in start[::degree]]
+        if degree == 2:
+            for curve, v in zip(curves, start[1::2], strict=True):
+                curve.append(self._mul(v, h))
 
         def rate(i: int, k: int) -> Any:
             if k == 0:
@@ -182,19 +189,44 @@ class StepWriter(LaneWriter):
             return self._mul(self._mul(self.constant(k + 1), per), curves[i][k + 1])
 
         varying: dict[Any, Any] = {law.time: lambda k: (t, h)[k] if k < 2 else None}
-        for i, (x, v) in enumerate(law.pairs):
+        for i, (x, *rates) in enumerate(law.chains):
             varying[x] = functools.partial(lambda i, k: curves[i][k], i)
-            varying[v] = functools.partial(rate, i)
+            varying.update((v, functools.partial(rate, i)) for v in rates)
         series = Series(self, varying, law.shared)
-        square = self._mul(h, h)
-        for k in range(order - 1):
-            scale = self._mul(square, self.constant(1.0 / ((k + 1) * (k + 2))))
+        power = self._mul(h, h) if degree == 2 else h
+        for k in range(order + 1 - degree):
+            part = (k + 1) * (k + 2) if degree == 2 else k + 1
+            scale = self._mul(power, self.constant(1.0 / part))
             for curve, force in zip(curves, law.forces, strict=True):
                 term = series.term(force, k)
                 curve.append(self.constant(0.0) if term is None else self._mul(term, scale))
         return curves
 
     def _allowed(
+        self, law: Law, curves: Sequence[Sequence[Any]], size: Any, h: Any, per: Any
+    ) -> list[tuple[Any, ...]]:
+        """Errors that are allowed, of each chain: of its state, or of a coordinate and its rate."""
+        limits = self.arrays[3]
+        rtol, atol, unit = (self.load(limits, row) for row in (RTOL, ATOL, UNIT))
+        found: list[tuple[Any, ...]] = []
+        if law.degree == 2:
+            found.append(self._allowed_pair(curves[0], per, size, rtol, atol, unit))
+            rates = [(curve[0], self._mul(curve[1], per)) for curve in curves[1:]]
+            return found + [2 * (self._allowed_beside(one, h, rtol, atol),) for one in rates]
+        n = law.width
+        for i, curve in enumerate(curves[:n]):
+            unit, scale = (self.load(limits, OWN + 2 * i + j) for j in range(2))
+            given = self.builder.fcmp_ordered(">", scale, self.constant(0.0))
+            least = self.builder.select(given, scale, self._smaller(size, self.constant(1.0)))
+            reach = self._smaller(self._larger(*map(self._size, curve[:2])), unit)
+            least = self._larger(self._mul(atol, least), self.constant(LEAST))
+            found.append((self._sum(self._mul(rtol, reach), least),))
+        for i in range(n, len(curves), n):
+            vector = [curve[0] for curve in curves[i : i + n]]
+            found += n * [(self._allowed_beside(vector, h, rtol, atol),)]
+        return found
+
+    def _allowed_pair(
         self, curve: Sequence[Any], per: Any, size: Any, rtol: Any, atol: Any, unit: Any
     ) -> tuple[Any, Any]:
         """Errors of the coordinate and its rate that are allowed, as of Runge-Kutta steps.
@@ -218,23 +250,20 @@ class StepWriter(LaneWriter):
         noise = self._size(self._mul(self._mul(self.constant(_EPS), x), per))
         return a, self._larger(c, noise)
 
-    def _allowed_beside(
-        self, curve: Sequence[Any], h: Any, per: Any, rtol: Any, atol: Any
-    ) -> tuple[Any, Any]:
-        """Those of a tangent vector: by its length."""
-        x, v = curve[0], self._mul(curve[1], per)
-        length = self._intrinsic("sqrt", self._sum(self._mul(x, x), self._mul(v, v)))
+    def _allowed_beside(self, vector: Sequence[Any], h: Any, rtol: Any, atol: Any) -> Any:
+        """That of the entries of a tangent vector: by its length."""
+        squares = [self._mul(x, x) for x in vector]
+        length = self._intrinsic("sqrt", functools.reduce(self._sum, squares))
         second = self._smaller(self._size(h), self.constant(1.0))
         part = self._mul(self._sum(self._mul(rtol, length), atol), second)
         part = self._larger(part, self._mul(self.constant(CLOSEST), length))
-        part = self._mul(part, self.load(self.arrays[3], BESIDE))
-        return part, part
+        return self._mul(part, self.load(self.arrays[3], BESIDE))
 
     def _part(
         self,
         order: int,
         curves: Sequence[Sequence[Any]],
-        allowed: Sequence[tuple[Any, Any]],
+        allowed: Sequence[tuple[Any, ...]],
         per: Any,
         refused: Any,
     ) -> Any:
@@ -242,12 +271,15 @@ class StepWriter(LaneWriter):
         found = None
         for k in (order, order - 1):
             most = None
-            for curve, (a, c) in zip(curves, allowed, strict=True):
+            for curve, (a, *c) in zip(curves, allowed, strict=True):
                 term = self._size(curve[k])
-                rate = self._mul(self._mul(self.constant(k), self._size(per)), term)
-                for part in (self.builder.fdiv(term, a), self.builder.fdiv(rate, c)):
+                parts = [self.builder.fdiv(term, a)]
+                for least in c:
+                    rate = self._mul(self._mul(self.constant(k), self._size(per)), term)
+                    parts.append(self.builder.fdiv(rate, least))
+                for part in parts:
                     most = part if most is None else self._larger(part, most)
-            root = self._mul(self._log2(most), self.constant(-1.0 / (k - 1)))
+            root = self._mul(self._log2(most), self.constant(-1.0 / (k + 1 - len(allowed[0]))))
             found = root if found is None else self._smaller(root, found)
         # After one that was refused, not longer than half of that.
         again = self.builder.fcmp_ordered(">", refused, self.constant(0.0))
@@ -258,37 +290,43 @@ class StepWriter(LaneWriter):
         self,
         law: Law,
         curves: Sequence[Sequence[Any]],
-        allowed: Sequence[tuple[Any, Any]],
+        allowed: Sequence[tuple[Any, ...]],
         then: Any,
         taken: Any,
         per: Any,
     ) -> tuple[list[Any], Any]:
         """States at the end of the step, and their error over what is allowed."""
         s = self._mul(taken, per)
-        ends, bends = [], []
+        ends, lasts = [], []
         for curve in curves:
             # Horner's scheme with the first derivative, and half of the second.
             value, slope, bend = curve[-1], self.constant(0.0), self.constant(0.0)
             for term in curve[-2::-1]:
-                bend = self._sum(self._mul(bend, s), slope)
+                if law.degree == 2:
+                    bend = self._sum(self._mul(bend, s), slope)
                 slope = self._sum(self._mul(slope, s), value)
                 value = self._sum(self._mul(value, s), term)
-            ends += [value, self._mul(slope, per)]
-            bends.append(self._mul(self._mul(self.constant(2.0), bend), self._mul(per, per)))
+            rate = self._mul(slope, per)
+            ends += [value, rate][: law.degree]
+            twice = self._mul(self.constant(2.0), bend)
+            lasts.append(self._mul(twice, self._mul(per, per)) if law.degree == 2 else rate)
         there = type(self)(self.module, self.builder, self.arrays, self.inputs)
         there.values.update(self.values)  # what does not vary
         there.values[law.time] = then
-        for i, (x, v) in enumerate(law.pairs):
-            there.values[x], there.values[v] = ends[2 * i], ends[2 * i + 1]
+        there.values.update(zip(itertools.chain(*law.chains), ends, strict=True))
         for symbol, part in law.shared:
             there.values.setdefault(symbol, there.write(part))
-        # What is missing of x'' grows as the power order - 1 of the time.
+        # What is missing of x'' grows as the power order - 1 of the time, of x' as the power order.
         error, order = None, len(curves[0]) - 1
-        for force, bend, (a, c) in zip(law.forces, bends, allowed, strict=True):
-            missing = self._size(self._mul(self.builder.fsub(there.write(force), bend), taken))
-            rate = self._mul(missing, self.constant(1.0 / order))
-            value = self._mul(rate, self._mul(self._size(taken), self.constant(1.0 / (order + 1))))
-            for part in (self.builder.fdiv(rate, c), self.builder.fdiv(value, a)):
+        for force, last, (a, *c) in zip(law.forces, lasts, allowed, strict=True):
+            missing = self._size(self._mul(self.builder.fsub(there.write(force), last), taken))
+            parts = []
+            for least in c:
+                missing = self._mul(missing, self.constant(1.0 / order))
+                parts.append(self.builder.fdiv(missing, least))
+            rest = self.constant(1.0 / (order + 1))
+            value = self._mul(missing, self._mul(self._size(taken), rest) if c else rest)
+            for part in (*parts, self.builder.fdiv(value, a)):
                 error = part if error is None else self._sum(part, error)
         return ends, error
 

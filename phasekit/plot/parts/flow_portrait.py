@@ -18,7 +18,7 @@ from phasekit.labelled.nullclines import nullclines
 from phasekit.labels.arguments import bad, number
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
-from phasekit.motion.flows import rates_on
+from phasekit.motion.equation_rates import rates_on
 from phasekit.plot.parts import strokes, style
 from phasekit.plot.parts.units import coordinate_symbol
 from phasekit.systems.problem import as_problem

@@ -1,0 +1,184 @@
+"""The rates of flows, or steps of maps, as machine code and as functions of points."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.laws.equations import Equations
+from phasekit.motion.rates import Rates
+
+Array = npt.NDArray[np.float64]
+
+#: Operations of formulas up to which steps by series are compiled unasked, in less than a second.
+LONG = 48
+
+
+def rates_of(law: Equations, order: int = 0, longest: float = LONG) -> Rates:
+    """Machine code of the rates of eight states, and of steps by series of that order, if any."""
+    address = _compiled(law.states, law.names, law.f, law.time)
+    series = series_of(law, order, longest=longest) if order else 0
+    room = len(law.states) * (order + 1) if series else 0
+    return Rates(address, law.names, -1, series, room)
+
+
+def series_of(law: Equations, order: int, tangents: int = 0, longest: float = LONG) -> int:
+    """Machine code of steps by series, with tangent vectors; 0 where a law has none, or is long."""
+    if law.kind != "symbolic":
+        return 0
+    return _series(law.states, law.names, law.f, law.time, order, tangents, longest)
+
+
+@functools.lru_cache(maxsize=128)
+def _series(
+    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, order: int,
+    tangents: int, longest: float,
+) -> int:  # fmt: skip
+    import sympy as sp
+
+    from phasekit.laws.formulas import symbols_of
+    from phasekit.motion.rates import series_of as steps_of
+
+    symbols = symbols_of([*states, *names, *([] if time is None else [time])])
+    t = sp.Dummy("t") if time is None else symbols[time]
+    expressions, places = varied(states, symbols, f, tangents)
+    shared, rest = sp.cse(expressions)
+    if sp.count_ops([part for _, part in shared] + rest) > longest:
+        return 0
+    parameters = {symbols[name]: i for i, name in enumerate(names)}
+    return steps_of(order, t, [(x,) for x in places], expressions, parameters, len(states))
+
+
+def varied(
+    states: tuple[str, ...], symbols: Mapping[str, Any], f: Sequence[Any], tangents: int
+) -> tuple[list[Any], dict[Any, int]]:
+    """Rates of states and of tangent vectors, and the places of all of them."""
+    import sympy as sp
+
+    x = [symbols[name] for name in states]
+    places, expressions = {symbol: i for i, symbol in enumerate(x)}, list(f)
+    slopes = [[one.diff(symbol) for symbol in x] for one in f] if tangents else []
+    for i in range(tangents):
+        u = sp.symbols(f"_u{i}_:{len(x)}", real=True)
+        places |= {symbol: (1 + i) * len(x) + j for j, symbol in enumerate(u)}
+        expressions += [sp.Add(*(a * b for a, b in zip(row, u, strict=True))) for row in slopes]
+    return expressions, places
+
+
+def parameters_of(law: Equations, values: Mapping[str, Any], count: int) -> Array:
+    """Parameters of the machine code in so many cells, of shape (parameters, cells)."""
+    columns = [np.asarray(values[name], float) for name in law.names] or [np.zeros(())]
+    return np.array([np.broadcast_to(column, (count,)) for column in columns])
+
+
+@functools.lru_cache(maxsize=128)
+def _compiled(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> int:
+    from phasekit.laws.formulas import symbols_of
+    from phasekit.numerics.lanes import compile_lanes
+
+    if not isinstance(f, tuple):
+        return int(_wrapped(states, names, f, time).address)
+    symbols = symbols_of([*states, *names, *([] if time is None else [time])])
+    places = {symbols[name]: (0, i) for i, name in enumerate(states)}
+    places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
+    if time is not None:
+        places[symbols[time]] = (2, 0)
+    return compile_lanes(f, places)
+
+
+@functools.cache  # the code lives as long as it may be called
+def _wrapped(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> Any:
+    import inspect
+
+    from phasekit.numerics.lanes import LANES
+    from phasekit.numerics.wrapped import wrap
+
+    arguments = list(inspect.signature(f.py_func).parameters)[1:]
+    order = tuple(None if name == time else names.index(name) for name in arguments)
+    return wrap(f, len(states), order, lanes=LANES)
+
+
+def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
+    """The rates of one system as a function of time and state."""
+    if law.kind == "python":
+        return _called(law, values)
+    from phasekit.motion.kernels.motions import rates_at
+
+    code, parameters = rates_of(law), parameters_of(law, values, 1)
+    n, table = len(law.states), np.zeros((0, 3))
+
+    def rates(t: float, x: Any) -> Array:
+        state = np.array(x, float).reshape(1, n)
+        out, sign = np.empty((1, n)), np.zeros(1)
+        rates_at(code.address, table, np.array([t]), state, parameters, sign, -1, 0, 1, out)
+        return np.asarray(out[0])
+
+    return rates
+
+
+def rates_on(law: Equations, values: Mapping[str, float], x: Array) -> Array:
+    """The rates at many states, the rows of x, at time 0."""
+    if law.kind == "python":
+        f = _called(law, values)
+        return np.array([f(0.0, row) for row in x]).reshape(x.shape)
+    from phasekit.motion.kernels.motions import rates_at
+
+    code, count = rates_of(law), len(x)
+    given = np.zeros(count), np.array(x), parameters_of(law, values, count), np.zeros(count)
+    out = np.empty(x.shape)
+    rates_at(code.address, np.zeros((0, 3)), *given, -1, 0, count, out)
+    return out
+
+
+def _called(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
+    """A Python function as the rates, NaN where it raises or has no value."""
+    given = {name: float(x) for name, x in values.items()}
+
+    def rates(t: float, x: Any) -> Array:
+        more = {} if law.time is None else {law.time: t}
+        try:
+            found = np.asarray(law.f(np.array(x, float), **given, **more), dtype=float)
+            return found.reshape(len(law.states))
+        except (ArithmeticError, ValueError):
+            return np.full(len(law.states), np.nan)
+
+    return rates
+
+
+def slopes_at(law: Equations, values: Mapping[str, float], x: Array, t: float = 0.0) -> Array:
+    """Derivatives of the rates, or of a step, by the states at one state."""
+    n = len(law.states)
+    if law.kind == "symbolic":
+        function = _slopes(law.states, law.names, law.f, law.time)
+        return np.array(function(x, values, t), float).reshape(n, n)
+    f = pointwise(law, values)
+    size = np.maximum(np.abs(x), 1e-3 * max(float(np.abs(x).max(initial=0.0)), 1e-300))
+    found = np.empty((n, n))
+    for i in range(n):
+        h = np.zeros(n)
+        h[i] = np.finfo(float).eps ** (1.0 / 3.0) * size[i]
+        found[:, i] = (f(t, x + h) - f(t, x - h)) / (2.0 * h[i])
+    return found
+
+
+@functools.lru_cache(maxsize=128)
+def _slopes(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> Any:
+    import sympy as sp
+
+    from phasekit.laws.formulas import symbols_of
+
+    given = [*states, *names, *([] if time is None else [time])]
+    symbols = symbols_of(given)
+    entries = [one.diff(symbols[name]) for one in f for name in states]
+    function = sp.lambdify([symbols[name] for name in given], entries, "numpy", cse=True)
+
+    def slopes(x: Array, values: Mapping[str, float], t: float) -> Any:
+        more = [] if time is None else [t]
+        with np.errstate(all="ignore"):
+            return function(*map(float, x), *(float(values[n]) for n in names), *more)
+
+    return slopes
