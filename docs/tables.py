@@ -16,12 +16,25 @@ from phasekit import errors
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.bifurcation_set import CURVES
 from phasekit.labels.coordinates import LABELS, STATES
-from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian, Standing, Trait
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.registry import models
 from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS, TABLE, variant
 from phasekit.table.row import LAW, Pass, Quantity
+
+#: What a system has whose law has a trait.
+TRAITS = {
+    Trait.TORQUED: "a constant torque",
+    Trait.DAMPED: "linear or quadratic damping, also negative",
+    Trait.DRIVEN: "forcing, modulation, drift, or a parameter that is a function of time",
+    Trait.NOISY: "damping and a thermal energy kT",
+    Trait.OWN: "a term of one's own, stated by a formula",
+    Trait.KINKED: "a force of one's own with a kink, such as of `abs`",
+    Trait.JUMPING: "a force of one's own that jumps, such as of `sign`",
+    Trait.CODED: "a force of one's own that is a function",
+    Trait.STATEFUL: "a term with states of its own",
+}
 
 
 def pages() -> dict[str, str]:
@@ -95,9 +108,11 @@ def _quantities() -> str:
         "Every row of the table of quantities: what `sweep(of=...)` and the labelled functions "
         "compute, of which laws, and from what. [](../references.md) lists the sources.",
         "## The ladder of laws",
-        "A system says by its rung what can be computed of it; the most special line that fits "
-        "answers.",
+        "A law is a base, which stands on a rung, and the terms that are added to it. A system "
+        "says by its rung and by the traits of its terms what can be computed of it; the most "
+        "special line that fits answers.",
         "\n".join(_ladder(Law)),
+        table(("trait", "where the system has"), [(code(t.name), TRAITS[t]) for t in Trait]),
         *(part for group in groups for part in _group(group)),
         "## Dimensions",
         table(
@@ -117,7 +132,8 @@ def _ladder(rung: type[Law], depth: int = 0) -> Iterator[str]:
     if rung.__module__.startswith("phasekit.laws."):
         yield f"{'  ' * depth}- `{rung.__name__}`: {first_line(rung)}"
         for special in rung.__subclasses__():
-            yield from _ladder(special, depth + 1)
+            if issubclass(special, (Flow, Map)):
+                yield from _ladder(special, depth + 1)
 
 
 def _group(group: str) -> Iterator[str]:
@@ -139,7 +155,7 @@ def _group(group: str) -> Iterator[str]:
 def _pass(one: Pass) -> tuple[str, ...]:
     inputs = ("the parameters" if name == LAW else code(name) for name in one.inputs)
     return (
-        plain(one.of.called),
+        plain(one.standing.called),
         ", ".join(inputs),
         codes(one.options),
         codes(state for state, _ in one.optional),
@@ -147,7 +163,7 @@ def _pass(one: Pass) -> tuple[str, ...]:
     )
 
 
-def _row(row: Quantity, rungs: set[type[Law]]) -> tuple[str, ...]:
+def _row(row: Quantity, rungs: set[type[Law] | Standing]) -> tuple[str, ...]:
     meaning = plain(row.long_name)
     if row.flags is not None:
         meaning += f": a code of [{row.flags.__name__}](codes.md)"

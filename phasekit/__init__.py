@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from phasekit.errors import FlowEquilibriumKind as FlowEquilibriumKind
     from phasekit.errors import InvalidCellsWarning as InvalidCellsWarning
     from phasekit.errors import Loop as Loop
+    from phasekit.errors import MergerKind as MergerKind
     from phasekit.errors import OrbitFamily as OrbitFamily
     from phasekit.errors import OrbitKind as OrbitKind
     from phasekit.errors import ParameterError as ParameterError
@@ -50,11 +51,13 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.continuation import continuation as continuation
     from phasekit.labelled.continuation.cycle_branch import CycleBranch as CycleBranch
     from phasekit.labelled.continuation.diagram import diagram as diagram
+    from phasekit.labelled.continuation.harmonic_record import fourier as fourier
     from phasekit.labelled.continuation.periodic_orbit import periodic_orbit as periodic_orbit
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
     from phasekit.labelled.critical import critical as critical
     from phasekit.labelled.driven import lyapunov as lyapunov
     from phasekit.labelled.driven import stroboscopic as stroboscopic
+    from phasekit.labelled.edge_state import edge_state as edge_state
     from phasekit.labelled.energy import curvature as curvature
     from phasekit.labelled.energy import energy as energy
     from phasekit.labelled.energy import gradient as gradient
@@ -68,11 +71,13 @@ if TYPE_CHECKING:
     from phasekit.labelled.manifolds import manifolds as manifolds
     from phasekit.labelled.motion import flow as flow
     from phasekit.labelled.motion import separatrix_motion as separatrix_motion
+    from phasekit.labelled.noise import first_passage as first_passage
     from phasekit.labelled.nullclines import nullclines as nullclines
     from phasekit.labelled.orbit_diagram import orbit_diagram as orbit_diagram
     from phasekit.labelled.orbits import action_angle as action_angle
     from phasekit.labelled.orbits import orbits as orbits
     from phasekit.labelled.orbits import state_of as state_of
+    from phasekit.labelled.periodic_orbits import periodic_orbits as periodic_orbits
     from phasekit.labelled.perturbed import capture as capture
     from phasekit.labelled.perturbed import critical_torque as critical_torque
     from phasekit.labelled.perturbed import escape_rate as escape_rate
@@ -85,10 +90,13 @@ if TYPE_CHECKING:
     from phasekit.labelled.quasi_static import quasi_static as quasi_static
     from phasekit.labelled.run_up import run_up as run_up
     from phasekit.labelled.section import poincare_section as poincare_section
+    from phasekit.labelled.spectrum import spectrum as spectrum
+    from phasekit.labelled.warm import warm as warm
     from phasekit.maps.sweep import sweep as sweep
     from phasekit.maps.whole import open_map as open_map
     from phasekit.mechanics.general.body import RigidBody as RigidBody
     from phasekit.mechanics.general.rotation import CoupledRotation as CoupledRotation
+    from phasekit.motion.events import Event as Event
     from phasekit.systems.analogues import ParticleOnCircle as ParticleOnCircle
     from phasekit.systems.analogues import Pendulum as Pendulum
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
@@ -106,6 +114,7 @@ if TYPE_CHECKING:
     from phasekit.systems.system import Coefficients as Coefficients
     from phasekit.systems.system import Reduced as Reduced
     from phasekit.systems.system import System as System
+    from phasekit.systems.term import Term as Term
     from phasekit.table.quantities import quantities as quantities
 
 _MODULES = {
@@ -118,6 +127,7 @@ _MODULES = {
         "InvalidCellsWarning",
         "EscapeRegime",
         "Loop",
+        "MergerKind",
         "OrbitFamily",
         "OrbitKind",
         "ParameterError",
@@ -134,6 +144,7 @@ _MODULES = {
     "phasekit.labelled.critical": ("critical",),
     "phasekit.labelled.continuation.cycle_branch": ("CycleBranch",),
     "phasekit.labelled.continuation.diagram": ("diagram",),
+    "phasekit.labelled.continuation.harmonic_record": ("fourier",),
     "phasekit.labelled.continuation.periodic_orbit": ("periodic_orbit",),
     "phasekit.labelled.figure_eights": ("figure_eights",),
     "phasekit.labelled.families": ("orbit_families",),
@@ -141,8 +152,10 @@ _MODULES = {
     "phasekit.systems.field_analogues": ("JosephsonJunction", "SpinOrbit"),
     "phasekit.systems.harmonic": ("Harmonic",),
     "phasekit.systems.perturbed": ("Perturbed",),
+    "phasekit.systems.term": ("Term",),
     "phasekit.systems.analogues": ("ParticleOnCircle", "Pendulum", "StonerWohlfarth"),
     "phasekit.labelled.basins": ("attractors", "basins"),
+    "phasekit.labelled.edge_state": ("edge_state",),
     "phasekit.labelled.driven": ("lyapunov", "stroboscopic"),
     "phasekit.labelled.energy": (
         "curvature",
@@ -156,9 +169,11 @@ _MODULES = {
     "phasekit.systems.disk": ("GyroRotorDisk",),
     "phasekit.labelled.manifolds": ("manifolds",),
     "phasekit.labelled.motion": ("flow", "separatrix_motion"),
+    "phasekit.labelled.noise": ("first_passage",),
     "phasekit.labelled.nullclines": ("nullclines",),
     "phasekit.labelled.orbit_diagram": ("orbit_diagram",),
     "phasekit.labelled.orbits": ("action_angle", "orbits", "state_of"),
+    "phasekit.labelled.periodic_orbits": ("periodic_orbits",),
     "phasekit.labelled.perturbed": (
         "capture",
         "critical_torque",
@@ -176,8 +191,11 @@ _MODULES = {
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
     "phasekit.labelled.run_up": ("run_up",),
     "phasekit.labelled.section": ("poincare_section",),
+    "phasekit.labelled.spectrum": ("spectrum",),
+    "phasekit.labelled.warm": ("warm",),
     "phasekit.maps.whole": ("open_map",),
     "phasekit.maps.sweep": ("sweep",),
+    "phasekit.motion.events": ("Event",),
     "phasekit.systems.parameter": ("parameter",),
     "phasekit.systems.statement": ("angle", "coordinate"),
     "phasekit.systems.system": ("Coefficients", "Reduced", "System"),
@@ -212,12 +230,14 @@ _ELSEWHERE = {
         ("simulate", "simulation", "integrate", "solve_ivp", "odeint", "trajectory", "motion"),
         "flow",
     ),
-    **dict.fromkeys(("limit_cycle", "limit_cycles", "cycle", "cycles"), "periodic_orbit"),
+    **dict.fromkeys(("limit_cycle", "cycle"), "periodic_orbit"),
+    **dict.fromkeys(("limit_cycles", "cycles"), "periodic_orbits"),
     **dict.fromkeys(("fixed_points", "fixedpoints", "steady_states", "roots"), "equilibria"),
     **dict.fromkeys(("continue_", "continuate", "equilibrium_curve", "branch"), "continuation"),
     **dict.fromkeys(("ODE", "Model", "Map"), "Problem"),
     **dict.fromkeys(("lyapunov_exponents", "lyapunovs", "lyapunov_spectrum"), "lyapunov"),
     **dict.fromkeys(("basins_of_attraction", "basin"), "basins"),
+    **dict.fromkeys(("fft", "power_spectrum", "psd", "periodogram", "welch"), "spectrum"),
     **dict.fromkeys(("poincare_map", "poincare", "section"), "poincare_section"),
 }
 

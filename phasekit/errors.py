@@ -47,7 +47,7 @@ class ArgumentError(ParameterError, TypeError):
     ...     pk.melnikov(pk.Perturbed(pk.Pendulum(length=1.0)), side="left")
     ... except pk.ParameterError as error:
     ...     print(error)
-    melnikov() got an unexpected keyword argument 'side'; its arguments are perturbed
+    melnikov() got an unexpected keyword argument 'side'; its arguments are system
     """
 
 
@@ -136,6 +136,28 @@ class FlowEquilibriumKind(IntEnum):
     UNSTABLE_NODE = 5
     STABLE_FOCUS = 6
     UNSTABLE_FOCUS = 7
+
+
+class MergerKind(IntEnum):
+    """How equilibria merge or cross at a critical value of a parameter.
+
+    A branch point is one of which it is not decided how.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> well = pk.Potential("x^4/4 - m*x^2/2", "x", {"m": 1.0})
+    >>> kind = pk.critical(well, "m", (-1.0, 1.0)).critical_fold_kind
+    >>> [pk.MergerKind(code).name for code in kind.values]
+    ['PITCHFORK']
+    """
+
+    ABSENT = 0
+    FOLD = 1
+    PITCHFORK = 2
+    TRANSCRITICAL = 3
+    CUSP = 4
+    BRANCH_POINT = 5
 
 
 class AttractorKind(IntEnum):

@@ -1,15 +1,18 @@
 """What extensions are made of: quantities, torques of a frame, special points, pictures.
 
-Systems need none of it: a class with `phasekit.System`, `phasekit.parameter` and a law is one. The
-contributing guide shows an example of each extension.
+Systems need none of it: a class with `phasekit.System`, `phasekit.parameter` and a law is one, and
+a class with `phasekit.Term` and a force is a term. The contributing guide has an example of each.
 
 ========================  ==========================================================================
 a quantity                `Quantity`, `Pass`, `add_quantity`; its rung: `Trigonometric`,
                           `Conservative`, `Routhian`
+where it is computed      `Standing`, a rung with the `Trait`s that terms bring in
 a torque of the frame     `Rate`
-a kind of special point   `PointKind`, `add_point_kind`; on curves in two parameters `CurveTest`,
-                          `add_curve_test`, and the curve that it is of: `FOLD`, `HOPF`, `BRANCH`,
-                          of maps `FLIP`, `TORUS`
+a kind of special point   `PointKind`, `add_point_kind`; where its function is zero, by
+                          `add_point_test`: a `CurveTest` along `EQUILIBRIUM` branches or the
+                          curves `FOLD`, `HOPF`, `BRANCH`, of maps `FLIP`, `TORUS`; an `OrbitTest`
+                          along a ``"cycle"`` family or the curves ``"fold_of_cycles"``,
+                          ``"period_doubling"``, ``"torus"``
 a picture                 `axes_for`, `label`, `shown`
 ========================  ==========================================================================
 
@@ -20,13 +23,21 @@ Examples
 ('Quantity', 'Pass')
 """
 
-from phasekit.bifurcation.continuation.kernels.defining import BRANCH, FLIP, FOLD, HOPF, TORUS
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BRANCH,
+    EQUILIBRIUM,
+    FLIP,
+    FOLD,
+    HOPF,
+    TORUS,
+)
+from phasekit.bifurcation.continuation.periodic.on_curves import OrbitTest
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
-from phasekit.bifurcation.continuation.points.curve_tests import add as add_curve_test
 from phasekit.bifurcation.special_points import PointKind
+from phasekit.bifurcation.special_points import look_for as add_point_test
 from phasekit.bifurcation.special_points import register as add_point_kind
-from phasekit.laws.ladder import Conservative, Routhian
-from phasekit.laws.perturbed import Rate
+from phasekit.laws.ladder import Conservative, Routhian, Standing, Trait
+from phasekit.laws.terms import Rate
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot.parts.labels import label, shown
 from phasekit.plot.parts.style import axes_for
@@ -35,20 +46,24 @@ from phasekit.table.row import Pass, Quantity
 
 __all__ = [
     "BRANCH",
+    "EQUILIBRIUM",
     "FLIP",
     "FOLD",
     "HOPF",
     "TORUS",
     "Conservative",
     "CurveTest",
+    "OrbitTest",
     "Pass",
     "PointKind",
     "Quantity",
     "Rate",
     "Routhian",
+    "Standing",
+    "Trait",
     "Trigonometric",
-    "add_curve_test",
     "add_point_kind",
+    "add_point_test",
     "add_quantity",
     "axes_for",
     "label",

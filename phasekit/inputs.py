@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import ArgumentError, ParameterError
+from phasekit.spellings import respelled
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -269,6 +270,7 @@ def call_checked(function: Function, name: str = "") -> Function:
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:
+        kwargs = respelled(function.__name__, kwargs)
         try:
             signature.bind(*args, **kwargs)
         except TypeError as error:

@@ -13,17 +13,10 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-# numba's cache of a kernel knows the file of that kernel only, not the files that it calls into:
-# after an edit there, old and new machine code would run side by side. So tests cache by content.
-COMPILED = (
-    text
-    for path in sorted((Path(__file__).parents[1] / "phasekit").rglob("*.py"))
-    if b"phasekit.numerics" in (text := path.read_bytes()) or path.parent.name == "numerics"
-)
-CONTENT = hashlib.sha256(b"".join(COMPILED))
+# Each tree has its own machine code, which is checked against the sources it was made from.
+TREE = hashlib.sha256(str(Path(__file__).parents[1]).encode()).hexdigest()[:16]
 os.environ.setdefault(
-    "NUMBA_CACHE_DIR",
-    f"{tempfile.gettempdir()}/phasekit-{getpass.getuser()}/{CONTENT.hexdigest()[:16]}",
+    "PHASEKIT_CACHE_DIR", f"{tempfile.gettempdir()}/phasekit-{getpass.getuser()}/{TREE}"
 )
 
 # Hundreds of processes that tests start read the bytecode of phasekit that this one leaves.

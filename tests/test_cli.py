@@ -57,7 +57,7 @@ def test_version_and_help_are_quick():
         "import sys, runpy; sys.argv = ['phasekit', '--version']\n"
         "from phasekit.cli import main\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
-        "heavy = {'numpy', 'numba', 'xarray', 'matplotlib'} & set(sys.modules)\n"
+        "heavy = {'numpy', 'llvmlite', 'xarray', 'matplotlib'} & set(sys.modules)\n"
         "assert not heavy, heavy\n"
     )
     result = subprocess.run(

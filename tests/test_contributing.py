@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.points import curve_tests
+from phasekit.bifurcation import special_points
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.request import ask
 from phasekit.laws.ladder import Conservative
@@ -22,6 +22,7 @@ from phasekit.maps.place import place_of
 from phasekit.maps.run import sweep_into
 from phasekit.systems.registry import models
 from phasekit.systems.system import MODELS
+from phasekit.systems.term import TERMS
 from phasekit.table import quantities
 from phasekit.table.row import Pass, Quantity
 
@@ -39,10 +40,10 @@ def registries(monkeypatch):
     """The tables and registries as they were before."""
     known, rows = dict(models()), dict(quantities.ROWS)
     monkeypatch.setattr(quantities.TABLE, "passes", quantities.TABLE.passes)
-    kinds = dict(KINDS)
-    monkeypatch.setattr(curve_tests, "TESTS", list(curve_tests.TESTS))
+    kinds, terms = dict(KINDS), dict(TERMS)
+    monkeypatch.setattr(special_points, "TESTS", list(special_points.TESTS))
     yield
-    every = ((MODELS, known), (quantities.ROWS, rows), (KINDS, kinds))
+    every = ((MODELS, known), (TERMS, terms), (quantities.ROWS, rows), (KINDS, kinds))
     for registry, before in every:
         registry.clear()
         registry.update(before)
@@ -65,6 +66,7 @@ def test_every_example_of_the_guide_is_run_here():
     assert with_code == {
         "A new quantity",
         "A new system",
+        "A new term",
         "A new perturbation",
         "A new picture",
         "Your own equations, with damping",
@@ -86,6 +88,16 @@ def test_a_quantity_is_a_row_and_a_pass():
         assert kinds.values.tolist() == [pk.OrbitKind.ROTATION, pk.OrbitKind.LIBRATION]
     with pytest.raises(pk.ParameterError, match="wants a system with coefficients"):
         pk.sweep(pk.Potential("k*x**2", "x", {"k": 1.0}), k=[1.0, 2.0], of="rotation_speed")
+
+
+def test_a_term_is_one_class():
+    """Up to the first turn of a swing, dry friction takes its force times the way."""
+    names = run("A new term")
+    assert names["ds"].isel(mu=1).phasekit.system().terms[0] == names["DryFriction"](mu=0.2)
+    phi, dphi = (names["motion"][f"motion_{name}"].values for name in ("phi", "dphi"))
+    last = np.flatnonzero(dphi > 0.0)[0] - 1
+    lost = 9.80665 * (np.cos(phi[last]) - np.cos(1.0)) - 0.5 * dphi[last] ** 2
+    assert lost == pytest.approx(0.3 * (1.0 - phi[last]), rel=1e-3)
 
 
 def test_a_quantity_of_any_potential_is_one_of_the_disk_too():

@@ -22,7 +22,8 @@ for part in PARTS:
     (BLOCKS[title],) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 (START,) = re.findall(r"```python\n(.*?)```", HEAD, re.DOTALL)
 TITLES = list(BLOCKS)
-SECOND_CENTER, DIAGRAM, MAP, PERIOD, LOOP, POTENTIAL, HOPF, PORTRAITS, FORCE, LARGE = TITLES
+SECOND_CENTER, DIAGRAM, MAP, PERIOD, LOOP, POTENTIAL, HOPF, PORTRAITS, FORCE, LARGE = TITLES[:10]
+NEURON, FORCED, TIPPING = TITLES[10:13]
 
 
 @pytest.fixture(autouse=True)
@@ -173,3 +174,49 @@ def test_j_large_map(monkeypatch, capsys):
         np.testing.assert_array_equal(ds[name], whole[name])
     assert 0.0 < names["share"] < 1.0
     assert int(re.search(r'"RECIPE_SIDE", (\d+)', BLOCKS[LARGE])[1]) ** 2 >= 10**7
+
+
+@pytest.mark.slow
+def test_k_neuron():
+    """The values of MatCont's Morris-Lecar neuron."""
+    names = run(NEURON)
+    found = [names[name].parameters["I"] for name in ("ignites", "ceases", "starts", "ends")]
+    np.testing.assert_allclose(found, [93.85762, 212.01882, 88.29325, 216.8998], rtol=1e-6)
+    at = int(np.argmin(np.abs(names["firing"].points.I.values - 150.0)))
+    assert 5.0 < names["rate"][at].item() < 30.0
+
+
+@pytest.mark.slow
+def test_l_forced_oscillator():
+    """Against SciPy's motion, whose third harmonic is a sum over a period."""
+    from scipy.integrate import solve_ivp
+
+    names = run(FORCED)
+    w = 0.55
+    period = 2 * np.pi / w
+    t = 60 * period + period * np.arange(400) / 400
+    x = solve_ivp(
+        lambda t, x: [x[1], np.cos(w * t) - 0.1 * x[1] - x[0] - x[0] ** 3], (0, t[-1]), [0, 0],
+        t_eval=t, rtol=1e-10, atol=1e-12,
+    ).y[0]  # fmt: skip
+    for k in (1, 2, 3):
+        size = 2 * abs(np.mean(x * np.exp(-1j * k * w * t)))
+        found = names["harmonics"].amplitude_x.sel(harmonic=k).item()
+        assert found == pytest.approx(size, abs=1e-6)
+    assert names["lines"].amplitude_x.dims == ("w", "frequency")
+
+
+@pytest.mark.slow
+def test_m_tipping():
+    """The share that tips early, by Euler's steps in NumPy."""
+    names = run(TIPPING)
+    assert names["limit"] == pytest.approx(2 / (3 * np.sqrt(3)), rel=1e-9)
+    rng = np.random.default_rng(1)
+    x, h = np.full(4000, -1.0), 0.01
+    tipped = np.zeros(4000, bool)
+    for k in range(int(names["limit"] / 0.002 / h)):
+        x += h * (x - x**3 + 0.002 * k * h) + np.sqrt(0.02 * h) * rng.standard_normal(4000)
+        tipped |= x > 0.5
+    share = tipped.mean()
+    assert 0.02 < share < 0.98
+    assert names["early"] == pytest.approx(share, abs=4 * np.sqrt(share * (1 - share) / 800))

@@ -195,7 +195,7 @@ def test_each_row_of_the_table_is_on_its_page_with_its_group(pages):
             (line,) = (
                 x
                 for x in sections[group].splitlines()
-                if x.endswith(f"`{one.function.replace(':', '.')}` |") and one.of.called in x
+                if x.endswith(f"`{one.function.replace(':', '.')}` |") and one.standing.called in x
             )
             assert all(f"`{name}`" in line for name in one.inputs if name != "law")
 
@@ -232,7 +232,7 @@ def test_every_kind_of_special_point_has_a_line(pages):
 def test_every_code_has_a_line(pages):
     enums = [thing for name in pk.__all__ if inspect.isclass(thing := getattr(pk, name))]
     enums = [thing for thing in enums if issubclass(thing, IntEnum)]
-    assert len(enums) == 9
+    assert len(enums) == 10
     for cls in enums:
         section = pages["codes"].partition(f"## {cls.__name__}\n")[2].partition("\n## ")[0]
         lines = [f"| {one.value} | `{one.name.lower()}` |" for one in cls]

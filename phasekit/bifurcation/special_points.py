@@ -7,7 +7,7 @@ the field's ([Kuznetsov2004]; the names that AUTO and MatCont use).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal, Protocol, TypeVar
 
 #: What `detect=` asks for.
 Group = Literal["fold", "branch_point", "hopf", "neutral_saddle"]
@@ -63,6 +63,46 @@ def register(kind: PointKind) -> PointKind:
         raise ValueError(f"the special point {kind.name!r} is registered already")
     KINDS[kind.name] = kind
     return kind
+
+
+class PointTest(Protocol):
+    """A function along what is followed, whose zeros are special points of a kind."""
+
+    @property
+    def kind(self) -> str:
+        """Of the registry."""
+
+    @property
+    def along(self) -> int | str:
+        """Along what it is looked for: equilibria, a curve of a kind, cycles, a curve of these."""
+
+
+TESTS: list[PointTest] = []
+T = TypeVar("T", bound=PointTest)
+
+
+def look_for(test: T) -> T:
+    """Look for the zeros of one more function along branches, curves or families.
+
+    Raises
+    ------
+    ValueError
+        If its kind is not registered.
+    """
+    if test.kind not in KINDS:
+        raise ValueError(f"no special point is a {test.kind!r}")
+    TESTS.append(test)
+    return test
+
+
+def functions_along(along: int | str) -> list[Any]:
+    """The functions that are looked for along something."""
+    return [test for test in TESTS if test.along == along]
+
+
+def looked_for(along: int | str) -> tuple[str, ...]:
+    """Kinds that are looked for along something by a function of theirs."""
+    return tuple(dict.fromkeys(test.kind for test in functions_along(along)))
 
 
 BOTH = ("continuation", "branches")

@@ -132,7 +132,7 @@ def compute(request: Request, progress: bool | None = False) -> xr.Dataset:
         }
         filled.update(results)
         arrays = {name: grid.aligned(name, part.dims) for name in part.inputs}
-        for tile in tiles(shape):
+        for tile in tiles(shape, part.most_cells):
             task = functools.partial(
                 fill, type(request.system), part.passes, arrays, results, tile, columns
             )

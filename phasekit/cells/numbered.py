@@ -17,8 +17,7 @@ import numpy as np
 
 from phasekit.labels.coordinates import LABELS, Labels
 from phasekit.labels.grid import refuse_too_large
-from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import PerturbedConservative, PerturbedRouthian
+from phasekit.laws.ladder import Conservative, Routhian, Standing
 from phasekit.systems.system import System
 from phasekit.table.numerical import NUMERICAL_ROWS
 from phasekit.table.quantities import ROWS, variant
@@ -37,6 +36,8 @@ _POINTWISE = (
     "energy_integral",
     "phase_velocity",
 )
+#: Groups that are numerical at constant momenta as well.
+_ALONG = ("separatrices", "orbits", "action_angle", "state_of")
 #: What stands where a cell has fewer than others, in place of NaN or 0.
 _EMPTY = {"kind": 0, "loop": 0}
 
@@ -63,12 +64,22 @@ def fitted(
     lines = [line for one in passes for line in (one, *one.behind)]
     if (resting or any(map(is_numbered, rows))) and not any(map(_finds, lines)):
         passes = [*passes, search]
-    searched = (Conservative, PerturbedConservative)
-    if issubclass(system.rung, searched) and not issubclass(system.rung, PerturbedRouthian):
-        groups = dict.fromkeys(row.group for row in rows)
-        rows = [*rows, *(row for group in groups for row in NUMERICAL_ROWS.get(group, ()))]
-    labels = _labels({})
-    return [_worded(row, system, labels) for row in rows], [_telling(p, system) for p in passes]
+    rows = [_worded(row, system, _labels({}, row)) for row in with_errors(system, rows)]
+    return rows, [_telling(p, system) for p in passes]
+
+
+def with_errors(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+    """Return rows with those that say how sure they are, where they are numerical."""
+    where = system.standing
+    groups = list(dict.fromkeys(row.group for row in rows))
+    if where == Standing(Routhian):  # whose equilibria and motions are not numerical
+        where, groups = Standing(Conservative), [group for group in groups if group in _ALONG]
+    elif not issubclass(where.rung, Conservative):
+        return rows
+    errors = [row for group in groups for row in NUMERICAL_ROWS.get(group, ())]
+    there = {row.name for row in rows}
+    more = (row for row in errors if where.is_within(row.of) and row.name not in there)
+    return [*rows, *more]
 
 
 def is_numbered(row: Quantity) -> bool:
@@ -78,13 +89,16 @@ def is_numbered(row: Quantity) -> bool:
 
 def sized(rows: Iterable[Quantity], widths: Widths) -> tuple[Quantity, ...]:
     """Return rows with so many numbers on their dims."""
-    labels = _labels(widths)
-    return tuple(replace(row, labels=labels) if is_numbered(row) else row for row in rows)
+    return tuple(
+        replace(row, labels=_labels(widths, row)) if is_numbered(row) else row for row in rows
+    )
 
 
-def _labels(widths: Widths) -> dict[str, Labels]:
-    numbers = {dim: (range(widths.get(dim, 0)), text) for dim, text in NUMBERED.items()}
-    return {**LABELS, **numbers}
+def _labels(widths: Widths, row: Quantity) -> dict[str, Labels]:
+    labels = row.labels or LABELS
+    own = NUMBERED if row.labels is None else {}
+    texts = {dim: own.get(dim, labels[dim][1]) for dim in NUMBERED}
+    return {**labels, **{dim: (range(widths.get(dim, 0)), text) for dim, text in texts.items()}}
 
 
 def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
@@ -93,7 +107,7 @@ def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
 
 
 def _worded(row: Quantity, system: System, labels: dict[str, Labels]) -> Quantity:
-    words: dict[str, Any] = {"labels": labels, **variant(row, system.rung)}
+    words: dict[str, Any] = {"labels": labels, **variant(row, system.standing.rung)}
     words |= system.law.words(row.name, row.units, row.long_name)
     if row.name == "n_equilibria":
         words["dtype"] = "int16"
@@ -112,9 +126,10 @@ def measured(one: Pass, found: dict[str, Any], widths: dict[str, int]) -> dict[s
 
     Functions that start from these, and reduce over them, need not care for cells without any.
     """
-    finds = not any(name in ROWS and is_numbered(ROWS[name]) for name in one.inputs)
+    rows = {row.name: row for row in one.rows} or ROWS
+    finds = not any(name in rows and is_numbered(rows[name]) for name in one.inputs)
     for name in found:
-        row = ROWS.get(name)
+        row = rows.get(name)
         if row is None or not is_numbered(row):
             continue
         tail = found[name].shape[found[name].ndim - len(row.dims) :]
@@ -134,7 +149,7 @@ def resized(values: Any, row: Quantity, tail: tuple[int, ...]) -> Any:
         return values
     values = values[(..., *map(slice, tail))]
     more = [(0, n - m) for n, m in zip(tail, values.shape[first:], strict=True)]
-    empty = _EMPTY.get(row.name, np.nan if values.dtype.kind == "f" else 0)
+    empty = _EMPTY.get(row.name, np.nan if values.dtype.kind in "fc" else 0)
     return np.pad(values, [(0, 0)] * first + more, constant_values=empty)
 
 
@@ -238,10 +253,10 @@ def _telling(one: Pass, system: System) -> Pass:
     behind = tuple(_telling(line, system) for line in one.behind)
     if {"orbits", "motion", "separatrices"}.isdisjoint(one.groups):
         return replace(one, behind=behind) if behind else one
-    return replace(one, function=functools.partial(_told, one, repr(system)), behind=behind)
+    return replace(one, function=functools.partial(_with_warning, one, repr(system)), behind=behind)
 
 
-def _told(one: Pass, text: str, *arrays: Any) -> Any:
+def _with_warning(one: Pass, text: str, *arrays: Any) -> Any:
     """Call a pass, and say how many results it could not compute, and why."""
     result = one.resolved(*arrays)
     for part in result if len(one.groups) > 1 else (result,):

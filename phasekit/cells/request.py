@@ -15,17 +15,12 @@ from phasekit.cells import numbered
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.grid import Grid, make_grid
-from phasekit.laws.ladder import Law
-from phasekit.laws.perturbed import (
-    PerturbedConservative,
-    TiltedConservative,
-    TiltedTrigonometric,
-)
-from phasekit.laws.trigonometric import Trigonometric
+from phasekit.labels.grid import TILE_CELLS, Grid, make_grid
+from phasekit.laws.equations import Equations, equations_of
+from phasekit.laws.ladder import Conservative, Law, Standing, Trait
 from phasekit.systems.system import System, stands_on
 from phasekit.table.quantities import ROWS, TABLE
-from phasekit.table.row import Pass, Quantity, depth
+from phasekit.table.row import Pass, Quantity, Table
 
 
 @dataclass(frozen=True)
@@ -37,6 +32,11 @@ class Part:
     rows: tuple[Quantity, ...]
     inputs: tuple[str, ...]
 
+    @property
+    def most_cells(self) -> int:
+        """Cells that are computed at a time at most."""
+        return min((TILE_CELLS, *(row.most_cells for row in self.rows)))
+
 
 @dataclass(frozen=True)
 class Request:
@@ -47,12 +47,19 @@ class Request:
     rows: tuple[Quantity, ...]
     needs: Mapping[Pass, Sequence[str]]  # the inputs on which each pass depends, in the end
     parts: tuple[Part, ...]
+    #: Of a system with states of its own that of its law.
+    table: Table = TABLE
 
     @property
     def is_open(self) -> bool:
         """Whether equilibria are numbered, so that the length of their dims is yet to be found."""
-        rung = self.system.rung
-        return not rung.labels_fixed and TABLE.offers(rung, "equilibria")
+        where = self.system.standing
+        return not where.rung.labels_fixed and self.table.offers(where, "equilibria")
+
+    @property
+    def states(self) -> frozenset[str]:
+        """Names of inputs that come with the quantities that need them."""
+        return frozenset({*STATES, *(self.grid.inputs.keys() - self.system.parameters.keys())})
 
     def sized(self, widths: Mapping[str, int]) -> Request:
         """Return it with so many equilibria and saddles."""
@@ -69,6 +76,7 @@ def ask(
     axis: Mapping[str, str] | None = None,
     called: Mapping[str, str] | None = None,
     order: Sequence[str] = (),
+    table: Table = TABLE,
 ) -> Request:
     """Say what is computed where, and refuse what cannot be.
 
@@ -88,14 +96,17 @@ def ask(
         What messages call a state, where that is not its own name.
     order : sequence of str
         Dims that come first.
+    table : Table
+        Where rows and lines stand.
 
     Raises
     ------
     ParameterError
         If nothing computes a row, an input is missing, or dims disagree.
     """
-    passes = passes or passes_of(system, rows)
-    rows, passes = fitted(system, rows, passes)
+    passes = passes or passes_of(system, rows, table=table)
+    if table is TABLE:
+        rows, passes = fitted(system, rows, passes)
     inputs = {**system.parameters, **(states or {})}
     grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = needs_of(system, passes)
@@ -108,6 +119,9 @@ def ask(
     titles, dims = {row.name for row in rows}, {dim for row in rows for dim in row.dims}
     if titles & dims or not grid.sizes.keys().isdisjoint(titles | dims):
         raise _taken(grid, rows, titles, dims)
+    if table is not TABLE and (both := sorted(titles & inputs.keys())):
+        wants = f"quantities of other names than the parameter {both[0]}; rename that"
+        raise bad("of", both[0], wants)
     on: dict[tuple[str, ...], list[Pass]] = {}
     for one, leaves in needs.items():
         on.setdefault(grid.dims_of(leaves), []).append(one)
@@ -122,7 +136,7 @@ def ask(
                 tuple(dict.fromkeys(name for one in together for name in needs[one])),
             )
         )
-    return Request(system, grid, tuple(rows), needs, tuple(parts))
+    return Request(system, grid, tuple(rows), needs, tuple(parts), table)
 
 
 def needs_of(system: System, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ...]]:
@@ -175,7 +189,7 @@ def _taken(grid: Grid, rows: Sequence[Quantity], names: set[str], dims: set[str]
 
 
 def passes_of(
-    system: System, rows: Iterable[Quantity], given: Iterable[str] = ()
+    system: System, rows: Iterable[Quantity], given: Iterable[str] = (), table: Table = TABLE
 ) -> tuple[Pass, ...]:
     """Return the passes that compute rows of the table for a system.
 
@@ -187,6 +201,8 @@ def passes_of(
         What to compute.
     given : iterable of str
         Names of states; a pass takes those of them that it can do without as well.
+    table : Table
+        Where rows and lines stand.
 
     Raises
     ------
@@ -194,43 +210,54 @@ def passes_of(
         If a row is not offered on the rung of the system's law.
     """
     rows = tuple(rows)
-    passes = TABLE.plan(rows, system.rung)
+    passes = table.plan(rows, system.standing)
     computed = {group for one in passes for group in one.groups}
     for row in rows:
         if row.group not in computed:
-            refuse(system, TABLE.rungs_of(row.group), row.group)
+            refuse(system, table.standings_of(row.group), row.group)
     states = {*given, *system.parameters}
     return tuple(
         one.bound(system, states)
-        if ROWS.keys().isdisjoint(one.inputs)
+        if table is not TABLE or ROWS.keys().isdisjoint(one.inputs)
         else _whole(one, system, states)
         for one in passes
     )
 
 
+def equations_for(system: System, group: str = "") -> Equations | None:
+    """The equations by which a group is answered; None where a line of the table answers it.
+
+    What no line bears of a system with terms is answered of its first-order equations.
+    """
+    law = equations_of(system)
+    if law is None and system.standing.traits is not None:
+        return None if TABLE.offers(system.standing, group) else system.equations()
+    return law
+
+
 def _whole(one: Pass, system: System, states: set[str]) -> Pass:
     """Return a line for one system with those that it starts from."""
-    lines, missing = TABLE.behind(one, system.rung)
+    lines, missing = TABLE.behind(one, system.standing)
     if missing is not None:
-        refuse(system, TABLE.rungs_of(missing), missing)
+        refuse(system, TABLE.standings_of(missing), missing)
     behind = tuple(other.bound(system, states) for other in lines)
     bound = one.bound(system, states)
     return replace(bound, behind=behind) if behind else bound
 
 
-def refuse(system: System, rungs: set[type[Law]], what: str) -> None:
-    """Raise a `ParameterError` that says on which of some rungs a system should stand."""
-    plain = {one for one in rungs if not issubclass(one, PerturbedConservative)}
-    own = (getattr(system, "system", None) or system).rung  # that of what is perturbed
-    near = {one for one in plain if issubclass(own, one)}
-    tilted = TiltedTrigonometric if issubclass(own, Trigonometric) else TiltedConservative
+def refuse(system: System, wanted: set[Standing], what: str) -> None:
+    """Raise a `ParameterError` that says where the law of a system should stand, of several."""
+    plain = {one for one in wanted if one.traits is None}
+    own = system.standing.rung
+    near = {one for one in plain if issubclass(own, one.rung)}
 
-    def order(one: type[Law]) -> tuple[int, str]:
-        return depth(one), one.__name__
+    def order(one: Standing) -> tuple[Any, str]:
+        return one.depth, one.rung.__name__
 
     # The nearest one below its own, else the most general, which asks for the least.
-    rung = max(near, key=order) if near else min(plain or rungs, key=order)
-    stands_on(system, rung, what, tilted=tilted in rungs)
+    where = max(near, key=order) if near else min(plain or wanted, key=order)
+    tilted = any(one.traits == Trait.TORQUED for one in wanted)
+    stands_on(system, where, what, tilted=tilted)
 
 
 def fitted(
@@ -243,30 +270,40 @@ def fitted(
     ParameterError
         If nothing is left of what was asked for, or the system lacks what it needs.
     """
-    kept = [row for row in rows if issubclass(system.rung, row.of)]
+    where = system.standing
+    kept = [row for row in rows if where.is_within(row.of)]
     if not rows:
         raise bad("system", system, "a system in a potential, for maps", system.answered_by)
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
-    if system.rung.labels_fixed:
+    if where.rung.labels_fixed:
         return worded(system, kept), passes
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
     labelled |= any(row.group == "equilibria" for row in kept)
-    if issubclass(system.rung, TiltedConservative):
+    if where.is_within(Standing(Conservative, Trait.TORQUED)):
         labelled |= any(row.group in ("orbits", "action_angle") for row in kept)
-    if issubclass(system.rung, PerturbedConservative) and not labelled:
+    followed = where.traits is not None or {row.group for row in kept} <= _FOLLOWED
+    if followed and not labelled:
+        kept = list(numbered.with_errors(system, kept))
         return numbered.worded(system, kept), passes  # no equilibrium is looked for
-    if not TABLE.offers(system.rung, "equilibria"):  # states of their own, and no labels
+    if not TABLE.offers(where, "equilibria"):  # states of their own, and no labels
         return kept, passes
     (search,) = passes_of(system, [ROWS["phi"]])
     return numbered.fitted(system, kept, passes, search)
 
 
+#: Groups of motions that are integrated, whatever the system.
+_FOLLOWED = {"lyapunov", "stroboscopic"}
+
+
 def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
     """Return rows with what a system's law alone says of them."""
-    if not system.rung.labels_fixed:
+    where = system.standing
+    if equations_of(system) is not None:
+        return rows  # which are of this law alone
+    if not where.rung.labels_fixed:
         return numbered.worded(system, rows)
-    if system.rung.words is Law.words:
+    if where.traits is None and where.rung.words is Law.words:
         return rows
     words: list[Any] = [system.law.words(row.name, row.units, row.long_name) for row in rows]
     return [replace(row, **own) for row, own in zip(rows, words, strict=True)]

@@ -14,6 +14,8 @@ import xarray as xr
 
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.laws.equations import equations_of
+from phasekit.laws.ladder import Map
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS
@@ -46,6 +48,12 @@ def input_attrs(system: System, name: str) -> dict[str, str]:
     for parameter in system.declared:
         if parameter.name == name:
             return {"long_name": parameter.long_name, "units": parameter.units}
+    own = name.removeprefix("state_")
+    law = equations_of(system)
+    if law is not None and own != name and own in law.states:
+        return {"long_name": f"{own} at the start", "units": law.units.get(own, "1")}
+    if name == "time" and system.rung is Map:
+        return {"long_name": "number of iterations", "units": "1"}
     if name in STATES:
         return {"long_name": STATES[name][1], "units": STATES[name][0]}
     return {}

@@ -20,7 +20,7 @@ from phasekit.labels.arguments import Value, bad, numeric, one_of
 from phasekit.labels.coordinates import AXES, LABELS
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import TABLE
-from phasekit.table.row import Pass, Quantity, depth
+from phasekit.table.row import Pass, Quantity
 
 CENTERS = tuple(name for name in LABELS["equilibrium"][0] if name.endswith("center"))
 SADDLES, SIDES = LABELS["saddle"][0], LABELS["side"][0]
@@ -54,6 +54,25 @@ def at_states(
         If an argument is unusable, or bare arrays differ in length.
     """
     system = as_system(system)
+    kept = kept_states(system, states)
+    return evaluate(
+        system,
+        rows,
+        passes,
+        states=kept,
+        axis={name: "point" for name in kept if name not in AXES},
+        called={name: argument for argument, (name, _) in states.items()},
+    )
+
+
+def kept_states(system: System, states: Mapping[str, tuple[str, Any]]) -> dict[str, Value]:
+    """States as numbers and arrays by name, from arguments as of `at_states`.
+
+    Raises
+    ------
+    ParameterError
+        If one is unusable, or bare arrays differ in length.
+    """
     kept: dict[str, Value] = {}
     length: dict[str, int] = {}
     for argument, (name, value) in states.items():
@@ -66,14 +85,7 @@ def at_states(
             f"{', '.join(length)}: got {got}, wants equal lengths, which pair point by point; "
             "for all combinations give DataArrays with dims of their own"
         )
-    return evaluate(
-        system,
-        rows,
-        passes,
-        states=kept,
-        axis={name: "point" for name in kept if name not in AXES},
-        called={name: argument for argument, (name, _) in states.items()},
-    )
+    return kept
 
 
 def pass_from(system: System, group: str, start: str, **options: Any) -> Noted:
@@ -100,26 +112,25 @@ def pass_from(system: System, group: str, start: str, **options: Any) -> Noted:
         for one in TABLE.passes
         if group in one.groups and start in one.inputs and set(one.options) == set(options)
     ]
-    rungs = [one.of for one in fitting if issubclass(system.rung, one.of)]
-    if not rungs:
-        refuse(system, {one.of for one in fitting}, f"{group} from {start}")
-    best = max(rungs, key=depth)
-    (one,) = (one for one in fitting if one.of is best)
-    chosen = {name: _option(system, name, value) for name, value in options.items()}
+    able = [one for one in fitting if system.standing.is_within(one.of)]
+    if not able:
+        refuse(system, {one.standing for one in fitting}, f"{group} from {start}")
+    one = max(able, key=lambda line: line.standing.depth)
+    chosen = {name: option_of(system, name, value) for name, value in options.items()}
     notes = {
-        name: str(system.rung.default[name] if value is None else value)
+        name: str(system.standing.rung.default[name] if value is None else value)
         for name, value in options.items()
     }
     return one.bound(system, set(), chosen), notes
 
 
-def _option(system: System, name: str, value: Any) -> int | None:
-    """Return an option as the number that array functions take; None where nothing is said."""
+def option_of(system: System, name: str, value: Any) -> int | None:
+    """Return a center, saddle or side as its number; None where nothing is said."""
     if name == "side":
         return one_of(name, value, SIDES)
     if value is None:
         return None
-    if system.rung.labels_fixed:
+    if system.standing.rung.labels_fixed:
         return one_of(name, value, {"center": CENTERS, "saddle": SADDLES}[name])
     if not is_whole(value) or value < 0:
         dim = {"center": "equilibrium", "saddle": "saddle"}[name]

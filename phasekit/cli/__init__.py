@@ -20,13 +20,15 @@ from phasekit.version import __version__
 
 COMMANDS = {
     "demo": "map a rotor; draw and store the map",
-    "portrait": "draw the phase portrait of one system",
+    "portrait": "draw the phase portrait of a system",
     "basins": "draw the basins of attraction of a damped system",
     "run-up": "run a disk up and draw its bearing forces",
     "diagram": "draw the equilibria against one parameter",
+    "flow": "follow a motion; draw it or write its numbers",
     "explore": "write the interactive page of a system and open it",
     "sweep": "compute the map that a TOML file describes, or resume it",
-    "info": "describe a stored map and its progress",
+    "info": "describe a stored map and its progress, or what phasekit runs with",
+    "warm": "compile beforehand what first calls would compile",
 }
 
 
@@ -66,11 +68,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="phasekit",
         usage="%(prog)s [-h] [--version] COMMAND ...",
-        description="Bifurcation and phase-space analysis of rotors and other oscillators.",
+        description="Bifurcation and phase-space analysis of equations of motion.",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="commands:\n"
         + "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
-        + "\n\nphasekit COMMAND --help says more.",
+        + "\n\nportrait, diagram, flow, explore and sweep take the file of a model (.toml, .ode):\n"
+        "  phasekit portrait model.toml --I 0.5\n"
+        "\nphasekit COMMAND --help says more.",
     )
     parser.add_argument("--version", action="version", version=f"phasekit {__version__}")
     parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)

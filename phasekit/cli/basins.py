@@ -13,7 +13,7 @@ from phasekit.errors import ParameterError
 def run(argv: Sequence[str]) -> None:
     """Draw the basins of one system into a file."""
     options, model, given = common.read_model(
-        "basins", "Draw the basins of attraction of one damped system.", argv, _options
+        "basins", "Draw the basins of attraction of one damped system.", argv, _options, files=False
     )
     path = common.output_file(options.out, overwrite=options.overwrite)
     system, swept = common.build(model, given)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import inspect
 import io
 import os
@@ -13,12 +14,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from phasekit.cli import Parser
+from phasekit.cli.models import model_called, read_file
 from phasekit.cli.values import glue_negative_values, is_range, number, span
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
 from phasekit.labels.units import UNITS
 from phasekit.systems.registry import models
-from phasekit.systems.system import System
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,32 +29,39 @@ if TYPE_CHECKING:
 PICTURES = (".pdf", ".png", ".svg")
 
 
-def model_called(name: Any) -> type[System]:
-    """Return the model of a name."""
-    known = models()
-    if not isinstance(name, str) or name not in known:
-        raise unknown("model", name, known)
-    return known[name]
-
-
 def read_model(
     command: str,
     description: str,
     argv: Sequence[str],
     more: Callable[[Parser], None],
-) -> tuple[Any, type[System], Mapping[str, str]]:
-    """Parse a command whose options are those of a model.
+    *,
+    files: bool = True,
+) -> tuple[Any, Any, Mapping[str, str]]:
+    """Parse a command whose options are those of a model, or of the file that comes first.
 
     Returns
     -------
     options, model, parameters
-        The command's own options; the model; the text given for each of its parameters.
+        The command's own options; the model: a class, or the system of a file; the text given for
+        each of its parameters.
     """
     words = glue_negative_values(list(argv))
+    if files:
+        description += (
+            " The system is that of FILE, a TOML table of equations or an .ode file, or one of "
+            f"phasekit's models. phasekit {command} FILE --help lists the parameters of a file."
+        )
+    if files and words and not words[0].startswith("-"):
+        return _read_file(command, description, words, more)
     first = Parser(prog=f"phasekit {command}", add_help=False, allow_abbrev=False)
     first.add_argument("--model", default="GyroRotorDisk")
     model = model_called(first.parse_known_args(words)[0].model)
-    parser = Parser(prog=f"phasekit {command}", description=description, allow_abbrev=False)
+    parser = Parser(
+        prog=f"phasekit {command}",
+        usage=f"%(prog)s {'[FILE | --model NAME]' if files else '[--model NAME]'} [OPTIONS]",
+        description=description,
+        allow_abbrev=False,
+    )
     parser.add_argument(
         "--model", default="GyroRotorDisk", help=f"one of {', '.join(models())} (%(default)s)"
     )
@@ -74,10 +82,51 @@ def read_model(
     return options, model, {name: text for name, text in given.items() if text is not None}
 
 
-def build(model: type[System], given: Mapping[str, str]) -> tuple[System, list[str]]:
+def _read_file(
+    command: str, description: str, words: Sequence[str], more: Callable[[Parser], None]
+) -> tuple[Any, Any, Mapping[str, str]]:
+    """The same of the system of a file."""
+    found = read_file(path_called("FILE", words[0]))
+    parser = Parser(
+        prog=f"phasekit {command} {words[0]}",
+        usage="%(prog)s [OPTIONS]",
+        description=description,
+        allow_abbrev=False,
+    )
+    group = parser.add_argument_group(f"parameters of {words[0]}")
+    more(parser)
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="NAME=VALUE",
+        help="a parameter by its name, also where an option has the same name",
+    )  # fmt: skip
+    declared = {p.name: p for p in found.system.declared if not p.optional}
+    for name, p in declared.items():
+        try:
+            group.add_argument(
+                f"--{name}", dest=f"parameter_{name}", metavar="VALUE",
+                help=f"{p.long_name}, {_fitting(p.units)}".replace("%", "%%"),
+            )  # fmt: skip
+        except argparse.ArgumentError:  # an option of the command has that name
+            continue
+    options = parser.parse_args(words[1:])
+    given = {name: getattr(options, f"parameter_{name}", None) for name in declared}
+    for text in options.set:
+        name, equals, value = text.partition("=")
+        if not equals or name.strip() not in declared:
+            raise ParameterError(
+                f"--set: got {text!r}, wants NAME=VALUE, NAME one of {', '.join(declared)}"
+            )
+        given[name.strip()] = value
+    options.duration_of_file, options.count_of_file = found.duration, found.times
+    return options, found.system, {name: text for name, text in given.items() if text is not None}
+
+
+def build(model: Any, given: Mapping[str, str]) -> tuple[Any, list[str]]:
     """Return the system, and the names of the parameters that are ranges."""
     units = {parameter.name: parameter.units for parameter in model.declared}
-    expected = inspect.signature(model).parameters.values()
+    units = {name: unit if unit in UNITS else "1" for name, unit in units.items()}
+    of_class = isinstance(model, type)
+    expected = inspect.signature(model).parameters.values() if of_class else ()
     missing = [f"--{p.name}" for p in expected if p.default is p.empty and p.name not in given]
     if missing:
         raise ParameterError(f"parameters: got none for {', '.join(missing)}, wants a value each")
@@ -86,11 +135,44 @@ def build(model: type[System], given: Mapping[str, str]) -> tuple[System, list[s
         name: span(name, text, units[name]) if name in swept else number(name, text, units[name])
         for name, text in given.items()
     }
-    return model(**values), swept
+    return (model if of_class else model.replace)(**values), swept
+
+
+def states_of(system: Any) -> tuple[dict[str, str], dict[str, float]]:
+    """Units of the states of a system by name, in their order, and where they begin."""
+    from phasekit.laws.equations import equations_of
+
+    law = equations_of(system)
+    if law is None:
+        return {"phi": "rad", "dphi": "s-1"}, {}
+    units = {name: law.units.get(name, "1") for name in law.states}
+    units |= {name: "rad" for name in law.periods if units[name] == "1"}
+    return units, dict(law.start)
+
+
+def state_of(system: Any, text: str, argument: str) -> dict[str, float]:
+    """The state that a user wrote: values in order, or NAME=VALUE, with commas between."""
+    units, found = states_of(system)
+    parts = [part.strip() for part in text.split(",") if part.strip()]
+    wants = f"{','.join(name.upper() for name in units)} or NAME=VALUE,..."
+    by_name = [part for part in parts if "=" in part]
+    if by_name and len(by_name) < len(parts) or not by_name and len(parts) != len(units):
+        raise ParameterError(f"{argument}: got {text!r}, wants {wants}")
+    pairs = (part.split("=", 1) for part in parts) if by_name else zip(units, parts, strict=True)
+    for name, value in pairs:
+        if name.strip() not in units:
+            raise unknown(f"{argument}: state", name.strip(), units)
+        unit = units[name.strip()]
+        found[name.strip()] = number(argument, value, unit if unit in UNITS else "1")
+    missing = [name for name in units if name not in found]
+    if missing:
+        raise ParameterError(f"{argument}: got {text!r}, wants a value for {', '.join(missing)}")
+    return {name: found[name] for name in units}
 
 
 def _fitting(units: str) -> str:
-    return " or ".join(UNITS.get(units) or ["a number"])
+    known = UNITS.get(units)
+    return " or ".join(known) if known else f"a number{'' if known is not None else f' in {units}'}"
 
 
 def add_units(parser: Parser) -> None:

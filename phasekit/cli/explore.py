@@ -49,7 +49,8 @@ def _model(argv: Sequence[str]) -> tuple[Any, Any]:
         argv,
         _options,
     )
-    if not given and EXAMPLE.keys() <= {parameter.name for parameter in model.declared}:
+    of_class = isinstance(model, type)
+    if of_class and not given and EXAMPLE.keys() <= {p.name for p in model.declared}:
         given = EXAMPLE
     system, swept = common.build(model, given)
     if swept:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from phasekit.cli import Parser, common
-from phasekit.cli.values import number
 from phasekit.errors import ParameterError
 
 
@@ -21,12 +21,13 @@ def run(argv: Sequence[str]) -> None:
         raise ParameterError(
             f"--{swept[0]}: got a range, wants one value; phasekit diagram draws ranges"
         )
-    orbits = [_orbit(text) for text in options.orbit]
+    orbits = [tuple(common.state_of(system, text, "--orbit").values()) for text in options.orbit]
     common.quiet_backend()
     from phasekit import plot
 
-    draw = plot.potential_well if options.well else plot.phase_portrait
-    drawn = draw(system, orbits=orbits, angles=options.angles, units=units)
+    draw: Any = plot.potential_well if options.well else plot.phase_portrait
+    shown = {"units": units} if units else {}
+    drawn = draw(system, orbits=orbits, angles=options.angles, **shown)
     common.save(drawn[0] if isinstance(drawn, tuple) else drawn, path)
     common.say(f"{system}\nwrote {path}")
 
@@ -36,18 +37,11 @@ def _options(parser: Parser) -> None:
         "--orbit",
         action="append",
         default=[],
-        metavar="PHI,DPHI",
-        help="draw the orbit from this angle and angular velocity, such as 45deg,15deg/s; may be "
-        "given several times",
+        metavar="STATE",
+        help="draw the orbit from this state, the angle and angular velocity such as 45deg,15deg/s "
+        "or the states of FILE in their order; may be given several times",
     )
     parser.add_argument("--well", action="store_true", help="draw the potential over the portrait")
     common.add_units(parser)
     parser.add_argument("--out", default="portrait.png", help="picture file (%(default)s)")
     parser.add_argument("--overwrite", action="store_true", help="replace an existing file")
-
-
-def _orbit(text: str) -> tuple[float, float]:
-    phi, comma, dphi = text.partition(",")
-    if not comma:
-        raise ParameterError(f"--orbit: got {text!r}, wants PHI,DPHI, such as 45deg,15deg/s")
-    return number("--orbit", phi, "rad"), number("--orbit", dphi, "s-1")

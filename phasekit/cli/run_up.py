@@ -17,6 +17,7 @@ def run(argv: Sequence[str]) -> None:
         "Run a disk up from --omega1 to --to with a constant acceleration.",
         argv,
         _options,
+        files=False,
     )
     path = common.output_file(options.out, overwrite=options.overwrite)
     for name in ("m", "half_span"):

@@ -23,7 +23,6 @@ Numbers without a unit are in SI units and radians.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -31,15 +30,15 @@ from typing import Any
 import numpy as np
 
 from phasekit.cli import Parser, common
+from phasekit.cli.models import LAWS, OF_MAPS, model_called, model_of, read_file, read_toml
 from phasekit.cli.values import between, number
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
 from phasekit.labels.coordinates import STATES
+from phasekit.labels.units import UNITS
 from phasekit.systems.system import System
 
-KEYS = (
-    "model", "store", "of", "chunks", "workers", "scheduler", "dtype", "parameters", "axes",
-)  # fmt: skip
+KEYS = ("model", *OF_MAPS[:-1], "parameters", "axes")
 RANGE_KEYS = ("from", "to", "count", "spacing")
 
 #: Cells from which on a sweep says beforehand how large it will be and how long it will take.
@@ -144,17 +143,18 @@ def _say_estimate(job: Any, workers: Any) -> None:
 
 def read_recipe(path: Path) -> dict[str, Any]:
     """Read the file, and refuse what is not in its schema."""
-    try:
-        recipe = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise StoreError(f"{path} does not exist; name a TOML file that says what to map") from None
-    except IsADirectoryError:
-        raise StoreError(f"{path} is a folder; name a TOML file that says what to map") from None
-    except (ValueError, RecursionError) as error:  # TOMLDecodeError, and what tomllib lets through
-        raise ParameterError(f"{path}: not TOML: {error}") from None
-    for key in recipe:
+    recipe = read_toml(path, "that says what to map")
+    of_file = str(recipe.get("model", "")).lower().endswith((".toml", ".ode"))
+    if of_file:
+        recipe["model"] = str(path.parent / recipe["model"])
+    stated = any(law in recipe for law in LAWS if law != "model")
+    for key in recipe if not stated else ():
         if key not in KEYS:
             raise unknown(f"{path}: key", key, KEYS)
+    if stated:
+        recipe["system"] = model_of(recipe, str(path)).system
+    elif of_file:
+        recipe["system"] = read_file(Path(recipe["model"])).system
     for key in ("parameters", "axes"):
         if not isinstance(recipe.setdefault(key, {}), dict):
             raise ParameterError(f"{path}: {key}: got {recipe[key]!r}, wants a table [{key}]")
@@ -163,27 +163,29 @@ def read_recipe(path: Path) -> dict[str, Any]:
 
 def read_system(recipe: Mapping[str, Any]) -> tuple[System, dict[str, Any]]:
     """Return the system of a recipe and its axes, in their order."""
-    model = common.model_called(recipe.get("model", "GyroRotorDisk"))
+    model: Any = recipe.get("system") or model_called(recipe.get("model", "GyroRotorDisk"))
+    title = model.__name__ if isinstance(model, type) else "the model"
     declared = {parameter.name: parameter.units for parameter in model.declared}
     units = {**declared, **{name: state[0] for name, state in STATES.items()}}
     for table in ("parameters", "axes"):
         for name in recipe[table]:
             if name not in units:
-                raise unknown(f"{table}: parameter of {model.__name__}", name, units)
+                raise unknown(f"{table}: parameter of {title}", name, units)
     for name in recipe["axes"]:
-        if name in recipe["parameters"]:
+        if name in recipe["parameters"] and isinstance(model, type):
             raise ParameterError(f"{name}: got it in parameters and in axes, wants it once")
     if not recipe["axes"]:
         raise ParameterError(
             f"axes: got none, wants at least one of {', '.join(declared)}, "
             "such as beta = { from = 0, to = 1.5, count = 100 }"
         )
+    units = {name: unit if unit in UNITS else "1" for name, unit in units.items()}
     fixed = {name: number(name, text, units[name]) for name, text in recipe["parameters"].items()}
     axes = {name: _axis(name, value, units[name]) for name, value in recipe["axes"].items()}
     given = {name: value for name, value in {**fixed, **axes}.items() if name in declared}
     # Fixed states are numbers among the axes.
     states = {name: value for name, value in fixed.items() if name in STATES}
-    return model(**given), {**axes, **states}
+    return (model if isinstance(model, type) else model.replace)(**given), {**axes, **states}
 
 
 def _axis(name: str, value: Any, units: str) -> Any:

@@ -94,6 +94,23 @@ def span(name: str, text: str, units: str) -> NDArray[np.float64]:
     return between(name, first, last, count, units)
 
 
+def ends(name: str, text: str, units: str) -> tuple[float, float]:
+    """Read a range ``FROM:TO``; a count after it is left out, a unit on TO alone holds for both.
+
+    Examples
+    --------
+    >>> ends("I", "0:2", "1")
+    (0.0, 2.0)
+    """
+    parts = text.split(":")
+    if len(parts) not in (2, 3):
+        raise ParameterError(f"{name}: got {text!r}, wants FROM:TO, such as 0:2")
+    low, high = span(name, ":".join([*parts[:2], "2"]), units if units in UNITS else "1")
+    if not low < high:
+        raise ParameterError(f"{name}: got {text!r}, wants FROM < TO")
+    return float(low), float(high)
+
+
 def between(
     name: str, first: Any, last: Any, count: Any, units: str, spacing: Any = "linear"
 ) -> NDArray[np.float64]:

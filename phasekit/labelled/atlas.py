@@ -2,27 +2,34 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.exact.atlas import Curve, atlas
-from phasekit.bifurcation.exact.line import Path
-from phasekit.bifurcation.exact.meetings import Meeting
+from phasekit.bifurcation.along import Along, branches_along
+from phasekit.bifurcation.curves import Curve, Meeting
 from phasekit.bifurcation.special_points import KINDS
-from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.cells.request import worded
+from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import EquilibriumKind
-from phasekit.labels.arguments import FloatArray, bad, pair, unknown
+from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import LABEL_DTYPE, variable
-from phasekit.laws.perturbed import PerturbedTrigonometric
+from phasekit.laws.ladder import PERTURBED, Conservative, Law, Routhian, Standing
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.systems.system import System, as_system, stands_on
+from phasekit.systems.system import System, as_system
+from phasekit.systems.system import single as single_law
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import FROM_MOTION
 
+PROVED = (
+    "complete: every equilibrium for every value of the parameter in the span lies on one of the "
+    "curves; where they merge is proved by interval arithmetic in boxes of coordinate and "
+    "parameter, and how many there are between these values"
+)
 COMPLETE = (
     "complete: every equilibrium for every value of the parameter in the span lies on one of the "
     "curves; all mergers are found by exact arithmetic, those closer together than 1e-15 of the "
@@ -36,10 +43,12 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     Parameters
     ----------
     system : system
-        A single system; its own value of the parameter is not used.
+        A single system in a potential; its own value of the parameter is not used. Of a
+        `Perturbed` system the constant torque counts, and nothing else.
     parameter : str
         A parameter on which the equilibria depend: beta, e, a, omega1, r or g of a
-        `GyroRotorDisk`, lam, psi or Omega_sq of a `Reduced`, and so on.
+        `GyroRotorDisk`, lam, psi or Omega_sq of a `Reduced`, one of a `Potential`, torque of a
+        `Perturbed` system, and so on.
     span : (float, float)
         First and last value of the parameter, in its unit.
 
@@ -53,7 +62,9 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
         ``special_kind`` (fold, pitchfork, transcritical, branch_point, cusp, no_force, end),
         ``special_label`` (LP, BP, CP, NF, EP), ``special_value`` of the parameter,
         ``special_phi``, the coefficients ``unfolding``, ``quadratic`` and ``cubic`` of the normal
-        form, and ``on_branch`` (``special``, ``branch``).
+        form, and ``on_branch`` (``special``, ``branch``). ``complete`` says whether it is proved
+        that there are no other branches; where it is not, a RuntimeWarning says why. Labels of a
+        `Potential` are numbers from left to right.
 
     Raises
     ------
@@ -68,6 +79,13 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     [Basu2006]. Between them each label is one smooth arc, because its bracket holds exactly one
     root of ``V'``. A branch goes on through a fold, where the parameter turns back, and through a
     pitchfork, where two branches cross; it ends with the span, or where A = B = C = 0.
+
+    Those of any other potential, or under a torque, are proved by interval arithmetic: all zeros of
+    ``V' = V'' = 0`` in the plane of coordinate and parameter [MooreKearfottCloud2009], and of
+    ``V'/(x - x0)`` and its slope next to an equilibrium x0 that does not move, by symmetry or else.
+    A merger of more than two equilibria without such a symmetry is not decided: it is marked as
+    what the branches next to it do, and ``complete`` is False. On an interval branches end where
+    they leave it, on a line where they go to infinity.
 
     The normal form at a special point, with ``x = phi - phi*`` and ``mu = p - p*``: at a fold
     ``x'' = unfolding mu + quadratic x^2``, at a pitchfork ``x'' = unfolding mu x + cubic x^3``, at
@@ -84,20 +102,56 @@ def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Datas
     >>> ds.special_value.values[0].round(12).item(), ds.cubic.values[0].item()
     (1.0, -0.5)
     """
-    system, values = single(system, parameter)
-    formula = system.formula_inputs()
-    if not isinstance(parameter, str) or parameter not in formula:
-        raise unknown(f"parameter of branches for {type(system).__name__}", parameter, formula)
+    system, law, values = resting(system, parameter, what="branches")
     low, high = limits(system, parameter, "span", span)
-    path = Path(system.trigonometric(), values, parameter, (low, high))
+    found = branches_along(law, values, parameter, (low, high))
+    tell_missing("branches", parameter, found.missing)
+    return _dataset(system, parameter, found)
 
-    def coefficients(at: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        arrays = {name: np.full_like(at, value) for name, value in values.items()}
-        A, B, C = type(system).valid_coefficients({**arrays, parameter: at})
-        return A, B, C
 
-    curves, meetings = atlas(path, coefficients)
-    return _dataset(system, parameter, curves, meetings)
+def resting(
+    system: Any, *names: Any, what: str, called: str = "parameter"
+) -> tuple[System, Law, dict[str, float]]:
+    """Return a single system in a potential, its law, and what its equilibria depend on.
+
+    Where `names` are lam and psi, the reduced form of a system that has no such parameters.
+
+    Raises
+    ------
+    ParameterError
+        If it is no system in a potential, a parameter is an array, or a name is none of these.
+    """
+    found = as_system(system)
+    if found.standing.is_within(Trigonometric):
+        found, values = single(found, *names)
+        law: Law = found.trigonometric()
+    else:
+        perturbed = found.standing.is_within(Standing(Conservative, PERTURBED))
+        kept = found.standing.is_within(Routhian)
+        if not perturbed and not kept and not found.standing.is_within(Conservative):
+            raise bad("system", found, Conservative.called, "pk.continuation follows any other")
+        law, every = single_law(found)
+        law.check_searchable()
+        law = found.law_of_parameters if kept else law
+        own = [*found.formula_inputs(), *(["torque"] if perturbed else [])]
+        values = {name: every[name] for name in own if name in every}
+        if kept and "momentum" in values:  # on which alone the speed of the support depends
+            del values["omega1"]
+    for name in names:
+        if not isinstance(name, str) or name not in values:
+            raise unknown(f"{called} of {what} for {type(found).__name__}", name, values)
+    return found, law, values
+
+
+def tell_missing(what: str, parameter: str, missing: str, where: str = "") -> None:
+    """Say where it is not proved that there are no others."""
+    if missing:
+        warnings.warn(
+            f"{what}: there may be others than these{where}, because {missing} along {parameter}; "
+            "`complete` is False",
+            RuntimeWarning,
+            stacklevel=4,
+        )
 
 
 def single(system: Any, *names: Any) -> tuple[System, dict[str, float]]:
@@ -111,8 +165,6 @@ def single(system: Any, *names: Any) -> tuple[System, dict[str, float]]:
         If it is not a system, or a parameter is an array.
     """
     system = as_system(system)
-    if issubclass(system.rung, PerturbedTrigonometric):
-        stands_on(system, Trigonometric, "exact folds")
     own = system.formula_inputs()
     reduced = all(isinstance(name, str) and name in ("lam", "psi") for name in names)
     if reduced and not all(name in own for name in names):
@@ -145,44 +197,54 @@ def limits(system: System, parameter: str, argument: str, span: Any) -> tuple[fl
     return min(low, high), max(low, high)
 
 
-def _dataset(
-    system: System, parameter: str, curves: list[Curve], meetings: list[Meeting]
-) -> xr.Dataset:
+def _dataset(system: System, parameter: str, found: Along) -> xr.Dataset:
+    curves, meetings = found.curves, found.meetings
     dims = ("branch", "point")
     names = ("phi", "label", "kind", "energy", "curvature")
     fill = {"label": -1, "kind": int(EquilibriumKind.ABSENT)}
+    named = system.standing.is_within(Trigonometric)
+    dtypes = {"label": np.int8 if named else np.int16, "kind": np.int8}
     size = max((curve.vertices.at.size for curve in curves), default=0)
 
     def table(name: str) -> Any:
-        dtype = np.int8 if name in fill else np.float64
-        array = np.full((len(curves), size), fill.get(name, np.nan), dtype)
+        array = np.full((len(curves), size), fill.get(name, np.nan), dtypes.get(name, np.float64))
         for row, curve in zip(array, curves, strict=True):
             column = getattr(curve.vertices, name)
             row[: column.size] = column
         return array
 
-    data = {
-        name: variable(dims, table(name), _LABEL if name == "label" else ROWS[name].attrs)
-        for name in names
+    about = {
+        row.name: row.attrs for row in worded(system, [ROWS[n] for n in names if n != "label"])
     }
+    about["label"] = _LABEL if named else {"long_name": "number of the equilibrium"}
+    data = {name: variable(dims, table(name), about[name]) for name in names}
     closed = np.array([curve.closed for curve in curves], bool)
     data["closed"] = variable(("branch",), closed, {"long_name": "whether the branch is closed"})
     attrs = input_attrs(system, parameter)
-    data.update(_special(attrs, curves, meetings))
+    units = about["phi"]["units"], about["curvature"]["units"]
+    data.update(_special(attrs, units, named, curves, meetings))
+    data["complete"] = variable(
+        (), not found.missing, {"long_name": "whether these are proved to be all branches"}
+    )
     coords = {
         parameter: variable(dims, table("at"), attrs),
         "branch": variable(("branch",), np.arange(len(curves)), {"long_name": "branch"}),
     }
     for name, value in system.parameters.items():
-        if name != parameter:
+        if name != parameter and name not in data:  # where drag is quadratic, no normal form is
             coords[name] = variable((), value, input_attrs(system, name))
-    attributes = {**dataset_attrs(system), "parameter": parameter, "completeness": COMPLETE}
+    complete = COMPLETE if named else PROVED
+    complete = f"not complete: {found.missing}" if found.missing else complete
+    attributes = {**dataset_attrs(system), "parameter": parameter, "completeness": complete}
+    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
     return xr.Dataset(data, coords=coords, attrs=attributes)
 
 
 def _special(
-    attrs: Mapping[str, str], curves: list[Curve], meetings: list[Meeting]
-) -> dict[str, xr.Variable]:
+    attrs: Mapping[str, str], both: tuple[str, str], exact: bool, curves: list[Curve],
+    meetings: list[Meeting],
+) -> dict[str, xr.Variable]:  # fmt: skip
+    units, bend = both  # of coordinates and of curvatures
     dims = ("special",)
     kinds = [meeting.kind for meeting in meetings]
     on_branch = np.zeros((len(meetings), len(curves)), bool)
@@ -192,7 +254,10 @@ def _special(
         "special_value": ([m.at for m in meetings], {**attrs}),
         "special_phi": (
             [m.phi for m in meetings],
-            {"long_name": "angle of the special point", "units": "rad"},
+            {
+                "long_name": f"{'angle' if units == 'rad' else 'coordinate'} of the special point",
+                "units": units,
+            },
         ),
         "unfolding": (
             [m.normal_form.unfolding for m in meetings],
@@ -206,8 +271,8 @@ def _special(
             [m.normal_form.quadratic for m in meetings],
             {
                 "long_name": "coefficient of x^2 in the normal form",
-                "units": "s-2",
-                "equation": "-V'''/2 = -(3/2) A sin(phi) cos(phi)",
+                "units": bend,
+                "equation": "-V'''/2" + " = -(3/2) A sin(phi) cos(phi)" * exact,
                 "source": FROM_MOTION,
             },
         ),
@@ -215,8 +280,8 @@ def _special(
             [m.normal_form.cubic for m in meetings],
             {
                 "long_name": "coefficient of x^3 in the normal form",
-                "units": "s-2",
-                "equation": "-V''''/6 = -(1/2) A cos(2 phi)",
+                "units": bend,
+                "equation": "-V''''/6" + " = -(1/2) A cos(2 phi)" * exact,
                 "source": FROM_MOTION,
             },
         ),

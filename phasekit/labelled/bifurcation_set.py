@@ -7,26 +7,31 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.exact.bifurcation_set import Cusp, Piece, loci
-from phasekit.bifurcation.exact.normal_forms import cubic_coefficient, quadratic_coefficient
-from phasekit.bifurcation.exact.plane import Plane, regions
+from phasekit.bifurcation.along import Loci, loci_in
+from phasekit.bifurcation.curves import Cusp
+from phasekit.cells.request import worded
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import ParameterError
-from phasekit.labelled.atlas import limits, single
+from phasekit.labelled.atlas import limits, resting, tell_missing
 from phasekit.labels.arguments import unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.systems.system import System
+from phasekit.table.quantities import ROWS
 from phasekit.table.row import FROM_MOTION
 
 #: What each kind of curve is.
 CURVES = {
-    "fold": "lower saddle and upper center merge: |B|^(2/3) + |C|^(2/3) = |A|^(2/3)",
-    "pitchfork": "three equilibria merge, as B or C is zero in the whole plane: |A| = |B| + |C|",
+    "fold": "a saddle and a center merge: V' = V'' = 0, |B|^(2/3) + |C|^(2/3) = |A|^(2/3)",
+    "pitchfork": "three equilibria merge, by a symmetry of the whole plane: V'' = 0 at one that "
+    "rests; |A| = |B| + |C|, where B or C is zero",
+    "transcritical": "an equilibrium crosses one that rests in the whole plane, which is V'' = 0",
     "sign_change": "A = 0",
-    "equal_saddles": "both saddles have the same energy (heteroclinic cycle): A > 0 and B = 0, or "
-    "A < 0 and C = 0, inside the fold",
-    "equal_centers": "both centers have the same energy: A > 0 and C = 0, or A < 0 and B = 0, "
-    "inside the fold",
+    "equal_saddles": "both saddles, or two neighbors, have the same energy (heteroclinic): A > 0 "
+    "and B = 0, or A < 0 and C = 0, inside the fold",
+    "equal_centers": "both centers, or two neighbors, have the same energy: A > 0 and C = 0, or "
+    "A < 0 and B = 0, inside the fold",
+    "window_exit": "an equilibrium leaves at an end of the interval: V' = 0 there",
 }
 
 
@@ -43,7 +48,8 @@ def bifurcation_set(
     Parameters
     ----------
     system : system
-        A single system; its own values of the two parameters are not used.
+        A single system in a potential; its own values of the two parameters are not used. Of a
+        `Perturbed` system the constant torque counts, and nothing else.
     x, y : str
         Two different parameters on which the equilibria depend.
     xlim, ylim : (float, float)
@@ -55,14 +61,16 @@ def bifurcation_set(
         Curves on (``curve``, ``point``), in order along each: both parameters (coordinates),
         ``phi`` (angle of the merged equilibria, on folds and pitchforks, continuous) and
         ``quadratic`` (coefficient of the fold's normal form, 0 at cusps); shorter curves end in
-        NaN. On ``curve``: ``curve_kind`` (fold, pitchfork, sign_change, equal_saddles,
-        equal_centers), ``merging`` (which equilibria merge), ``sign_of_A`` (-1: the side A < 0,
-        1: A > 0, 0: A = 0) and ``closed``. On ``cusp``: ``cusp_<x>``, ``cusp_<y>``, ``cusp_phi``,
+        NaN. On ``curve``: ``curve_kind`` (fold, pitchfork, transcritical, sign_change,
+        equal_saddles, equal_centers, window_exit), ``merging`` (which equilibria merge), with
+        coefficients (A, B, C) ``sign_of_A`` (-1: the side A < 0, 1: A > 0, 0: A = 0), and
+        ``closed``. On ``cusp``: ``cusp_<x>``, ``cusp_<y>``, ``cusp_phi``,
         ``cusp_like`` (center: two centers and a saddle become a center; saddle: two saddles and a
         center become a saddle) and ``cusp_cubic``, the coefficient of the normal form. On
         ``region``: a point ``region_<x>``, ``region_<y>`` inside each region, its
         ``region_count`` of equilibria and the distance ``region_reach`` to its border, in units
-        of the plane.
+        of the plane. ``complete`` says whether it is proved that no curve is missing at which the
+        number of equilibria changes.
 
     Raises
     ------
@@ -78,6 +86,12 @@ def bifurcation_set(
     units of the plane; cusps and ends on its edges are vertices. Curves are found from all their
     crossings with a net of 52 lines, by exact arithmetic: one that lies between them, closed and
     smaller than 1/20 of the plane, may be missing; narrow the limits to see it.
+
+    Of any other potential, or under a torque, no such curve is missing where ``complete`` is True:
+    each reaches an edge of the plane, or has a cusp or a point where x is extreme along it, and all
+    of these are proved by interval arithmetic [MooreKearfottCloud2009]. Where an equilibrium rests
+    in the whole plane and others merge right beside it, it is not proved. Curves of equal energies
+    are those of neighbors, found on a grid of 25 x 25 points.
 
     The normal form at a fold is ``x'' = ... + quadratic x^2``, at a cusp ``x'' = ... + cubic x^3``,
     with ``quadratic = -V'''/2`` and ``cubic = -V''''/6`` and x the angle from the merged point
@@ -100,81 +114,73 @@ def bifurcation_set(
     >>> bool((abs(gap) < 1e-12).all()), bool(astroid.closed), ds.sizes["cusp"]
     (True, True, 4)
     """
-    system, values = single(system, x, y)
-    formula = system.formula_inputs()
-    for argument, name in (("x", x), ("y", y)):
-        if not isinstance(name, str) or name not in formula:
-            what = f"{argument}: parameter of bifurcation_set for {type(system).__name__}"
-            raise unknown(what, name, formula)
+    system, law, values = resting(system, x, what="bifurcation_set", called="x: parameter")
+    if not isinstance(y, str) or y not in values:
+        what = f"y: parameter of bifurcation_set for {type(system).__name__}"
+        raise unknown(what, y, values)
     if x == y:
         raise ParameterError(f"y: got {y!r}, wants a parameter that is not on x")
     box = limits(system, x, "xlim", xlim), limits(system, y, "ylim", ylim)
-    plane = Plane(system.trigonometric(), values, (x, y), box)
-    pieces, cusps = loci(plane)
-    return _dataset(system, plane, pieces, cusps)
+    found = loci_in(law, values, (x, y), box)
+    tell_missing("bifurcation_set", f"{x} and {y}", found.missing)
+    return _dataset(system, (x, y), box, found)
 
 
-def _dataset(system: System, plane: Plane, pieces: list[Piece], cusps: list[Cusp]) -> xr.Dataset:
-    x, y = plane.names
-    about = {name: input_attrs(system, name) for name in plane.names}
-    values = {name: np.full(1, value) for name, value in plane.values.items()}
-
-    def A(at_x: Any, at_y: Any) -> Any:
-        full = {name: np.full(np.shape(at_x), value[0]) for name, value in values.items()}
-        return type(system).valid_coefficients({**full, x: at_x, y: at_y})[0]
-
-    quadratic = [
-        quadratic_coefficient(A(piece.x, piece.y), piece.phi)
-        if piece.kind == "fold"
-        else np.full(piece.x.size, np.nan)
-        for piece in pieces
-    ]
+def _dataset(system: System, names: tuple[str, str], box: Any, found: Loci) -> xr.Dataset:
+    (x, y), pieces = names, found.curves
+    about = {name: input_attrs(system, name) for name in names}
+    exact = system.standing.is_within(Trigonometric)
+    (angle,) = worded(system, [ROWS["phi"]])
     curves = ("curve", "point")
     data = {
         "phi": variable(
             curves,
             _table([piece.phi for piece in pieces]),
             {
-                "long_name": "angle of the merged equilibria",
-                "units": "rad",
-                "equation": "A cos(phi)^3 = B, A sin(phi)^3 = -C",
-                "source": FROM_MOTION,
+                "long_name": f"{'angle' * exact or 'coordinate'} of the merged equilibria",
+                "units": angle.units,
+                "equation": "A cos(phi)^3 = B, A sin(phi)^3 = -C" if exact else "V' = V'' = 0",
+                "source": angle.source,
             },
         ),
         "quadratic": variable(
             curves,
-            _table(quadratic),
+            _table([piece.quadratic for piece in pieces]),
             {
                 "long_name": "coefficient of x^2 in the normal form of the fold",
                 "units": "s-2",
-                "equation": "-V'''/2 = -(3/2) A sin(phi) cos(phi)",
-                "source": FROM_MOTION,
+                "equation": "-V'''/2" + " = -(3/2) A sin(phi) cos(phi)" * exact,
+                "source": angle.source,
             },
         ),
         "curve_kind": _text("curve", [p.kind for p in pieces], "kind of the curve"),
-        "merging": _text("curve", [_merging(p) for p in pieces], "equilibria that merge"),
-        "sign_of_A": variable(
-            ("curve",),
-            np.array([p.sign_of_A for p in pieces], np.int8),
-            {"long_name": "sign of A on the curve"},
-        ),
+        "merging": _text("curve", [p.merging for p in pieces], "equilibria that merge"),
         "closed": variable(
             ("curve",),
             np.array([p.closed for p in pieces], bool),
             {"long_name": "whether the curve is closed"},
         ),
-        **_cusps(plane, cusps, about, A),
-        **_regions(plane, about),
+        **_cusps(names, found.cusps, about, angle.units, exact),
+        **_regions(names, found.regions, about),
+        "complete": variable(
+            (), not found.missing and not exact, {"long_name": "whether no curve can be missing"}
+        ),
     }
+    if exact:
+        data["sign_of_A"] = variable(
+            ("curve",),
+            np.array([p.sign_of_A for p in pieces], np.int8),
+            {"long_name": "sign of A on the curve"},
+        )
     coords = {
         x: variable(curves, _table([p.x for p in pieces]), about[x]),
         y: variable(curves, _table([p.y for p in pieces]), about[y]),
     }
     for name, value in system.parameters.items():
-        if name not in plane.names:
+        if name not in names and name not in data:
             coords[name] = variable((), value, input_attrs(system, name))
-    box = {"xlim": list(plane.limits[0]), "ylim": list(plane.limits[1])}
-    attrs = {**dataset_attrs(system), "x": x, "y": y, **box}
+    ends = {"xlim": list(box[0]), "ylim": list(box[1])}
+    attrs = {**dataset_attrs(system), "x": x, "y": y, **ends}
     return xr.Dataset(data, coords=coords, attrs=attrs)
 
 
@@ -190,25 +196,16 @@ def _text(dim: str, values: list[str], long_name: str) -> xr.Variable:
     return variable((dim,), np.array(values, LABEL_DTYPE), {"long_name": long_name})
 
 
-def _merging(piece: Piece) -> str:
-    if piece.kind == "fold":
-        return "lower_saddle upper_center"
-    if piece.kind != "pitchfork":
-        return ""
-    along_B = abs(np.cos(piece.phi[0])) > 0.5
-    if along_B == (piece.sign_of_A > 0):
-        return "lower_center lower_saddle upper_center"
-    return "lower_saddle upper_center upper_saddle"
-
-
-def _cusps(plane: Plane, cusps: list[Cusp], about: Any, A: Any) -> dict[str, xr.Variable]:
-    x, y, phi = (np.array([getattr(c, n) for c in cusps], float) for n in ("x", "y", "phi"))
-    cubic = cubic_coefficient(A(x, y), phi)
-    dim = ("cusp",)
+def _cusps(
+    names: tuple[str, str], cusps: list[Cusp], about: Any, units: str, exact: bool
+) -> dict[str, xr.Variable]:
+    columns = ("x", "y", "phi", "cubic")
+    x, y, phi, cubic = (np.array([getattr(c, n) for c in cusps], float) for n in columns)
+    dim, angle = ("cusp",), "angle" if units == "rad" else "coordinate"
     return {
-        f"cusp_{plane.names[0]}": variable(dim, x, about[plane.names[0]]),
-        f"cusp_{plane.names[1]}": variable(dim, y, about[plane.names[1]]),
-        "cusp_phi": variable(dim, phi, {"long_name": "angle of the cusp point", "units": "rad"}),
+        f"cusp_{names[0]}": variable(dim, x, about[names[0]]),
+        f"cusp_{names[1]}": variable(dim, y, about[names[1]]),
+        "cusp_phi": variable(dim, phi, {"long_name": f"{angle} of the cusp point", "units": units}),
         "cusp_like": _text("cusp", [c.like for c in cusps], "what the merged equilibria become"),
         "cusp_cubic": variable(
             dim,
@@ -216,20 +213,21 @@ def _cusps(plane: Plane, cusps: list[Cusp], about: Any, A: Any) -> dict[str, xr.
             {
                 "long_name": "coefficient of x^3 in the normal form of the cusp",
                 "units": "s-2",
-                "equation": "-V''''/6 = -(1/2) A cos(2 phi)",
-                "source": FROM_MOTION,
+                "equation": "-V''''/6" + " = -(1/2) A cos(2 phi)" * exact,
+                "source": FROM_MOTION if exact else "",
             },
         ),
     }
 
 
-def _regions(plane: Plane, about: Any) -> dict[str, xr.Variable]:
-    found = regions(plane)
-    x, y, count, reach = (np.array(column) for column in zip(*found, strict=True))
+def _regions(
+    names: tuple[str, str], found: list[tuple[float, float, int, float]], about: Any
+) -> dict[str, xr.Variable]:
+    x, y, count, reach = np.array(found, float).reshape(-1, 4).T
     dim = ("region",)
     return {
-        f"region_{plane.names[0]}": variable(dim, x, about[plane.names[0]]),
-        f"region_{plane.names[1]}": variable(dim, y, about[plane.names[1]]),
+        f"region_{names[0]}": variable(dim, x, about[names[0]]),
+        f"region_{names[1]}": variable(dim, y, about[names[1]]),
         "region_count": variable(
             dim, count.astype(np.int8), {"long_name": "number of equilibria in the region"}
         ),

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.request import passes_of
+from phasekit.cells.request import equations_for
 from phasekit.cells.states import at_states
 from phasekit.inputs import refuse_call
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
@@ -21,11 +22,10 @@ from phasekit.labels.arguments import (
     whole,
 )
 from phasekit.labels.coordinates import LABELS
-from phasekit.laws.equations import equations_of
-from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.numerics.waits import said
+from phasekit.laws.perturbed import OWN
+from phasekit.numerics.waits import notice
 from phasekit.systems.perturbed import Perturbed
-from phasekit.systems.system import as_system
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS, select
 from phasekit.table.row import STATE, Pass
 
@@ -39,11 +39,27 @@ def perturbed_of(system: Any) -> Perturbed:
         If it is another one.
     """
     found: Any = as_system(system)
-    if not issubclass(found.rung, PerturbedConservative):
+    if found.standing.traits is None:
         raise bad("perturbed", found, "a pk.Perturbed(system, damping=..., forcing=...)")
     refuse_noise(found)
     perturbed: Perturbed = found
     return perturbed
+
+
+def following(system: System, function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of a law with terms, of parameters and of states, for a system with or without.
+
+    The terms of a system without have the value zero.
+    """
+    if system.standing.traits is not None:
+        refuse_noise(system)
+        return functools.partial(function, system.law)
+    law, count = Perturbed(system).law, len(system.parameters)
+
+    def alone(*arrays: Any) -> Any:
+        return function(law, *arrays[:count], *np.zeros(len(OWN)), *arrays[count:])
+
+    return alone
 
 
 @state_arguments
@@ -116,32 +132,37 @@ def stroboscopic(
         if not period > 0.0:
             raise bad("period", period, wants)
     found = as_system(system)
-    if (law := equations_of(found)) is not None:
-        from phasekit.labelled.flows import sections_of
+    if (law := equations_for(found, "motion")) is not None:
+        from phasekit.labelled.flows import sections_of, starts_of
 
-        given = (phi0, dphi0) if x0 is None and dphi0 is not None else phi0
-        start, tolerances = given if x0 is None else x0, checked_tolerances(rtol, atol)
-        return sections_of(found, law, start, states, n, skip, period, tolerances)
+        start, named = starts_of(found, x0, states, phi0, dphi0)
+        tolerances = checked_tolerances(rtol, atol)
+        return sections_of(found, law, start, named, n, skip, period, tolerances)
     needed = {"phi0": phi0, "dphi0": dphi0}
     refuse_call(stroboscopic, states, [name for name, value in needed.items() if value is None])
     if x0 is not None:
         raise bad("x0", x0, "nothing for a system whose state is phi0, dphi0")
-    perturbed = perturbed_of(found)
     options = {"n": n, "skip": skip, "period": period, **checked_tolerances(rtol, atol)}
     names = ("section_time", "section_phi", "section_dphi", "rotation_number")
     labels = {**LABELS, "crossing": (range(skip, skip + n), "number of the period")}
     rows = [replace(ROWS[name], labels=labels) for name in names]
-    function = functools.partial(_sections, perturbed.law, **options)
-    one = Pass(function, (*perturbed.parameters, *STATE), ("stroboscopic",), PerturbedConservative)
+    function = following(found, functools.partial(_sections, **options))
+    one = Pass(function, (*found.parameters, *STATE), ("stroboscopic",), found.standing)
     at = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
-    with said(f"following motions for {skip + n:,} periods"):
-        return at_states(perturbed, rows, at, (one,))
+    with notice(f"following motions for {skip + n:,} periods"):
+        return at_states(found, rows, at, (one,))
 
 
-def _sections(law: PerturbedConservative, *arrays: Any, **options: Any) -> Any:
+def _sections(*arrays: Any, **options: Any) -> Any:
     from phasekit.motion.strobe import sections
 
-    return sections(law, *arrays, **options)
+    return sections(*arrays, **options)
+
+
+def _exponents(*arrays: Any, **options: Any) -> Any:
+    from phasekit.motion.strobe import lyapunov
+
+    return lyapunov(*arrays, **options)
 
 
 @state_arguments
@@ -154,7 +175,6 @@ def lyapunov(
     duration: Any = None,
     n: Any = None,
     count: int | None = None,
-    time: Any = None,
     rtol: float | None = None,
     atol: float | None = None,
     **states: Any,
@@ -176,8 +196,6 @@ def lyapunov(
         Of a map the number of iterations in place of a duration, at least 100.
     count : int, optional
         Of a `Problem` how many exponents, the largest first; by default all.
-    time : float, 1-D array_like or xarray.DataArray, optional
-        The same as `duration`.
     rtol, atol : float, optional
         As in `flow`.
     **states
@@ -220,33 +238,26 @@ def lyapunov(
     -1.203972804
     """
     found = as_system(system)
-    law = equations_of(found)
-    if duration is not None and time is not None:
-        raise bad("time", time, "None beside duration")
-    length = time if duration is None else duration
-    called = "duration" if time is None else "time"
+    law = equations_for(found, "lyapunov")
     if law is not None:
-        given = (phi0, dphi0) if x0 is None and dphi0 is not None else phi0
-        start = given if x0 is None else x0
-        from phasekit.labelled.flows import exponents_of
+        from phasekit.labelled.flows import exponents_of, starts_of
 
+        start, named = starts_of(found, x0, states, phi0, dphi0)
         tolerances = checked_tolerances(rtol, atol)
-        return exponents_of(found, law, start, states, (called, length), n, count, tolerances)
-    needed = {"phi0": phi0, "dphi0": dphi0, called: length}
+        return exponents_of(found, law, start, named, ("duration", duration), n, count, tolerances)
+    needed = {"phi0": phi0, "dphi0": dphi0, "duration": duration}
     refuse_call(lyapunov, states, [name for name, value in needed.items() if value is None])
     for name, value in {"x0": x0, "n": n, "count": count}.items():
         if value is not None:
             raise bad(name, value, "nothing for a system whose state is phi0, dphi0")
-    perturbed = perturbed_of(found)
     wants = "times in s, > 0"
-    if np.any(np.asarray(numeric(called, length, "s", wants)) <= 0.0):
-        raise bad(called, length, wants)
+    if np.any(np.asarray(numeric("duration", duration, "s", wants)) <= 0.0):
+        raise bad("duration", duration, wants)
     rows = select("lyapunov")
-    (one,) = passes_of(perturbed, rows)
-    tolerances = checked_tolerances(rtol, atol)
-    one = replace(one, function=functools.partial(one.resolved, **tolerances))
+    function = following(found, functools.partial(_exponents, **checked_tolerances(rtol, atol)))
+    one = Pass(function, (*found.parameters, *STATE, "time"), ("lyapunov",), found.standing)
     at = {
-        "phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), called: ("time", length)
+        "phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0), "duration": ("time", duration)
     }  # fmt: skip
-    with said("following motions and their tangent vectors"):
-        return at_states(perturbed, rows, at, (one,))
+    with notice("following motions and their tangent vectors"):
+        return at_states(found, rows, at, (one,))

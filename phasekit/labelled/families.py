@@ -17,8 +17,7 @@ from phasekit.labels.arguments import (
     number,
     whole,
 )
-from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import TiltedConservative, TiltedTrigonometric
+from phasekit.laws.ladder import Conservative, Standing, Trait
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.families import (
     Families,
@@ -83,7 +82,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     True
     """
     system = with_families(system, "orbit_families")
-    tilted = issubclass(system.rung, TiltedTrigonometric)
+    tilted = system.standing.is_within(Standing(Trigonometric, Trait.TORQUED))
     n = whole("n", n, "a number of orbits >= 1")
     wants = "one number, finite, in s^-2"
     top = None if energy_max is None else number("energy_max", energy_max, wants, "s-2")
@@ -101,7 +100,7 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
     if tilted:
         function = functools.partial(families_under_torque, top, system.law)
         inputs = (*system.parameters, "level")
-        one = Pass(function, inputs, ("orbit_families",), TiltedTrigonometric)
+        one = Pass(function, inputs, ("orbit_families",), Standing(Trigonometric, Trait.TORQUED))
     levels = (np.arange(n) + 0.5) / n
     ds = at_states(system, rows, {"n": ("level", levels)}, (one,))
     return ds.transpose(..., "family", "level")
@@ -116,6 +115,6 @@ def with_families(system: Any, what: str) -> System:
         If it is no system, or damped or driven.
     """
     found = as_system(system)
-    if issubclass(found.rung, (TiltedTrigonometric, TiltedConservative)):
+    if found.standing.is_within(Standing(Conservative, Trait.TORQUED)):
         return found
     return as_system(found, rung=Conservative, what=what)

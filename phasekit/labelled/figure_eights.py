@@ -164,7 +164,7 @@ def _marks(
     else:
         ds = separatrices(at)
         columns = ds.topology.values, ds.figure_eight.values, equilibria(at).n_equilibria.values
-        if system.rung.labels_fixed:
+        if system.standing.rung.labels_fixed:
             A, B, C = (np.broadcast_to(np.asarray(x), s.shape) for x in at.coefficients())
             side = np.where(A > 0.0, np.sign(B), 2.0 * np.sign(C))
             eights = np.where(ds.figure_eight.values, side, 0.0)
@@ -192,11 +192,11 @@ def _narrow(
     system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], low: float, high: float
 ) -> list[Event]:
     """Events between two places, each to rounding: (place, mark before, mark after)."""
-    least = 4.0 * np.spacing(high) if system.rung.labels_fixed else _ROUNDING
+    least = 4.0 * np.spacing(high) if system.standing.rung.labels_fixed else _ROUNDING
     if high - low <= least:
         marks = _marks(system, ways, np.array([low, high]))
         return [(0.5 * (low + high), marks[0], marks[1])]
-    s = np.linspace(low, high, _PARTS if system.rung.labels_fixed else _FEW)
+    s = np.linspace(low, high, _PARTS if system.standing.rung.labels_fixed else _FEW)
     marks = _marks(system, ways, s)
     found: list[Event] = []
     if (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -13,22 +12,17 @@ import xarray as xr
 from phasekit.cells.states import at_states
 from phasekit.labels.arguments import bad, numeric, one_of, unknown, whole
 from phasekit.labels.coordinates import LABELS, STATES
-from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations
-from phasekit.laws.formulas import symbols_of, take_formula
+from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.motion import flows
-from phasekit.motion.equation_rates import pointwise
-from phasekit.motion.events import Event
-from phasekit.motion.integrate import Solution, integrate
-from phasekit.motion.prescribed import span
-from phasekit.motion.steps import InitialValue
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.system import System
 from phasekit.table.row import Pass, Quantity
 
 #: Methods of integration by name.
-METHODS = ("taylor", "dop853", "radau")
+METHODS = ("taylor", "dop853", "rosenbrock", "radau")
 
 
 def rung_of(law: Equations) -> type[Law]:
@@ -37,7 +31,7 @@ def rung_of(law: Equations) -> type[Law]:
 
 
 def states_of(law: Equations, x0: Any, named: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
-    """States at the start by name, from one argument or one for each.
+    """States at the start by name, from one argument or one for each, others as the law has them.
 
     Parameters
     ----------
@@ -68,10 +62,25 @@ def states_of(law: Equations, x0: Any, named: Mapping[str, Any]) -> dict[str, tu
         if given:
             raise bad("x0", x0, f"None beside {', '.join(named)}")
         given = _spread(law, x0)
+    given = {**law.start, **given}
     missing = [name for name in law.states if name not in given]
     if missing:
         raise bad("x0", list(given), f"a value for {', '.join(missing)} as well")
     return {name: (f"state_{name}", given[name]) for name in law.states}
+
+
+def starts_of(
+    system: System, x0: Any, named: Mapping[str, Any], first: Any, second: Any
+) -> tuple[Any, Mapping[str, Any]]:
+    """All states in one, and those by name, of a call that may have phi0 and dphi0 in their place.
+
+    Of a system with terms these are two of its states, beside those of the terms.
+    """
+    if x0 is not None or second is None:
+        return (first if x0 is None else x0), named
+    if system.standing.traits is None:
+        return [first, second], named
+    return None, {"phi": first, "dphi": second, **named}
 
 
 def _spread(law: Equations, x0: Any) -> dict[str, Any]:
@@ -99,7 +108,7 @@ def _spread(law: Equations, x0: Any) -> dict[str, Any]:
 
 def motions_of(
     system: System, law: Equations, x0: Any, named: Mapping[str, Any], t: Any, *,
-    tolerances: Mapping[str, float], method: str | None = None, events: Any = None,
+    tolerances: Mapping[str, float], method: str | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """States of motions at times, of maps after so many steps.
 
@@ -113,24 +122,50 @@ def motions_of(
     if method is not None:
         one_of("method", method, METHODS)
     discrete = isinstance(law, Map)
-    if discrete and events is not None:
-        raise bad("events", events, "nothing for a map, whose states are between no times")
     if discrete and method is not None:
         raise bad("method", method, "nothing for a map, which is not integrated")
     refuse_force(system)
     rows = [_row(law, name) for name in law.states]
-    options = {**tolerances, **({} if discrete else {"method": method})}
+    taken: dict[str, int] = {}
+    options = {**tolerances, **({} if discrete else {"method": method, "taken": taken})}
     states = {**states_of(law, x0, named), "t": ("time", t)}
     inputs = tuple(name for name, _ in states.values())
     one = Pass(
         functools.partial(_move, law, **options), (*law.names, *inputs), ("flow",), rung_of(law)
     )
-    with said("following motions"):
+    with notice("following motions"):
         ds = at_states(system, rows, states, (one,))
     if discrete:
         ds.time.attrs = {"long_name": "number of iterations", "units": "1"}
     ds = with_starts(ds, law, inputs)
-    return ds if events is None else _with_events(ds, law, system, events, tolerances)
+    if any(taken.values()):
+        ds.attrs["method"] = ", ".join(name for name, number in taken.items() if number > 0)
+    return with_observables(ds, law, getattr(system, "observables", {}))
+
+
+def with_observables(ds: xr.Dataset, law: Equations, observables: Mapping[str, Any]) -> xr.Dataset:
+    """Add the values of formulas along motions."""
+    import sympy as sp
+
+    clock = law.time or "time"
+    arrays = {name: ds[f"motion_{name}"] for name in law.states}
+    arrays |= {name: ds[name] for name in law.names} | {clock: ds.time}
+    symbols = symbols_of(arrays)
+    for name, formula in observables.items():
+        used = [x for x in arrays if symbols[x] in formula.free_symbols]
+        function = sp.lambdify([symbols[x] for x in used], formula, ["scipy", "numpy"])
+        dims = ds[f"motion_{law.states[0]}"].dims
+        with np.errstate(all="ignore"):
+            found = xr.apply_ufunc(function, *(arrays[x] for x in used), dask="allowed")
+        along = arrays[law.states[0]]
+        values = (0.0 * along + found).transpose(*dims)  # of all of them, NaN where it ended
+        text = str(formula)
+        attrs = {
+            "long_name": f"{name} along the motion", "units": law.units.get(name, "1"),
+            "equation": text if len(text) < 200 else f"{name} = g({', '.join(law.states)})",
+        }  # fmt: skip
+        ds[f"motion_{name}"] = variable(map(str, dims), values.data, attrs)
+    return ds
 
 
 def refuse_force(system: Any) -> None:
@@ -174,85 +209,6 @@ def with_starts(ds: xr.Dataset, law: Equations, inputs: Sequence[str]) -> xr.Dat
             given = ds[name].variable
             coords[name] = variable(map(str, given.dims), given.data, attrs)
     return ds.assign_coords(coords)
-
-
-def _with_events(
-    ds: xr.Dataset, law: Equations, system: Any, events: Any, tolerances: Mapping[str, float]
-) -> xr.Dataset:
-    """Add the events on one motion, and end it where they say so."""
-    named = events if isinstance(events, Mapping) else {"event": events}
-    starts = [ds[f"state_{name}"] for name in law.states]
-    if any(start.ndim for start in starts) or any(np.ndim(ds[name]) for name in law.names):
-        raise bad("events", list(named), "nothing, or one motion: a single state and system")
-    values = {name: float(ds[name]) for name in law.names}
-    watched = {name: _event(law, values, name, event) for name, event in named.items()}
-    rates = pointwise(law, values)
-    start = [float(one) for one in starts]
-    data = {name: ds[f"motion_{name}"].values.copy() for name in law.states}
-    found: list[tuple[str, float, Any]] = []
-    for stop in span(ds.time.values):
-        if stop == 0.0:
-            continue
-        motion = motion_of(rates, start, stop, tolerances, watched)
-        own = list(zip(motion.events.name, motion.events.time, motion.events.state.T, strict=True))
-        found = own[::-1] if stop < 0.0 else found + [e for e in own if e[1] > 0.0 or not found]
-        beyond = np.sign(stop) * (ds.time.values - motion.times[-1]) > 0.0
-        for array in data.values():
-            array[beyond] = np.nan
-    ds = ds.assign({f"motion_{n}": ds[f"motion_{n}"].copy(data=x) for n, x in data.items()})
-    names = np.array([name for name, *_ in found], LABEL_DTYPE)
-    ds["event_name"] = variable(("event",), names, {"long_name": "name of the event"})
-    times = np.array([time for _, time, _ in found], float)
-    attrs = {**ds.time.attrs, "long_name": "time of the event", "equation": "event = 0"}
-    ds["event_time"] = variable(("event",), times, attrs)
-    columns = np.reshape([state for *_, state in found], (-1, len(law.states))).T
-    for name, column in zip(law.states, columns, strict=True):
-        words = {**ds[f"motion_{name}"].attrs, "long_name": f"{name} at the event"}
-        ds[f"event_{name}"] = variable(("event",), column, {**words, "equation": "event = 0"})
-    return ds
-
-
-def motion_of(
-    rates: Any, start: Sequence[float], stop: float, tolerances: Mapping[str, Any],
-    watched: Mapping[str, Event] | None = None,
-) -> Solution:  # fmt: skip
-    """One motion of rates, with events."""
-    return integrate(InitialValue(rates, start, **tolerances, unit=np.inf), stop, watched)
-
-
-def _event(law: Equations, values: Mapping[str, float], name: str, given: Any) -> Event:
-    """The event of a formula of states, parameters and time, or of a function of (t, x)."""
-    argument = f"events[{name!r}]"
-    if isinstance(given, Event):
-        return given
-    if isinstance(given, str) or hasattr(given, "free_symbols"):
-        return Event(scalar_of(law, values, argument, given))
-    if not callable(given):
-        wants = "a formula of the states, or a function of (t, x), whose zeros are looked for"
-        raise bad(argument, given, wants)
-    count = sum(
-        one.default is one.empty and one.kind in (one.POSITIONAL_ONLY, one.POSITIONAL_OR_KEYWORD)
-        for one in inspect.signature(given).parameters.values()
-    )
-    if count != 2:
-        raise bad(argument, given, f"a function of (t, x), x holding {', '.join(law.states)}")
-    terminal, direction = getattr(given, "terminal", 0), getattr(given, "direction", 0)
-    return Event(lambda t, x: float(given(t, x)), int(terminal), float(direction))
-
-
-def scalar_of(law: Equations, values: Mapping[str, float], argument: str, given: Any) -> Any:
-    """A formula of states, parameters and time as a function of (t, x)."""
-    import sympy as sp
-
-    clock = law.time or "t"
-    names = [*law.states, *law.names, *([] if clock in (*law.states, *law.names) else [clock])]
-    symbols = symbols_of(names)
-    formula = take_formula(given, symbols, argument, "it is no state and no parameter")
-    states = [symbols[name] for name in law.states]
-    fixed = {symbols[name]: sp.Float(value, 17) for name, value in values.items()}
-    time = symbols.get(clock, sp.Dummy())
-    function = sp.lambdify([time, states], formula.subs(fixed), "numpy")
-    return lambda t, x: function(t, x)
 
 
 def exponents_of(
@@ -303,7 +259,7 @@ def exponents_of(
     inputs = tuple(name for name, _ in at.values())
     function = functools.partial(_exponents, law, count=count, **tolerances)
     one = Pass(function, (*law.names, *inputs), ("exponents",), rung_of(law))
-    with said("following motions and their tangent vectors"):
+    with notice("following motions and their tangent vectors"):
         ds = at_states(system, rows, at, (one,))
     if discrete:
         ds.time.attrs = {"long_name": "number of iterations", "units": "1"}
@@ -345,5 +301,5 @@ def sections_of(
     inputs = tuple(name for name, _ in at.values())
     function = functools.partial(flows.sections, law, n=n, skip=skip, period=period, **tolerances)
     one = Pass(function, (*law.names, *inputs), ("sections",), Flow)
-    with said(f"following motions for {skip + n:,} periods"):
+    with notice(f"following motions for {skip + n:,} periods"):
         return with_starts(at_states(system, rows, at, (one,)), law, inputs)

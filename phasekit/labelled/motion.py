@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from phasekit.cells.request import passes_of
+from phasekit.cells.request import equations_for, passes_of
 from phasekit.cells.states import at_states, pass_from
 from phasekit.inputs import refuse_call
-from phasekit.labelled.orbits import noted
+from phasekit.labelled.orbits import with_notes
 from phasekit.labels.arguments import (
     NumberLike,
     bad,
@@ -23,10 +23,8 @@ from phasekit.labels.arguments import (
     number,
     state_arguments,
 )
-from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Conservative
-from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import select
@@ -44,6 +42,9 @@ def flow(
     atol: float | None = None,
     events: Any = None,
     method: str | None = None,
+    paths: int | None = None,
+    seed: int | None = None,
+    step: float | None = None,
     **states: Any,
 ) -> xr.Dataset:
     """Motion from a state: exact for any time, integrated with damping and drive.
@@ -66,17 +67,30 @@ def flow(
         1e-10) and absolute (1e-12, in rad and in s^-1). Of a coordinate beyond one radian it is
         relative to one radian. On a line, of motions whose states are below 1 as yet, the absolute
         error is that part of the greatest: lengths may be in any unit.
-    events : callable or mapping of str to callable, optional
-        Of one motion that is integrated: functions of (t, phi, dphi) whose zeros are looked
-        for between t = 0 and the times. As in SciPy they may have attributes: ``terminal``, True
-        or at which of its zeros the motion ends, and ``direction``, > 0 or < 0. A function
-        that comes to 1e-8 of its values around and turns back touches zero and counts, unless it
-        has a direction; zeros that lie closer together than a quarter of a step may be missed. A
-        stretch on which one vanishes counts once, with a RuntimeWarning. Of a `Problem` they are
-        formulas of its states, parameters and time, or functions of (t, x).
-    method : {"taylor", "dop853", "radau"}, optional
-        Of a `Problem`; by default Radau's where the motion is stiff, Taylor series where the
+    events : str, callable, Event, or mapping of str to such, optional
+        Of motions that are integrated: formulas of states, parameters and time ``t``, or functions
+        of (t, phi, dphi), of a `Problem` of (t, x), whose zeros are looked for between t = 0 and
+        the times. Functions may have attributes as in SciPy: ``terminal``, True or at which of its
+        zeros the motion ends, and ``direction``, > 0 or < 0; `Event` gives both to formulas. What
+        comes to 1e-8 of its values around and turns back touches zero and counts, unless it has a
+        direction; zeros that lie closer together than a quarter of a step may be missed. A
+        stretch on which one vanishes counts once, of a function with a RuntimeWarning. Formulas
+        are watched in compiled code, functions motion by motion.
+    method : {"taylor", "dop853", "rosenbrock", "radau"}, optional
+        Of a `Problem`; ``attrs["method"]`` says which was taken. By default an implicit one where
+        the motion is stiff, else Taylor series where the
         formulas are short (up to 48 operations, shared parts counted once), else DOP853.
+    paths : int, optional
+        Of a `Problem` with noise, or a `Perturbed` system with kT: how many paths to follow from
+        each state. Without it a `Problem` is followed without noise.
+    seed : int, optional
+        Of the random numbers of paths. A path has the same bits for the same seed, number,
+        parameters and state, whatever is followed beside it (with the same version of NumPy). By
+        default one that ``attrs["seed"]`` names.
+    step : float, optional
+        Longest time step of paths, in s. By default 1/20 of the fastest time in which motions
+        without noise change, and less where such steps would feed a weakly damped oscillation.
+        Errors of means fall with its square: another step shows them.
     **states
         The states of a `Problem` by name, one argument each, in place of `x0`.
 
@@ -86,8 +100,10 @@ def flow(
         ``motion_phi`` in rad, continuous in time (a rotation runs past pi), and ``motion_dphi``
         in s^-1. NaN where a motion with damping and drive could not be followed to a time, which
         a RuntimeWarning says. With events also ``event_name``, ``event_time``, ``event_phi`` and
-        ``event_dphi`` on the dim ``event``; after one that ends the motion it is NaN. Of a
-        `Problem` ``motion_`` and ``event_`` and the name of each state.
+        ``event_dphi`` on the dim ``event``; after one that ends the motion it is NaN. Where there
+        are several motions, ``n_events`` says how many each has, and the others are NaN. Of a
+        `Problem` ``motion_`` and ``event_`` and the name of each state. With paths they
+        have the dim ``path``, and ``noise_step`` is the longest step.
 
     Raises
     ------
@@ -128,15 +144,36 @@ def flow(
     ('b', 'time')
     """
     system = as_system(system)
-    if (law := equations_of(system)) is not None:
-        two = [phi0, dphi0] if t is not None and dphi0 is not None else phi0
-        x0, t = (two if x0 is None else x0), (dphi0 if t is None else t)
-        from phasekit.labelled.flows import motions_of
+    law = equations_for(system, "motion")
+    if paths is None:
+        for name, value in {"seed": seed, "step": step}.items():
+            if value is not None:
+                raise bad(name, value, "nothing without paths")
+    else:
+        for name, value in {"events": events, "method": method, "rtol": rtol, "atol": atol}.items():
+            if value is not None:
+                raise bad(name, value, "nothing beside paths, which are taken by Heun's steps")
+        from phasekit.labelled.noise import checked, paths_of
 
+        options = checked(paths, seed, step)
+        if law is None or system.standing.traits is not None:
+            return paths_of(system, None, states, (phi0, dphi0), t, options)
+        given = [phi0, dphi0] if t is not None and dphi0 is not None else phi0
+        x0, t = (given if x0 is None else x0), (dphi0 if t is None else t)
+        return paths_of(system, x0, states, (), t, options)
+    if law is not None:
+        from phasekit.labelled.events import events_of_equations, watched_of
+        from phasekit.labelled.flows import motions_of, starts_of
+
+        if t is None:
+            t, dphi0 = dphi0, None
+        start, named = starts_of(system, x0, states, phi0, dphi0)
         tolerances = checked_tolerances(rtol, atol)
-        return motions_of(
-            system, law, x0, states, t, tolerances=tolerances, method=method, events=events
-        )
+        watched = None if events is None else watched_of(law, events)
+        ds = motions_of(system, law, start, named, t, tolerances=tolerances, method=method)
+        if watched is None:
+            return ds
+        return events_of_equations(ds, law, system, start, named, watched, tolerances)
     for name, value in {"x0": x0, "method": method}.items():
         if value is not None:
             raise bad(name, value, "nothing for a system whose state is phi0, dphi0")
@@ -149,18 +186,18 @@ def flow(
                 hint = "pk.Perturbed(system) takes them"
                 raise bad(name, value, "nothing, because this system's motion is exact", hint)
     else:
-        if issubclass(system.rung, PerturbedConservative):
+        if system.standing.traits is not None:
             refuse_noise(system)
         tolerances = checked_tolerances(rtol, atol)
         (one,) = passes_of(system, select("motion"))
         one = replace(one, function=functools.partial(one.resolved, **tolerances))
-        with said("following damped and driven motions"):
+        with notice("following damped and driven motions"):
             ds = at_states(system, select("motion"), given, (one,))
         if events is None:
             return ds
         from phasekit.labelled.events import with_events
 
-        moved = system if issubclass(system.rung, PerturbedConservative) else Perturbed(system)
+        moved = Perturbed(system) if system.standing.traits is None else system
         return with_events(ds, moved, events, tolerances)
     return at_states(system, select("motion"), given)
 
@@ -174,7 +211,8 @@ def refuse_noise(system: System) -> None:
     """
     kT = system.parameters["kT"]
     if np.any(np.asarray(kT) > 0.0):
-        raise bad("kT", kT, "0 for a motion: noise is not integrated", "use .replace(kT=0)")
+        hint = ".replace(kT=0) has none, pk.flow(..., paths=...) follows paths with it"
+        raise bad("kT", kT, "0 for a motion without noise", hint)
 
 
 def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, float]:
@@ -241,4 +279,4 @@ def separatrix_motion(
     system = as_system(system)
     one, notes = pass_from(system, "motion", "time", saddle=saddle, side=side)
     ds = at_states(system, select("motion"), {"t": ("time", t)}, (one,))
-    return noted(ds, **notes)
+    return with_notes(ds, **notes)

@@ -16,7 +16,7 @@ from phasekit.laws.equations import Equations, equations_of
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
 from phasekit.motion.flow import ATOL, RTOL
-from phasekit.numerics.waits import said, stage
+from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import as_problem
 from phasekit.systems.system import as_system
 
@@ -78,8 +78,9 @@ def orbit_diagram(
     [1, 2, 4]
     """
     found = as_system(system)
+    found = found if found.standing.traits is None else as_problem(found)
     law = equations_of(found)
-    if law is None or not (isinstance(law, Map) or law.time is not None):
+    if law is None or not (isinstance(law, Map) or law.period is not None):
         hint = "for other flows use pk.poincare_section, or follow equilibria by pk.diagram"
         raise bad("system", found, "a map, or a flow with a period", hint)
     problem = as_problem(found)
@@ -93,7 +94,7 @@ def orbit_diagram(
     flag("from_last", from_last)
     start = _start(law, x0)
     fixed = {name: float(problem.parameters[name]) for name in law.names}
-    with said(f"following {array.size:,} values of {parameter}"):
+    with notice(f"following {array.size:,} values of {parameter}"):
         samples = _samples(law, fixed, parameter, array, start, n, skip, from_last)
     lost = int(np.isnan(samples).any(axis=(1, 2)).sum())
     if lost:

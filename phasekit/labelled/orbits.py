@@ -7,6 +7,7 @@ dims; they come back as coordinates (state_phi, state_dphi, ...).
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -14,6 +15,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.request import passes_of
 from phasekit.cells.states import SIDES, at_states, pass_from
 from phasekit.errors import OrbitFamily, ParameterError
 from phasekit.labels.arguments import (
@@ -25,11 +27,14 @@ from phasekit.labels.arguments import (
     one_of,
     state_arguments,
 )
-from phasekit.systems.system import as_system
+from phasekit.phase.numerical.families import BACKWARD, FORWARD, MOST
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import select
 
-#: Families that have orbits of given action.
+#: Families that have orbits of given action; of any potential rotations, and wells by number.
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
+ROTATIONS = {"forward": FORWARD, "backward": BACKWARD}
+_WELLS = re.compile(r"wells?_(\d+(?:_\d+)*)", re.ASCII)
 
 #: Gaps of which some numbers on the way are no doubles any more, in some system.
 _LEAST = 1e-290
@@ -129,12 +134,12 @@ def orbits(
     if energy is not None:
         one, notes = pass_from(system, "orbits", "state_energy", center=center)
         ds = at_states(system, rows, {"energy": ("state_energy", energy)}, (one,))
-        return noted(ds, **notes)
+        return with_notes(ds, **notes)
     if gap is not None:
         one, notes = pass_from(system, "orbits", "state_gap", saddle=saddle, side=side)
         ds = at_states(system, rows, {"gap": ("state_gap", gap)}, (one,))
         _tell_nearest(ds)
-        return noted(ds, **notes)
+        return with_notes(ds, **notes)
     states = {"phi0": ("state_phi", phi0), "dphi0": ("state_dphi", dphi0)}
     return at_states(system, rows, states)
 
@@ -176,7 +181,7 @@ def _tell_nearest(ds: xr.Dataset) -> None:
         )
 
 
-def noted(ds: xr.Dataset, **attrs: str) -> xr.Dataset:
+def with_notes(ds: xr.Dataset, **attrs: str) -> xr.Dataset:
     """Write down, on each variable, the arguments that are neither parameters nor states."""
     for variable in ds.data_vars.values():
         variable.attrs.update(attrs)
@@ -200,8 +205,10 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
         ``orbit_family`` (`OrbitFamily`), ``action`` and ``frequency`` in s^-1, ``angle`` in rad,
         in [0, 2 pi), and ``twist``: d(frequency)/d(action). The angle grows evenly in time, at
         ``frequency``; it is 0 where a libration is at its greatest phi, or a rotation at the lower
-        center. Those of a `Potential` have estimates of their errors, and neither family nor twist;
-        an angle whose error may exceed 1e-7 is NaN.
+        center. Those of a `Potential` have estimates of their errors, and no twist; an angle whose
+        error may exceed 1e-7 is NaN. The code of a family is there the sum of 2^k over the numbers
+        k of the centers that the orbit goes round, -1 of a rotation forward and -2 backward, 0 of
+        an orbit in no family.
 
     Raises
     ------
@@ -247,13 +254,16 @@ def state_of(
         Angle variables in rad.
     family : str, OrbitFamily, or array_like or xarray.DataArray of either
         The family of the orbit, by name ("lower_well", "upper_well", "outer", "forward",
-        "backward") or code: actions repeat from family to family.
+        "backward") or code: actions repeat from family to family. Those of a `Potential` are
+        "forward", "backward", and "well_0", "wells_0_2", ... by the numbers of the centers that
+        the orbit goes round, or the codes of `action_angle`.
 
     Returns
     -------
     xarray.Dataset
         ``phi_of_angle`` in rad and ``dphi_of_angle`` in s^-1; NaN where the family has no orbit
-        of that action.
+        of that action. Those of a `Potential` have estimates of their errors, and are NaN where
+        these exceed 1e-7 of the orbit's size.
 
     Raises
     ------
@@ -273,17 +283,40 @@ def state_of(
     >>> state.phi_of_angle.dims
     ('point',)
     """
+    system, rows = as_system(system), select("state_of")
+    passes_of(system, rows)  # before any name of a family is read
     states = {
         "action": ("state_action", action),
         "angle": ("state_angle", angle),
-        "family": ("state_family", _codes(family)),
+        "family": ("state_family", _codes(system, family)),
     }
-    return at_states(system, select("state_of"), states)
+    return at_states(system, rows, states)
 
 
-def _codes(family: Any) -> Any:
+def family_code(system: System, name: Any) -> int | None:
+    """The code of a family of orbits by its name; None where a system has no such name."""
+    if system.standing.rung.labels_fixed:
+        return FAMILIES.get(name)
+    if name in ROTATIONS:
+        return ROTATIONS[name]
+    found = _WELLS.fullmatch(name)
+    if found is None:
+        return None
+    numbers = {int(number) for number in found.group(1).split("_")}
+    return sum(1 << k for k in numbers) if max(numbers) <= MOST else None
+
+
+def wants_family(system: System) -> str:
+    """What names of families a system has, for messages."""
+    if system.standing.rung.labels_fixed:
+        return f"one of {', '.join(FAMILIES)}"
+    centers = "well_0, wells_0_2, ... by the numbers of the centers"
+    return f"one of {', '.join(ROTATIONS)}, or {centers}"
+
+
+def _codes(system: System, family: Any) -> Any:
     """Return families as codes, whether they came as names or as codes."""
-    wants = f"one of {', '.join(FAMILIES)}"
+    wants = wants_family(system)
     data = (
         family.values if isinstance(family, xr.DataArray) and family.dtype.kind in "OTU" else family
     )
@@ -291,12 +324,16 @@ def _codes(family: Any) -> Any:
     if several or isinstance(data, (str, np.ndarray)):
         array = np.asarray(data, dtype=object)
         if array.size and all(isinstance(name, str) for name in array.flat):
-            wrong = [name for name in array.flat if name not in FAMILIES]
+            codes = np.array([family_code(system, name) for name in array.flat], dtype=object)
+            wrong = [name for name, code in zip(array.flat, codes, strict=True) if code is None]
             if wrong:
                 raise bad("family", wrong[0], wants)
-            codes = np.array([FAMILIES[name] for name in array.flat]).reshape(array.shape)
+            codes = codes.astype(float).reshape(array.shape)
             return family.copy(data=codes) if isinstance(family, xr.DataArray) else codes
     kept = numeric("family", family)
-    if isinstance(kept, float) and kept not in FAMILIES.values():
+    known = FAMILIES.values() if system.standing.rung.labels_fixed else ()
+    if isinstance(kept, float) and (
+        kept not in known if known else not kept.is_integer() or kept == 0.0 or kept < BACKWARD
+    ):
         raise ParameterError(f"family: got {describe(family)}, wants {wants}, or its code")
     return kept

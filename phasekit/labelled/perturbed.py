@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -12,29 +13,27 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
+from phasekit.cells.numbered import with_errors
 from phasekit.cells.request import passes_of
-from phasekit.cells.states import CENTERS
-from phasekit.labelled.orbits import FAMILIES, noted
-from phasekit.labels.arguments import (
-    bad,
-    call_checked,
-    named,
-    one_of,
-    whole,
-)
+from phasekit.cells.states import option_of
+from phasekit.labelled.orbits import family_code, wants_family, with_notes
+from phasekit.labels.arguments import bad, call_checked, one_of, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.systems.system import as_system
 from phasekit.table.quantities import select
 from phasekit.table.row import Quantity
 
+#: The family that is meant where none is named, of numbered centers and of those with names.
+LOWEST = ("the well of the lowest center", "lower_well")
+
 
 @call_checked
-def melnikov(perturbed: Any) -> xr.Dataset:
+def melnikov(system: Any) -> xr.Dataset:
     """Melnikov's function on the separatrices: thresholds of irregular motion.
 
     Parameters
     ----------
-    perturbed : Perturbed
+    system : Perturbed
         A system with damping and drive.
 
     Returns
@@ -76,17 +75,17 @@ def melnikov(perturbed: Any) -> xr.Dataset:
     >>> pk.melnikov(driven).chaos_threshold.sel(saddle="lower").values.round(9).tolist()
     [0.814751185, 1.119291703]
     """
-    return _of_system("melnikov", perturbed)
+    return _of_system("melnikov", system)
 
 
 @call_checked
-def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
+def quiet_frequencies(system: Any, *, n: int = 8) -> xr.Dataset:
     """Frequencies of a torque to which the lobes of a figure-eight do not respond.
 
     Parameters
     ----------
-    perturbed : Perturbed
-        A system with coefficients (A, B, C), perturbed.
+    system : Perturbed
+        A system in a potential, perturbed.
     n : int, default 8
         How many of them.
 
@@ -95,6 +94,8 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
     xarray.Dataset
         ``quiet_frequency`` in s^-1 on (``saddle``, ``side``, ``order``): the zeros of Melnikov's
         function of a torque ``cos(nu t)``, multiples of the first; NaN for loops that wind.
+        Those of a `Potential` have ``quiet_frequency_error``; they are the least ones, and NaN
+        from where the response, which falls exponentially, is lost in rounding.
 
     Raises
     ------
@@ -104,11 +105,13 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
 
     Notes
     -----
-    Along a loop that returns to its saddle on the same side, the amplitude of a torque's Melnikov
-    function has the factor ``sin(nu x/k)``, where ``cosh(x + i y) = (-S + i k^2)/sqrt D``,
+    Along a loop that returns to its saddle on the same side, in (A, B, C), the amplitude of a
+    torque's Melnikov function has the factor ``sin(nu x/k)``, where
+    ``cosh(x + i y) = (-S + i k^2)/sqrt D``,
     ``S = (A/2) sin 2 phi_s``, ``D = S^2 + (B cos phi_s + C sin phi_s) k^2``, and k is the saddle's
     exponent: the two poles of the separatrix next to real time give a residue each
     ([Melnikov1963]; [GuckenheimerHolmes1983] section 4.5). It vanishes at ``nu = order pi k/x``.
+    In any potential these are the zeros of ``int phi' sin(nu t) dt``, by the trapezoidal rule.
 
     Examples
     --------
@@ -121,22 +124,22 @@ def quiet_frequencies(perturbed: Any, *, n: int = 8) -> xr.Dataset:
     True
     """
     number = whole("n", n, "a whole number >= 1")
-    ds = _of_system("quiet_frequencies", perturbed)
-    attrs = {"long_name": "number of the quiet frequency"}
-    order = xr.DataArray(np.arange(1, number + 1), dims="order", attrs=attrs)
-    first = ds.quiet_frequency
-    listed = first * order
-    listed.attrs = {**first.attrs, "long_name": "frequency to which the lobe does not respond"}
-    return ds.assign(quiet_frequency=listed).assign_coords(order=order)
+    system = as_system(system)
+    labels = {**LABELS, "order": (range(1, number + 1), "number of the quiet frequency")}
+    rows = select("quiet_frequencies")
+    if not system.standing.rung.labels_fixed:
+        rows = tuple(with_errors(system, rows))
+    rows = tuple(replace(row, labels=labels) for row in rows)
+    return _of_system("quiet_frequencies", system, rows, number=number)
 
 
 @call_checked
-def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
+def capture(system: Any, *, start: str = "outside") -> xr.Dataset:
     """Probability of capture in each well, for a motion that slowly reaches a separatrix.
 
     Parameters
     ----------
-    perturbed : Perturbed
+    system : Perturbed
         A system with damping, and parameters that drift or a constant torque.
     start : {"outside", "rotation"}
         Where the motion comes from: round both wells, from outside the figure-eight of the lower
@@ -179,20 +182,21 @@ def capture(perturbed: Any, *, start: str = "outside") -> xr.Dataset:
     [0.28055, 0.71945, 0.0]
     """
     rotation = bool(one_of("start", start, ("outside", "rotation")))
-    return noted(_of_system("capture", perturbed, rotation=rotation), start=start)
+    return with_notes(_of_system("capture", system, rotation=rotation), start=start)
 
 
 @call_checked
-def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
+def escape_rate(system: Any, *, center: str | int | None = None) -> xr.Dataset:
     """Rates of thermal escape from a well, over each saddle at its ends.
 
     Parameters
     ----------
-    perturbed : Perturbed
-        A system with coefficients (A, B, C), damping and a thermal energy kT; with a constant
-        torque, and no other drive.
-    center : {"lower_center", "upper_center"}
-        The center of the well.
+    system : Perturbed
+        A system in a potential, with damping and a thermal energy kT; with a constant torque, and
+        no other drive.
+    center : {"lower_center", "upper_center"} or int, optional
+        The center of the well: a label, or of a `Potential` its number among the equilibria; by
+        default the lower, or the lowest.
 
     Returns
     -------
@@ -202,8 +206,10 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
         over the upper one, which winds, out of both wells together, on either side.
         ``escape_regime`` (`EscapeRegime`) says what limits it, ``escape_error`` the relative error.
         Under a torque both ends of a well differ; the rate is that of the end which is reached
-        first, over the higher one at low damping next to nothing. Absent ones, barriers below 2 kT,
-        rates that are not known within their own size and systems with a drive are NaN.
+        first, over the higher one at low damping next to nothing. In a row of wells, over the lower
+        end of the well, then over that of the wells on both sides of it together, and so on.
+        Absent ones, barriers below 2 kT, rates that are not known within their own size and
+        systems with a drive are NaN.
 
     Raises
     ------
@@ -212,7 +218,7 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
 
     Notes
     -----
-    Kramers' rate with the exact integral over the well, times the factors for recrossing and for
+    Kramers' rate with the integral over the well, times the factors for recrossing and for
     low damping ([MelnikovMeshkov1986], [HanggiTalknerBorkovec1990]). These factors hold for high
     barriers. In the limits of low and of strong damping the mean first passage of the energy, by
     its exact actions, and that of the angle correct them; in between the corrections enter as far
@@ -228,8 +234,10 @@ def escape_rate(perturbed: Any, *, center: str = "lower_center") -> xr.Dataset:
     >>> round(rate, 5)
     0.00053
     """
-    number = one_of("center", center, CENTERS)
-    return noted(_of_system("escape", perturbed, center=number), center=center)
+    system = as_system(system)
+    number = option_of(system, "center", center)
+    meant = system.standing.rung.default["center"] if center is None else center
+    return with_notes(_of_system("escape", system, center=number), center=str(meant))
 
 
 @call_checked
@@ -239,13 +247,16 @@ def critical_torque(system: Any) -> xr.Dataset:
     Parameters
     ----------
     system : system
-        A system with coefficients (A, B, C), perturbed or not; a torque of its own does not count.
+        A system in a potential, perturbed or not; a torque of its own does not count.
 
     Returns
     -------
     xarray.Dataset
         On ``direction`` (minus, plus): ``critical_torque`` in s^-2, signed, and ``critical_phi``
-        in rad, where equilibria merge.
+        in rad, where equilibria merge. Those of a `Potential` have ``critical_torque_error``, an
+        estimate, ``critical_phi_error``, a bound, and ``critical_complete``: whether they are
+        proved to be the extremes. On an interval equilibria may leave at an end of it instead; on a
+        line without ends the torque is infinite where V' has no bound, and has no place.
 
     Raises
     ------
@@ -254,7 +265,8 @@ def critical_torque(system: Any) -> xr.Dataset:
 
     Notes
     -----
-    The extremes of V', exact: V'' = 0 is the equation of equilibria of another system,
+    The extremes of V', which are equilibria of V' as a potential [MooreKearfottCloud2009]. Those of
+    (A, B, C) are exact: V'' = 0 is the equation of equilibria of another system,
     ``V''(phi; A, B, C) = V'(phi - pi/4; -2 A, (C - B)/sqrt 2, -(B + C)/sqrt 2)``, V being that of
     [Veljovic2015] (15). The critical current of a Josephson junction ([Stewart1968],
     [McCumber1968]) is that of ``A = C = 0``.
@@ -265,17 +277,28 @@ def critical_torque(system: Any) -> xr.Dataset:
     >>> pk.critical_torque(pk.Pendulum(length=1.0, g=9.81)).critical_torque.values.round(9).tolist()
     [-9.81, 9.81]
     """
-    return _of_system("critical_torques", system)
+    ds = _of_system("critical_torques", system)
+    proved = ds.get("critical_complete")
+    if proved is not None and proved.chunks is None:
+        open_ = int((~proved & ds.critical_torque.notnull().any("direction")).sum())
+        if open_:
+            warnings.warn(
+                f"critical_torque: in {open_} of {proved.size} systems it is not proved that these "
+                "are the extremes; there `critical_complete` is False",
+                RuntimeWarning,
+                stacklevel=3,
+            )
+    return ds
 
 
 @call_checked
-def retrapping_torque(perturbed: Any) -> xr.Dataset:
+def retrapping_torque(system: Any) -> xr.Dataset:
     """Smallest constant torque that sustains a rotation, at small damping.
 
     Parameters
     ----------
-    perturbed : Perturbed
-        A system with coefficients (A, B, C) and damping; a torque of its own does not count.
+    system : Perturbed
+        A system in a potential on a circle, and damping; a torque of its own does not count.
 
     Returns
     -------
@@ -287,7 +310,7 @@ def retrapping_torque(perturbed: Any) -> xr.Dataset:
     Raises
     ------
     ParameterError
-        If the system is not perturbed, or omega1 is a function of time.
+        If the system is not perturbed or on a line, or omega1 is a function of time.
 
     Notes
     -----
@@ -303,25 +326,26 @@ def retrapping_torque(perturbed: Any) -> xr.Dataset:
     >>> pk.retrapping_torque(damped).retrapping_torque.values.round(6).tolist()  # 0.4/pi
     [-0.127324, 0.127324]
     """
-    return _of_system("retrapping", perturbed)
+    return _of_system("retrapping", system)
 
 
 @call_checked
 def resonances(
-    perturbed: Any, *, n: int | Sequence[int], m: int = 1, family: str = "lower_well"
+    system: Any, *, n: int | Sequence[int], m: int = 1, family: str | None = None
 ) -> xr.Dataset:
     """Resonances between orbits and drive: their actions, widths and overlap.
 
     Parameters
     ----------
-    perturbed : Perturbed
-        A system with coefficients (A, B, C) and a drive.
+    system : Perturbed
+        A system in a potential, and a drive; a constant torque is part of the potential.
     n : int or sequence of int
         Orders of the resonances: all from 1 to n, or those given.
     m : int, default 1
         Multiple of the drive's frequency.
-    family : {"lower_well", "upper_well", "outer", "forward", "backward"}
-        The family of orbits.
+    family : {"lower_well", "upper_well", "outer", "forward", "backward"}, optional
+        The family of orbits; of a `Potential` "forward", "backward", and "well_0", "wells_0_2", ...
+        by the numbers of the centers. By default the well of the lower, or lowest, center.
 
     Returns
     -------
@@ -332,7 +356,7 @@ def resonances(
         the next over their distance: near 1 motion between them becomes irregular. NaN where the
         family has no such orbit; of several, that of least action, in "outer" and rotations that
         next to the separatrix. The width is 0 where no harmonic has the frequency m nu, and NaN
-        closer to the separatrix than 1e-12 of its height.
+        closer to the separatrix than 1e-12 of its height. Under a torque nothing rotates: NaN.
 
     Raises
     ------
@@ -342,7 +366,7 @@ def resonances(
     Notes
     -----
     The pendulum approximation, first order in the drive ([Chirikov1979]); Fourier coefficients over
-    the exact angle variable.
+    the angle variable, exact in (A, B, C), and of a `Potential` or under a torque by quadrature.
 
     Examples
     --------
@@ -354,12 +378,19 @@ def resonances(
     """
     orders = _orders(n)
     order = whole("m", m, "a whole number >= 1")
-    number = FAMILIES[named("family", family, FAMILIES)]
+    system = as_system(system)
+    code = 0
+    if family is not None:
+        found = family_code(system, family) if isinstance(family, str) else None
+        if found is None:
+            raise bad("family", family, wants_family(system))
+        code = found
     labels = {**LABELS, "order": (orders, "order of the resonance")}
     rows = tuple(replace(row, labels=labels) for row in select("resonances"))
-    options = {"orders": orders, "m": order, "family": number}
-    ds = _of_system("resonances", perturbed, rows, **options)
-    return noted(ds, family=family, m=str(order))
+    options = {"orders": orders, "m": order, "family": code}
+    ds = _of_system("resonances", system, rows, **options)
+    meant = LOWEST[system.standing.rung.labels_fixed] if family is None else family
+    return with_notes(ds, family=meant, m=str(order))
 
 
 def _orders(n: Any) -> tuple[int, ...]:

@@ -5,16 +5,17 @@ Array parameters of the system span the result's dims.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import xarray as xr
 
 from phasekit.cells.evaluate import evaluate
+from phasekit.cells.request import equations_for
 from phasekit.labels.arguments import (
     bad,
     call_checked,
 )
-from phasekit.laws.equations import equations_of
 from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import as_system
 from phasekit.table.quantities import select
@@ -84,10 +85,12 @@ def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
     'SADDLE'
     """
     found = as_system(system)
-    if equations_of(found) is not None:
+    if (law := equations_for(found, "equilibria")) is not None:
         # Only then: continuation takes long to load.
         from phasekit.labelled.in_box import equilibria_in_box
 
+        if found.standing.traits is not None:
+            box = box_of(found, law, box)
         return equilibria_in_box(found, box, n)
     if n is not None:
         raise bad("n", n, "None: only maps are iterated")
@@ -140,6 +143,17 @@ def separatrices(system: Any) -> xr.Dataset:
     (True, 'FIGURE_EIGHT')
     """
     return _of_system("separatrices", system)
+
+
+def box_of(system: Any, law: Any, box: Any) -> Any:
+    """A box with what a system with terms says of it: no rate at rest, the part of a line."""
+    if box is not None and not isinstance(box, Mapping):
+        return box
+    x = system.coordinate
+    known = {f"d{x}": (-1.0, 1.0)}  # zero, wherever the system rests
+    if (interval := getattr(system.system, "interval", None)) is not None:
+        known[x] = interval
+    return {**known, **(box or {})}
 
 
 def _of_system(group: str, system: Any) -> xr.Dataset:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,14 +20,20 @@ from phasekit.bifurcation.exact.quasi_static import (
     sheet_of,
     start_label,
 )
-from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.bifurcation.numerical.quasi_static import Track
+from phasekit.bifurcation.numerical.steady import steady_line
+from phasekit.cells.request import worded
+from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import ParameterError
-from phasekit.labelled.atlas import single
+from phasekit.labelled.atlas import resting, single, tell_missing
+from phasekit.labelled.slow_path import slow_path
 from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
 from phasekit.labels.grid import variable
+from phasekit.laws.equations import equations_of
+from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.potential import potential
-from phasekit.systems.system import System
+from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS
 
 
@@ -36,22 +42,27 @@ def quasi_static(
     path: Mapping[str, Any] | None = None,
     *,
     phi0: float | None = None,
+    x0: Any = None,
     **path_by_name: Any,
 ) -> xr.Dataset:
-    """Follow one center while parameters change slowly, with its jumps at folds.
+    """Follow one center or attractor while parameters change slowly, with its jumps.
 
-    A hysteresis loop of a magnet, or the slow run-up of a disk.
+    A hysteresis loop of a magnet, the slow run-up of a disk, the tipping of a climate.
 
     Parameters
     ----------
     system : system
-        A single system; its own values of the parameters that change are not used.
+        A single system; its own values of the parameters that change are not used. Of a
+        `Perturbed` system the constant torque counts, and nothing else.
     path : mapping of str to array_like, optional
         Values of the parameters that change, step by step, forth and back as often as wanted: 1-D
         arrays of one length. Between steps parameters change on a straight line.
     phi0 : float, optional
         The angle in rad from which the system slides to rest at the first step; by default it
         begins in the deepest well.
+    x0 : mapping or sequence, optional
+        Of a flow or map, the state whose attractor at the first step is followed; by default the
+        middle of the window.
     **path_by_name
         The path by keyword in place of `path`.
 
@@ -62,14 +73,24 @@ def quasi_static(
         s^-2 and ``natural_frequency`` in s^-1 of the center, and ``jumped``, whether it was lost
         since the step before. On ``jump``: ``jump_step``, the parameters at the fold
         (``jump_omega1``, ...), ``jump_phi_from`` and ``jump_phi_to`` in rad, and ``jump_loss``,
-        the energy in s^-2 that is lost by coming to rest in the other well. Where there is no force
-        the center disappears for good: NaN from there on, with a RuntimeWarning.
+        the energy in s^-2 that is lost by coming to rest in the other well; ``jump_certain`` says
+        whether it comes to rest there however weak the damping is. ``complete`` says whether it is
+        proved that no jump is missing. Where there is no force, or nothing stops the motion, or the
+        center leaves the interval, it is lost for good: NaN from there on, with a RuntimeWarning.
+
+        Of a flow or map, on ``step``: the least and greatest value of each state along the
+        attractor (``v_min``, ``v_max``), ``attractor_kind``, ``attractor_period``, the
+        ``recovery_rate`` of disturbances, and ``jumped``. On ``jump``: ``jump_step``, the
+        parameters where the attractor is lost, ``jump_kind`` (fold, hopf, period_doubling, torus,
+        crisis), ``jump_soft``, whether what comes after grows out of it, and for each state
+        ``jump_from_`` and ``jump_to_``. Where the motion then runs to infinity, NaN from there on,
+        with a RuntimeWarning.
 
     Raises
     ------
     ParameterError
         If the system is not a single one, a parameter of the path is unknown or leaves its domain,
-        lengths differ, an angle changes together with others, or phi0 is no place in a well.
+        lengths differ, or phi0 is no place in a well.
 
     Notes
     -----
@@ -79,6 +100,17 @@ def quasi_static(
     ``|B|^(2/3) + |C|^(2/3) = |A|^(2/3)``, a fold ([Kuznetsov2004] section 3.3), or a cusp of this
     curve. Where a pitchfork leaves the choice between two wells, it is that of the limit B, C -> 0
     from above.
+
+    In any other potential, or under a torque, a center is held from step to step by a tube in which
+    V'' > 0 and V' has its signs at the walls for all parameters in between, by interval arithmetic;
+    where there is no such tube, all mergers on the way are found as in `branches`. From a fold the
+    force leads to the next center on its side; from a pitchfork to the right.
+
+    An equilibrium or a periodic orbit of a flow or map is found step by step by Newton's method,
+    and attracts by its eigenvalues or multipliers; where it does not, steps are halved until the
+    place is known to 1e-11 of a step. The motion from there, a little beyond, shows what comes
+    after. At a pitchfork it goes to the side of the greater first state. A chaotic attractor is
+    followed by its motion.
 
     Examples
     --------
@@ -90,13 +122,31 @@ def quasi_static(
     >>> loop = pk.quasi_static(magnet, h_x=np.linspace(3.0, -3.0, 13))
     >>> np.cos(loop.phi.values).round(6).tolist()[:3], loop.jump_h_x.values.tolist()
     ([1.0, 1.0, 1.0], [-2.0])
+
+    A fold of a lake's model, at which it tips:
+
+    >>> lake = pk.Problem("a - x + 2*x^2/(x^2 + 1)", "x", {"a": 0.1}, window={"x": (0, 4)})
+    >>> up = pk.quasi_static(lake, a=np.linspace(0.1, 0.2, 11), x0=0.1)
+    >>> up.jump_a.round(6).values.tolist(), up.jump_kind.values.tolist()
+    ([0.134884], ['fold'])
     """
     values = _values(path, path_by_name)
+    system = as_system(system)
+    if (law := equations_of(system)) is not None:
+        if phi0 is not None:
+            raise bad("phi0", phi0, "nothing for a system with states of its own: x0")
+        return slow_path(system, law, values, x0)
+    if x0 is not None:
+        raise bad("x0", x0, "nothing for a system whose state is phi0")
+    if not system.standing.is_within(Trigonometric):
+        return _of_any(system, values, phi0)
     system, _ = single(system)
-    steps = _steps(system, values)
+    steps = _steps(system, values, system.formula_inputs())
     # The names that stand still have numbers.
     names = system.formula_inputs()
     moved = {name: array for name, array in steps.items() if np.ptp(array) > 0.0}
+    if len(moved) > 1 and not moved.keys().isdisjoint(system.trigonometric().angles):
+        return _of_any(system, values, phi0)  # no polynomials along such lines
     size = len(next(iter(steps.values())))
     fixed = {name: float(system.parameters[name]) for name in names}
     fixed |= {name: float(array[0]) for name, array in steps.items() if name not in moved}
@@ -127,6 +177,50 @@ def quasi_static(
     return _dataset(system, steps, track, np.array(sheets), jumps)
 
 
+def _of_any(system: System, values: Mapping[str, Any], phi0: Any) -> xr.Dataset:
+    """A center of any potential, or under a torque."""
+    system, law, numbers = resting(system, what="quasi_static")
+    steps = _steps(system, values, list(numbers))
+    line = steady_line(
+        law, numbers, {name: (float(a[0]), float(a[-1])) for name, a in steps.items()}
+    )
+    track = Track(line.formula, line.still, steps)
+    valid = track.points.n_equilibria >= 0
+    if not valid.all():
+        raise bad("path", f"step {int(np.argmin(valid))}", "parameters for which V is finite")
+    if phi0 is None:
+        column = track.deepest()
+        if column < 0:
+            raise bad("path", "step 0", "parameters for which there is a center")
+    else:
+        column = track.slide(number("phi0", phi0, "a coordinate", system.unit_of("state_phi")))
+        if column < 0:
+            raise bad("phi0", phi0, "a coordinate from which the force leads to a center")
+    found = track.follow(column)
+    tell_missing("quasi_static", "the path", track.missing)
+    there = found >= 0
+    if not there.all():
+        warnings.warn(
+            f"path: {track.gone or 'the center disappears'} before step {int(np.argmin(there))}",
+            RuntimeWarning,
+            stacklevel=3,
+        )
+    rows = np.flatnonzero(there)
+    columns = {}
+    for name in ("phi", "energy", "natural_frequency"):
+        columns[name] = np.full(found.size, np.nan)
+        columns[name][rows] = getattr(track.points, name)[rows, found[rows]]
+    moved = {
+        "step": np.array([one.step for one in track.jumps], int),
+        **{name: np.array([one.at[name] for one in track.jumps]) for name in steps},
+        "phi_from": np.array([one.start for one in track.jumps]),
+        "phi_to": np.array([one.end for one in track.jumps]),
+        "loss": np.array([one.loss for one in track.jumps]),
+        "certain": np.array([one.certain for one in track.jumps], bool),
+    }
+    return _labelled(system, steps, columns, moved, complete=not track.missing)
+
+
 def _values(path: Mapping[str, Any] | None, by_name: Mapping[str, Any]) -> dict[str, Any]:
     if path is not None and not isinstance(path, Mapping):
         raise bad("path", path, "a mapping of parameter names to values, {'omega1': [...]}")
@@ -140,9 +234,11 @@ def _values(path: Mapping[str, Any] | None, by_name: Mapping[str, Any]) -> dict[
     return values
 
 
-def _steps(system: System, values: Mapping[str, Any]) -> dict[str, FloatArray]:
+def _steps(
+    system: System, values: Mapping[str, Any], inputs: Sequence[str]
+) -> dict[str, FloatArray]:
     """The parameters of a path as arrays of one length; numbers stand still."""
-    declared = {p.name: p for p in system.declared if p.name in system.formula_inputs()}
+    declared = {p.name: p for p in system.declared if p.name in inputs}
     kept: dict[str, Any] = {}
     for name, value in values.items():
         if name not in declared:
@@ -198,14 +294,11 @@ class _Track:
         if not self.moved:
             yield 0, Walk(Segment(law, self.fixed, "", (0.0, 1.0)), [0.5] * size, numbers), dict
             return
-        angles = [name for name in self.moved if name in law.angles]
         if len(self.moved) == 1:
             ((name, array),) = self.moved.items()
             path = Path(law, self.fixed, name, (float(array.min()), float(array.max())))
             yield 0, Walk(path, array.tolist(), numbers), lambda at: {name: at}
             return
-        if angles:
-            raise bad(angles[0], "an angle that changes with others", "an angle that moves alone")
         names = list(self.moved)
         places = np.stack([self.moved[name] for name in names])
         line = _line(places)
@@ -252,16 +345,63 @@ def _dataset(
     rows = np.arange(there)
     points = type(track.points)(*(field[:there] for field in track.points))
     label = center_on(points, track.A[:there], sheets)
-    jumped = np.zeros(size, bool)
-    jumped[[one.step for one in jumps]] = True
-    data = {}
+    columns = {}
     for name in ("phi", "energy", "natural_frequency"):
-        column = np.full(size, np.nan)
-        column[:there] = getattr(points, name)[rows, label]
-        data[name] = variable(("step",), column, ROWS[name].attrs)
+        columns[name] = np.full(size, np.nan)
+        columns[name][:there] = getattr(points, name)[rows, label]
+    at = {
+        name: np.array([{**track.fixed, **one.at}[name] for one in jumps]) for name in track.fixed
+    }
+    A, B, C = type(system).valid_coefficients(at)
+    points = equilibria(A, B, C)
+    start = fold_angle(A, B, C)
+    moved = {
+        "step": np.array([one.step for one in jumps], int),
+        **{name: at[name] for name in steps},
+        "phi_from": start,
+        "phi_to": points.phi[:, 0],
+        "loss": potential(A, B, C, start) - points.energy[:, 0],
+        "certain": np.ones(len(jumps), bool),  # there is no other center
+    }
+    return _labelled(system, steps, columns, moved, complete=True)
+
+
+def _labelled(
+    system: System,
+    steps: dict[str, FloatArray],
+    columns: Mapping[str, FloatArray],
+    jumps: Mapping[str, Any],
+    *,
+    complete: bool,
+) -> xr.Dataset:
+    size = len(next(iter(steps.values())))
+    rows = worded(system, [ROWS[name] for name in columns])
+    data = {row.name: variable(("step",), columns[row.name], row.attrs) for row in rows}
+    jumped = np.zeros(size, bool)
+    jumped[jumps["step"]] = True
     about = "whether the center was lost at a fold since the step before"
     data["jumped"] = variable(("step",), jumped, {"long_name": about})
-    data |= _jumps(system, track, jumps, steps)
+    angle, height = (row.units for row in rows[:2])
+    words = {
+        "step": ("1", "first step after the jump"),
+        **{
+            name: (
+                input_attrs(system, name)["units"],
+                f"{input_attrs(system, name)['long_name']} at the fold",
+            )
+            for name in steps
+        },
+        "phi_from": (angle, "angle of the center where the fold ends it"),
+        "phi_to": (angle, "angle of the center to which it jumps"),
+        "loss": (height, "energy that the jump loses"),
+        "certain": ("1", "whether it jumps there however weak the damping is"),
+    }
+    for name, values in jumps.items():
+        units, long_name = words[name]
+        if angle != "rad":
+            long_name = long_name.replace("angle", "coordinate")
+        data[f"jump_{name}"] = variable(("jump",), values, {"long_name": long_name, "units": units})
+    data["complete"] = variable((), complete, {"long_name": "whether no jump can be missing"})
     coords = {
         "step": variable(("step",), np.arange(size), {"long_name": "step along the path"}),
         **{
@@ -271,37 +411,8 @@ def _dataset(
                 input_attrs(system, name),
             )
             for name, value in system.parameters.items()
+            if name not in data
         },
     }
+    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
     return xr.Dataset(data, coords, dataset_attrs(system))
-
-
-def _jumps(
-    system: System, track: _Track, jumps: list[_Lost], steps: dict[str, FloatArray]
-) -> dict[str, xr.Variable]:
-    at = {
-        name: np.array([{**track.fixed, **one.at}[name] for one in jumps]) for name in track.fixed
-    }
-    A, B, C = type(system).valid_coefficients(at)
-    points = equilibria(A, B, C)
-    start = fold_angle(A, B, C)
-    end = points.phi[:, 0]
-    columns = {
-        "jump_step": (np.array([one.step for one in jumps], int), "1", "first step after the jump"),
-        **{
-            f"jump_{name}": (
-                at[name], input_attrs(system, name)["units"],
-                f"{input_attrs(system, name)['long_name']} at the fold",
-            )
-            for name in steps
-        },
-        "jump_phi_from": (start, "rad", "angle of the center where the fold ends it"),
-        "jump_phi_to": (end, "rad", "angle of the center to which it jumps"),
-        "jump_loss": (
-            potential(A, B, C, start) - points.energy[:, 0], "s-2", "energy that the jump loses",
-        ),
-    }  # fmt: skip
-    return {
-        name: variable(("jump",), column, {"long_name": about, "units": units})
-        for name, (column, units, about) in columns.items()
-    }

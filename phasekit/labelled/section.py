@@ -1,4 +1,4 @@
-"""Poincare sections, labelled: the states in which a motion passes a value of its coordinate."""
+"""Poincare sections, labelled: the states in which motions pass a value, or meet a formula."""
 
 from __future__ import annotations
 
@@ -7,22 +7,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from phasekit.cells.request import equations_for
 from phasekit.cells.schema import dataset_attrs, input_attrs
-from phasekit.labelled.flows import states_of
+from phasekit.inputs import is_real, refuse_call
+from phasekit.labelled.crossings import sections_through
 from phasekit.labelled.motion import checked_tolerances, refuse_noise
-from phasekit.labels.arguments import (
-    FloatArray,
-    bad,
-    call_checked,
-    number,
-    whole,
-)
+from phasekit.labels.arguments import bad, number, state_arguments, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import variable
-from phasekit.laws.equations import Equations, equations_of
 from phasekit.laws.ladder import Map, Routhian
-from phasekit.laws.perturbed import PerturbedConservative
-from phasekit.motion.equation_rates import pointwise as pointwise_of
 from phasekit.motion.flow import pointwise
 from phasekit.motion.method import circle, unit_of
 from phasekit.motion.sections import Section, passages
@@ -32,60 +25,71 @@ from phasekit.systems.system import as_system, single
 from phasekit.table.quantities import ROWS
 
 
-@call_checked
+@state_arguments
 def poincare_section(
     system: Any,
-    phi0: Any,
-    dphi0: float | None = None,
+    phi0: Any = None,
+    dphi0: Any = None,
     *,
-    duration: float,
     section: Any,
+    duration: float | None = None,
+    n: int | None = None,
+    x0: Any = None,
     direction: int = 1,
     rtol: float | None = None,
     atol: float | None = None,
-    **arguments: Any,
+    **states: Any,
 ) -> xr.Dataset:
-    """States at which a motion crosses a section, from time 0 on.
+    """States at which motions cross a section, from time 0 on.
 
     Parameters
     ----------
     system : system, Perturbed, FreeGyroRotor or Problem
-        One system. `stroboscopic` gives the states once a period of a drive.
-    phi0, dphi0 : float
-        State at t = 0: angle in rad, angular velocity in s^-1; of a `Problem` ``phi0`` is the
-        sequence of its states, and ``dphi0`` None.
-    duration : float
-        Time to follow the motion, s.
-    section : float or (str, float)
-        The angle of the section in rad, full turns aside; of a `Problem` the name of a state with
-        its value.
+        Any flow. `stroboscopic` gives the states once a period of a drive.
+    phi0, dphi0 : float, 1-D array_like or xarray.DataArray
+        States at t = 0: angles in rad, angular velocities in s^-1.
+    section : float, (str, float), str or sympy expression
+        The angle of the section in rad, full turns aside; or a state with its value, such as
+        ``("z", 27.0)``; or a formula of states, parameters and time: ``"z = r - 1"``, or
+        ``"x + 2*y - 1"``, which vanishes there.
+    duration : float, optional
+        Time to follow the motions, s.
+    n : int, optional
+        In place of a duration, or besides: crossings after which a motion ends.
+    x0 : mapping, sequence or xarray.DataArray, optional
+        States at t = 0 of a `Problem`, as in `flow`; ``poincare_section(problem, x0, ...)`` does
+        as well. Each may be an array.
     direction : {1, -1, 0}
-        Passages in which the coordinate rises, falls, or both.
+        Crossings at which the coordinate, or the formula, rises, falls, or both.
     rtol, atol : float, optional
         Error of a step that is allowed, relative and absolute; default 1e-10 and 1e-12.
-    **arguments
-        What `FreeGyroRotor.poincare` takes besides.
+    **states
+        The states of a `Problem` by name, in place of `x0`; what `FreeGyroRotor.poincare` takes
+        besides.
 
     Returns
     -------
     xarray.Dataset
         On the dim ``crossing``: ``section_time`` in s, ``section_phi`` in rad in (-pi, pi],
-        ``section_dphi`` in s^-1; of a `Problem` ``section_`` and the name of each state; of a
-        `FreeGyroRotor` what its `poincare` gives.
+        ``section_dphi`` in s^-1; of a `Problem` ``section_`` and the name of each state, angles
+        within half a period of 0; of a `FreeGyroRotor` what its `poincare` gives. Arrays of states
+        and parameters span further dims; there ``n_crossings`` says how many a motion has, and
+        others are NaN.
 
     Raises
     ------
     ParameterError
         If an argument is unusable.
     ConvergenceError
-        If the integrator cannot reach the end with the accuracy asked for.
+        If the integrator cannot reach the end of a single motion with the accuracy asked for.
 
     Notes
     -----
-    The points of the motion with ``phi = section`` ([GuckenheimerHolmes1983] section 1.5). The
-    motion is integrated by DOP853 ([HairerNorsettWanner1993]); each step is cut where the
-    coordinate turns, so that two passages in one step are not lost, and a passage is a root of the
-    step's interpolant. The state at t = 0 is none.
+    The points of the motions with ``phi = section`` ([GuckenheimerHolmes1983] section 1.5). Motions
+    are integrated by DOP853 ([HairerNorsettWanner1993]), many in compiled code on all cores; each
+    step is looked at in parts, and where the formula turns towards zero, so that two crossings in
+    one step are not lost. A crossing is a zero on the interpolant of a step. The state at t = 0 is
+    none. A RuntimeWarning counts the motions that do not meet the section.
 
     Examples
     --------
@@ -94,34 +98,79 @@ def poincare_section(
     >>> pk.poincare_section(pendulum, 0.0, 1.0, duration=20.0, section=0.0).section_dphi.round(3)
     <xarray.DataArray 'section_dphi' (crossing: 3)> Size: 24B
     array([0.724, 0.527, 0.384])...
+    >>> lorenz = pk.Problem(
+    ...     {"x": "10*(y - x)", "y": "x*(r - z) - y", "z": "x*y - 8*z/3"}, parameters={"r": 28.0}
+    ... )
+    >>> ds = pk.poincare_section(lorenz, {"x": [1, 2], "y": 1, "z": 20}, section="z = r - 1", n=50)
+    >>> ds.section_x.dims
+    ('point', 'crossing')
     """
     wants = "a time in s, > 0"
     found: Any = as_system(system)
-    law = equations_of(found)
+    law = equations_for(found, "motion")
     if isinstance(law, Map):
         raise bad("system", system, "a flow x' = f(x): a map has no sections")
-    duration = number("duration", duration, wants, "s")
-    if not duration > 0.0:
-        raise bad("duration", duration, wants)
+    if duration is None and n is None:
+        raise bad("duration", duration, f"{wants}, or a number of crossings n=")
+    if duration is not None:
+        duration = number("duration", duration, wants, "s")
+        if not duration > 0.0:
+            raise bad("duration", duration, wants)
+    if n is not None:
+        n = whole("n", n, "a number of crossings >= 1", 1)
     senses = "1 (rising), -1 (falling) or 0 (both)"
     direction = whole("direction", direction, senses, -1)
     if direction > 1:
         raise bad("direction", direction, senses)
     tolerances = checked_tolerances(rtol, atol)
     if issubclass(found.rung, Routhian):
-        arguments |= {"direction": direction, **tolerances}
+        if duration is None or n is not None:
+            raise bad("n", n, "None, and a duration, for a FreeGyroRotor")
+        arguments = {**states, "direction": direction, **tolerances}
         ds: xr.Dataset = found.poincare(
             phi0, _needed(dphi0), duration, section=section, **arguments
         )
         return ds
-    if arguments:
-        raise bad(*next(iter(arguments.items())), "nothing, except of a FreeGyroRotor")
+    how = {"section": section, "duration": duration, "n": n, "direction": direction}
     if law is not None:
-        return _of_equations(found, law, phi0, duration, section, direction, tolerances)
-    return _of_system(found, phi0, dphi0, duration, section, direction, tolerances)
+        given = [phi0, dphi0] if x0 is None and dphi0 is not None else phi0
+        start = given if x0 is None else x0
+        return sections_through(found, law, start, states, tolerances=tolerances, **how)
+    refuse_call(poincare_section, states)
+    if x0 is not None:
+        raise bad("x0", x0, "nothing for a system whose state is phi0, dphi0")
+    if phi0 is None:
+        raise bad("phi0", None, "the angle at t = 0, in rad")
+    alone = all(isinstance(value, float) for value in found.parameters.values())
+    if n is None and alone and not np.ndim(phi0) and not np.ndim(dphi0) and is_real(section):
+        return _of_system(found, phi0, dphi0, duration, section, direction, tolerances)
+    return _of_many(found, phi0, _needed(dphi0), tolerances, **how)
 
 
-def _needed(dphi0: float | None) -> float:
+def _of_many(
+    system: Any, phi0: Any, dphi0: Any, tolerances: dict[str, Any], *, section: Any, **how: Any
+) -> xr.Dataset:
+    """Sections of many motions of a system of one coordinate, by its equations."""
+    moved = system if system.standing.traits is not None else Perturbed(system)
+    refuse_noise(moved)
+    level = section
+    if is_real(section):
+        level = ("phi", number("section", section, units=system.unit_of("state_phi")))
+    start = {"phi": phi0, "dphi": dphi0}
+    other = {getattr(system, "coordinate", "phi"): "phi"}
+    ds = sections_through(
+        moved, moved.equations(), start, {}, section=level, tolerances=tolerances, other=other,
+        **how,
+    )  # fmt: skip
+    for name in ("section_time", "section_phi", "section_dphi"):
+        row = ROWS[name]
+        words = moved.law.words(name, row.units, row.long_name)
+        ds[name].attrs |= {**row.attrs, **words, "equation": ds[name].attrs["equation"]}
+    ds.attrs = dataset_attrs(system)
+    return ds.drop_vars([name for name in moved.parameters if name not in system.parameters])
+
+
+def _needed(dphi0: Any) -> Any:
     if dphi0 is None:
         raise bad("dphi0", None, "the angular velocity at t = 0, in s^-1")
     return dphi0
@@ -131,13 +180,13 @@ def _of_system(
     system: Any,
     phi0: float,
     dphi0: float | None,
-    duration: float,
+    duration: Any,
     section: float,
     direction: int,
     tolerances: dict[str, Any],
 ) -> xr.Dataset:
     perturbed = system
-    if not issubclass(system.rung, PerturbedConservative):
+    if system.standing.traits is None:
         perturbed = Perturbed(system)
     refuse_noise(perturbed)
     level = number("section", section, "a finite number", system.unit_of("state_phi"))
@@ -170,37 +219,3 @@ def _of_system(
 
 def _numbers(found: Section) -> xr.Variable:
     return variable(("crossing",), np.arange(found.time.size), {"long_name": LABELS["crossing"][1]})
-
-
-def _of_equations(
-    system: Any,
-    law: Equations,
-    x0: Any,
-    duration: float,
-    section: Any,
-    direction: int,
-    tolerances: dict[str, Any],
-) -> xr.Dataset:
-    wants = f"one of the states {', '.join(law.states)} with a value: ('{law.states[0]}', 0.)"
-    if not isinstance(section, tuple) or len(section) != 2 or section[0] not in law.states:
-        raise bad("section", section, wants)
-    level = number("section", section[1], wants)
-    given = [value for _, value in states_of(law, x0, {}).values()]
-    start: FloatArray = np.array([number("x0", value) for value in given])
-    _, values = single(system)
-    found = passages(
-        InitialValue(pointwise_of(law, values), list(start), **tolerances, unit=np.inf),
-        duration, law.states.index(section[0]), level,
-        period=law.periods.get(section[0]), direction=direction,
-    )  # fmt: skip
-    equation = f"{section[0]} = {level!r}"
-    attrs = {"long_name": "time of the crossing", "units": "1", "equation": equation}
-    data = {"section_time": variable(("crossing",), found.time, attrs)}
-    for name, column in zip(law.states, found.state, strict=True):
-        attrs = {
-            "long_name": f"{name} in the section", "units": law.units.get(name, "1"),
-            "equation": equation,
-        }  # fmt: skip
-        data[f"section_{name}"] = variable(("crossing",), column, attrs)
-    coords = {name: variable((), values[name], input_attrs(system, name)) for name in law.names}
-    return xr.Dataset(data, {**coords, "crossing": _numbers(found)}, dataset_attrs(system))

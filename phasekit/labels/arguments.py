@@ -10,7 +10,6 @@ from __future__ import annotations
 import difflib
 import functools
 import inspect
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias, TypeVar, Union, cast
 
@@ -31,6 +30,7 @@ from phasekit.inputs import (
     whole,
 )  # fmt: skip
 from phasekit.labels.units import factor, si_unit
+from phasekit.spellings import respelled
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "call_checked", "describe"]
 __all__ += [
@@ -274,10 +274,9 @@ def state_arguments(function: Function) -> Function:
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:
-        if "perturbed" in kwargs and not args and first == "system":
-            text = f"{function.__name__}(perturbed=...) is now {function.__name__}(system=...)"
-            warnings.warn(text, DeprecationWarning, stacklevel=2)
-            args = (kwargs.pop("perturbed"),)
+        kwargs = respelled(function.__name__, kwargs)
+        if first in kwargs and not args:
+            args = (kwargs.pop(first),)
         # A system with states of its own takes them by their names.
         own_states = () if not args else getattr(args[0], "state", getattr(args[0], "states", ()))
         names = {name: to for name, to in other.items() if name not in own_states}

@@ -47,7 +47,7 @@ STATES: dict[str, tuple[str, str]] = {
     "state_excess": ("s-2", "energy of the state above the center"),
     "state_action": ("s-1", "action of the state"),
     "state_angle": ("rad", "angle variable of the state"),
-    "state_family": ("1", "family of the state's orbit, a code of OrbitFamily"),
+    "state_family": ("1", "family of the state's orbit, by its code"),
     "time": ("s", "time"),
     "box_phi": ("rad", "half of the width in angle of the box of states around rest at 0"),
     "box_dphi": ("s-1", "half of the height in angular velocity of the box of states"),

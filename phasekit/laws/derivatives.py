@@ -2,46 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import sympy as sp
+from phasekit.numerics.later import later
 
-
-class _Tanh(sp.Function):  # type: ignore[misc]
-    def fdiff(self, argindex: int = 1) -> Any:
-        return _Cosh(self.args[0]) ** -2
-
-
-class _Cosh(sp.Function):  # type: ignore[misc]
-    def fdiff(self, argindex: int = 1) -> Any:
-        return _Tanh(self.args[0]) * self
-
-
-class _Si(sp.Function):  # type: ignore[misc]
-    def fdiff(self, argindex: int = 1) -> Any:
-        return SphericalJ0(self.args[0])
-
-
-class _LambertW(sp.Function):  # type: ignore[misc]
-    def fdiff(self, argindex: int = 1) -> Any:
-        return sp.exp(-self) / (1 + self)
-
-
-class SphericalJ0(sp.Function):  # type: ignore[misc]
-    """sin(x)/x, 1 at x = 0: the slope of Si."""
-
-    def fdiff(self, argindex: int = 1) -> Any:
-        """Return its derivative."""
-        return -SphericalJ1(self.args[0])
-
-
-class SphericalJ1(sp.Function):  # type: ignore[misc]
-    """sin(x)/x^2 - cos(x)/x, 0 at x = 0."""
-
-
-#: What derivatives may hold beside the functions of formulas.
-DERIVED = frozenset({SphericalJ0, SphericalJ1})
-_INSTEAD = ((sp.tanh, _Tanh), (sp.cosh, _Cosh), (sp.Si, _Si), (sp.LambertW, _LambertW))
+if TYPE_CHECKING:
+    import sympy as sp
+else:
+    sp = later("sympy")
 
 
 def derivative(expression: Any, x: Any, order: int = 1) -> Any:
@@ -57,9 +25,11 @@ def derivative(expression: Any, x: Any, order: int = 1) -> Any:
     >>> derivative(sp.tanh(x), x, 2)
     -2*tanh(x)/cosh(x)**2
     """
-    for function, own in _INSTEAD:
+    from phasekit.laws.derived import INSTEAD
+
+    for function, own in INSTEAD:
         expression = expression.replace(function, own)
     found = sp.diff(expression, x, order)
-    for function, own in _INSTEAD:
+    for function, own in INSTEAD:
         found = found.replace(own, function)
     return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar
 
 from phasekit.laws.ladder import Flow, Lawful, Map
@@ -33,6 +33,10 @@ class Equations:
         How often a map is applied in each step.
     period : sympy.Expr, optional
         The period of f in time, a formula of the parameters.
+    start : mapping of str to float
+        Where motions begin unless something else is said, of states of which this is known.
+    noise : mapping of str to sympy.Expr
+        Of states with noise its amplitude s, a formula of the parameters: dx = f dt + s dW.
     """
 
     states: tuple[str, ...]
@@ -44,6 +48,13 @@ class Equations:
     units: Mapping[str, str] = field(default_factory=dict, hash=False)
     times: int = 1
     period: Any = None
+    start: Mapping[str, float] = field(default_factory=dict, hash=False)
+    noise: Mapping[str, Any] = field(default_factory=dict, hash=False)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Worker processes take it with plain mappings."""
+        given = (getattr(self, one.name) for one in fields(self))
+        return type(self), tuple(dict(x) if isinstance(x, Mapping) else x for x in given)
 
     @property
     def kind(self) -> str:

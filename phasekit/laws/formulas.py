@@ -67,6 +67,7 @@ def read_formula(
     declare: str = "",
     *,
     exact: bool = False,
+    read: Callable[[str, Any], Any] = parse,
 ) -> sympy.Expr:
     """Read a formula.
 
@@ -88,6 +89,8 @@ def read_formula(
     exact : bool
         Take doubles as the fractions that they are, so that nothing is rounded before code is
         written; else sympy rounds what it makes of them.
+    read : callable
+        The grammar: makes nodes of a text by a builder.
 
     Raises
     ------
@@ -126,10 +129,10 @@ def read_formula(
         return ParameterError(f"{argument}: got {got}{hint}{declare and '; ' + declare}")
 
     try:
-        found = parse(text, Nodes(unknown, symbols, exact))
+        found = read(text, Nodes(unknown, symbols, exact))
         values([found])
         found = exact_numbers(found) if exact else found  # gamma functions of fractions are doubles
-        return _known(found, symbols, argument)
+        return _free_of_foreign(found, symbols, argument)
     except FormulaError as error:
         raise ParameterError(
             f"{argument}: got {_cut(text)}, wants a formula such as 'x^4/4 - x^2/2': {error}"
@@ -184,7 +187,7 @@ def take_formula(
                 f"{', '.join(symbols)}{declare and '; ' + declare}"
             )
     try:
-        found = _known(expression.xreplace(replaced), symbols, argument)
+        found = _free_of_foreign(expression.xreplace(replaced), symbols, argument)
         bounded(found)
         return found
     except FormulaError as error:
@@ -308,7 +311,7 @@ def _number(value: Any, argument: str, double: Callable[[float], Any]) -> Any:
     return sympy.Integer(int(number)) if whole else double(float(number))
 
 
-def _known(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:
+def _free_of_foreign(found: Any, symbols: Mapping[str, Any], argument: str) -> Any:
     """Return what was read or given, if nothing in it is foreign to formulas."""
     import sympy
 

@@ -20,7 +20,8 @@ _TOKEN = re.compile(
     r"|(?P<name>[^\W\d]\w*)"
     r"|(?P<sign>\*\*|<=|>=|==|!=|[-+*/^()<>,&|~]))"
 )
-_COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
+#: Signs of comparisons.
+COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
 
 class FormulaError(ValueError):
@@ -55,14 +56,17 @@ class Builder(Protocol):
         """Conditions joined by ``&`` or ``|``, or one denied by ``~``."""
 
 
-class _Token(NamedTuple):
+class Token(NamedTuple):
+    """A part of a text."""
+
     kind: str | None  # None after the last one
     text: str
     place: int
 
 
-def _tokens(text: str) -> list[_Token]:
-    tokens: list[_Token] = []
+def tokens(text: str) -> list[Token]:
+    """The parts of a text: numbers, names and signs."""
+    found: list[Token] = []
     place, end = 0, len(text.rstrip())
     while place < end:
         match = _TOKEN.match(text, place)
@@ -70,15 +74,15 @@ def _tokens(text: str) -> list[_Token]:
             rest = text[place:].lstrip()
             at = text.index(rest, place) + 1
             attribute = re.match(r"\.([^\W\d]\w*)", rest)
-            if attribute and tokens and tokens[-1].kind == "name":
-                got = f"{tokens[-1].text}.{attribute[1]}"
+            if attribute and found and found[-1].kind == "name":
+                got = f"{found[-1].text}.{attribute[1]}"
                 write = f"write {attribute[1]}" + "(...)" * rest[attribute.end() :].startswith("(")
-                raise FormulaError(f"{got} at character {tokens[-1].place + 1}; {write}")
+                raise FormulaError(f"{got} at character {found[-1].place + 1}; {write}")
             raise FormulaError(f"{rest[:1]!r} at character {at}")
         kind = str(match.lastgroup)
-        tokens.append(_Token(kind, match[kind], match.start(kind)))
+        found.append(Token(kind, match[kind], match.start(kind)))
         place = match.end()
-    return [*tokens, _Token(None, "", end)]
+    return [*found, Token(None, "", end)]
 
 
 def parse(text: str, build: Builder) -> Any:
@@ -89,16 +93,19 @@ def parse(text: str, build: Builder) -> Any:
     FormulaError
         If the text is no formula, or is nested too deeply.
     """
-    return _Parser(_tokens(text), build).whole()
+    return Parser(tokens(text), build).whole()
 
 
-class _Parser:
-    def __init__(self, tokens: list[_Token], build: Builder) -> None:
+class Parser:
+    """Reads tokens by precedence, from loose to tight."""
+
+    def __init__(self, tokens: list[Token], build: Builder) -> None:
         self.tokens, self.build = tokens, build
         self.place = self.depth = 0
 
     @property
-    def next(self) -> _Token:
+    def next(self) -> Token:
+        """The token that comes next."""
         return self.tokens[self.place]
 
     def take(self, *signs: str) -> str | None:
@@ -110,16 +117,19 @@ class _Parser:
         return None
 
     def fail(self, wants: str) -> NoReturn:
+        """Refuse the next token."""
         token = self.next
         got = "its end" if token.kind is None else f"{token.text[:40]!r}"
         raise FormulaError(f"{got} at character {token.place + 1} where {wants} belongs")
 
     def deeper(self) -> None:
+        """Count a level of parentheses and powers."""
         self.depth += 1
         if self.depth > DEPTH:
             raise FormulaError(f"more than {DEPTH} levels of parentheses and powers")
 
     def whole(self) -> Any:
+        """The formula to its end."""
         result = self.condition()
         if self.next.kind is not None:
             self.fail("an operator")
@@ -130,7 +140,7 @@ class _Parser:
         if level == 3:
             return self.sum()
         left = self.condition(level + 1)
-        signs = (_COMPARISONS, ("|",), ("&",))[level]
+        signs = (COMPARISONS, ("|",), ("&",))[level]
         sign = self.take(*signs)
         if sign is None:
             return left
@@ -147,16 +157,18 @@ class _Parser:
         while sign is not None:
             right = self.condition(1)
             found.append(self.build.compare(sign, left, right))
-            left, sign = right, self.take(*_COMPARISONS)
+            left, sign = right, self.take(*COMPARISONS)
         return found[0] if len(found) == 1 else self.build.join("&", found)
 
     def sum(self) -> Any:
+        """Terms with their signs."""
         terms = [self.product(1)]
         while sign := self.take("+", "-"):
             terms.append(self.product(1 if sign == "+" else -1))
         return terms[0] if len(terms) == 1 else self.build.add(terms)
 
     def signs(self) -> int:
+        """Signs before a term or factor, as one."""
         sign = 1
         while found := self.take("+", "-"):
             sign = sign if found == "+" else -sign
@@ -177,6 +189,7 @@ class _Parser:
         return factors[0] if len(factors) == 1 else self.build.multiply(factors)
 
     def power(self) -> Any:
+        """A power, those of powers from the right."""
         if self.take("~"):
             self.deeper()
             denied = self.build.join("~", [self.power()])
@@ -194,6 +207,7 @@ class _Parser:
         return self.build.power(base, exponent)
 
     def primary(self) -> Any:
+        """A number, a name, a call, or what stands in parentheses."""
         token = self.next
         if token.kind == "number":
             self.place += 1

@@ -1,13 +1,16 @@
 """The ladder of laws: each rung is a set of equations, and a method belongs to a rung.
 
-A law says by its rung what can be computed of it; the table of quantities names for each rung what
-computes it, and the most special line that fits answers.
+A law is a base, which stands on a rung, and the terms that are added to it. The rung and the traits
+of the terms say what can be computed of it; the table of quantities names for each rung, and for
+the traits that it bears, what computes it, and the most special line that fits answers.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Flag, auto
 from typing import Any, ClassVar
 
 
@@ -109,13 +112,106 @@ def is_turn(period: float | None) -> bool:
     return period is not None and math.isclose(period, 2.0 * math.pi, rel_tol=1e-12)
 
 
+class Trait(Flag):
+    """What the terms of a law bring into it; without `DRIVEN` it is steady."""
+
+    #: A constant torque: V falls by a constant a turn.
+    TORQUED = auto()
+    #: What takes energy from the motion, or gives it where it is negative.
+    DAMPED = auto()
+    #: What varies with time.
+    DRIVEN = auto()
+    #: White noise.
+    NOISY = auto()
+    #: A formula of one's own.
+    OWN = auto()
+    #: A kink of a force of one's own, along which it is continuous.
+    KINKED = auto()
+    #: A jump of a force of one's own.
+    JUMPING = auto()
+    #: A force of one's own that is a function, of which no formula is known.
+    CODED = auto()
+    #: States of their own.
+    STATEFUL = auto()
+
+
+#: The traits of damping, torque, drive and noise together; with smooth formulas; all.
+PERTURBED = Trait.TORQUED | Trait.DAMPED | Trait.DRIVEN | Trait.NOISY
+FORMULAS = PERTURBED | Trait.OWN | Trait.KINKED
+ANY = ~Trait(0)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """Where a law stands: the rung of its base, and the traits of its terms.
+
+    Examples
+    --------
+    >>> pushed = Standing(Conservative, Trait.TORQUED)
+    >>> pushed.is_within(Standing(Flow, PERTURBED)), pushed.is_within(Conservative)
+    (True, False)
+    >>> Standing(Conservative).is_within(Flow), Standing(Flow).is_within(Conservative)
+    (True, False)
+    """
+
+    rung: type[Law]
+    traits: Trait | None = None
+    """None of a base alone; of a base with terms none need act."""
+
+    @classmethod
+    def of(cls, rung: type[Law] | Standing) -> Standing:
+        """A rung as where a base alone stands."""
+        return rung if isinstance(rung, Standing) else cls(rung)
+
+    def is_within(self, where: type[Law] | Standing) -> bool:
+        """Whether the base is on a rung, or a more special one, and bears no other traits.
+
+        What takes a base alone takes no terms, but what needs no more than a `Law` takes any, and
+        what needs a `Flow`, which a law with terms is as well.
+        """
+        wanted = Standing.of(where)
+        rung, traits = wanted.rung, wanted.traits
+        if traits is None and self.traits is not None:
+            return rung is Law or rung is Flow
+        if traits is not None and (self.traits is None or self.traits not in traits):
+            return False
+        return issubclass(self.rung, rung)
+
+    @property
+    def depth(self) -> tuple[int, int]:
+        """How special it is: by the rung, then by how few traits it has."""
+        few = 0 if self.traits is None else -1 - len(self.traits)
+        return len(self.rung.__mro__), few
+
+    @property
+    def called(self) -> str:
+        """What messages call a system with such a law."""
+        if self.traits is None:
+            return self.rung.called
+        exact, alone = self.rung.labels_fixed, self.traits == Trait.TORQUED
+        if alone:
+            of = " with coefficients (A, B, C)" if exact else ""
+            return f"a system{of} under a constant torque alone, pk.Perturbed(system, torque=)"
+        if issubclass(self.rung, Routhian):
+            return "a perturbed system at a constant momentum"
+        if exact:
+            of = " with coefficients (A, B, C)"
+            return f"a perturbed system{of}, pk.Perturbed(system, damping=...)"
+        return "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
+
+
 class Lawful:
     """What has a law: systems, and what motion at constant momenta is."""
 
     __slots__ = ()
 
-    #: The rung of its law, which says what can be computed of it.
+    #: The rung of its law, which says what can be computed of it; `Flow` of a base with terms.
     rung: ClassVar[type[Law]] = Law
+
+    @property
+    def standing(self) -> Standing:
+        """Where its law stands: the rung of the base, and the traits of the terms."""
+        return Standing(self.rung)
 
     @property
     def law(self) -> Law:

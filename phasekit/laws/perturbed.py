@@ -1,129 +1,222 @@
-"""Laws with damping and drive: what is added to a potential, by name.
-
-``x'' + V'(x; p(t)) = -d x' - q |x'| x' + N + sum F cos(nu t + phase) + E(x) omega'(t)``, with
-parameters ``p(t) = p + P cos(nu t + phase)`` or ``p + rate t``.
-"""
+"""The law of a base with terms: damping, torque, drive and noise added to a potential."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
-from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
+from phasekit.errors import ParameterError
+from phasekit.laws.ladder import PERTURBED, Conservative, Law, Routhian, Standing, Trait
+from phasekit.laws.perturbed_words import words_of
+from phasekit.laws.terms import (
+    Drift,
+    Forcing,
+    Instant,
+    Modulation,
+    Own,
+    Prescribed,
+    Rate,
+    Term,
+    drift_name,
+    forcing_names,
+    modulation_names,
+)
 from phasekit.laws.trigonometric import Trigonometric
 
-#: What every perturbed law has beside the parameters of its potential.
+__all__ = [
+    "OWN", "PerturbedConservative", "PerturbedLaw", "drift_name", "forcing_names",
+    "modulation_names",
+]  # fmt: skip
+
+#: Parameters of the terms that every perturbed law has, in their order among the values.
 OWN = ("damping", "quadratic", "torque", "kT")
-#: The fields of a harmonic.
-HARMONIC = ("amplitude", "frequency", "phase")
-
-
-def forcing_names(number: int) -> tuple[str, ...]:
-    """Names of the parameters of the harmonic of a number, from 0, of the forcing."""
-    prefix = "forcing" if number == 0 else f"forcing{number + 1}"
-    return tuple(f"{prefix}_{part}" for part in HARMONIC)
-
-
-def modulation_names(parameter: str) -> tuple[str, ...]:
-    """Names of the parameters of the harmonic of a modulated parameter."""
-    return tuple(f"modulation_{parameter}_{part}" for part in HARMONIC)
-
-
-def drift_name(parameter: str) -> str:
-    """Name of the rate at which a parameter drifts."""
-    return f"drift_{parameter}"
 
 
 @dataclass(frozen=True)
-class Rate:
-    """A parameter that is an angular velocity of the frame, and the torque of its change.
+class PerturbedLaw(Law):
+    """One degree of freedom in a potential, or at constant momenta, and the terms added to it.
+
+    At constant momenta, where the inertia M depends on the coordinate, terms are per unit of the
+    inertia M0 with all other coordinates held: ``M(x) x'' + M'(x) x'^2/2 + V'(x) = M0 (terms)``;
+    energies are in J.
 
     Attributes
     ----------
-    parameter : str
-        Its name.
-    euler : callable
-        Of the parameters by name: (E0, Es, Ec) of ``E = E0 + Es sin phi + Ec cos phi``.
-    """
-
-    parameter: str
-    euler: Callable[[Mapping[str, Any]], tuple[Any, Any, Any]]
-    #: The class that states it, and under which name.
-    stated: tuple[type, str] | None = field(default=None, init=False, compare=False, repr=False)
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        """Remember which class states it."""
-        object.__setattr__(self, "stated", (owner, name))
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Travel by the name of the class, whose function may be a lambda."""
-        if self.stated is not None:
-            return getattr, self.stated
-        return Rate, (self.parameter, self.euler)
-
-
-@dataclass(frozen=True)
-class PerturbedConservative(Law):
-    """One degree of freedom in a potential, damped and driven.
-
-    Attributes
-    ----------
-    base : Conservative
-        The law of the potential.
+    base : Conservative or Routhian
+        The law without the terms.
     names : tuple of str
         All parameters, in the order of the values.
     inputs : tuple of str
-        Those of the potential, as its law takes them.
-    harmonics : int
-        Number of harmonics of the forcing.
-    modulated, drifting : tuple of str
-        Parameters of the potential that vary.
+        Those of the base, as its law takes them.
+    terms : tuple of Term
+        What is added.
     rate : Rate, optional
-        The angular velocity of the frame, where the potential has one.
-    prescribed : Any
-        That angular velocity as a function or a table of time.
+        The angular velocity of the frame, where the base has one.
     unit : str
         Unit of the amplitude of the first harmonic, of the forcing or else of a modulation.
-    torqued : bool
-        Whether there is a constant torque, of which equations then tell.
+    traits : Trait
+        What the terms bring in where their values are not zero.
     """
-
-    called: ClassVar[str] = "a perturbed system, pk.Perturbed(system, damping=..., forcing=...)"
 
     base: Conservative | Routhian
     names: tuple[str, ...]
     inputs: tuple[str, ...]
-    harmonics: int = 0
-    modulated: tuple[str, ...] = ()
-    drifting: tuple[str, ...] = ()
+    terms: tuple[Term, ...]
     rate: Rate | None = None
-    prescribed: Any = field(default=None, compare=False)
     unit: str = "s-2"
-    torqued: bool = field(default=True, compare=False)
+    traits: Trait = field(default=PERTURBED, compare=False)
+
+    @property
+    def standing(self) -> Standing:
+        """The rung of the base, and the traits of the terms."""
+        return Standing(type(self.base), self.traits)
+
+    @property
+    def called(self) -> str:  # type: ignore[override]
+        """What messages call a system with such a law."""
+        return self.standing.called
 
     @property
     def may_be_incomplete(self) -> bool:
-        """Whether equilibria of the potential may be missed."""
+        """Whether equilibria of the base may be missed."""
         return self.base.may_be_incomplete
 
     def check_searchable(self) -> None:
-        """Refuse where equilibria of the potential cannot all be found."""
+        """Refuse where equilibria of the base cannot all be found."""
         self.base.check_searchable()
 
     def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
-        """What is said of a quantity: as of the potential, but that the torque has a part in it."""
-        words = dict(self.base.words(name, units, long_name))
-        if self.torqued and name in _STANDING:
-            words["equation"] = _STANDING[name]
-        if name == "chaos_threshold" and self.unit != units:
-            words["units"] = self.unit
-        if name in _MOTION:
-            words["equation"] = "phi'' + V'(phi; p(t)) = -d phi' - q |phi'| phi' + N + F(t)"
-        return words
+        """What is said of a quantity: as of the base, but for what the terms have a part in."""
+        return words_of(self.base, self.traits, self.unit, (name, units, long_name))
+
+    # ------------------------------------------------------------------ terms
+
+    def _of(self, kind: type[Term]) -> tuple[Any, ...]:
+        return tuple(term for term in self.terms if isinstance(term, kind))
+
+    @property
+    def harmonics(self) -> int:
+        """Number of harmonics of the forcing."""
+        return len(self._of(Forcing))
+
+    @property
+    def modulated(self) -> tuple[str, ...]:
+        """Parameters of the base that harmonics are added to."""
+        return tuple(term.varies for term in self._of(Modulation))
+
+    @property
+    def drifting(self) -> tuple[str, ...]:
+        """Parameters of the base that drift."""
+        return tuple(term.varies for term in self._of(Drift))
+
+    @property
+    def prescribed(self) -> Any:
+        """The function or table of time that a parameter is, or None."""
+        return next((term.function for term in self._of(Prescribed)), None)
+
+    @property
+    def own(self) -> tuple[Own, ...]:
+        """Terms of one's own."""
+        return self._of(Own)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """States of the terms, beside coordinate and rate."""
+        return tuple(name for term in self.terms for name in term.states)
+
+    def frequencies(self) -> list[Any] | None:
+        """What varies in time by its angular frequency: formulas of the parameters.
+
+        None where something varies that has no period.
+        """
+        import sympy as sp
+
+        from phasekit.laws.formulas import symbols_of
+
+        found: list[Any] = []
+        for term in self.terms:
+            if isinstance(term, (Drift, Prescribed)):
+                return None
+            if isinstance(term, (Forcing, Modulation)):
+                found.append(symbols_of(term.names[1:2])[term.names[1]])
+            elif isinstance(term, Own) and Trait.DRIVEN in term.trait:
+                if term.period is None:
+                    return None
+                found.append(2 * sp.pi / term.period)
+        return found
+
+    def own_frequencies(self, values: Mapping[str, Any]) -> list[Any]:
+        """Angular frequencies of terms of one's own that vary with time; NaN without a period."""
+        import sympy as sp
+
+        from phasekit.laws.formulas import symbols_of
+
+        of, found = symbols_of(self.names), list[Any]()
+        for term in self.own:
+            if Trait.DRIVEN not in term.trait:
+                continue
+            if term.period is None:
+                found.append(np.array(np.nan))
+                continue
+            used = [name for name in self.names if of[name] in term.period.free_symbols]
+            function = sp.lambdify([of[name] for name in used], 2 * sp.pi / term.period, "numpy")
+            found.append(np.asarray(function(*(values[name] for name in used)), float))
+        return found
+
+    @property
+    def varying(self) -> frozenset[str]:
+        """Parameters of the base that vary with time."""
+        return frozenset(term.varies for term in self.terms if term.varies is not None)
+
+    def parameter_at(self, name: str, at: Instant) -> Any:
+        """A parameter of the base as a formula of the time, where it varies."""
+        value = at.parameter(name)
+        for term in self.terms:
+            if term.varies == name:
+                value = term.moved(value, at)
+        return value
+
+    def force(self, at: Instant, kinds: tuple[type[Term], ...] = (Term,)) -> Any:
+        """The sum of the forces of terms of some kinds, per unit of inertia, as a formula."""
+        moving = replace(
+            at,
+            parameter=lambda n: self.parameter_at(n, at) if n in self.inputs else at.parameter(n),
+        )
+        return sum(
+            term.force(moving if isinstance(term, Own) else at)
+            for term in self.terms
+            if isinstance(term, kinds)
+        )
+
+    def euler_formula(self, at: Instant, parts: tuple[str, ...]) -> Any:
+        """The torque of the change of the frame's angular velocity, its parts by names.
+
+        Raises
+        ------
+        ParameterError
+            If other parameters vary as well, on which it may depend.
+        """
+        import sympy as sp
+
+        if self.rate is None:
+            return 0
+        change = sum(term.change(at) for term in self.terms if term.varies == self.rate.parameter)
+        if change == 0:
+            return 0
+        if others := self.varying - {self.rate.parameter}:
+            raise ParameterError(
+                f"modulation, drift: got {', '.join(sorted(others))} beside {self.rate.parameter}, "
+                f"wants {self.rate.parameter} alone or not at all: its change is a torque that "
+                "depends on the others, which is not integrated"
+            )
+        still, sine, cosine = map(at.parameter, parts)
+        return (still + sine * sp.sin(at.x) + cosine * sp.cos(at.x)) * change
+
+    # ------------------------------------------------------------------ values
 
     def values(self, *arrays: Any) -> dict[str, Any]:
         """Values by name, as arrays; NaN where they leave their domain."""
@@ -132,6 +225,8 @@ class PerturbedConservative(Law):
         least = {n: math.ulp(0.0) for n in self.names if n.endswith("_frequency")}
         bounds = {**domains, **{n: (low, math.inf) for n, low in least.items()}}
         bounds["kT"] = (0.0, math.inf)
+        for term in self._of(Own):
+            bounds |= {name: (low, high) for name, low, high in term.domains}
         for name, (low, high) in bounds.items():
             if name in values:
                 x = values[name]
@@ -146,180 +241,33 @@ class PerturbedConservative(Law):
 
     def forcing(self, values: Mapping[str, Any]) -> list[tuple[Any, Any, Any]]:
         """The harmonics of the forcing."""
-        return [self.harmonic(values, forcing_names(i)) for i in range(self.harmonics)]
+        return [self.harmonic(values, term.names) for term in self._of(Forcing)]
 
     def euler(self, values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
         """(E0, Es, Ec) of the torque ``(E0 + Es sin phi + Ec cos phi) omega'(t)``."""
-        return (0.0, 0.0, 0.0) if self.rate is None else self.rate.euler(values)
-
-
-@dataclass(frozen=True)
-class TiltedConservative(PerturbedConservative):
-    """The same under a constant torque alone, which keeps an energy."""
-
-    called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
-
-    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
-        """What is said of a quantity: the torque has a part in the energy."""
-        words = dict(super().words(name, units, long_name))
-        x = self.base.coordinate
-        tilted = {
-            "potential": f"{words.get('equation', 'V')} - torque {x}",
-            "potential_gradient": "V' - torque",
-            "energy_integral": f"h = {x}'^2/2 + V - torque {x}",
-            "phase_velocity": f"{x}' = sqrt(2 (h - V + torque {x}))",
-            **_turns(self.base.period),
-        }
-        return words | _tilted_words(name, words.get("long_name", long_name), tilted)
-
-
-@dataclass(frozen=True)
-class PerturbedRouthian(PerturbedConservative):
-    """The same at constant momenta, where the inertia depends on the coordinate.
-
-    ``M(x) x'' + M'(x) x'^2/2 + V'(x) = M0 (-d x' - q |x'| x' + N + sum F cos(nu t + phase))``,
-    M0 being the inertia with all other coordinates held; energies are in J.
-    """
-
-    base: Routhian
-
-    called: ClassVar[str] = "a perturbed system at a constant momentum"
-
-    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
-        """What is said of a quantity: energies are no longer per unit of inertia."""
-        words = dict(self.base.words(name, units, long_name))
-        if self.torqued and name in _STEADY:
-            words["equation"] = _STEADY[name]
-        if name in _MOTION:
-            words["equation"] = (
-                "M phi'' + M' phi'^2/2 + V_p' = M22 (-d phi' - q |phi'| phi' + N + F(t))"
-            )
-        if name in _IN_JOULES:
-            words["units"] = _IN_JOULES[name]
-        return words
-
-
-@dataclass(frozen=True)
-class TiltedRouthian(PerturbedRouthian):
-    """The same under a constant torque alone, which keeps an energy."""
-
-    called: ClassVar[str] = "a system under a constant torque alone, pk.Perturbed(system, torque=)"
-
-    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
-        """What is said of a quantity: the torque has a part in the energy."""
-        words = dict(super().words(name, units, long_name))
-        return words | ({"equation": _ROUTH[name]} if name in _ROUTH else {})
-
-
-#: Equations of the equilibria under a torque, of a potential and at a constant momentum.
-_STANDING = {
-    "phi": "V'(phi) = torque",
-    "energy": "V(phi) - torque phi",
-    "n_equilibria": "changes of sign of V' - torque between the zeros of V''",
-}
-_AMENDED = "V + p^2/(2 M11) - M22 torque phi"
-_STEADY = {
-    "phi": "V' = p^2 M11'/(2 M11^2) + M22 torque",
-    "energy": _AMENDED,
-    "n_equilibria": "zeros of M11^2 (V' - M22 torque) - p^2 M11'/2",
-}
-#: Equations of what has a part of the torque in its energy.
-_ROUTH = {
-    "potential": _AMENDED,
-    "potential_gradient": "V' - p^2 M11'/(2 M11^2) - M22 torque",
-    "energy_integral": f"h = (M22 - M12^2/M11) phi'^2/2 + {_AMENDED}",
-    "phase_velocity": f"phi' = sqrt(2 (h - ({_AMENDED}))/(M22 - M12^2/M11))",
-}
-_LEVELS = {
-    "topology": "by what the separatrices of all saddles do",
-    "figure_eight": "V - torque phi = h_s on both sides of a saddle, before a saddle as high",
-    "saddle_phi": "V'(phi_s) = torque, V''(phi_s) < 0",
-    "saddle_energy": "h_s = V(phi_s) - torque phi_s",
-    "loop": "where V - torque phi = h_s again on either side of the saddle",
-    "turning_phi": "V(phi_t) - torque phi_t = h_s",
-    "orbit_kind": "sign of h - h_s; equilibrium: phi' = 0 and V'(phi) = torque",
-    "orbit_energy": "h = phi'^2/2 + V(phi) - torque phi",
-    "phi_min": "V(phi_min) - torque phi_min = h",
-    "phi_max": "V(phi_max) - torque phi_max = h",
-}
-
-
-def _turns(period: float | None) -> dict[str, str]:
-    """Equations of what a turn gains."""
-    if period is None:
-        return {"energy_per_turn": "no turn on a line", "gain_per_turn": "no turn on a line"}
-    turn = "2 pi" if is_turn(period) else f"{period:g}"
-    return {"energy_per_turn": f"{turn} torque", "gain_per_turn": f"{turn} |torque|"}
-
-
-def _tilted_words(name: str, long_name: str, own: Mapping[str, str]) -> dict[str, str]:
-    """Equation and long name of a quantity under a torque alone, beside what a law says itself."""
-    equations = {**_LEVELS, **own}
-    words = {"equation": equations[name]} if name in equations else {}
-    if "NaN for a rotation" in long_name:
-        words["long_name"] = f"{long_name}, infinite where it runs"
-    return words
-
-
-_MOTION = ("motion_phi", "motion_dphi")
-#: Units of what is an energy or an action where that is not per unit of inertia.
-_IN_JOULES = {
-    "melnikov_mean": "J",
-    "melnikov_amplitude": "J",
-    "turnstile_area": "kg m2 s-1",
-    "capture_flux": "J",
-}
-
-
-@dataclass(frozen=True)
-class PerturbedTrigonometric(PerturbedConservative):
-    """The same in the potential of (A, B, C)."""
-
-    base: Trigonometric
-
-    called: ClassVar[str] = (
-        "a perturbed system with coefficients (A, B, C), pk.Perturbed(system, damping=...)"
-    )
-    labels_fixed: ClassVar[bool] = True
-    default: ClassVar[Mapping[str, str]] = Trigonometric.default
+        if self.rate is None:
+            return (0.0, 0.0, 0.0)
+        with np.errstate(all="ignore"):  # where there is no inertia
+            return self.rate.euler(values)
 
     def coefficients(self, values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
-        """A, B and C."""
-        return self.base.coefficients({name: values[name] for name in self.inputs})
+        """A, B and C of a trigonometric base."""
+        return self._trigonometric.coefficients({name: values[name] for name in self.inputs})
 
     def derivatives(self, values: Mapping[str, Any], parameter: str) -> tuple[Any, Any, Any]:
         """Derivatives of A, B and C by a parameter, to rounding: of a complex step."""
         used = {name: np.asarray(values[name], complex) for name in self.inputs}
         step = 1e-100
         used[parameter] = used[parameter] + 1j * step
-        *products, scale = self.base(used)
+        *products, scale = self._trigonometric(used)
         dA, dB, dC = (np.imag(np.asarray(product / scale)) / step for product in products)
         return dA, dB, dC
 
-
-@dataclass(frozen=True)
-class TiltedTrigonometric(PerturbedTrigonometric):
-    """The same under a constant torque alone, which keeps an energy."""
-
-    called: ClassVar[str] = (
-        "a system with coefficients (A, B, C) under a constant torque alone, "
-        "pk.Perturbed(system, torque=)"
-    )
-
-    def words(self, name: str, units: str, long_name: str) -> Mapping[str, str]:
-        """What is said of a quantity: the torque has a part in the energy."""
-        words = dict(super().words(name, units, long_name))
-        return words | _tilted_words(name, words.get("long_name", long_name), TILTED)
+    @property
+    def _trigonometric(self) -> Trigonometric:
+        assert isinstance(self.base, Trigonometric)
+        return self.base
 
 
-_V = "-B cos(phi) + (A/2) cos(phi)^2 - C sin(phi) - torque phi"
-#: Equations that the torque changes, by quantity.
-TILTED = {
-    "potential": f"V = {_V}",
-    "potential_gradient": "V' = B sin(phi) - A sin(phi) cos(phi) - C cos(phi) - torque",
-    "energy_integral": f"h = phi'^2/2 + ({_V})",
-    "orbit_energy": f"h = phi'^2/2 + ({_V})",
-    "phase_velocity": "phi' = sqrt(2 (h - V(phi) + torque phi))",
-    "motion_phi": "phi'' = -V'(phi) + torque",
-    "motion_dphi": "phi'' = -V'(phi) + torque",
-}
+#: The name by which modules of motions know it.
+PerturbedConservative = PerturbedLaw

@@ -183,6 +183,10 @@ def turn(angle: Any) -> Turn:
     """Sine, cosine and radius 1 of an angle; the sine of the double nearest to pi is 0."""
     if isinstance(angle, complex):
         return cmath.sin(angle), cmath.cos(angle), 1.0
+    if hasattr(angle, "free_symbols"):
+        import sympy
+
+        return sympy.sin(angle), sympy.cos(angle), sympy.Integer(1)
     if isinstance(angle, np.ndarray):
         return np.where(angle == np.pi, 0.0, np.sin(angle)), np.cos(angle), 1.0
     return 0.0 if angle == math.pi else math.sin(angle), math.cos(angle), 1.0

@@ -67,11 +67,12 @@ def _nodes() -> tuple[Array, Array]:
     distances, weights = [], []
     for level in range(LEVELS):
         step = STEP / 2**level
-        q = np.arange(-REACH * 2**level, REACH * 2**level + 1)
+        q = np.arange(-(REACH << level), (REACH << level) + 1)
         t = step * (q if level == 0 else q[q % 2 != 0])
         stretch = 0.5 * math.pi * np.sinh(t)
         distances.append(np.where(t > 0, -0.5, 0.5) * np.exp(-np.abs(stretch)) / np.cosh(stretch))
-        weights.append(step * 0.25 * math.pi * np.cosh(t) / np.cosh(stretch) ** 2)
+        with np.errstate(over="ignore"):  # where the weight is 0
+            weights.append(step * 0.25 * math.pi * np.cosh(t) / np.cosh(stretch) ** 2)
     return np.concatenate(distances), np.concatenate(weights)
 
 
@@ -230,9 +231,10 @@ def over_arc(
     arc[SIN_LAST], arc[COS_LAST] = math.sin(last), math.cos(last)
     settled, kinked = np.zeros(MEASURES, np.bool_), np.zeros(MEASURES, np.bool_)
     for level in range(LEVELS):
-        count = 2 * REACH + 1 if level == 0 else REACH * 2**level
+        count = 2 * REACH + 1 if level == 0 else REACH << level
         scale *= 0.5
-        new *= 0.5
+        for n in range(SUMS):
+            new[n] *= 0.5
         for q in range(first, first + count):
             phi, dphi = state(k, arc, distance[q], table)
             s, c = math.sin(phi), math.cos(phi)
@@ -245,12 +247,13 @@ def over_arc(
                     new[2 * measure] += weight[q] * value
                     new[2 * measure + 1] += weight[q] * value * value
                     if level < SAMPLED:
-                        stride = 2 ** (SAMPLED - 1 - level)
+                        stride = 1 << (SAMPLED - 1 - level)
                         at = (q if level == 0 else 2 * (q - first) + 1) * stride
                         samples[b, measure, at] = value
                         places[at] = place(distance[q])
         first += count
-        settled[:] = level >= SAMPLED - 1
+        for measure in range(MEASURES):
+            settled[measure] = level >= SAMPLED - 1
         for n in range(SUMS):
             close = abs(new[n] / scale - old[n]) <= TOLERANCE * new[n] / scale
             settled[n // 2] = settled[n // 2] and close
@@ -258,7 +261,10 @@ def over_arc(
         if level == SAMPLED - 1:
             for measure in range(MEASURES):
                 kinked[measure] = dips(samples, measure, branches, old)
-        if level >= SAMPLED - 1 and (settled | kinked).all():
+        finished = level >= SAMPLED - 1
+        for measure in range(MEASURES):
+            finished = finished and (settled[measure] or kinked[measure])
+        if finished:
             break
     for measure in range(MEASURES):
         if kinked[measure] or not settled[measure]:
@@ -347,6 +353,7 @@ def separatrices(
                     highest[i, j, side, measure] = best[measure, 0] if present else NAN
                     peak_phi[i, j, side, measure] = at if present else NAN
                     peak_dphi[i, j, side, measure] = best[measure, 2] if present else NAN
-                    over = sums[measure] / abs(delta)
-                    mean[i, j, side, measure] = over[0] if present else NAN
-                    rms[i, j, side, measure] = math.sqrt(over[1]) if present else NAN
+                    over = abs(delta)
+                    square = sums[measure, 1] / over
+                    mean[i, j, side, measure] = sums[measure, 0] / over if present else NAN
+                    rms[i, j, side, measure] = math.sqrt(square) if present else NAN

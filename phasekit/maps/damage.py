@@ -147,13 +147,13 @@ def refuse(name: str, damaged: Sequence[Damage], sizes: Mapping[str, int]) -> No
 def describe(damaged: Sequence[Damage], sizes: Mapping[str, int]) -> str:
     """Name damaged tiles."""
     named = [
-        f"the tile {place(one.part, one.index, sizes)} of {_some(one.part)} {one.what}"
+        f"the tile {place(one.part, one.index, sizes)} of {_few_names(one.part)} {one.what}"
         for one in damaged[:NAMED]
     ]
     more = len(damaged) - len(named)
     return "; ".join(named) + (f"; and {more} more tiles" if more else "")
 
 
-def _some(part: StoredPart) -> str:
+def _few_names(part: StoredPart) -> str:
     names = list(part.quantities)
     return ", ".join(names[:3]) + (", ..." if names[3:] else "")

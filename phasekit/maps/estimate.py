@@ -21,6 +21,8 @@ from phasekit.table.row import Quantity
 SAMPLE_CELLS = 1 << 14
 SAMPLES = 4
 SAMPLE_SECONDS = 0.1
+#: Of tiles that are small, because each cell takes long, a part is a sample.
+SAMPLE_CELLS_OF_TILE = 8
 LEAST_CELLS, MOST_CELLS = 1 << 13, 1 << 17
 
 
@@ -74,6 +76,12 @@ def estimate(shares: Sequence[tuple[Left, Sequence[Tile]]]) -> Estimate:
     )
 
 
+def sample_cells(rows: Sequence[Quantity]) -> int:
+    """Return how many cells are a sample that takes no long time."""
+    least = min(row.most_cells for row in rows)
+    return SAMPLE_CELLS if least > SAMPLE_CELLS else max(least // SAMPLE_CELLS_OF_TILE, 1)
+
+
 def _sample(chosen: Sequence[Tile]) -> tuple[float, float]:
     """Return the compressed part of the bytes, and seconds a cell, of some cells of tiles."""
     from phasekit.numerics.launch import one_thread
@@ -81,11 +89,12 @@ def _sample(chosen: Sequence[Tile]) -> tuple[float, float]:
     bytes_written = raw = cells = 0
     seconds = 0.0
     with one_thread():
-        _timed(chosen[0], SAMPLE_CELLS)  # loads or compiles the kernels
-        took, _, taken = _timed(chosen[0], SAMPLE_CELLS)
+        few = sample_cells(chosen[0].rows)
+        _timed(chosen[0], few)  # loads or compiles the kernels
+        took, _, taken = _timed(chosen[0], few)
         room = int(taken * SAMPLE_SECONDS / max(took, 1e-9))
         for tile in chosen:
-            took, results, taken = _timed(tile, min(max(room, LEAST_CELLS), MOST_CELLS))
+            took, results, taken = _timed(tile, min(max(room, min(LEAST_CELLS, few)), MOST_CELLS))
             seconds += took
             for row in tile.rows:
                 size, took = _written(row, results[row.name])

@@ -28,7 +28,7 @@ class Noted:
 
 
 @contextlib.contextmanager
-def noted() -> Iterator[Noted]:
+def deferred_interrupts() -> Iterator[Noted]:
     """Only take note of Ctrl-C, where it would raise: between any two steps of what is to be ended.
 
     In other threads than the main one none can come.

@@ -41,7 +41,7 @@ def is_name(name: object) -> bool:
         return False
     return (
         0 < size <= _LONGEST
-        and _one(name) not in (GROUP, DOCUMENT)
+        and _folded(name) not in (GROUP, DOCUMENT)
         and _DEVICES.fullmatch(name.split(".")[0].rstrip()) is None
     )
 
@@ -70,10 +70,10 @@ def is_document(key: object, names: Set[str]) -> bool:
 def unfit(names: Iterable[object]) -> list[str]:
     """Return the names that no arrays of a map may have, or not together: equal but for case."""
     every = list(dict.fromkeys(names))
-    count = Counter(_one(name) for name in every if type(name) is str)
-    return [repr(n) for n in every if type(n) is not str or not is_name(n) or count[_one(n)] > 1]
+    count = Counter(_folded(name) for name in every if type(name) is str)
+    return [repr(n) for n in every if type(n) is not str or not is_name(n) or count[_folded(n)] > 1]
 
 
-def _one(name: str) -> str:
+def _folded(name: str) -> str:
     """Return what is the same of names that some system takes for one."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())

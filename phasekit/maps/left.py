@@ -19,6 +19,7 @@ from phasekit.maps.parts import StoredPart
 from phasekit.maps.place import Place
 from phasekit.maps.plan import Plan
 from phasekit.maps.tile import Tile
+from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass
 
 #: Bytes that a file takes at least.
@@ -94,8 +95,8 @@ class Left:
         """Return tiles with what is needed to compute them; by default all that are left."""
         part, grid = self.part, request.grid
         rows = part.rows
-        passes: Sequence[Pass] = passes_of(request.system, rows)
-        if request.is_open:
+        passes: Sequence[Pass] = passes_of(request.system, rows, table=request.table)
+        if request.is_open and request.table is TABLE:
             passes = fitted(request.system, rows, passes)[1]
         names = {
             name for needs in needs_of(request.system, tuple(passes)).values() for name in needs

@@ -146,7 +146,7 @@ class Marks:
     #: Tiles whose chunks have other numbers of columns than the arrays.
     uneven: dict[Index, Mark] = field(default_factory=dict)
 
-    def known(self) -> dict[Index, Mark]:
+    def computed(self) -> dict[Index, Mark]:
         """Return what is recorded of each tile that is done, or was when the map was shorter."""
         return {**{index: mark for index, (mark, _) in self.shorter.items()}, **self.done}
 

@@ -46,6 +46,8 @@ class StoredPart:
     inputs: tuple[str, ...] | None = None
     #: How many equilibria and saddles the arrays hold, where these are numbered; else None.
     columns: dict[str, int] | None = None
+    #: Rows that are those of one system and not of the table.
+    own: tuple[Quantity, ...] = ()
 
     @property
     def checked(self) -> bool:
@@ -53,9 +55,15 @@ class StoredPart:
         return self.inputs is not None
 
     @property
+    def known(self) -> Mapping[str, Quantity]:
+        """Rows that it may hold, by name."""
+        rows = rows_of(is_open=self.columns is not None)
+        return {**rows, **{row.name: row for row in self.own}} if self.own else rows
+
+    @property
     def rows(self) -> tuple[Quantity, ...]:
         """The rows of the table, with the dtypes that are stored."""
-        known = rows_of(is_open=self.columns is not None)
+        known = self.known
         rows = tuple(replace(known[name], dtype=dtype) for name, dtype in self.quantities.items())
         return rows if self.columns is None else sized(rows, self.columns)
 
@@ -116,6 +124,7 @@ def new_part(
         MOST_CELLS,
         MOST_BYTES // max(sum(row.cell_bytes for row in part.rows), 1),
         max(FEWEST_CELLS, whole // FEWEST_TILES),
+        *(row.most_cells for row in part.rows),
     )
     found = {
         dim: sizes[dim] if chunks[dim] == -1 else chunks[dim] for dim in part.dims if dim in chunks
@@ -134,6 +143,7 @@ def new_part(
         for dim, n in zip(row.dims, row.label_shape, strict=True)
         if dim in NUMBERED
     }
+    titles = {row.name for one in part.passes for row in one.rows}
     stored = StoredPart(
         name,
         part.dims,
@@ -141,6 +151,7 @@ def new_part(
         quantities,
         inputs=tuple(sorted(part.inputs)),
         columns=columns if is_open else None,
+        own=tuple(row for row in part.rows if row.name in titles),
     )
     _refuse_large_tiles(stored)
     return stored
@@ -171,6 +182,7 @@ def cut_again(
         return part
     own = Part(part.dims, (), part.rows, tuple(names))
     fresh = new_part(part.name, own, sizes, {}, is_open=part.columns is not None)
+    fresh = replace(fresh, own=part.own)
     return fresh if tiles > TOO_SMALL * prod(fresh.grid(sizes)) else part
 
 

@@ -21,7 +21,6 @@ import xarray as xr
 
 from phasekit.cells.request import Request
 from phasekit.errors import StoreError
-from phasekit.labels.coordinates import STATES
 from phasekit.maps.options import StoreOptions
 from phasekit.maps.parts import StoredPart, cut_again, new_part
 
@@ -166,7 +165,7 @@ def _differences(stored: Plan, wanted: Plan, request: Request) -> Iterable[str]:
         old, new = _shown(stored, name), _shown(wanted, name)
         if old is None or new is None:
             # States and optional parameters come with the quantities that need them.
-            if name in required if old is None else name not in STATES:
+            if name in required if old is None else name not in request.states:
                 yield f"{name} is {old or 'not given'}, in the call {new or 'not given'}"
         elif name in stored.scalars and name in wanted.scalars:
             if stored.scalars[name] != wanted.scalars[name]:

@@ -11,13 +11,16 @@ import json
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from phasekit import errors
 from phasekit.cells.numbered import NUMBERED
 from phasekit.errors import ParameterError
 from phasekit.labels.coordinates import LABELS
+from phasekit.laws.ladder import Law
 from phasekit.maps.keys import DOCUMENT, GROUP, is_document, is_name, is_part, unfit
-from phasekit.maps.parts import StoredPart, rows_of
+from phasekit.maps.parts import StoredPart
 from phasekit.maps.plan import LAYOUT, Plan
 from phasekit.systems.identity import SCHEMA, versions
+from phasekit.table.row import Quantity
 
 #: The file that holds the plan, and the attribute in it.
 PLAN_KEY = f"{GROUP}/{DOCUMENT}"
@@ -31,6 +34,9 @@ CLEARED = Plan("", {}, {}, {}, ())
 
 #: Dtypes in which results of others may be stored; equilibria that are numbered may be many.
 _KINDS = {"float64": ("float32", "float64"), "int8": ("int8", "int16")}
+
+#: What is text of a row that is of one system.
+_TEXTS = ("name", "group", "dtype", "units", "long_name", "equation", "source")
 
 _DAMAGED = "its plan, sweep/zarr.json, is damaged"
 
@@ -57,6 +63,7 @@ def _to_json(plan: Plan) -> dict[str, Any]:
         }
         | ({"inputs": list(part.inputs)} if part.inputs is not None else {})
         | ({"columns": part.columns} if part.columns is not None else {})
+        | ({"own": [_row_to_json(row) for row in part.own]} if part.own else {})
         for part in plan.parts
     ]
     stored = {
@@ -78,6 +85,32 @@ def _to_json(plan: Plan) -> dict[str, Any]:
     } | ({"packed": plan.packed} if plan.packed else {})
     stored |= {"coordinate": plan.coordinate} if plan.coordinate != "phi" else {}
     return {**stored, "sha256": _digest(stored)}
+
+
+def _row_to_json(row: Quantity) -> dict[str, Any]:
+    """A row that is of one system, as text and numbers."""
+    kept = {name: getattr(row, name) for name in _TEXTS}
+    labels = {
+        dim: [list(labels), text] for dim in row.dims for labels, text in [row.labels_of(dim)]
+    }
+    flags = None if row.flags is None else row.flags.__name__
+    return {
+        **kept,
+        "dims": list(row.dims),
+        "cells": row.most_cells,
+        "labels": labels,
+        "flags": flags,
+    }
+
+
+def _row_from(stored: Mapping[str, Any]) -> Quantity:
+    texts = {name: str(stored[name]) for name in _TEXTS}
+    labels = {dim: (tuple(labels), str(text)) for dim, (labels, text) in stored["labels"].items()}
+    flags = None if stored["flags"] is None else getattr(errors, str(stored["flags"]))
+    return Quantity(
+        dims=tuple(stored["dims"]), flags=flags, labels={**LABELS, **labels}, of=Law,
+        most_cells=int(stored["cells"]), **texts,
+    )  # fmt: skip
 
 
 def _digest(stored: Mapping[str, Any]) -> str:
@@ -143,6 +176,7 @@ def _read(stored: Mapping[str, Any]) -> Plan:
             part["complete"],
             tuple(part["inputs"]) if "inputs" in part else None,
             dict(part["columns"]) if "columns" in part else None,
+            tuple(map(_row_from, part.get("own", ()))),
         )
         for part in stored["parts"]
     )
@@ -196,7 +230,7 @@ def _check(plan: Plan) -> None:
         wants(set(part.dims) <= plan.sizes.keys(), f"dims of {part.name}")
         wants(len(part.chunks) == len(set(part.dims)) == len(part.dims), f"dims of {part.name}")
         wants(all(type(n) is int and 0 < n <= 2**63 for n in part.chunks), f"chunks of {part.name}")
-        known_rows = rows_of(is_open=part.columns is not None)
+        known_rows = part.known
         for name, dtype in part.quantities.items():
             wants(name in known_rows, f"the quantity {name!r}")
             kinds = _KINDS.get(known_rows[name].dtype, (known_rows[name].dtype,))

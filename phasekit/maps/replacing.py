@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from phasekit.errors import StoreError
-from phasekit.maps.interrupts import noted
+from phasekit.maps.interrupts import deferred_interrupts
 
 #: What the old folder is called while it is aside.
 _OLD = "replaced"
@@ -40,7 +40,7 @@ def scratch(target: Path) -> Iterator[Path]:
 
 def put(fresh: Path, target: Path) -> None:
     """Put what was made in a scratch folder into its place; if that fails, the old one stays."""
-    with noted():
+    with deferred_interrupts():
         if target.is_dir():
             old = fresh.parent / _OLD
             target.rename(old)

@@ -22,8 +22,8 @@ from phasekit.errors import StoreError
 from phasekit.maps import workers as run
 from phasekit.maps.clusters import connected, on_cluster
 from phasekit.maps.damage import describe
-from phasekit.maps.estimate import SAMPLE_CELLS, refuse_too_large_for
-from phasekit.maps.interrupts import noted
+from phasekit.maps.estimate import SAMPLE_CELLS, refuse_too_large_for, sample_cells
+from phasekit.maps.interrupts import deferred_interrupts
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.marks import read_marks
 from phasekit.maps.options import StoreOptions
@@ -87,7 +87,7 @@ def _carry_out(job: Job, options: StoreOptions, progress: bool | None) -> None:
     """Make the arrays those of the plan, and compute the tiles that are left."""
     tally = Tally(job)
     with contextlib.ExitStack() as stack:
-        stack.enter_context(_told(tally))
+        stack.enter_context(_interrupt_report(tally))
         client, workers = options.client, options.workers
         if client is not None:
             client = stack.enter_context(connected(client))
@@ -129,8 +129,9 @@ def _weigh(job: Job, most: int, workers: int | None, force: bool, hired: bool) -
     free = job.place.free_bytes()
     most_bytes = sum(left.raw + left.overhead for left in job.left if len(left))
     tight = not force and free is not None and most_bytes > free + freed
+    few = min((sample_cells(left.part.rows) for left in job.left), default=SAMPLE_CELLS)
     # Processes that are hired already would wait for samples that decide nothing.
-    if not tight and (most <= 1 or hired or job.cells <= SAMPLE_CELLS):
+    if not tight and (most <= 1 or hired or job.cells <= few):
         return 1 if workers is None else most
     # Kernels that are not compiled yet are compiled here, before many processes do so.
     needed = job.estimate()
@@ -171,13 +172,13 @@ class Tally:
 
 
 @contextlib.contextmanager
-def _told(tally: Tally) -> Iterator[None]:
+def _interrupt_report(tally: Tally) -> Iterator[None]:
     """Say how far a job is when it is interrupted."""
     try:
         yield
     except KeyboardInterrupt:
         with contextlib.suppress(KeyboardInterrupt):  # a second one ends this, too
-            with noted():
+            with deferred_interrupts():
                 tally.settle()
             if tally.under_way:
                 tally.job.place.sweep_leftovers()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from os import PathLike
@@ -15,13 +16,15 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import refuse_too_large
+from phasekit.laws.equations import equations_of
+from phasekit.laws.ladder import Map
 from phasekit.maps.job import Job, plan_job
 from phasekit.maps.options import StoreOptions, check_dtypes, without_store
 from phasekit.maps.whole import WholeTarget, open_map, target_of
 from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import System, as_system
-from phasekit.table.quantities import select
-from phasekit.table.row import Quantity
+from phasekit.table.quantities import TABLE, select
+from phasekit.table.row import Quantity, Table
 
 #: What is computed where nothing is said, as far as the system's law offers it.
 OFFERED = ("equilibria", "separatrices")
@@ -47,14 +50,19 @@ def sweep(
     Parameters
     ----------
     system : system
-        A `GyroRotorDisk`, `Reduced`, `Coefficients` or any other system.
+        A `GyroRotorDisk`, `Reduced`, `Coefficients`, `Problem` or any other system.
     axes : mapping of str to array_like, optional
         Values of the swept parameters: 1-D lists, arrays or ranges, each a dim of the map, in
         the order given; or DataArrays, which broadcast by the names of their dims. Likewise the
         states that the quantities need (``state_phi``, ``state_dphi``, ``time``, ..., or ``phi``,
         ``dphi``, ``t`` as the labelled functions call them), which may be single numbers as well.
     of : str or iterable of str, default ("equilibria", "separatrices")
-        Quantities, or groups of them; `quantities` lists them.
+        Quantities, or groups of them; `quantities` lists them. Of a system with states of its own,
+        such as a `Problem`: ``equilibria`` in its window with ``n_equilibria`` and ``n_stable``,
+        ``attractors`` and ``basin_fractions`` of motions from its window; and of the motion from
+        one state, by default the middle of the window, ``lyapunov`` after a ``duration`` (a map:
+        ``n`` iterations), and the ``period`` and ``extrema`` of the attractor to which it comes:
+        ``min_``, ``max_`` and ``mean_`` of each state and observable.
     store : path, URL or zarr store, optional
         Put the map there: a name that ends in ``.zarr``, a URL that fsspec knows, or a store of
         zarr (Zarr v3), tile by tile, so that it need not fit into memory; or a name that ends in
@@ -98,6 +106,11 @@ def sweep(
         If `store` holds something else and overwrite is not set, it cannot be written, the disk
         is too small, or a tile fails. Tiles that are done are kept: the same call resumes the map.
 
+    Warns
+    -----
+    RuntimeWarning
+        If it is not proved of some systems that there are no more equilibria.
+
     Examples
     --------
     >>> import numpy as np
@@ -108,6 +121,12 @@ def sweep(
     {'beta': 4, 'a': 3}
     >>> ds.sel(beta=0.5, a=0.01, method="nearest").phasekit.system().a
     0.01
+    >>> henon = pk.Problem(
+    ...     {"x": "1 - a*x^2 + y", "y": "b*x"}, parameters={"a": 1.4, "b": 0.3}, map=True
+    ... )
+    >>> ds = pk.sweep(henon, b=[0.1, 0.3], of="lyapunov", x=0.1, y=0.1, n=1000)
+    >>> ds.lyapunov_sum.values.round(9).tolist()  # ln b
+    [-2.302585093, -1.203972804]
     """
     flag("overwrite", overwrite)
     flag("force", force)
@@ -115,17 +134,19 @@ def sweep(
         flag("progress", progress)
     place = None if store is None else target_of(store)
     system = as_system(system)
-    rows = select(of, system.rung if of is OFFERED else None)
+    table, rows = _selected(system, of)
     if place is not None and not place.is_netcdf:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
-        request = _asked(system, axes, axes_by_name, rows, loaded=True)
+        request = _asked(system, axes, axes_by_name, rows, table, loaded=True)
         options = StoreOptions.of(
             request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
         warn_of_invalid(request.system.declared, request.system.parameters)
         sweep_into(place, request, options, progress)
-        return open_map(store)
+        ds = open_map(store)
+        _warn_of_incomplete(system, ds)
+        return ds
     for name, value in {
         "chunks": chunks, "workers": workers, "client": client, "force": force or None
     }.items():  # fmt: skip
@@ -135,12 +156,29 @@ def sweep(
     if dtype is not None:
         dtypes = check_dtypes(dtype, rows)
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
-    request = _asked(system, axes, axes_by_name, rows)
+    request = _asked(system, axes, axes_by_name, rows, table)
     warn_of_invalid(request.system.declared, request.system.parameters)
     ds = _computed(request, progress)
+    _warn_of_incomplete(system, ds)
     if target is not None:
         target.write(ds)
     return ds
+
+
+def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
+    """Say in how many systems that state their rates or step there may be more equilibria."""
+    if "complete" not in ds or equations_of(system) is None:
+        return
+    open_ = ~ds["complete"]
+    if "n_equilibria" in ds:  # cells that are not valid were not searched
+        open_ &= ds["n_equilibria"] >= 0
+    if number := int(open_.sum()):
+        warnings.warn(
+            f"equilibria: it is not proved that there are no others in {number} of {open_.size} "
+            "systems; there `complete` is False",
+            RuntimeWarning,
+            stacklevel=3,
+        )
 
 
 def _computed(request: Request, progress: bool | None) -> xr.Dataset:
@@ -165,9 +203,23 @@ def plan_sweep(
     overwrite: bool = False,
 ) -> Job:
     """Return what `sweep` with a Zarr store would have to do; nothing is computed or written."""
-    request = _asked(as_system(system), axes, {}, select(of), loaded=True)
+    system = as_system(system)
+    table, rows = _selected(system, of)
+    request = _asked(system, axes, {}, rows, table, loaded=True)
     options = StoreOptions.of(request, chunks, dtype, overwrite=overwrite)
     return plan_job(target_of(store), request, options)
+
+
+def _selected(system: System, of: Any) -> tuple[Table, tuple[Quantity, ...]]:
+    """Return the table that a system has, and the rows of it that are named, or offered."""
+    if (law := equations_of(system)) is None:
+        return TABLE, select(of, system.standing if of is OFFERED else None)
+    from phasekit.cells.equations import table_of  # here: it loads sympy
+
+    table = table_of(system, law)
+    if of is OFFERED:
+        of = ("equilibria",) if law.time is None else ("attractors",)
+    return table, table.select(of)
 
 
 def _asked(
@@ -175,11 +227,12 @@ def _asked(
     axes: Mapping[str, Any] | None,
     by_name: Mapping[str, Any],
     rows: tuple[Quantity, ...],
+    table: Table = TABLE,
     *,
     loaded: bool = False,
 ) -> Request:
     """Return what is computed along axes, whose dims come first; chunked axes `loaded` if so."""
-    swept, states, called = _swept(system, axes, by_name, rows)
+    swept, states, called = _swept(system, axes, by_name, rows, table)
     if loaded:
         swept, states = swept.replace(**_loaded(swept.parameters)), _loaded(states)
     kept = {**swept.parameters, **states}
@@ -190,7 +243,7 @@ def _asked(
         if not isinstance(value, float)
         for dim in (value.dims if isinstance(value, xr.DataArray) else (name,))
     }
-    return ask(swept, rows, states=states, order=tuple(order))
+    return ask(swept, rows, states=states, order=tuple(order), table=table)
 
 
 def _swept(
@@ -198,6 +251,7 @@ def _swept(
     axes: Mapping[str, Any] | None,
     by_name: Mapping[str, Any],
     rows: tuple[Quantity, ...],
+    table: Table,
 ) -> tuple[System, dict[str, Value], dict[str, str]]:
     """Return the system along its axes, the states, and what the call calls each of them."""
     if axes is not None and not isinstance(axes, Mapping):
@@ -208,25 +262,26 @@ def _swept(
             raise ParameterError(f"{name}: got it in axes and as a keyword, wants it once")
     given.update(by_name)
     declared = [parameter.name for parameter in system.declared]
+    known = _states_of(system)
     called: dict[str, str] = {}
     for key in given:
-        name = key if key in declared or key in STATES else _state_called(key, system)
-        if name not in declared and name not in STATES:
-            raise _unknown_axis(system, key, rows)
+        name = key if key in declared or key in known else _state_called(key, system)
+        if name not in declared and name not in known:
+            raise _unknown_axis(system, key, rows, table)
         if name in called or (name != key and name in given):
             raise ParameterError(f"{key}: got it besides {name}, wants it once")
         called[name] = key
     if not called and all(isinstance(v, float) for v in system.parameters.values()):
-        valid = _valid(system, rows)
+        valid = _valid(system, rows, table)
         raise ParameterError(
             f"axes: got none, wants at least one of {', '.join(valid)}, "
             f"as in pk.sweep(system, {valid[0]}=[...])"
         )
-    if any(name in STATES for name in called):
-        valid = _valid(system, rows)
+    if any(name in known for name in called):
+        valid = _valid(system, rows, table)
         for name, key in called.items():
             if name not in valid:
-                raise _unknown_axis(system, key, rows)
+                raise _unknown_axis(system, key, rows, table)
     swept = system.replace(**{name: given[name] for name in called if name in declared})
     states: dict[str, Value] = {}
     for name, key in called.items():
@@ -239,11 +294,17 @@ def _swept(
                 "a 1-D list, array or range of values to sweep over",
                 f"to change a fixed parameter use system.replace({name}=...)",
             )
+    if table is not TABLE:
+        states |= _middles(system, rows, table, states)
     return swept, states, called
 
 
 def _state_called(key: Any, system: System) -> str:
     """Return the state that an argument of the labelled functions is, which may have its name."""
+    if (law := equations_of(system)) is not None:
+        clock = "n" if isinstance(law, Map) else "duration"
+        own = str(key).removesuffix("0")
+        return "time" if key in ("t", clock) else f"state_{own if own in law.states else key}"
     stem = str(key).rstrip("0")
     coordinate = getattr(system, "coordinate", None)
     if isinstance(coordinate, str) and stem in (coordinate, f"d{coordinate}"):
@@ -251,16 +312,46 @@ def _state_called(key: Any, system: System) -> str:
     return "time" if stem == "t" else f"state_{stem}"
 
 
-def _valid(system: System, rows: tuple[Quantity, ...]) -> list[str]:
+def _states_of(system: System) -> tuple[str, ...]:
+    """The states that a sweep may be told, by the names of the table."""
+    law = equations_of(system)
+    return tuple(STATES) if law is None else (*(f"state_{x}" for x in law.states), "time")
+
+
+def _middles(
+    system: System, rows: tuple[Quantity, ...], table: Table, given: Mapping[str, Value]
+) -> dict[str, Value]:
+    """States at the start that are needed and not given."""
+    from phasekit.cells.equations import start_of
+
+    law: Any = equations_of(system)
+    needs = needs_of(system, passes_of(system, rows, table=table))
+    names = dict.fromkeys(name for one in needs.values() for name in one)
+    if "time" in names and "time" not in given:
+        clock = "n" if isinstance(law, Map) else "duration"
+        raise bad(
+            clock, None, f"{'iterations' if clock == 'n' else 'a time'} for lyapunov, {clock}="
+        )
+    starts = {f"state_{name}": name for name in law.states}
+    return {
+        key: start_of(law, name)
+        for key, name in starts.items()
+        if key in names and key not in given
+    }
+
+
+def _valid(system: System, rows: tuple[Quantity, ...], table: Table) -> list[str]:
     """The parameters and states along which rows can be swept."""
-    needs = needs_of(system, passes_of(system, rows))
+    needs = needs_of(system, passes_of(system, rows, table=table))
     needed = {name for names in needs.values() for name in names}
     declared = [parameter.name for parameter in system.declared]
-    return declared + [name for name in STATES if name in needed]
+    return declared + [name for name in _states_of(system) if name in needed]
 
 
-def _unknown_axis(system: System, name: Any, rows: tuple[Quantity, ...]) -> ParameterError:
-    valid = _valid(system, rows)
+def _unknown_axis(
+    system: System, name: Any, rows: tuple[Quantity, ...], table: Table
+) -> ParameterError:
+    valid = _valid(system, rows, table)
     if name in ("lam", "psi", "A", "B", "C"):
         other = "system.reduced()" if name in ("lam", "psi") else "system.coefficients()"
         return ParameterError(

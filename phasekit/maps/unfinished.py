@@ -90,14 +90,14 @@ def open_stored(
     marks = _all_marks(source, plan, ds)
     damaged: list[Damage] = []
     for part in plan.parts:
-        known = marks[part.name].known()
+        known = marks[part.name].computed()
         found = (in_full if verify else at_a_glance)(source, part, known)
         if found:  # or written anew since its mark was read
             now = read_marks(source, part)
             found = [one for one in found if now.get(one.index) == known[one.index]]
         damaged += [*lost_tiles(part, marks[part.name], plan.sizes), *found]
     refuse(name, damaged, plan.sizes)
-    store.marks = {part: one.known() for part, one in marks.items()}
+    store.marks = {part: one.computed() for part, one in marks.items()}
     if verify and plan.packed and may_be_packed(plan):
         _refuse_packed(source, plan, name, packed_bytes(plan, store.kept, store.marks))
     if all(part.complete for part in plan.parts):

@@ -31,13 +31,13 @@ def work(pipe: Connection) -> None:
     parent = multiprocessing.parent_process()
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     # The process that started this one has said so already.
-    warnings.filterwarnings("ignore", "numba has no place for its cache", RuntimeWarning)
+    warnings.filterwarnings("ignore", "no lasting place for compiled kernels", RuntimeWarning)
     # Tiles are plain arrays: labels, a third of the time to start, are loaded if they are needed.
     sys.modules.setdefault("xarray", Later("xarray"))
     # Loaded while the parent is not ready.
-    import numba  # noqa: F401
     import zarr  # noqa: F401
 
+    import phasekit.numerics.forms  # noqa: F401
     from phasekit.errors import StoreError
     from phasekit.maps.tile import compute
 

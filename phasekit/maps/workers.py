@@ -18,7 +18,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from phasekit.errors import StoreError
-from phasekit.maps.interrupts import noted, unheard
+from phasekit.maps.interrupts import deferred_interrupts, unheard
 from phasekit.maps.tile import Tile, compute, release_buffers
 from phasekit.maps.worker_process import work
 
@@ -57,7 +57,7 @@ def hired(workers: int) -> Iterator[Staff]:
             staff.hire()
         yield staff
     finally:
-        with noted():
+        with deferred_interrupts():
             staff.dismiss()
 
 
@@ -91,7 +91,7 @@ class Staff:
         again: list[Tile] = []
         losses: Counter[object] = Counter()
         error = ""
-        with noted() as interrupts:
+        with deferred_interrupts() as interrupts:
             while staff:
                 interrupts.act()
                 for pipe in wait(list(staff), LOOK):

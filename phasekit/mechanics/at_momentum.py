@@ -113,47 +113,96 @@ class Machines(Routhian):
             )
         return AtMomentum(machine, p)
 
+    def resting_formula(self, symbols: Mapping[str, Any]) -> Any:
+        """A function of phi with the equilibria as its stationary points, of parameters as symbols.
+
+        Its slope is M11^2 times that of the amended potential, ``M11^2 V' - p^2 M11'/2``, a
+        polynomial of sine and cosine; it need not close on the circle.
+        """
+        import sympy as sp
+
+        c = constants_formulas(symbols)
+        phi, sine, cosine = symbols["phi"], sp.sin(symbols["phi"]), sp.cos(symbols["phi"])
+        flat, one = c["rest"] + c["tilt"] + c["m"] * c["a"] ** 2, 2 * c["m"] * c["a"] * c["offset"]
+        two = c["m"] * c["offset"] ** 2 - c["tilt"]  # M11 = flat + one sine + two sine^2
+        powers = [phi, -cosine]  # integrals of the powers of the sine
+        for k in range(2, 6):
+            powers.append((k - 1) * powers[k - 2] / k - sine ** (k - 1) * cosine / k)
+        square = (flat**2, 2 * flat * one, one**2 + 2 * flat * two, 2 * one * two, two**2)
+        lifted = sum(part * powers[k + 1] for k, part in enumerate(square))
+        return c["weight"] * lifted - c["p"] ** 2 / 2 * (one * sine + two * sine**2)
+
     def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
         """The acceleration, of constants or parameters as symbols; push is a torque over M22.
 
         From Lagrange's equations with omega1 = (p - M12 phi')/M11.
         """
-        import sympy as sp
-
-        c = symbols if CONSTANTS[0] in symbols else {**symbols, **self._formulas(symbols)}
-        sine, cosine = sp.sin(symbols["phi"]), sp.cos(symbols["phi"])
-        reach = c["a"] + c["offset"] * sine
-        m11 = c["rest"] + c["tilt"] * cosine**2 + c["m"] * reach**2
-        half_slope = cosine * (c["m"] * c["offset"] * reach - c["tilt"] * sine)
-        m12 = c["Jvn"] * cosine
+        c = symbols if CONSTANTS[0] in symbols else {**symbols, **constants_formulas(symbols)}
+        m11, m12, half_slope, sine = _parts(c, symbols["phi"])
         omega1 = (c["p"] - m12 * rate) / m11
         right1 = c["Jvn"] * sine * rate**2 - 2 * half_slope * omega1 * rate
         right2 = c["Jn"] * push + half_slope * omega1**2 - c["weight"] * sine
         return (m11 * right2 - m12 * right1) / (m11 * c["Jn"] - m12**2)
 
-    def _formulas(self, symbols: Mapping[str, Any]) -> dict[str, Any]:
-        """The constants as formulas of the parameters: `two_degrees` in symbols."""
-        import sympy as sp
 
-        sine, cosine = sp.sin(symbols["beta"]), sp.cos(symbols["beta"])
-        m, e, a = (symbols[name] for name in ("m", "e", "a"))
-        J = m * symbols["r"] ** 2 / 4
-        turned = J + m * e**2
-        found = {
-            "rest": symbols["carrier_inertia"] + J + m * (e * cosine) ** 2,
-            "tilt": J * cosine**2,
-            "m": m,
-            "a": a,
-            "offset": e * sine,
-            "Jn": J + turned * sine**2,
-            "Jvn": turned * sine * cosine,
-            "weight": m * symbols["g"] * e * sine,
-        }
-        rest = found["rest"] + found["tilt"] + m * a**2
-        return {
-            **found,
-            "p": symbols["momentum"] if "momentum" in symbols else symbols["omega1"] * rest,
-        }
+def _parts(c: Mapping[str, Any], phi: Any) -> tuple[Any, Any, Any, Any]:
+    """M11, M12, half the slope of M11, and the sine of the angle, as formulas."""
+    import sympy as sp
+
+    sine, cosine = sp.sin(phi), sp.cos(phi)
+    reach = c["a"] + c["offset"] * sine
+    m11 = c["rest"] + c["tilt"] * cosine**2 + c["m"] * reach**2
+    half_slope = cosine * (c["m"] * c["offset"] * reach - c["tilt"] * sine)
+    return m11, c["Jvn"] * cosine, half_slope, sine
+
+
+def lagrange_formulas(symbols: Mapping[str, Any], torques: tuple[Any, Any]) -> dict[str, Any]:
+    """Accelerations, energy and momentum of support and disk under torques, as formulas.
+
+    Symbols are those of the parameters and of phi, omega1 and dphi; torques act on the support and
+    on the disk by its shaft, in N m. Lagrange's equations, without a constant momentum.
+    """
+    import sympy as sp
+
+    c = constants_formulas({**symbols, "momentum": 0})
+    speed, rate = symbols["omega1"], symbols["dphi"]
+    m11, m12, half_slope, sine = _parts(c, symbols["phi"])
+    right1 = torques[0] + c["Jvn"] * sine * rate**2 - 2 * half_slope * speed * rate
+    right2 = torques[1] + half_slope * speed**2 - c["weight"] * sine
+    scale = m11 * c["Jn"] - m12**2
+    kinetic = (m11 * speed**2 + 2 * m12 * speed * rate + c["Jn"] * rate**2) / 2
+    return {
+        "domega1": (c["Jn"] * right1 - m12 * right2) / scale,
+        "ddphi": (m11 * right2 - m12 * right1) / scale,
+        "mechanical_energy": kinetic - c["weight"] * sp.cos(symbols["phi"]),
+        "angular_momentum": m11 * speed + m12 * rate,
+        "torque_power": torques[0] * speed + torques[1] * rate,
+    }
+
+
+def constants_formulas(symbols: Mapping[str, Any]) -> dict[str, Any]:
+    """The constants as formulas of the parameters: `two_degrees` in symbols."""
+    import sympy as sp
+
+    sine, cosine = sp.sin(symbols["beta"]), sp.cos(symbols["beta"])
+    m, e, a = (symbols[name] for name in ("m", "e", "a"))
+    J = m * symbols["r"] ** 2 / 4
+    turned = J + m * e**2
+    found = {
+        "rest": symbols["carrier_inertia"] + J + m * (e * cosine) ** 2,
+        "tilt": J * cosine**2,
+        "m": m,
+        "a": a,
+        "offset": e * sine,
+        "Jn": J + turned * sine**2,
+        "Jvn": turned * sine * cosine,
+        "weight": m * symbols["g"] * e * sine,
+    }
+    rest = found["rest"] + found["tilt"] + m * a**2
+    return {
+        **found,
+        "p": symbols["momentum"] if "momentum" in symbols else symbols["omega1"] * rest,
+    }
 
 
 @functools.cache

@@ -97,9 +97,13 @@ def disk_mixing(r: npt.ArrayLike, e: npt.ArrayLike, beta: npt.ArrayLike) -> Arra
     """
     r, e, beta = floats(r=r, e=e, beta=beta)
     with np.errstate(all="ignore"):
-        s = turn(beta)[0]
-        inertia = 4.0 * e * e * s * s + r * r * (1.0 + s * s)
-        return np.asarray((r * r + 4.0 * e * e) * s * np.cos(beta) / inertia)
+        return np.asarray(mixing(r, e, turn(beta)[0], np.cos(beta)))
+
+
+def mixing(r: Any, e: Any, sine: Any, cosine: Any) -> Any:
+    """The same of sine and cosine of beta: numbers, arrays or symbols."""
+    inertia = 4.0 * e * e * sine * sine + r * r * (1.0 + sine * sine)
+    return (r * r + 4.0 * e * e) * sine * cosine / inertia
 
 
 def disk_eccentricity(e: npt.ArrayLike, beta: npt.ArrayLike) -> Array:

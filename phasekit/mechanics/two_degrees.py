@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 
 from phasekit.errors import EquilibriumKind
 from phasekit.mechanics.disk import disk_eccentricity, disk_inertia
@@ -308,7 +307,9 @@ def _extrema(machine: TwoDegrees, p: float, torque: float) -> Array:
     # matrix itself does not: alpha/beta are the zeros, infinite ones included.
     right, left = np.eye(10, dtype=complex), np.eye(10, k=-1, dtype=complex)
     right[0, 0], left[0] = series[-1], -series[-2::-1]
-    alpha, beta = scipy.linalg.eigvals(left, right, homogeneous_eigvals=True)
+    from scipy.linalg import eigvals
+
+    alpha, beta = eigvals(left, right, homogeneous_eigvals=True)
     angles = np.sort(np.mod(np.angle(alpha * np.conj(beta)), 2.0 * np.pi))
     # Zeros off the unit circle are none of the real function.
     powers = np.exp(1j * np.multiply.outer(angles, np.arange(-5, 6)))

@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import AttractorKind
+from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.motion.flow import ATOL, RTOL
 from phasekit.motion.lost import EXHAUSTED, MOST
-from phasekit.motion.method import circle
+from phasekit.motion.method import turns_of
 from phasekit.motion.strobe import Strobed, Targets, common_period, strobe
 
 Array = npt.NDArray[np.float64]
@@ -23,8 +24,6 @@ Array = npt.NDArray[np.float64]
 LONGEST = 16
 #: Legs after which motions are looked at, one round after another.
 ROUNDS = (60, 240, 1000, 3000)
-#: Motions that are followed further where many have come to nothing that repeats itself.
-MOST_OPEN = 24
 #: Log of the contraction of areas after which motions count as settled, and most legs until then.
 SETTLED, PATIENCE = 30.0, 100_000
 #: Why it is not seen where a motion ends.
@@ -33,21 +32,20 @@ TOO_LONG = f"take more than {MOST} steps"
 
 
 class Attractors(NamedTuple):
-    """The group "attractors", rows in the order of the first point's coordinate."""
+    """The group "attractors", rows in the order of the first point's first state."""
 
-    attractor_phi: Array
-    """Of shape (attractors, points), NaN beyond the last."""
-    attractor_dphi: Array
-    attractor_kind: npt.NDArray[np.int8]
-    attractor_period: npt.NDArray[np.int64]
-    """Legs after which it repeats itself; 0: it does not."""
-    attractor_multiplier: Array
+    state: Array
+    """Of shape (attractors, points, states), NaN beyond the last point."""
+    kind: npt.NDArray[np.int8]
+    period: Array
+    """Legs, or the time, after which it repeats itself; 0: it does not."""
+    multiplier: Array
     """Greatest modulus of its multipliers over that period or, of a rotation, over a turn."""
-    attractor_exponent: Array
+    exponent: Array
     """Largest Lyapunov exponent."""
-    attractor_exponent_error: Array
-    rotation_number: Array
-    """Turns in a leg."""
+    exponent_error: Array
+    rotation: Array
+    """Turns of the first state in a leg, or in a unit of time."""
 
 
 @dataclass
@@ -56,40 +54,58 @@ class Attractor:
 
     kind: AttractorKind
     points: Array
-    """States once a leg, of shape (n, 2): the whole orbit of a periodic one."""
+    """States once a leg, of shape (n, states): the whole orbit of a periodic one."""
     turns: float
-    """In a leg."""
+    """In a leg, or in a unit of time."""
     exponent: float
     exponent_error: float = 0.0
     multiplier: float = np.nan
+    time: float | None = None
+    """Of a flow that does not vary: in which it repeats itself."""
 
     @property
-    def period(self) -> int:
-        """Legs after which it repeats itself; 0: it does not."""
-        periodic = self.kind in (AttractorKind.EQUILIBRIUM, AttractorKind.CYCLE)
-        return len(self.points) if periodic else 0
+    def is_periodic(self) -> bool:
+        """Whether the points are the whole of it."""
+        at_once = self.kind in (AttractorKind.EQUILIBRIUM, AttractorKind.CYCLE)
+        return at_once or self.time is not None
+
+    @property
+    def period(self) -> float:
+        """Legs, or the time, after which it repeats itself; 0: it does not."""
+        if self.time is not None:
+            return self.time
+        return len(self.points) if self.is_periodic else 0
 
 
 @dataclass
 class Search:
     """A search for the attractors of one system."""
 
-    law: PerturbedConservative
+    law: PerturbedConservative | Equations
     values: Mapping[str, Array]
     leg: float
-    scale: float
-    """By which rates are measured against coordinates."""
-    size: float
-    """Of the box from which motions start."""
+    """Time, or steps of a map."""
+    units: Array
+    """By which the states are measured: the box from which motions start, or their range."""
     rtol: float = RTOL
     found: list[Attractor] = field(default_factory=list)
     open: Counter[str] = field(default_factory=Counter)
     """Motions of which it was not seen where they end, by the reason."""
+    bounds: Array | None = None
+    """Rows: least and greatest state of a motion that is not gone for good."""
+    #: Points of an attractor that are kept.
+    kept = LONGEST
+    #: Whether a further look adds to what was found.
+    adds = False
+
+    def __post_init__(self) -> None:
+        """Note which states are angles."""
+        self.turns = turns_of(self.law)
 
     @property
     def period(self) -> float:
-        """Of the coordinate, 0 on a line."""
-        return circle(self.law)
+        """Of the first state, 0 on a line."""
+        return float(self.turns[0])
 
     @property
     def step(self) -> float:
@@ -122,64 +138,90 @@ class Search:
         """Where motions have come to an attractor."""
         raise NotImplementedError
 
+    def nowhere(self) -> Targets:
+        """No attractors, but where motions are gone."""
+        to = Targets.none(self.units)
+        return to if self.bounds is None else to._replace(reach=self.bounds)
+
+    def nearest_turn(self, off: Array) -> Array:
+        """Differences of states, those of angles less than half a turn."""
+        turning = self.turns > 0.0
+        if not turning.any():
+            return off
+        whole = np.where(turning, self.turns, 1.0)
+        return np.asarray(off - np.where(turning, self.turns * np.round(off / whole), 0.0))
+
     def apart(self, x: Array, y: Array) -> Array:
-        """Distances of states."""
-        off = x - y
-        phi = off[..., 0]
-        if self.period:
-            phi = phi - self.period * np.round(phi / self.period)
-        return np.asarray(np.hypot(phi, off[..., 1] / self.scale))
+        """Distances of states, in units of the box."""
+        return np.asarray(np.linalg.norm(self.nearest_turn(x - y) / self.units, axis=-1))
 
     def run(self, states: Array, kept: int, skip: int) -> Strobed:
         """Follow motions."""
-        found = strobe(self.law, self.values, states, self.leg, kept, skip, **self.tolerances)
+        found = strobe(
+            self.law, self.values, states, self.leg, kept, skip, targets=self.nowhere(),
+            **self.tolerances,
+        )  # fmt: skip
         self.open[TOO_LONG] += int(np.sum(found.status == EXHAUSTED))
         return found
 
-    def wrapped(self, phi: Array) -> Array:
-        """Angles in the half-open turn round 0."""
-        if not self.period:
-            return np.asarray(phi)
-        half = 0.5 * self.period
-        return np.asarray(half - np.mod(half - phi, self.period))
+    def wrapped(self, states: Array) -> Array:
+        """States whose angles lie in the half-open turn round 0."""
+        half = 0.5 * self.turns
+        with np.errstate(invalid="ignore", divide="ignore"):
+            inside = half - np.mod(half - states, self.turns)
+        return np.asarray(np.where(self.turns > 0.0, inside, states))
 
     def order(self) -> None:
         """Number the attractors by what they are, not by when they were found.
 
-        Periodic ones come first, by period and least angle, at which they begin; then the others,
-        by their turns and mean angle.
+        Periodic ones come first, by period and least state, at which they begin; then the others,
+        by their turns and mean first state.
         """
 
-        def first(orbit: Array) -> tuple[float, float]:
-            phi, dphi = self.wrapped(orbit[0, 0]), orbit[0, 1] / self.scale
-            return round(float(phi) / self.size, 9), round(float(dphi) / self.size, 9)
+        def first(orbit: Array) -> tuple[float, ...]:
+            return tuple(np.round(self.wrapped(orbit[0]) / self.units, 9).tolist())
 
         def place(one: Attractor) -> tuple[float, ...]:
-            if one.period:
-                return (0.0, one.period, *first(one.points))
-            return (1.0, round(one.turns, 3), float(self.wrapped(one.points[:, 0]).mean()))
+            if one.is_periodic:
+                return (0.0, round(one.period, 9), *first(one.points))
+            mean = self.wrapped(one.points)[:, 0].mean()
+            return (1.0, round(one.turns, 3), float(mean))
 
         for one in self.found:
-            if one.period:
-                turned = [np.roll(one.points, -i, axis=0) for i in range(one.period)]
+            if one.is_periodic:
+                turned = (np.roll(one.points, -i, axis=0) for i in range(len(one.points)))
                 one.points = min(turned, key=first)
         self.found.sort(key=place)
 
     def result(self) -> Attractors:
         """What was found: periodic orbits first."""
-        lengths = [one.period or LONGEST for one in self.found]
-        shape = len(self.found), max([*lengths, 1])
-        phi, dphi = np.full(shape, np.nan), np.full(shape, np.nan)
+        lengths = [len(one.points) if one.is_periodic else self.kept for one in self.found]
+        states = np.full((len(self.found), max([*lengths, 1]), self.turns.size), np.nan)
         for row, (one, length) in enumerate(zip(self.found, lengths, strict=True)):
             own = one.points[:length]
-            phi[row, : len(own)], dphi[row, : len(own)] = self.wrapped(own[:, 0]), own[:, 1]
+            states[row, : len(own)] = self.wrapped(own)
         return Attractors(
-            phi,
-            dphi,
+            states,
             np.array([one.kind for one in self.found], np.int8),
-            np.array([one.period for one in self.found], np.int64),
+            np.array([one.period for one in self.found], float),
             np.array([one.multiplier for one in self.found], float),
             np.array([one.exponent for one in self.found], float),
             np.array([one.exponent_error for one in self.found], float),
             np.array([one.turns for one in self.found], float),
         )
+
+
+class PlaneSearch(Search):
+    """A search in the plane of a coordinate and its rate."""
+
+    law: PerturbedConservative
+
+    @property
+    def size(self) -> float:
+        """Of the box, along the coordinate."""
+        return float(self.units[0])
+
+    @property
+    def scale(self) -> float:
+        """By which rates are measured against coordinates."""
+        return float(self.units[1] / self.units[0])

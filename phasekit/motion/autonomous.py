@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import AttractorKind
-from phasekit.motion.attractor import PATIENCE, ROUNDS, SETTLED, TOO_WEAK, Attractor, Search
+from phasekit.motion.attractor import PATIENCE, ROUNDS, SETTLED, TOO_WEAK, Attractor, PlaneSearch
 from phasekit.motion.landscape import BORDER, Landscape
 from phasekit.motion.rotation import Turn, rotation, slowest
-from phasekit.motion.strobe import NO_TARGETS, Targets, strobe
+from phasekit.motion.strobe import Targets, strobe
 
 Array = npt.NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Candidate(NamedTuple):
 
 
 @dataclass
-class AutonomousSearch(Search):
+class AutonomousSearch(PlaneSearch):
     """A search for the attractors of one system that does not vary."""
 
     candidates: list[Candidate] = field(default_factory=list)
@@ -194,10 +194,10 @@ class AutonomousSearch(Search):
 
     def _targets(self, candidates: list[Candidate]) -> Targets:
         if not candidates:
-            return NO_TARGETS._replace(scale=self.scale)
+            return self.nowhere()
         spans = np.array([[one.low, one.high, i] for i, one in enumerate(candidates)])
         bands = np.stack([one.border for one in candidates])
-        return NO_TARGETS._replace(scale=self.scale, spans=spans, bands=bands)
+        return self.nowhere()._replace(spans=spans, bands=bands)
 
     def targets(self) -> Targets:
         """Where motions have come to an attractor."""

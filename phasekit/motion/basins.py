@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import AttractorKind
-from phasekit.motion.attractor import TOO_LONG, Search
-from phasekit.motion.lost import EXHAUSTED, FAILED
+from phasekit.motion.attractor import TOO_LONG, Attractor, Search
+from phasekit.motion.equation_rates import LONG
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED
 from phasekit.motion.strobe import strobe
 
 Array = npt.NDArray[np.float64]
 
 #: Legs after which a motion is given up.
 LEGS = 10_000
+#: Legs after which undecided ones are looked at again, and how many of them.
+FIRST, AGAIN = 1_000, 32
 #: Codes of motions that came to no attractor: undecided, or away to infinity.
 UNDECIDED, ESCAPED = -1, -2
 #: Errors of a leg in units of the tolerance; parts of the size of the box that errors may come to,
 #: and where borders decide, which motions pass more closely.
 ERRORS, FINE, BORDERS = 10.0, 1e-2, 1e-6
+#: Motions from which on steps by series are compiled of formulas so many times as long.
+MANY, PAYS = 4_000, 4.0
 #: Share of the cells beside another basin from which on a grid is too coarse.
 COARSE = 0.5
 
@@ -30,7 +36,7 @@ class Basins(NamedTuple):
     """The group "basins"."""
 
     basin: npt.NDArray[np.int16]
-    """Of shape (phi, dphi)."""
+    """Of the shape of the grid."""
     basin_decided: npt.NDArray[np.bool_]
     """Whether errors of the steps cannot have grown so far that they decide where it comes to."""
     basin_time: Array
@@ -42,7 +48,12 @@ class Basins(NamedTuple):
 
 
 def basins(
-    search: Search, phi: Array, dphi: Array, *, legs: int = LEGS, threads: int | None = None
+    search: Search,
+    axes: Mapping[int, Array],
+    states: Array | None = None,
+    *,
+    legs: int = LEGS,
+    threads: int | None = None,
 ) -> Basins:
     """Basins of the attractors that a search has found, over a grid.
 
@@ -50,8 +61,10 @@ def basins(
     ----------
     search : Search
         The attractors.
-    phi, dphi : array, 1-D
-        The grid.
+    axes : mapping of int to array, 1-D
+        The grid: values of states by their places.
+    states : array, shape (cells, n), optional
+        States of its cells, where there are more than the axes say.
     legs : int
         Legs after which a motion is given up.
 
@@ -60,12 +73,23 @@ def basins(
     The error of a share has two parts: that of a sample of as many states, Wilson's, which is
     not 0 of a share of 0 or 1; and the undecided.
     """
-    shape = (len(phi), len(dphi))
-    states = np.stack(np.meshgrid(phi, dphi, indexing="ij"), axis=-1).reshape(-1, 2)
-    enough = _least(search, phi, dphi) / (
-        max(search.rtol, np.finfo(float).eps) * ERRORS * search.size
+    shape = tuple(map(len, axes.values()))
+    if states is None:
+        states = np.stack(np.meshgrid(*axes.values(), indexing="ij"), axis=-1)
+        states = states.reshape(-1, len(axes))
+    enough = _least(search, axes) / (max(search.rtol, np.finfo(float).eps) * ERRORS)
+    code, time, status, grown = _followed(
+        search, states, min(legs, FIRST) if search.adds else legs, enough, threads
     )
-    code, time, status, grown = _followed(search, states, legs, enough, threads)
+    left = np.flatnonzero((code == UNDECIDED) & (status == ARRIVED))
+    if search.adds and left.size and legs > FIRST:
+        # What they come to may be an attractor that no start of the search came to.
+        old = list(search.found)
+        search.look(states[left[np.linspace(0, left.size - 1, AGAIN).astype(int)]])
+        search.order()
+        code = _renumbered(code, old, search.found)
+        more = _followed(search, states[left], legs, enough, threads)
+        code[left], time[left], status[left], grown[left] = more
     search.open[TOO_LONG] += int(np.sum(status == EXHAUSTED))
     code[(code < 0) & (status == FAILED)] = ESCAPED
     # Where all come to the same, errors decide nothing.
@@ -78,7 +102,7 @@ def basins(
     doubt = [one.kind is AttractorKind.UNKNOWN for one in search.found]
     errors = np.where(doubt, np.nan, sampled + open_)
     grid = code.reshape(shape)
-    wraps = bool(search.period) and _covers_turn(phi, search.period)
+    wraps = [_covers_turn(axis, float(search.turns[i])) for i, axis in axes.items()]
     rows = grid, decided.reshape(shape), time.reshape(shape)
     return Basins(*rows, shares, errors, _boundary(grid, wraps))
 
@@ -95,7 +119,9 @@ def _followed(
     count, targets = len(states), search.targets()
     code, status = np.full(count, -1, np.int16), np.zeros(count, np.int64)
     time, grown, on = np.zeros(count), np.zeros(count, bool), np.ones(count, bool)
-    now = np.column_stack([states, np.ones(count), np.zeros(count)])
+    n = states.shape[1]
+    now = np.column_stack([states, np.zeros(states.shape)])
+    now[:, n] = search.units[0]
     rounds = search.rounds(legs)
     # Motions can be taken up again after any leg of a law that is the same then.
     stop = enough if search.repeats else np.inf
@@ -103,10 +129,11 @@ def _followed(
         rows = np.flatnonzero(on & (grown != measured))
         if not rows.size:
             continue
-        width = 4 if measured else 2
+        width = 2 * n if measured else n
         found = strobe(
             search.law, search.values, now[rows, :width], leg, 1, many, targets=targets,
             most_legs=many, enough=stop, **search.tolerances, threads=threads,
+            longest=PAYS * LONG if count >= MANY else LONG,
         )  # fmt: skip
         code[rows], status[rows], now[rows, :width] = found.code, found.status, found.states[:, 0]
         time[rows] += found.taken * leg
@@ -116,38 +143,47 @@ def _followed(
     return code, np.where(code >= 0, time, np.nan), status, grown
 
 
-def _least(search: Search, phi: Array, dphi: Array) -> float:
+def _renumbered(
+    code: npt.NDArray[np.int16], old: Sequence[Attractor], new: Sequence[Attractor]
+) -> npt.NDArray[np.int16]:
+    """Codes of attractors among others that were found since."""
+    place = {id(one): i for i, one in enumerate(new)}
+    moved = np.array([place[id(one)] for one in old] + [UNDECIDED, ESCAPED][::-1], np.int16)
+    return moved[code]
+
+
+def _least(search: Search, axes: Mapping[int, Array]) -> float:
     """Greatest error that cannot decide: less than a cell, and than attractors catch."""
-    parts = [FINE * search.size]
-    for axis, unit in ((phi, 1.0), (dphi, search.scale)):
+    parts = [FINE]
+    for i, axis in axes.items():
         if len(axis) > 1:
-            parts.append(float(np.diff(axis).min()) / unit)
+            parts.append(float(np.diff(axis).min() / search.units[i]))
     targets = search.targets()
-    radii = targets.points[:, 2]
+    radii = targets.points[:, -2]
     parts += [float(radii[radii > 0.0].min())] if (radii > 0.0).any() else []
     if len(targets.spans):
-        parts.append(BORDERS * search.size)
+        parts.append(BORDERS)
     return min(parts)
 
 
-def _covers_turn(phi: Array, period: float) -> bool:
+def _covers_turn(axis: Array, turn: float) -> bool:
     """Whether the last cell has the first as its neighbour."""
-    turn = abs(phi[-1] - phi[0]) * len(phi) / max(len(phi) - 1, 1)
-    return len(phi) > 2 and bool(abs(turn / period - 1.0) < 1e-6)
+    way = abs(axis[-1] - axis[0]) * len(axis) / max(len(axis) - 1, 1)
+    return turn > 0.0 and len(axis) > 2 and bool(abs(way / turn - 1.0) < 1e-6)
 
 
-def _boundary(grid: npt.NDArray[np.int16], wraps: bool) -> float:
+def _boundary(grid: npt.NDArray[np.int16], wraps: Sequence[bool]) -> float:
     """Share of the cells with a neighbour in another basin."""
     beside = np.zeros(grid.shape, bool)
-    for axis in (0, 1):
+    for axis, around in enumerate(wraps):
         other = np.diff(grid, axis=axis) != 0
-        left = [slice(None), slice(None)]
-        right = [slice(None), slice(None)]
+        left, right = [slice(None)] * grid.ndim, [slice(None)] * grid.ndim
         left[axis], right[axis] = slice(None, -1), slice(1, None)
         beside[tuple(left)] |= other
         beside[tuple(right)] |= other
-    if wraps:
-        ends = grid[0] != grid[-1]
-        beside[0] |= ends
-        beside[-1] |= ends
+        if around:
+            left[axis], right[axis] = slice(None, 1), slice(-1, None)
+            ends = grid[tuple(left)] != grid[tuple(right)]
+            beside[tuple(left)] |= ends
+            beside[tuple(right)] |= ends
     return float(beside.mean()) if beside.size else 0.0

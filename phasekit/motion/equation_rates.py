@@ -10,20 +10,56 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
 from phasekit.motion.rates import Rates
 
 Array = npt.NDArray[np.float64]
 
+#: States up to which slopes are compiled, for stiff motions.
+MANY = 40
 #: Operations of formulas up to which steps by series are compiled unasked, in less than a second.
 LONG = 48
 
 
-def rates_of(law: Equations, order: int = 0, longest: float = LONG) -> Rates:
-    """Machine code of the rates of eight states, and of steps by series of that order, if any."""
-    address = _compiled(law.states, law.names, law.f, law.time)
-    series = series_of(law, order, longest=longest) if order else 0
-    room = len(law.states) * (order + 1) if series else 0
-    return Rates(address, law.names, -1, series, room)
+def rates_of(law: Equations, order: int = 0, longest: float = LONG, tangents: int = 0) -> Rates:
+    """Machine code of the rates of eight states, with so many tangent vectors.
+
+    With steps by series of that order, if it has them; of a map steps are its own.
+    """
+    address = _compiled(law.states, law.names, law.f, law.time, tangents)
+    entries = len(law.states) * (1 + tangents)
+    if isinstance(law, Map):
+        from phasekit.motion.kernels.iteration import compile_iterations
+
+        return Rates(address, law.names, -1, compile_iterations(address, entries), entries)
+    series = series_of(law, order, tangents, longest) if order else 0
+    return Rates(address, law.names, -1, series, entries * (order + 1) if series else 0)
+
+
+def derivatives_of(law: Equations) -> int:
+    """Machine code of the slopes of the rates, by rows, and their derivatives by time.
+
+    0 where the law is no formula, or there is too much of it.
+    """
+    if law.kind != "symbolic" or len(law.states) > MANY:
+        return 0
+    return _derivatives(law.states, law.names, law.f, law.time)
+
+
+@functools.lru_cache(maxsize=128)
+def _derivatives(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> int:
+    import sympy as sp
+
+    from phasekit.laws.formulas import symbols_of
+    from phasekit.numerics.lanes import compile_lanes
+
+    symbols = symbols_of([*states, *names, *([] if time is None else [time])])
+    places = {symbols[name]: (0, i) for i, name in enumerate(states)}
+    places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
+    t = sp.Dummy("t", real=True) if time is None else symbols[time]
+    places[t] = (2, 0)
+    entries = [one.diff(symbols[name]) for one in f for name in states]
+    return compile_lanes(tuple([*entries, *(one.diff(t) for one in f)]), places)
 
 
 def series_of(law: Equations, order: int, tangents: int = 0, longest: float = LONG) -> int:
@@ -76,22 +112,27 @@ def parameters_of(law: Equations, values: Mapping[str, Any], count: int) -> Arra
 
 
 @functools.lru_cache(maxsize=128)
-def _compiled(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> int:
+def _compiled(
+    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, tangents: int
+) -> int:
     from phasekit.laws.formulas import symbols_of
     from phasekit.numerics.lanes import compile_lanes
 
     if not isinstance(f, tuple):
-        return int(_wrapped(states, names, f, time).address)
+        return int(_wrapped(states, names, f, time, tangents).address)
     symbols = symbols_of([*states, *names, *([] if time is None else [time])])
-    places = {symbols[name]: (0, i) for i, name in enumerate(states)}
+    expressions, order = varied(states, symbols, f, tangents)
+    places = {symbol: (0, i) for symbol, i in order.items()}
     places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
     if time is not None:
         places[symbols[time]] = (2, 0)
-    return compile_lanes(f, places)
+    return compile_lanes(expressions, places)
 
 
 @functools.cache  # the code lives as long as it may be called
-def _wrapped(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None) -> Any:
+def _wrapped(
+    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, tangents: int
+) -> Any:
     import inspect
 
     from phasekit.numerics.lanes import LANES
@@ -99,7 +140,7 @@ def _wrapped(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str 
 
     arguments = list(inspect.signature(f.py_func).parameters)[1:]
     order = tuple(None if name == time else names.index(name) for name in arguments)
-    return wrap(f, len(states), order, lanes=LANES)
+    return wrap(f, len(states), order, lanes=LANES, tangents=tangents)
 
 
 def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, Any], Array]:
@@ -154,7 +195,7 @@ def slopes_at(law: Equations, values: Mapping[str, float], x: Array, t: float = 
     n = len(law.states)
     if law.kind == "symbolic":
         function = _slopes(law.states, law.names, law.f, law.time)
-        return np.array(function(x, values, t), float).reshape(n, n)
+        return np.array(function([float(one) for one in x], values, t), float).reshape(n, n)
     f = pointwise(law, values)
     size = np.maximum(np.abs(x), 1e-3 * max(float(np.abs(x).max(initial=0.0)), 1e-300))
     found = np.empty((n, n))
@@ -163,6 +204,23 @@ def slopes_at(law: Equations, values: Mapping[str, float], x: Array, t: float = 
         h[i] = np.finfo(float).eps ** (1.0 / 3.0) * size[i]
         found[:, i] = (f(t, x + h) - f(t, x - h)) / (2.0 * h[i])
     return found
+
+
+def slopes_on(law: Equations, values: Mapping[str, float], x: Array) -> Array:
+    """Derivatives of the rates by the states at many states, the rows of x, at time 0."""
+    count, n = x.shape
+    if law.kind == "symbolic":
+        found = _slopes(law.states, law.names, law.f, law.time)(x.T, values, 0.0)
+        rows = [np.broadcast_to(np.asarray(one, float), (count,)) for one in found]
+        return np.stack(rows, axis=-1).reshape(count, n, n)
+    size = np.maximum(np.abs(x), 1e-3 * np.abs(x).max(axis=1, initial=1e-300, keepdims=True))
+    steps = np.finfo(float).eps ** (1.0 / 3.0) * size
+    columns = []
+    for i in range(n):
+        h = np.where(np.arange(n) == i, steps, 0.0)
+        change = rates_on(law, values, x + h) - rates_on(law, values, x - h)
+        columns.append(change / (2.0 * steps[:, i : i + 1]))
+    return np.stack(columns, axis=-1)
 
 
 @functools.lru_cache(maxsize=128)
@@ -176,9 +234,9 @@ def _slopes(states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str |
     entries = [one.diff(symbols[name]) for one in f for name in states]
     function = sp.lambdify([symbols[name] for name in given], entries, "numpy", cse=True)
 
-    def slopes(x: Array, values: Mapping[str, float], t: float) -> Any:
+    def slopes(x: Any, values: Mapping[str, float], t: float) -> Any:
         more = [] if time is None else [t]
         with np.errstate(all="ignore"):
-            return function(*map(float, x), *(float(values[n]) for n in names), *more)
+            return function(*x, *(float(values[n]) for n in names), *more)
 
     return slopes

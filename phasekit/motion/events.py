@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
-from phasekit.motion.steps import Rates, Step
+from phasekit.motion.steps import Step
 
 #: Ends of the pieces in which a step is looked at.
 PIECES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -19,22 +18,42 @@ TOUCH = 1e-8
 
 @dataclass(frozen=True)
 class Event:
-    """A function of (t, x) whose zeros are looked for along a motion.
+    """A formula or function whose zeros are looked for along a motion.
 
-    A step is looked at in pieces, and where the function turns towards zero between them. Zeros
-    that lie more closely, several in a piece, may be missed.
+    Parameters
+    ----------
+    function : str, sympy.Expr or callable
+        A formula of states, parameters and time; or a function of (t, x), of systems of one
+        coordinate of (t, phi, dphi).
+    terminal : int, default 0
+        At which of its zeros the motion ends; 0: at none.
+    direction : {0, 1, -1}
+        Only where the function rises (1) or falls (-1) along the motion; 0: both.
+
+    Notes
+    -----
+    A step is looked at in quarters, and where the function turns towards zero between them. Zeros
+    that lie more closely, several in a quarter, may be missed.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> ball = pk.Problem({"h": "v", "v": "-g"}, parameters={"g": [9.81, 1.62]})
+    >>> down = pk.Event("h", terminal=1, direction=-1)
+    >>> pk.flow(ball, [1.0, 0.0], [0.0, 9.0], events={"ground": down}).event_time.values.round(3)
+    array([[0.452],
+           [1.111]])
     """
 
-    function: Rates
+    function: Any
     terminal: int = 0
-    """At which of its zeros the motion ends; 0: at none."""
     direction: float = 0
-    """Only where the function rises (> 0) or falls (< 0) along the motion; 0: both."""
 
-    def passes(self, before: float, after: float) -> bool:
-        """Whether the values at the ends of a step have a zero between them."""
-        rises, falls = before <= 0.0 <= after, before >= 0.0 >= after
-        return (rises and self.direction >= 0) or (falls and self.direction <= 0)
+
+def passes(event: Event, before: float, after: float) -> bool:
+    """Whether the values at the ends of a step have a zero between them, passed as is wanted."""
+    rises, falls = before <= 0.0 <= after, before >= 0.0 >= after
+    return (rises and event.direction >= 0) or (falls and event.direction <= 0)
 
 
 @dataclass
@@ -90,7 +109,7 @@ class Watch:
         """The zero in a piece at whose ends the signs differ, or vanish."""
         (start, stop), (before, after) = times, values
         first = not self.looked and self.behind is None and self.rest is None
-        if not self.event.passes(before, after):
+        if not passes(self.event, before, after):
             return []
         if before == 0.0:
             middle = 0.5 * (start + stop)
@@ -109,6 +128,8 @@ class Watch:
 
         Where it comes to zero within what the motion itself may be wrong by, it touches.
         """
+        from scipy.optimize import minimize_scalar
+
         sign = 1.0 if values[1] > 0.0 else -1.0
         left, middle, right = (sign * value for value in values)
         if not (0.0 < middle <= min(left, right)) or middle == max(left, right):
@@ -126,7 +147,7 @@ class Watch:
             part *= 1e-6
         if least < 0.0:
             rises = ((times[0], turn, values[0]), (turn, times[2], -values[0]))
-            return [instant(function, a, b) for a, b, at in rises if self.event.passes(at, -at)]
+            return [instant(function, a, b) for a, b, at in rises if passes(self.event, at, -at)]
         touches = least <= TOUCH * max(left, right) and self.event.direction == 0
         return [turn] if touches else []
 
@@ -141,6 +162,8 @@ def instant(function: Callable[[float], float], start: float, stop: float) -> fl
 
     One of them, if rounding leaves the zero just outside.
     """
+    from scipy.optimize import brentq
+
     left, right = function(start), function(stop)
     if not min(left, right) < 0.0 < max(left, right):
         return start if abs(left) < abs(right) else stop

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +10,11 @@ import numpy.typing as npt
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
-from phasekit.motion.equation_rates import pointwise, series_of, slopes_at, varied
+from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of, slopes_at
 from phasekit.motion.flow import ATOL, RTOL
-from phasekit.motion.flows import limits_of
-from phasekit.motion.lost import ARRIVED, FAILED, MOST, judged, tell
-from phasekit.motion.method import WEIGHT, cells_of, run
-from phasekit.motion.rates import Rates, order_of
+from phasekit.motion.lost import ARRIVED, FAILED, judged, tell
+from phasekit.motion.method import cells_of, limits_of, run
+from phasekit.motion.rates import order_of
 from phasekit.motion.steps import InitialValue, steps
 
 Array = npt.NDArray[np.float64]
@@ -122,64 +119,27 @@ def _growth(
 ) -> tuple[Array, Index]:  # fmt: skip
     """Logs of the growth of tangent vectors after each part of the time, added up."""
     cells, n = states.shape
-    address = _compiled(law.states, law.names, law.f, law.time, count)
-    columns = [np.atleast_1d(np.asarray(values[name], float)) for name in law.names] or [
-        np.zeros(1)
-    ]
-    parameters = np.stack(np.broadcast_arrays(*columns))
-    parameters = np.array(np.broadcast_to(parameters, (len(parameters), cells)))
+    code = rates_of(law, order_of(rtol), tangents=count)
+    parameters = parameters_of(law, values, cells)
     first = np.concatenate([states, np.tile(np.eye(n)[:count].ravel(), (cells, 1))], axis=1)
     out, status = np.full((cells, PARTS, count), np.nan), np.zeros(cells, np.int64)
-    if isinstance(law, Map):
-        from phasekit.motion.kernels.iterates import growth as of_map
-        from phasekit.numerics.launch import launch
+    from phasekit.motion.kernels.tangents import growth
 
-        work = WEIGHT + int(legs.max(initial=0.0)) * PARTS // 4
-        given = legs.astype(np.int64), np.array(first), parameters
-        groups: Any = (out, status)
-        launch(of_map, (address, *given), cells, groups, threads, work)
-    else:
-        from phasekit.motion.kernels.tangents import growth
-
-        code = Rates(address, law.names, -1, series_of(law, order_of(rtol), count), 0)
-        shared = np.zeros((0, 3)), limits_of(law, rtol, atol, MOST), code.kink
-        own = np.array(legs), np.array(first)
-        run(growth, code, shared, own, parameters, (out, status), status, threads)
+    limits = limits_of(law, rtol, atol, alone=True)
+    own = np.array(legs, float), first
+    run(
+        growth,
+        code,
+        (np.zeros((0, 3)), limits, -1),
+        own,
+        parameters,
+        (out, status),
+        status,
+        threads,
+    )
+    status[np.isnan(out[:, -1]).any(axis=1)] = FAILED
     judged(status, parameters)
     return out, status
-
-
-@functools.lru_cache(maxsize=128)
-def _compiled(
-    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, count: int
-) -> int:
-    """Machine code of the states and so many tangent vectors."""
-    if not isinstance(f, tuple):
-        return int(_wrapped(states, names, f, time, count).address)
-    from phasekit.laws.formulas import symbols_of
-    from phasekit.numerics.lanes import compile_lanes
-
-    symbols = symbols_of([*states, *names, *([] if time is None else [time])])
-    expressions, order = varied(states, symbols, f, count)
-    places = {symbol: (0, i) for symbol, i in order.items()}
-    places |= {symbols[name]: (1, i) for i, name in enumerate(names)}
-    if time is not None:
-        places[symbols[time]] = (2, 0)
-    return compile_lanes(expressions, places)
-
-
-@functools.cache  # the code lives as long as it may be called
-def _wrapped(
-    states: tuple[str, ...], names: tuple[str, ...], f: Any, time: str | None, count: int
-) -> Any:
-    import inspect
-
-    from phasekit.numerics.lanes import LANES
-    from phasekit.numerics.wrapped import wrap
-
-    arguments = list(inspect.signature(f.py_func).parameters)[1:]
-    order = tuple(None if name == time else names.index(name) for name in arguments)
-    return wrap(f, len(states), order, lanes=LANES, tangents=count)
 
 
 def _one_by_one(

@@ -8,17 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.laws.perturbed import (
-    OWN,
-    PerturbedConservative,
-    PerturbedRouthian,
-    drift_name,
-    forcing_names,
-    modulation_names,
-)
+from phasekit.laws.ladder import Trait
+from phasekit.laws.perturbed import OWN, PerturbedLaw
+from phasekit.laws.terms import STANDARD, drift_name, forcing_names, modulation_names
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.motion.lost import ARRIVED, MOST, judged, tell
-from phasekit.motion.method import both_ways, cells_of, kinds, limits_of, run, some, unit_of
+from phasekit.motion.method import both_ways, cells_of, entries_of, kinds, limits_of, run, unit_of
 from phasekit.motion.prescribed import span, table_of
 from phasekit.motion.rates import order_of, rates_of
 from phasekit.motion.stiff import follow, stiff_cells
@@ -48,7 +43,7 @@ class Cells(NamedTuple):
 
 
 def flow(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     *arrays: npt.ArrayLike,
     rtol: float = RTOL,
     atol: float = ATOL,
@@ -58,7 +53,7 @@ def flow(
 
     Parameters
     ----------
-    law : PerturbedConservative
+    law : PerturbedLaw
         The law.
     *arrays : array_like
         Its parameters, then angles and angular velocities at t = 0, then times; they broadcast.
@@ -143,12 +138,12 @@ def at_momentum(law: Any, *arrays: npt.ArrayLike, **how: Any) -> Motion:
         NaN where a motion did not come to a time, which a RuntimeWarning says.
     """
     count = len(law.names)
-    alone = PerturbedRouthian(law, (*law.names, *OWN), law.names, torqued=False)
+    alone = PerturbedLaw(law, (*law.names, *OWN), law.names, STANDARD, traits=Trait(0))
     return flow(alone, *arrays[:count], *np.zeros(len(OWN)), *arrays[count:], **how)
 
 
 def _motions(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: Mapping[str, Array],
     states: Array,
     times: Array,
@@ -165,15 +160,15 @@ def _motions(
     assert isinstance(law.base, Trigonometric)
     A, B, C = (np.reshape(x, (-1, 1)) for x in law.base.coefficients(own))
     phi, dphi = states[still].T[..., None]
-    result[still] = np.stack(exact(A, B, C, phi, dphi, some(times, still)), axis=-1)
+    result[still] = np.stack(exact(A, B, C, phi, dphi, entries_of(times, still)), axis=-1)
     if not still.all():
-        rest = cells_of(values, ~still), states[~still], some(times, ~still)
+        rest = cells_of(values, ~still), states[~still], entries_of(times, ~still)
         result[~still] = _integrated(law, *rest, *how)
     return result
 
 
 def _integrated(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: Mapping[str, Array],
     states: Array,
     times: Array,
@@ -188,17 +183,17 @@ def _integrated(
         if which.all():
             found, status, _ = motions(law, values, states, times, *how)
         elif which.any():
-            cells = cells_of(values, which), states[which], some(times, which)
+            cells = cells_of(values, which), states[which], entries_of(times, which)
             found[which], status[which], _ = motions(law, *cells, *how)
     if stiff.any():
-        cells = cells_of(values, stiff), states[stiff], some(times, stiff)
+        cells = cells_of(values, stiff), states[stiff], entries_of(times, stiff)
         found[stiff], status[stiff] = _stiff_motions(law, *cells, *how)
     tell("motion_phi", status, states)
     return found
 
 
 def _stiff_motions(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: Mapping[str, Array],
     states: Array,
     times: Array,
@@ -224,9 +219,9 @@ def _stiff_motions(
     return found, status
 
 
-def _is_still(law: PerturbedConservative, values: Mapping[str, Array], count: int) -> Any:
+def _is_still(law: PerturbedLaw, values: Mapping[str, Array], count: int) -> Any:
     """In which cells there is neither damping nor torque nor anything that varies."""
-    if not isinstance(law.base, Trigonometric) or law.prescribed is not None:
+    if not isinstance(law.base, Trigonometric) or law.prescribed is not None or law.own:
         return np.zeros(count, bool)
     names = ["damping", "quadratic", "torque"]
     names += [forcing_names(i)[0] for i in range(law.harmonics)]
@@ -248,7 +243,7 @@ def _time_axes(arrays: tuple[Array, ...], t: Array, n: int) -> tuple[int, ...]:
 
 
 def motions(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: Mapping[str, Array],
     states: Array,
     times: Array,
@@ -295,7 +290,7 @@ def motions(
 
 
 def accelerations(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: Mapping[str, Array],
     times: npt.ArrayLike,
     phi: npt.ArrayLike,
@@ -317,7 +312,7 @@ def accelerations(
 
 
 def pointwise(
-    law: PerturbedConservative, values: Mapping[str, Array], start: float, stop: float
+    law: PerturbedLaw, values: Mapping[str, Array], start: float, stop: float
 ) -> Callable[[float, Any], Array]:
     """The law of one system as a function of time and state, between two times."""
     from phasekit.motion.kernels.motions import rates_at

@@ -16,6 +16,8 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.ladder import Map
 from phasekit.motion.equation_rates import (
     LONG,
+    MANY,
+    derivatives_of,
     parameters_of,
     pointwise,
     rates_of,
@@ -24,15 +26,16 @@ from phasekit.motion.equation_rates import (
 )
 from phasekit.motion.flow import ATOL, RTOL, Laid
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, MOST, judged, tell
-from phasekit.motion.method import WEIGHT, both_ways, cells_of, run, some
+from phasekit.motion.method import WEIGHT, both_ways, cells_of, entries_of, limits_of, run
 from phasekit.motion.rates import order_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 
-#: Steps of the explicit method, after which the implicit one is tried.
-TRIED = 100_000
-#: Steps of the implicit method.
+#: Steps of the explicit method, after which an implicit one is tried, and how many that may take.
+FEW, TRIED = 5_000, 100_000
+FEW_IMPLICIT, TRIED_IMPLICIT = 50_000, 200_000
+#: Steps of the implicit method in Python.
 MOST_IMPLICIT = 30_000
 
 
@@ -43,6 +46,7 @@ def flow(
     atol: float = ATOL,
     threads: int | None = None,
     method: str | None = None,
+    taken: dict[str, int] | None = None,
 ) -> tuple[Array, ...]:
     """States after times from t = 0, or after so many steps of a map.
 
@@ -56,8 +60,10 @@ def flow(
         Error of a step that is allowed, relative and absolute.
     threads : int, optional
         Default: all cores where there are many motions.
-    method : {"taylor", "dop853", "radau"}, optional
-        Default: Radau's where the motion is stiff; else series where formulas are short.
+    method : {"taylor", "dop853", "rosenbrock", "radau"}, optional
+        Default: an implicit one where the motion is stiff; else series where formulas are short.
+    taken : dict, optional
+        Is told how many motions each method followed.
 
     Raises
     ------
@@ -75,41 +81,101 @@ def flow(
         found, status = iterates(law, values, laid.states, laid.times * law.times)
     else:
         how = {"rtol": rtol, "atol": atol}
-        found, status = _flows(law, values, laid.states, laid.times, method, threads, how)
+        taken = {} if taken is None else taken
+        found, status = _flows(law, values, laid.states, laid.times, method, threads, how, taken)
     tell(f"motion of {', '.join(law.states)}", status, laid.states)
     return tuple(laid.back(found))
 
 
 def _flows(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
-    method: str | None, threads: int | None, how: dict[str, float],
+    method: str | None, threads: int | None, how: dict[str, float], taken: dict[str, int],
 ) -> tuple[Array, Index]:  # fmt: skip
     order = order_of(how["rtol"])
     if method == "taylor" and not series_of(law, order, longest=np.inf):
         why = "f has functions whose series are not known, or is no formula"
         raise bad("method", method, "dop853 or radau", why)
+    count = len(states)
+    implicit = derivatives_of(law) if method in (None, "rosenbrock") else 0
+    if method == "rosenbrock" and not implicit:
+        why = f"f is no formula, or has more than {MANY} states; radau takes any"
+        raise bad("method", method, "another method", why)
     if law.kind == "python" or method == "radau":
-        return _one_by_one(law, values, states, times, method, how)
-    few = TRIED if method is None else MOST
+        name = "radau" if method == "radau" else "dop853"
+        taken[name] = taken.get(name, 0) + count
+        return one_by_one(law, values, states, times, method, how)
+    if method == "rosenbrock":
+        taken["rosenbrock"] = taken.get("rosenbrock", 0) + count
+        return stiff(law, values, states, times, how["rtol"], how["atol"], threads)
 
-    def move(cells: tuple[Any, Array, Array], most: int) -> tuple[Array, Index]:
-        return motions(law, *cells, how["rtol"], how["atol"], threads, most, method)
-
-    found, status = move((values, states, times), few)
-    lost = np.flatnonzero(status == EXHAUSTED)
-    if few == MOST or not lost.size:
-        return found, status
+    def move(cells: tuple[Any, Array, Array], most: int, again: bool = True) -> tuple[Array, Index]:
+        return motions(law, *cells, how["rtol"], how["atol"], threads, most, method, again=again)
 
     def part(cells: Any) -> tuple[dict[str, Array], Array, Array]:
-        return cells_of(values, cells), states[cells], some(times, cells)
+        return cells_of(values, cells), states[cells], entries_of(times, cells)
 
-    # Stiff motions take the implicit method few steps; others as many, each of which takes longer.
-    _, ended = _one_by_one(law, *part(lost[:1]), "radau", how)
-    if ended[0] == ARRIVED:
-        found[lost], status[lost] = _one_by_one(law, *part(lost), "radau", how)
-    else:
-        found[lost], status[lost] = move(part(lost), MOST)
+    explicit = "taylor" if method != "dop853" and series_of(
+        law, order, longest=LONG if method is None else np.inf
+    ) else "dop853"  # fmt: skip
+    taken[explicit] = taken.get(explicit, 0) + count
+    if method is not None:
+        return move((values, states, times), MOST)
+    # Explicit steps before, implicit ones, and explicit ones of what these do not bring to its end.
+    budgets = [(TRIED, 0, MOST)]
+    if implicit:
+        budgets = [(FEW, FEW_IMPLICIT, TRIED), (TRIED, TRIED_IMPLICIT, MOST)]
+    found, status = move((values, states, times), budgets[0][0], not implicit)
+    lost = np.flatnonzero(status == EXHAUSTED)
+    for _, budget, more in budgets:
+        if not lost.size:
+            break
+        name = "rosenbrock" if implicit else "radau"
+        if implicit:
+            tried, ended = stiff(law, *part(lost), how["rtol"], how["atol"], threads, budget)
+        else:  # the first tells whether it is worth its time
+            tried, ended = one_by_one(law, *part(lost[:1]), "radau", how)
+            if ended[0] == ARRIVED:
+                tried, ended = one_by_one(law, *part(lost), "radau", how)
+            else:
+                ended = np.full(lost.size, EXHAUSTED)
+        well = ended == ARRIVED
+        found[lost[well]], status[lost[well]] = tried[well], ARRIVED
+        taken[name] = taken.get(name, 0) + int(well.sum())
+        taken[explicit] -= int(well.sum())
+        lost = lost[~well]
+        if lost.size:
+            found[lost], status[lost] = move(part(lost), more, more == MOST or not implicit)
+            lost = lost[status[lost] == EXHAUSTED]
     return found, status
+
+
+def stiff(
+    law: Equations,
+    values: Mapping[str, Array],
+    states: Array,
+    times: Array,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    threads: int | None = None,
+    most: int = MOST,
+) -> tuple[Array, Index]:
+    """Integrate stiff motions of formulas from t = 0; states, and how it ended."""
+    from phasekit.motion.kernels.rosenbrock import rosenbrock as kernel
+    from phasekit.numerics.launch import launch
+
+    count, n = states.shape
+    address, slopes = rates_of(law).address, derivatives_of(law)
+    parameters = parameters_of(law, values, count)
+    limits = limits_of(law, rtol, atol, most)
+
+    def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
+        given = address, slopes, limits, 0.0, rising, np.array(states), parameters
+        into: Any = groups
+        launch(kernel, given, count, into, threads, WEIGHT)
+
+    result, status, _ = both_ways(times, count, n, integrate)
+    judged(status, parameters)
+    return result, status
 
 
 def sections(
@@ -153,48 +219,39 @@ def motions(
     threads: int | None = None,
     most: int = MOST,
     method: str | None = None,
+    tangents: int = 0,
+    again: bool = True,
 ) -> tuple[Array, Index]:
-    """Integrate a flow from t = 0 to times of either sign; states at them, and how it ended."""
+    """Integrate a flow from t = 0 to times of either sign; states at them, and how it ended.
+
+    Behind the states may stand so many tangent vectors, which move along.
+    """
     from phasekit.motion.kernels.motions import motions as kernel
 
-    count, n = states.shape
+    count, width = states.shape
     longest = LONG if method is None else np.inf
-    code = rates_of(law, 0 if method == "dop853" else order_of(rtol), longest)
+    code = rates_of(law, 0 if method == "dop853" else order_of(rtol), longest, tangents)
     parameters = parameters_of(law, values, count)
-    limits = limits_of(law, rtol, atol, most, keep=True)
+    limits = limits_of(law, rtol, atol, most, alone=True, keep=True)
     shared = np.zeros((0, 3)), limits, 0.0, code.kink
 
     def integrate(rising: Array, groups: tuple[Any, ...]) -> None:
         cells = rising, np.array(states)
-        run(kernel, code, shared, cells, parameters, groups, groups[1], threads)
+        run(kernel, code, shared, cells, parameters, groups, groups[1], threads, again=again)
 
-    result, status, _ = both_ways(times, count, n, integrate)
+    result, status, _ = both_ways(times, count, width, integrate)
     failed = np.flatnonzero((status == FAILED) & np.isfinite(states).all(axis=1))
-    if code.series and failed.size:  # as those of a root do where it vanishes
-        part = cells_of(values, failed), states[failed], some(times, failed)
-        again = motions(law, *part, rtol, atol, threads, most, "dop853")
-        result[failed], status[failed] = again
+    if (
+        code.series and failed.size and not isinstance(law, Map)
+    ):  # as those of a root do where it vanishes
+        part = cells_of(values, failed), states[failed], entries_of(times, failed)
+        other = motions(law, *part, rtol, atol, threads, most, "dop853", tangents=tangents)
+        result[failed], status[failed] = other
     judged(status, parameters)
     return result, status
 
 
-def limits_of(law: Equations, rtol: float, atol: float, most: int, *, keep: bool = False) -> Array:
-    """What bounds the steps of the kernels: common limits, then unit and scale of each state.
-
-    Steps by series are taken one at a time; they are kept where states within them are asked for.
-    """
-    from phasekit.numerics.lanes import LANES
-
-    rows = [rtol, atol, np.inf, float(most), 1.0, float(keep), 1.0]
-    for name in law.states:
-        low, high = law.window.get(name, (0.0, 0.0))
-        # Without a window an angle is measured by radians.
-        unit = law.periods[name] / (2.0 * np.pi) if name in law.periods else np.inf
-        rows += [unit, min(high - low, unit)]
-    return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
-
-
-def _one_by_one(
+def one_by_one(
     law: Equations, values: Mapping[str, Array], states: Array, times: Array,
     method: str | None, how: dict[str, float],
 ) -> tuple[Array, Index]:  # fmt: skip
@@ -266,31 +323,18 @@ def iterates(
             RuntimeWarning,
             stacklevel=2,
         )
-    wanted = np.where(np.isfinite(times) & ~wrong, times, -1.0).astype(np.int64)
-    found, status = np.full((count, times.shape[1], n), np.nan), np.full(count, ARRIVED)
-    order = np.argsort(wanted, axis=1)
-    rising = np.take_along_axis(wanted, order, axis=1)
-    out = np.full(found.shape, np.nan)
-    if law.kind == "python":
-        for cell in range(count):
+    wanted = np.where(wrong, np.nan, times)
+    if law.kind != "python":
+        found, status = motions(law, values, states, wanted)
+    else:
+        found, status = np.full((count, times.shape[1], n), np.nan), np.full(count, ARRIVED)
+        for cell, order in enumerate(np.argsort(wanted, axis=1)):
             one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
             step, x, done = pointwise(law, one), states[cell], 0
-            for i, k in enumerate(rising[cell]):
-                while done < k:
+            for i in order[np.isfinite(wanted[cell, order])]:
+                while done < wanted[cell, i]:
                     x, done = step(float(done), x), done + 1
-                if k >= 0:
-                    out[cell, i] = x
-    elif count and times.shape[1]:
-        from phasekit.motion.kernels.iterates import iterates as kernel
-        from phasekit.numerics.launch import launch
-
-        code, parameters = rates_of(law), parameters_of(law, values, count)
-        work = WEIGHT + int(rising[:, -1].max(initial=0)) // 8
-        cells = np.array(rising), np.array(states), parameters
-        groups: Any = (out,)
-        launch(kernel, (code.address, *cells), count, groups, None, work)
-    back = np.argsort(order, axis=1)[..., None]
-    found = np.take_along_axis(out, np.broadcast_to(back, (count, *back.shape[1:])), axis=1)
-    lost = ~np.isfinite(found).all(axis=2) & (wanted >= 0)
+                found[cell, i] = x
+    lost = ~np.isfinite(found).all(axis=2) & np.isfinite(wanted)
     status[lost.any(axis=1)] = FAILED
     return np.where(lost[..., None], np.nan, found), status

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.integrate import DenseOutput, OdeSolution
 
 from phasekit.motion.events import Event, Watch
 from phasekit.motion.steps import Array, InitialValue, steps
+
+if TYPE_CHECKING:
+    from scipy.integrate import DenseOutput, OdeSolution
 
 
 class Occurrences(NamedTuple):
@@ -58,12 +60,15 @@ def integrate(
     >>> found.events.name, found.events.time.round(6), found.times[-1].round(6)
     (['floor'], array([0.451524]), np.float64(0.451524))
     """
+    from scipy.integrate import OdeSolution
+
     state = np.array(problem.state, dtype=float)
     watches = {
         name: Watch(event, event.function(problem.start, state))
         for name, event in (events or {}).items()
     }
-    times, segments = [problem.start], list[DenseOutput]()
+    times = [problem.start]
+    segments: list[DenseOutput] = []
     found: list[tuple[str, float]] = []
     for step in steps(problem, stop):
         seen = {name: watch.look(step) for name, watch in watches.items()}

@@ -13,6 +13,9 @@ MOST = 10_000_000
 #: States of a motion: none yet, under way, at its end; and of those that do not come to it: too
 #: many steps, steps too short, a parameter that has no value.
 IDLE, RUNNING, ARRIVED, EXHAUSTED, FAILED, INVALID = range(6)
+#: And of those whose crossings are looked for: no more room, outside of a box, at a point of rest,
+#: of which there may be several, numbered on from here.
+CROWDED, LEFT, RESTING = 6, 7, 8
 
 REASONS = {
     EXHAUSTED: f"they take more than {MOST} steps: try a shorter time or a larger rtol; strong "

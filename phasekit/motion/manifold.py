@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import ConvergenceError
-from phasekit.motion.steps import InitialValue, steps
+from phasekit.laws.equations import Equations
+from phasekit.motion.equation_rates import rates_on
+from phasekit.motion.lost import ARRIVED, CROWDED, LEFT, RESTING
+from phasekit.motion.paths import Path, distances, paths
 
 Array = npt.NDArray[np.float64]
 
@@ -20,8 +22,20 @@ NEAR = 1e-6
 REACHED = 1e-5
 #: Greatest distance between points, over the size of the window.
 CLOSE = 1.0 / 200.0
-#: Steps of the integrator.
-MOST = 100_000
+#: Distance from a cycle at which a motion has come to it, over the size of the window, and how many
+#: of its periods a motion is followed further before that is asked.
+ON_CYCLE, PERIODS = 1e-3, 30
+
+
+class Start(NamedTuple):
+    """Where half of a manifold begins."""
+
+    rest: int
+    """Number of the equilibrium."""
+    direction: Array
+    """An eigenvector, in widths of the window."""
+    sense: float
+    """1.0: forward in time (unstable manifold), -1.0: backward."""
 
 
 class Strand(NamedTuple):
@@ -37,72 +51,143 @@ class Strand(NamedTuple):
     """Number of the equilibrium that it comes to; -1: of none."""
 
 
-def strand(
-    rates: Callable[[float, Any], Array],
-    start: Array,
-    direction: Array,
-    sense: float,
+def strands(
+    law: Equations,
+    values: Mapping[str, float],
+    starts: Sequence[Start],
     window: tuple[Array, Array],
+    turns: Array,
     rests: Array,
     length: float,
-    rtol: float = 1e-9,
-) -> Strand:
-    """Follow the half of a manifold that begins in a direction.
+    rtol: float,
+) -> list[Strand]:
+    """Follow halves of manifolds.
 
     Parameters
     ----------
-    rates : callable
-        Of time and state.
-    start, direction : array
-        The equilibrium, and an eigenvector, in widths of the window.
-    sense : {1.0, -1.0}
-        Forward in time (unstable manifold) or backward.
+    law : Equations
+        The law of a flow.
+    values : mapping of str to float
+        Its parameters.
+    starts : sequence of Start
+        Where they begin.
     window : (array, array)
-        Least and greatest states; where it leaves them, the manifold ends.
+        Least and greatest states; where it leaves them, a manifold ends.
+    turns : array
+        Periods of states that are angles all round, 0 of others.
     rests : array, shape (n, states)
-        Equilibria, at which it may end.
+        Equilibria, at which they may end.
     length : float
         Greatest length, in widths of the window.
+    rtol : float
+        Relative error of a step.
     """
+    if not starts:
+        return []
     low, high = window
-    width = high - low
-    room = 0.02 * width
+    widths = np.where(turns > 0.0, turns, high - low)
+    room = np.where(turns > 0.0, np.inf, 0.02 * widths)
+    around, numbers = _everywhere(rests, turns, length)
+    begin, times = [], []
+    for one in starts:
+        unit = one.direction / np.linalg.norm(one.direction)
+        begin.append(rests[one.rest] + NEAR * unit * widths)
+        times.append([0.0, one.sense * np.inf])
+    found = paths(
+        law, values, np.array(begin), np.array(times), widths=widths, close=CLOSE, longest=length,
+        box=(low - room, high + room), rests=around, near=REACHED * widths, rtol=rtol,
+        atol=1e-3 * rtol,
+    )  # fmt: skip
+    return [
+        _strand(law, values, rests[one.rest], path, widths, numbers, one.sense)
+        for one, path in zip(starts, found, strict=True)
+    ]
 
-    def scaled(t: float, y: Array) -> Array:
-        return sense * rates(t, low + y * width) / width
 
-    first = (start - low) / width + NEAR * direction / np.linalg.norm(direction)
-    others = (rests - low) / width
-    points, total = [(start - low) / width, first], NEAR
-    end, reached = "length", -1
-    problem = InitialValue(
-        scaled, list(first), rtol=rtol, atol=1e-12, unit=np.inf, most=MOST, max_step=np.inf
-    )
-    try:
-        # The end is never reached: something else ends it before.
-        for step in steps(problem, 1e300):
-            chord = float(np.linalg.norm(step.after - step.before))
-            many = int(min(max(np.ceil(chord / CLOSE), 1.0), 1_000.0))
-            times = np.linspace(step.start, step.stop, many + 1)[1:]
-            inner = step.dense(times).T if many > 1 else step.after[None]
-            lengths = np.linalg.norm(np.diff(np.vstack([points[-1], inner]), axis=0), axis=1)
-            for y, piece in zip(inner, lengths, strict=True):
-                points.append(y)
-                total += float(piece)
-                at = low + y * width
-                if np.any(at < low - room) or np.any(at > high + room):
-                    end = "window"
-                elif len(others):
-                    away = np.linalg.norm(others - y, axis=1)
-                    if away.min() < REACHED and total > 10.0 * REACHED:
-                        end, reached = "equilibrium", int(np.argmin(away))
-                if end != "length" or total >= length:
-                    break
-            if end != "length" or total >= length:
-                break
-    except (ConvergenceError, ValueError):
-        end = "lost"
-    found = np.array(points)
-    pieces = np.linalg.norm(np.diff(found, axis=0), axis=1)
-    arclength = np.concatenate([[0.0], np.cumsum(pieces)])
-    return Strand(low + found * width, arclength, end, reached)
+def _everywhere(rests: Array, turns: Array, length: float) -> tuple[Array, list[int]]:
+    """Equilibria, also whole turns further on, and their numbers."""
+    found, numbers = rests.reshape(-1, len(turns)), list(range(len(rests)))
+    for i in np.flatnonzero(turns > 0.0):
+        step = np.where(np.arange(len(turns)) == i, turns, 0.0)
+        most = int(min(np.ceil(length) + 1, 50))
+        shifts = range(-most, most + 1)
+        found = np.concatenate([found + k * step for k in shifts])
+        numbers = numbers * len(shifts)
+    return found, numbers
+
+
+def _strand(
+    law: Equations, values: Mapping[str, float], rest: Array, path: Path, widths: Array,
+    numbers: Sequence[int], sense: float,
+) -> Strand:  # fmt: skip
+    end, reached = "lost", -1
+    if path.status >= RESTING:
+        end, reached = "equilibrium", numbers[path.status - RESTING]
+    elif path.status == LEFT:
+        end = "window"
+    elif path.status in (ARRIVED, CROWDED):
+        end = "length"
+    lengths = _arclength(law, values, path, widths)
+    x = np.vstack([rest, path.state])
+    return Strand(x, np.concatenate([[0.0], NEAR + lengths]), end, reached)
+
+
+def _arclength(law: Equations, values: Mapping[str, float], path: Path, widths: Array) -> Array:
+    """Length along a path, of cubics through its states with the rates there."""
+    x, t = path.state / widths, path.time
+    v = rates_on(law, values, path.state) / widths
+    step = np.diff(t)[:, None]
+    change = np.diff(x, axis=0)
+    total = np.zeros(len(step))
+    at, weights = np.polynomial.legendre.leggauss(4)
+    for s, weight in zip(0.5 * (at + 1.0), 0.5 * weights, strict=True):
+        slope = 6.0 * s * (1.0 - s) * change
+        slope = slope + step * ((1.0 - s) * (1.0 - 3.0 * s) * v[:-1] + s * (3.0 * s - 2.0) * v[1:])
+        total += weight * np.linalg.norm(slope, axis=1)
+    return np.concatenate([[0.0], np.cumsum(total)])
+
+
+class Goal(NamedTuple):
+    """Where a motion comes in the end: the number of an equilibrium or of a cycle, or -1."""
+
+    rest: int
+    cycle: int
+
+
+def goals(
+    law: Equations,
+    values: Mapping[str, float],
+    ends: Sequence[tuple[Array, float]],
+    turns: Array,
+    widths: Array,
+    rests: Array,
+    cycles: Sequence[tuple[Array, float]],
+    rtol: float,
+) -> list[Goal]:
+    """Where motions come from states, forward (1.0) or backward in time (-1.0).
+
+    Cycles are given by states close together and their periods. Motions are followed for some of
+    the longest of these, or until they come to rest.
+    """
+    if not ends:
+        return []
+    around, numbers = _everywhere(rests, turns, 2.0)
+    span = PERIODS * max((period for _, period in cycles), default=np.inf)
+    states = np.array([state for state, _ in ends])
+    times = np.array([[0.0, sense * span] for _, sense in ends])
+    found = paths(
+        law, values, states, times, widths=widths, close=np.inf, rests=around,
+        near=REACHED * widths, rtol=rtol, atol=1e-3 * rtol,
+    )  # fmt: skip
+    result = []
+    for path in found:
+        rest, cycle = -1, -1
+        if path.status >= RESTING:
+            rest = numbers[path.status - RESTING]
+        elif path.status == ARRIVED and np.isfinite(path.state[-1]).all():
+            last = path.state[-1:]
+            away = [float(distances(last, curve, widths, turns)[0]) for curve, _ in cycles]
+            if away and min(away) < ON_CYCLE:
+                cycle = int(np.argmin(away))
+        result.append(Goal(rest, cycle))
+    return result

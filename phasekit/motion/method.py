@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.equations import Equations
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.motion.lost import EXHAUSTED, MOST
 from phasekit.motion.rates import Rates
 
@@ -32,6 +33,8 @@ def run(
     groups: Any,
     status: npt.NDArray[np.int64],
     threads: int | None,
+    *,
+    again: bool = True,
 ) -> None:
     """Run a kernel over cells.
 
@@ -44,13 +47,15 @@ def run(
         Parameters of the machine code.
     groups : tuple of array
         What it fills, the status among them.
+    again : bool
+        Whether to try Runge-Kutta where series take too many steps.
     """
     from phasekit.numerics.launch import launch
 
     count = len(status)
     launch(kernel, (*code.steps, *shared, *cells, parameters), count, groups, threads, WEIGHT)
     lost = np.flatnonzero(status == EXHAUSTED)
-    if not (code.series and lost.size):
+    if not (again and code.series and lost.size):
         return
     own = tuple(array[lost] if len(array) == count else array for array in cells)
     arguments = (0, 0, code.address, *shared, *own, np.array(parameters[:, lost]))
@@ -88,14 +93,14 @@ def both_ways(
     return result, status, steps
 
 
-def some(array: Array, which: Any) -> Array:
+def entries_of(array: Array, which: Any) -> Array:
     """Entries of cells, of what may be the same in all."""
     return array[which] if array.ndim and len(array) > 1 else array
 
 
 def cells_of(values: Mapping[str, Array], which: Any) -> dict[str, Array]:
     """Values of parameters in some cells."""
-    return {name: some(np.asarray(value), which) for name, value in values.items()}
+    return {name: entries_of(np.asarray(value), which) for name, value in values.items()}
 
 
 def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]]:
@@ -105,7 +110,7 @@ def kinds(values: Mapping[str, Array], count: int) -> list[npt.NDArray[np.bool_]
 
 
 def limits_of(
-    law: PerturbedConservative,
+    law: PerturbedLaw | Equations,
     rtol: float,
     atol: float,
     most: int = MOST,
@@ -116,19 +121,34 @@ def limits_of(
 ) -> Array:
     """What bounds the steps of the kernels, in all lanes; whether to take and keep each alone.
 
-    Errors of tangent vectors may be `beside` times as great.
+    Errors of tangent vectors may be `beside` times as great. Of equations a unit and a scale of
+    each state follow.
     """
     from phasekit.numerics.lanes import LANES
 
-    rows = rtol, atol, unit_of(law), float(most), float(alone), float(keep), beside
+    unit = np.inf if isinstance(law, Equations) else unit_of(law)
+    rows = [rtol, atol, unit, float(most), float(alone), float(keep), beside]
+    if isinstance(law, Equations):
+        for name in law.states:
+            low, high = law.window.get(name, (0.0, 0.0))
+            # Without a window an angle is measured by radians.
+            unit = law.periods.get(name, np.inf) / (2.0 * np.pi)
+            rows += [unit, min(high - low, unit)]
     return np.repeat(np.reshape(rows, (-1, 1)), LANES, axis=1)
 
 
-def circle(law: PerturbedConservative) -> float:
+def turns_of(law: PerturbedLaw | Equations) -> Array:
+    """Periods of the states that are angles, 0 of others."""
+    if isinstance(law, Equations):
+        return np.array([law.periods.get(name, 0.0) for name in law.states])
+    return np.array([circle(law), 0.0])
+
+
+def circle(law: PerturbedLaw) -> float:
     """Period of the coordinate; 0 on a line."""
     return 0.0 if law.base.period is None else float(law.base.period)
 
 
-def unit_of(law: PerturbedConservative) -> float:
+def unit_of(law: PerturbedLaw) -> float:
     """Value from which on a coordinate is held as closely as there: a radian; none on a line."""
     return circle(law) / (2.0 * np.pi) if law.base.period is not None else np.inf

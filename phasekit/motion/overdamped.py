@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from phasekit.errors import AttractorKind
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
-from phasekit.motion.attractor import LONGEST, Attractor, Search
+from phasekit.motion.attractor import LONGEST, Attractor, PlaneSearch
 from phasekit.motion.method import circle
 from phasekit.motion.rates import rates_of
-from phasekit.motion.strobe import NO_TARGETS, Targets, strobe
+from phasekit.motion.strobe import Targets, strobe
 
 Array = npt.NDArray[np.float64]
 
@@ -119,7 +119,7 @@ def partials(
 
 
 @dataclass
-class OverdampedSearch(Search):
+class OverdampedSearch(PlaneSearch):
     """A search for the attractors of one driven system that damping rules."""
 
     spans: list[tuple[float, float, Attractor]] = field(default_factory=list)
@@ -264,8 +264,7 @@ class OverdampedSearch(Search):
                 low = rows[i - 1][0].x_spent if i else self.ends[0]
                 high = rows[i + 1][0].x_spent if i + 1 < len(rows) else self.ends[1]
             one = self._attractor(orbit, q, turns)
-            near = BORDER * self.size
-            same = [k for k in kept if self.apart(k.points, one.points[0]).min() < near]
+            same = [k for k in kept if self.apart(k.points, one.points[0]).min() < BORDER]
             if not same:
                 kept.append(one)
             self.spans.append((low, high, same[0] if same else one))
@@ -378,4 +377,4 @@ class OverdampedSearch(Search):
                 rows.append([low + gap, high - gap, place[id(one)]])
         spans = np.array(rows).reshape(-1, 3)
         bands = np.tile(np.array([-BOUNDLESS, BOUNDLESS]), (len(spans), 2, 1))
-        return NO_TARGETS._replace(scale=self.scale, spans=spans, bands=bands)
+        return self.nowhere()._replace(spans=spans, bands=bands)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,12 +17,8 @@ import numpy.typing as npt
 
 from phasekit.errors import ParameterError
 from phasekit.laws.ladder import Conservative, Routhian
-from phasekit.laws.perturbed import (
-    PerturbedConservative,
-    drift_name,
-    forcing_names,
-    modulation_names,
-)
+from phasekit.laws.perturbed import PerturbedLaw
+from phasekit.laws.terms import Drag, Instant
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.at_momentum import Machines
 
@@ -56,7 +52,7 @@ class Rates:
 
 
 def rates_of(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: Mapping[str, Array],
     tangents: int = 0,
     order: int = 0,
@@ -65,7 +61,7 @@ def rates_of(
 
     Parameters
     ----------
-    law : PerturbedConservative
+    law : PerturbedLaw
         The law.
     values : mapping of str to array
         Values of its parameters in the cells, that broadcast.
@@ -81,18 +77,20 @@ def rates_of(
         angular velocity of its frame.
     """
     quadratic = bool(np.any(np.asarray(values["quadratic"]) != 0.0))
-    code = _compiled(_Form.of(law), _Same(law.base), law.rate, quadratic, tangents, order)
+    same: Any = _Same(law.base)
+    one = replace(law, base=same, names=(), unit="")
+    code = _compiled(one, quadratic, tangents, order)
     known: dict[str, Any] = dict(values)
     if {"A", "B", "C"} <= set(code.names) and isinstance(law.base, Trigonometric):
         inputs = {name: np.asarray(values[name], float) for name in law.inputs}
         with np.errstate(all="ignore"):
             known.update(zip("ABC", law.base.coefficients(inputs), strict=True))
-    if "euler_0" in code.names:
+    if _EULER[0] in code.names:
         euler = law.euler({name: np.asarray(value, float) for name, value in values.items()})
         known.update(zip(_EULER, euler, strict=True))
     elif isinstance(law.base, Machines):
-        known.update(law.base.constants_of(values))
-    known["sign"] = 0.0
+        known.update({f"({n})": x for n, x in law.base.constants_of(values).items()})
+    known["(sign)"] = 0.0
     columns = [np.atleast_1d(np.asarray(known[name], float)) for name in code.names]
     return code, np.stack(np.broadcast_arrays(*columns))
 
@@ -108,29 +106,8 @@ def order_of(rtol: float) -> int:
     return 2 * round(0.5 * (4.5 - 0.5 * float(np.log(rtol))))
 
 
-_EULER = ("euler_0", "euler_s", "euler_c")
-
-
-@dataclass(frozen=True)
-class _Form:
-    """What of a law its machine code depends on, beside the potential."""
-
-    inputs: tuple[str, ...]
-    harmonics: int
-    modulated: tuple[str, ...]
-    drifting: tuple[str, ...]
-    prescribed: bool
-
-    @classmethod
-    def of(cls, law: PerturbedConservative) -> _Form:
-        return cls(
-            law.inputs, law.harmonics, law.modulated, law.drifting, law.prescribed is not None
-        )
-
-    @property
-    def varies(self) -> bool:
-        """Whether the potential does."""
-        return bool(self.modulated or self.drifting or self.prescribed)
+#: Names that no parameter has, of what is computed of them.
+_EULER = ("(euler_0)", "(euler_s)", "(euler_c)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,52 +124,35 @@ class _Same:
 
 
 @functools.lru_cache(maxsize=128)
-def _compiled(
-    form: _Form, same: _Same, rate: Any, quadratic: bool, tangents: int, order: int
-) -> Rates:
+def _compiled(law: Any, quadratic: bool, tangents: int, order: int) -> Rates:
+    """Machine code of a law, whose base is known as the `_Same`."""
     import sympy as sp
 
     from phasekit.numerics.lanes import compile_lanes
 
-    base = same.base
+    base = law.base.base
     x, v, t, w, dw = (sp.Symbol(f"_{name}", real=True) for name in "xvtwd")
     used: dict[str, Any] = {}
 
     def parameter(name: str) -> Any:
         return used.setdefault(name, sp.Symbol(f"_p{len(used)}", real=True))
 
-    def harmonic(names: Sequence[str]) -> Any:
-        amplitude, frequency, phase = map(parameter, names)
-        return amplitude * sp.cos(frequency * t + phase), frequency * t + phase
-
-    if isinstance(base, Trigonometric) and not form.varies:
+    at = Instant(x, v, t, parameter, lambda: parameter("(sign)") * v, (w, dw))
+    if isinstance(base, Trigonometric) and not law.varying:
         A, B, C = map(parameter, "ABC")
         slope = (B - A * sp.cos(x)) * sp.sin(x) - C * sp.cos(x)
     elif isinstance(base, Machines):
-        constants = {base.coordinate: x, **{name: parameter(name) for name in base.constants}}
+        constants = {base.coordinate: x, **{n: parameter(f"({n})") for n in base.constants}}
         slope = 0
     else:
-        symbols = {}
-        for name in form.inputs:
-            symbols[name] = parameter(name)
-            if form.prescribed and rate is not None and name == rate.parameter:
-                symbols[name] = w
-            if name in form.modulated:
-                symbols[name] += harmonic(modulation_names(name))[0]
-            if name in form.drifting:
-                symbols[name] += parameter(drift_name(name)) * t
-        symbols[base.coordinate] = x
+        symbols = {name: law.parameter_at(name, at) for name in law.inputs}
         assert isinstance(base, Conservative)
-        slope = base.gradient_formula(symbols)
-    force = parameter("torque") - slope - parameter("damping") * v
-    for number in range(form.harmonics):
-        force += harmonic(forcing_names(number))[0]
-    if rate is not None and form.varies:
-        force += _euler(form, rate, parameter, harmonic, x, t, dw)
-    kink = -1
+        slope = base.gradient_formula({**symbols, base.coordinate: x})
+    smooth = tuple({type(term) for term in law.terms} - {Drag})
+    force = law.force(at, smooth) - slope + law.euler_formula(at, _EULER)
     if quadratic:
-        force -= parameter("quadratic") * parameter("sign") * v * v
-        kink = list(used).index("sign")
+        force += law.force(at, (Drag,))
+    kink = list(used).index("(sign)") if "(sign)" in used else -1
     if isinstance(base, Machines):
         force = base.acceleration_formula(constants, v, force)
     expressions = [v, force]
@@ -209,7 +169,7 @@ def _compiled(
     except ParameterError as error:
         raise ParameterError(f"system: {error}") from None
     series = room = 0
-    if order and not (quadratic or form.prescribed):
+    if order and kink < 0 and law.prescribed is None:
         parameters = {symbol: i for i, symbol in enumerate(used.values())}
         series = series_of(order, t, pairs, expressions[1::2], parameters)
         room = len(pairs) * (order + 1)
@@ -232,28 +192,3 @@ def series_of(
     if not all(has_series(force, varying) for force in forces):
         return 0
     return compile_steps(Law(time, chains, forces, parameters, width), order)
-
-
-def _euler(form: _Form, rate: Any, parameter: Any, harmonic: Any, x: Any, t: Any, dw: Any) -> Any:
-    """The torque of the change of the frame's angular velocity."""
-    import sympy as sp
-
-    varying = {*form.modulated, *form.drifting}
-    change: Any = dw if form.prescribed else 0
-    if rate.parameter in form.modulated:
-        names = modulation_names(rate.parameter)
-        _, phase = harmonic(names)
-        change -= parameter(names[0]) * parameter(names[1]) * sp.sin(phase)
-    if rate.parameter in form.drifting:
-        change += parameter(drift_name(rate.parameter))
-    if change == 0:
-        return 0
-    others = varying - {rate.parameter}
-    if others:
-        raise ParameterError(
-            f"modulation, drift: got {', '.join(sorted(others))} beside {rate.parameter}, wants "
-            f"{rate.parameter} alone or not at all: its change is a torque that depends on the "
-            "others, which is not integrated"
-        )
-    still, sine, cosine = map(parameter, _EULER)
-    return (still + sine * sp.sin(x) + cosine * sp.cos(x)) * change

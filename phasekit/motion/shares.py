@@ -65,9 +65,10 @@ def fractions(law: PerturbedConservative, *arrays: npt.ArrayLike) -> Fractions:
         phi, dphi = cell[-2] * middle, cell[-1] * middle
         some = np.stack(np.meshgrid(phi[::EVERY], dphi[::EVERY], indexing="ij"), axis=-1)
         search = find(law, values, leg, some.reshape(-1, 2))
-        found, places = basins(search, phi, dphi), search.result().attractor_phi
+        found = basins(search, {0: phi, 1: dphi})
+        places = search.result().state[:, 0, 0]
         unseen += search.open
-        columns = found.basin_fraction, found.basin_fraction_error, places[:, 0]
+        columns = found.basin_fraction, found.basin_fraction_error, places
         for slot, column in zip(slots, columns, strict=True):
             slot[row, : len(column)] = column[:SLOTS]
         number[row] = len(places)

@@ -5,14 +5,16 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853, DenseOutput, OdeSolver
 
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import bad
+
+if TYPE_CHECKING:
+    from scipy.integrate import DenseOutput, OdeSolver
 
 Array = npt.NDArray[np.float64]
 #: A function of (t, x): the rates x' of a law, or one value.
@@ -54,8 +56,8 @@ class InitialValue:
     """Steps that a motion may take."""
     causes: str = "Rates without bound"
     """What a message supposes where steps become too short to go on."""
-    method: type[OdeSolver] = DOP853
-    """One of SciPy's with an error of its own."""
+    method: type[OdeSolver] | None = None
+    """One of SciPy's with an error of its own; None for DOP853."""
 
 
 @dataclass
@@ -78,6 +80,7 @@ class Pace:
         self.longest = max(self.longest, abs(t - start))
         rest = abs(self.stop - t)
         foreseen = self.taken >= TRIAL and self.taken * rest > self.longest * self.most**2
+        foreseen = foreseen and rest < np.inf
         return rest > 0.0 and (self.taken >= self.most or foreseen)
 
 
@@ -107,7 +110,7 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     problem : InitialValue
         The law and where it starts.
     stop : float
-        Time to go to.
+        Time to go to; infinite, where something else ends the motion.
 
     Raises
     ------
@@ -121,6 +124,8 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     -----
     The method is the explicit Runge-Kutta method DOP853 of order 8, unless the problem has another.
     """
+    from scipy.integrate import DOP853
+
     with np.errstate(all="ignore"):
         first = np.asarray(problem.rates(problem.start, np.array(problem.state, dtype=float)))
     if not np.isfinite(first).all():  # the integrator would not come back from NaN
@@ -130,9 +135,9 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
     options = {"rtol": problem.rtol, "atol": atol, "max_step": problem.max_step}
     start = problem.start, np.array(problem.state)
     with np.errstate(all="ignore"):
-        solver = problem.method(problem.rates, *start, stop, **options)
+        solver = (problem.method or DOP853)(problem.rates, *start, stop, **options)
     # Beside a component that is zero, the first step that is proposed may be next to nothing.
-    ulp = np.finfo(float).eps * max(abs(stop), abs(problem.start))
+    ulp = np.finfo(float).eps * max(abs(stop) if np.isfinite(stop) else 0.0, abs(problem.start))
     solver.h_abs = max(solver.h_abs, ulp)
     pace = Pace(problem.most, stop)
     while solver.status == "running":

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import PerturbedLaw
 
 Array = npt.NDArray[np.float64]
 
@@ -27,9 +27,7 @@ MOST_STEPS = 30_000
 LEAST = 1e-13
 
 
-def stiff_cells(
-    law: PerturbedConservative, values: Mapping[str, Array], times: Array, count: int
-) -> Any:
+def stiff_cells(law: PerturbedLaw, values: Mapping[str, Array], times: Array, count: int) -> Any:
     """Which of so many cells are stiff at times > 0; none of those whose law has a kink."""
     reach = np.max(times, axis=1, initial=0.0, where=np.isfinite(times))
     with np.errstate(all="ignore"):

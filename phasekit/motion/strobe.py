@@ -11,12 +11,16 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.inputs import bad
+from phasekit.laws.equations import Equations
 from phasekit.laws.perturbed import PerturbedConservative, forcing_names, modulation_names
+from phasekit.motion import equation_rates
+from phasekit.motion.equation_rates import LONG
 from phasekit.motion.flow import ATOL, RTOL
+from phasekit.motion.flows import period_of
 from phasekit.motion.lost import judged, tell
-from phasekit.motion.method import cells_of, circle, kinds, limits_of, run, some
+from phasekit.motion.method import cells_of, circle, entries_of, kinds, limits_of, run, turns_of
 from phasekit.motion.prescribed import table_of
-from phasekit.motion.rates import order_of, rates_of
+from phasekit.motion.rates import Rates, order_of, rates_of
 
 Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
@@ -29,18 +33,23 @@ LOOSE = 1e-4
 PARTS, SKIPPED = 20, 2
 
 
-def common_period(law: PerturbedConservative, values: Mapping[str, Array]) -> Array | None:
+def common_period(
+    law: PerturbedConservative | Equations, values: Mapping[str, Array]
+) -> Array | None:
     """Period of all that varies with time; None without such, NaN without a common one.
 
     Frequencies whose ratio is a fraction of small numbers, to rounding, are commensurate.
     """
+    if isinstance(law, Equations):
+        return None if law.time is None else period_of(law, [values[name] for name in law.names])
     if law.drifting or law.prescribed is not None:
         return np.array(np.nan)
     names = [forcing_names(i) for i in range(law.harmonics)]
     names += [modulation_names(name) for name in law.modulated]
-    if not names:
+    found = [values[frequency] for _, frequency, _ in names] + law.own_frequencies(values)
+    if not found:
         return None
-    frequencies = np.broadcast_arrays(*(values[frequency] for _, frequency, _ in names))
+    frequencies = np.broadcast_arrays(*found)
     flat = np.stack([x.reshape(-1) for x in frequencies], axis=-1)
     return np.array([_period(row) for row in flat]).reshape(frequencies[0].shape)
 
@@ -63,7 +72,7 @@ class Strobed(NamedTuple):
     """States of motions after equal times."""
 
     states: Array
-    """Of shape (cells, kept, 2), or with a tangent vector (cells, kept, 4)."""
+    """Of shape (cells, kept, n), or with a tangent vector (cells, kept, 2 n)."""
     code: Index
     """Attractor at which a motion came; -1: at none."""
     taken: Index
@@ -73,48 +82,57 @@ class Strobed(NamedTuple):
     status: Index
 
 
-NO_SPANS, NO_BANDS = np.zeros((0, 3)), np.zeros((0, 2, 2))
-
-
 class Targets(NamedTuple):
-    """Where motions end: near points, within borders, or in boxes of a grid."""
+    """Where motions end: near points, within borders, in cells of a grid, or beyond all."""
 
+    units: Array
+    """By which the states are measured."""
     points: Array
-    """Rows: coordinate, rate, radius, attractor."""
-    scale: float
-    """By which rates are measured against coordinates."""
-    box: Array
-    """Ends of the grid: coordinate from, to, rate from, to."""
-    boxes: npt.NDArray[np.int16]
-    """Attractor of each box, -1 for none."""
+    """Rows: state, radius, attractor."""
+    grid: Array
+    """Rows: its least state, and the edges of a cell."""
+    side: int
+    """Cells along each axis."""
+    keys: Index
+    """Table of the cells by their numbers, -1 for none, and of what is written in them:"""
+    codes: Index
     visits: int
-    """Boxes of one attractor in succession after which a motion belongs to it."""
-    spans: Array = NO_SPANS
+    """Cells of one attractor in succession after which a motion belongs to it."""
+    reach: Array
+    """Rows: least and greatest state of a motion that is not gone for good."""
+    spans: Array
     """Rows: coordinate from, to, attractor; of each the borders:"""
-    bands: Array = NO_BANDS
+    bands: Array
     """Least and greatest rates at equal distances, of shape (spans, points, 2)."""
 
-
-NO_TARGETS = Targets(
-    np.zeros((0, 4)), 1.0, np.array([0.0, 1.0, 0.0, 1.0]), np.zeros((0, 0), np.int16), 1
-)
+    @classmethod
+    def none(cls, units: npt.ArrayLike) -> Targets:
+        """Nowhere."""
+        own = np.array(units, float)
+        n, nothing = own.size, np.zeros(0, np.int64)
+        reach = np.repeat([[-np.inf], [np.inf]], n, axis=1)
+        spans, bands = np.zeros((0, 3)), np.zeros((0, 2, 2))
+        points = np.zeros((0, n + 2))
+        return cls(own, points, np.ones((2, n)), 1, nothing, nothing, 1, reach, spans, bands)
 
 
 def strobe(
-    law: PerturbedConservative,
+    law: PerturbedConservative | Equations,
     values: Mapping[str, Array],
     states: Array,
     legs: npt.ArrayLike,
     kept: int,
     skip: int = 0,
     *,
-    targets: Targets = NO_TARGETS,
+    targets: Targets | None = None,
     most_legs: int | None = None,
     enough: float = np.inf,
     rtol: float = RTOL,
     atol: float = ATOL,
     threads: int | None = None,
     series: bool = True,
+    longest: float = LONG,
+    stiff: bool = False,
 ) -> Strobed:
     """States after skip, skip + 1, ... legs.
 
@@ -122,11 +140,11 @@ def strobe(
     ----------
     law, values
         The law, and values of its parameters in the cells.
-    states : array, shape (cells, 2) or (cells, 4)
+    states : array, shape (cells, n) or (cells, 2 n)
         States at t = 0; with a tangent vector, as long as the error, its growth is measured.
     legs : array_like, shape (cells,) or ()
-        Time of a leg; NaN: there is no motion. Where it is the period of the law, time begins anew
-        after each.
+        Time of a leg, or steps of a map; NaN: there is no motion. Where it is the period of the
+        law, time begins anew after each.
     kept, skip : int
         States to keep, and legs before the first of them.
     targets : Targets
@@ -138,37 +156,71 @@ def strobe(
     series : bool
         Take steps by Taylor series where the law has them; by Runge-Kutta otherwise, and where
         series would take too many.
+    longest : float
+        Operations of equations up to which steps by series are compiled.
+    stiff : bool
+        Take implicit steps, of a flow that does not vary.
     """
     from phasekit.motion.kernels.strobe import strobe as kernel
 
-    tangents = states.shape[1] // 2 - 1
-    code, parameters = rates_of(law, values, tangents, order_of(rtol) if series else 0)
-    count = len(states)
-    parameters = np.array(np.broadcast_to(parameters, (len(parameters), count)))
+    turns = turns_of(law)
+    count, n = len(states), turns.size
+    to = Targets.none(np.ones(n)) if targets is None else targets
     legs = np.array(np.broadcast_to(np.asarray(legs, float), (count,)))
     many = max(skip + kept - 1, 0) if most_legs is None else most_legs
     period = common_period(law, values)
     never = ~np.isfinite(legs)
     again = np.full(count, True) if period is None else np.abs(legs - period) <= 1e-14 * legs
     states, legs = np.where(never[:, None], np.nan, states), np.where(never, 1.0, legs)
-    end = float(np.max(legs, initial=0.0)) * many
-    table = table_of(law.prescribed, 0.0, end)
-    out = np.full((count, kept, states.shape[1]), np.nan)
-    if skip == 0 and kept:
-        out[:, 0] = states
     found = np.full(count, -1, np.int64)
     taken, status = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    growth = np.zeros(count)
-    if count and many:
-        limits = limits_of(law, rtol, atol, beside=max(LOOSE / rtol, 1.0) if tangents else 1.0)
-        shared: Any = table, limits, code.kink, skip, many, circle(law)
-        shared += targets.scale, targets.points, targets.box, targets.boxes, targets.visits
-        shared += enough, targets.spans, targets.bands
-        cells = legs, again, np.array(states)
-        groups = out, found, taken, growth, status
-        run(kernel, code, shared, cells, parameters, groups, status, threads)
+    out, growth = np.full((count, kept, states.shape[1]), np.nan), np.zeros(count)
+    if skip == 0 and kept:
+        out[:, 0] = states
+    groups = out, found, taken, growth, status
+    if stiff and isinstance(law, Equations):
+        from phasekit.motion.stiff_strobe import strobe_stiff
+
+        strobe_stiff(law, values, states, legs, skip, many, to, enough, groups, rtol, atol, threads)
+    elif isinstance(law, Equations) and law.kind == "python":
+        from phasekit.motion.called import strobe_called
+
+        strobe_called(law, values, states, legs, skip, many, to, enough, groups, rtol, atol)
+    elif count and many:
+        tangents = states.shape[1] // n - 1
+        order = order_of(rtol) if series else 0
+        code, parameters = code_of(law, values, count, tangents, order, longest)
+        table = table_of(
+            getattr(law, "prescribed", None), 0.0, float(np.max(legs, initial=0.0)) * many
+        )
+        beside = max(LOOSE / rtol, 1.0) if tangents else 1.0
+        limits = limits_of(law, rtol, atol, beside=beside)
+        shared: Any = table, limits, code.kink, skip, many, turns, to.units, to.points, to.grid
+        shared += to.side, to.keys, to.codes, to.visits, to.reach, enough, to.spans, to.bands
+        run(
+            kernel,
+            code,
+            shared,
+            (legs, again, np.array(states)),
+            parameters,
+            groups,
+            status,
+            threads,
+        )
         judged(status, parameters)
     return Strobed(out, found, taken, growth, status)
+
+
+def code_of(
+    law: PerturbedConservative | Equations, values: Mapping[str, Array], count: int,
+    tangents: int, order: int, longest: float = LONG,
+) -> tuple[Rates, Array]:  # fmt: skip
+    """Machine code of a law, and its parameters in so many cells."""
+    if isinstance(law, Equations):
+        code = equation_rates.rates_of(law, order, longest, tangents)
+        return code, equation_rates.parameters_of(law, values, count)
+    code, parameters = rates_of(law, values, tangents, order)
+    return code, np.array(np.broadcast_to(parameters, (len(parameters), count)))
 
 
 class Exponents(NamedTuple):
@@ -326,7 +378,7 @@ def sections(
     states = np.stack([np.broadcast_to(x, (count,)) for x in (phi, dphi)], axis=-1)
     found, status = np.empty((count, n, 2)), np.empty(count, np.int64)
     for which in kinds(values, count):
-        cells = cells_of(values, which), states[which], some(legs, which)
+        cells = cells_of(values, which), states[which], entries_of(legs, which)
         own_run = strobe(law, *cells, n, skip, rtol=rtol, atol=atol)
         found[which], status[which] = own_run.states, own_run.status
     tell("section_phi", status, np.where(np.isfinite(legs).reshape(-1, 1), states, np.nan))

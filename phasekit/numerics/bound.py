@@ -9,32 +9,21 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
-import numba
 import numpy as np
 import numpy.typing as npt
-from llvmlite import ir
-from numba import types
 
-from phasekit.numerics.cache import kept
-from phasekit.numerics.machine_code import machine_code, new_module
+from phasekit.numerics.machine_code import machine_code
 
 
 @functools.cache
-def _compiled(function: Callable[..., Any]) -> Any:
-    """The function as machine code, kept on disk where that can be."""
-    reals: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-    wholes: Any = types.CPointer(types.int64)  # type: ignore[no-untyped-call]
-    signature = types.void(wholes, reals, reals, reals, reals, reals)
-    make: Any = partial(_cfunc, signature)
-    return kept(make, function)
+def _compiled(function: Callable[..., Any]) -> int:
+    """The address of the function, kept on disk where that can be."""
+    from phasekit.numerics.compiler.kinds import DOUBLES, LONGS
+    from phasekit.numerics.forms import native_function
 
-
-def _cfunc(signature: Any, function: Callable[..., Any], *, cache: bool) -> Any:
-    cfunc: Any = numba.cfunc
-    return cfunc(signature, cache=cache, error_model="numpy")(function)
+    return native_function(function, (LONGS, *[DOUBLES] * 5))
 
 
 def bound(
@@ -49,18 +38,11 @@ def bound(
     numbers, sizes : ndarray
         Must outlast the calls; what they hold may change between these.
     """
-    real, whole, void = ir.DoubleType().as_pointer(), ir.IntType(64).as_pointer(), ir.VoidType()
-    module = new_module()
-    outer = ir.Function(module, ir.FunctionType(void, [real] * 4), name="fill")
-    builder = ir.IRBuilder(outer.append_basic_block())
-    inner = ir.FunctionType(void, [whole, *[real] * 5]).as_pointer()
-
-    def pointer(address: int, kind: Any) -> Any:
-        return builder.inttoptr(ir.Constant(ir.IntType(64), address), kind)
-
-    builder.call(
-        pointer(int(_compiled(function).address), inner),
-        [pointer(numbers.ctypes.data, whole), pointer(sizes.ctypes.data, real), *outer.args],
+    own = ", ".join(f"ptr inttoptr (i64 {array.ctypes.data} to ptr)" for array in (numbers, sizes))
+    return machine_code(
+        "define void @fill(ptr %x, ptr %p, ptr %z, ptr %out) {\n"
+        f"  call void inttoptr (i64 {_compiled(function)} to ptr)"
+        f"({own}, ptr %x, ptr %p, ptr %z, ptr %out)\n"
+        "  ret void\n}\n",
+        host=False,
     )
-    builder.ret_void()
-    return machine_code(str(module), host=False)

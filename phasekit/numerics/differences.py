@@ -280,7 +280,7 @@ def values(first: Any, n: int, par: Array, active: Any, points: Array, out: Arra
     m = n + active.size
     w = np.zeros(m + n)
     for k in range(points.shape[0]):
-        for j in range(m):
+        for j in range(points.shape[1]):  # which may be fewer, where more values come than states
             w[j] = points[k, j]
         plain(first, n, w, 0, par, active, m)
         for i in range(n):

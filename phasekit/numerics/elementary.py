@@ -117,6 +117,17 @@ def atanh(z: float, rest: float) -> float:
 
 
 @inline
+def hypot(x: float, y: float) -> float:
+    """Length of (x, y), without overflow on the way; Python's own differs between its versions."""
+    x = abs(x)
+    y = abs(y)
+    large = x if x >= y else y
+    small = y if x >= y else x
+    ratio = small / large if 0.0 < large < np.inf else 0.0
+    return large * np.sqrt(1.0 + ratio * ratio) if small == small else small
+
+
+@inline
 def wrap(angle: float) -> float:
     """Bring an angle of (-3 pi, 3 pi) into (-pi, pi]."""
     lower = (angle - 2.0 * PI) - 2.0 * PI_LOW

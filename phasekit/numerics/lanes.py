@@ -8,14 +8,18 @@ C library takes; what other functions there are, it takes lane by lane.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import sympy
 from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
+from phasekit.numerics.later import later
 from phasekit.numerics.machine_code import Writer, compile_expressions
+from phasekit.numerics.pointers import invoke as invoke
+
+if TYPE_CHECKING:
+    import sympy
+else:
+    sympy = later("sympy")
 
 LANES = 8
 #: Up to here the multiple of pi/2 has at most 20 bits, so that its product with `PARTS` is exact.
@@ -67,7 +71,7 @@ class LaneWriter(Writer):
             self.constants[bits] = ir.Constant(self.kind, [value] * LANES)
         return self.constants[bits]
 
-    def known(self, value: bool) -> Any:
+    def boolean(self, value: bool) -> Any:
         """The same truth in all lanes."""
         return ir.Constant(self.truth, [int(value)] * LANES)
 
@@ -186,20 +190,3 @@ def compile_lanes(
         If an expression holds a function that has no machine code.
     """
     return compile_expressions(expressions, inputs, writer_class=LaneWriter)
-
-
-@intrinsic
-def invoke(typing_context: Any, address: Any, x: Any, p: Any, z: Any, out: Any) -> tuple[Any, Any]:
-    """Call the function at an address with contiguous arrays x, p, z and out."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointer = ir.DoubleType().as_pointer()
-        function = ir.FunctionType(ir.VoidType(), [pointer] * 4)
-        arrays = [
-            context.make_array(kind)(context, builder, value).data
-            for kind, value in zip(signature.args[1:], args[1:], strict=True)
-        ]
-        builder.call(builder.inttoptr(args[0], function.as_pointer()), arrays)
-        return context.get_dummy_value()
-
-    return types.void(address, x, p, z, out), generate

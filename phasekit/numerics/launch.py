@@ -15,14 +15,15 @@ import numpy.typing as npt
 
 from phasekit.errors import ParameterError
 
-# A kernel takes seconds to compile when it is not in numba's cache, and half a millisecond a
-# system when interpreted, but some systems take a thousand times as long as most. So small inputs
-# are interpreted, until a process has interpreted so many systems by one kernel, or for so long,
-# that compiling it has paid.
+# A compiled kernel is there after tens of milliseconds at the earliest; interpreted, a system takes
+# half a millisecond, but some take a thousand times as long as most. So small inputs are
+# interpreted, until a process has interpreted so many systems by one kernel, or for so long.
 INTERPRETED_AT_MOST = 4_000
-INTERPRETED_SECONDS = 2.0
+INTERPRETED_SECONDS = 0.2
 AT_A_TIME = 32
 THREADS_FROM = 100_000
+#: Seconds that a quick form runs before it is judged again.
+SLICE = 0.1
 _interpreted: dict[Callable[..., None], int] = {}
 _seconds: dict[Callable[..., None], float] = {}
 
@@ -63,9 +64,41 @@ def launch(
     if threads is not None:
         check_threads(threads)
     first = _interpret(kernel, arrays, size, groups, weight)
-    if first == size:
-        return
     workers = (threads or _default_threads.get() or cpus()) if size * weight >= THREADS_FROM else 1
+    pace = 0.0  # seconds a cell, of a quick form
+    while first < size:
+        form = _quick_form(kernel, (*arrays, first, size, *groups))
+        count = size - first
+        if form is not None:
+            count = min(count, max(AT_A_TIME, int(SLICE / pace)) if pace else AT_A_TIME)
+        began = time.perf_counter()
+        _run(kernel, arrays, first, first + count, groups, workers)
+        first += count
+        if form is not None and first < size:
+            pace = (time.perf_counter() - began) / count
+            form.consider(pace * (size - first))
+
+
+def _quick_form(kernel: Any, args: tuple[Any, ...]) -> Any:
+    """The form of a kernel that was compiled without effort, if it would run."""
+    from phasekit.numerics.kernels import Kernel, QuickForm
+
+    if not isinstance(kernel, Kernel):
+        return None
+    _, form = kernel.form(args)
+    return form if isinstance(form, QuickForm) else None
+
+
+def _run(
+    kernel: Callable[..., None],
+    arrays: tuple[Any, ...],
+    first: int,
+    size: int,
+    groups: Sequence[Arrays],
+    workers: int,
+) -> None:
+    """Run a kernel over cells, compiled, in so many threads."""
+    workers = min(workers, size - first)
     if workers == 1:
         kernel(*arrays, first, size, *groups)
         return

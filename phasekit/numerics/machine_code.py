@@ -8,13 +8,18 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding as llvm
-import sympy
 from llvmlite import ir
 
 from phasekit.errors import ParameterError
+from phasekit.numerics.later import later
+
+if TYPE_CHECKING:
+    import sympy
+else:
+    sympy = later("sympy")
 
 _DOUBLE = ir.DoubleType()
 _KEPT: list[Any] = []  # machine code lives as long as the process
@@ -44,14 +49,14 @@ LIBRARY = {
 #: Functions that have machine code, and those whose derivatives have it as well.
 COMPILED = {*LIBRARY, "atan2", "Abs", "sign", "Heaviside", "Max", "Min", "Piecewise"}
 DIFFERENTIABLE = COMPILED - {"gamma", "loggamma"}
-#: What conditions compare by.
+#: What conditions compare by, by the names of their classes.
 COMPARISONS = {
-    sympy.StrictLessThan: "<",
-    sympy.LessThan: "<=",
-    sympy.StrictGreaterThan: ">",
-    sympy.GreaterThan: ">=",
-    sympy.Equality: "==",
-    sympy.Unequality: "!=",
+    "StrictLessThan": "<",
+    "LessThan": "<=",
+    "StrictGreaterThan": ">",
+    "GreaterThan": ">=",
+    "Equality": "==",
+    "Unequality": "!=",
 }
 
 
@@ -93,7 +98,7 @@ def compile_expressions(
         list(expressions.values()), symbols=sympy.numbered_symbols("_c"), list=True
     )
     for symbol, expression in shared:
-        truth = isinstance(expression, (*COMPARISONS, sympy.And, sympy.Or, sympy.Not))
+        truth = isinstance(expression, (sympy.Rel, sympy.And, sympy.Or, sympy.Not))
         writer.values[symbol] = (writer.condition if truth else writer.write)(expression)
     for i, result in zip(expressions, results, strict=True):
         writer.store(writer.write(result), i)
@@ -161,7 +166,7 @@ class Writer:
         """A number."""
         return ir.Constant(self.kind, value)
 
-    def known(self, value: bool) -> Any:
+    def boolean(self, value: bool) -> Any:
         """A truth."""
         return ir.Constant(self.truth, int(value))
 
@@ -263,10 +268,10 @@ class Writer:
         if c.is_Symbol:  # several functions share it
             return self.values[c]
         if c in (sympy.true, sympy.false):
-            return self.known(bool(c))
-        if type(c) in COMPARISONS:
+            return self.boolean(bool(c))
+        if type(c).__name__ in COMPARISONS:
             left, right = self.write(c.lhs), self.write(c.rhs)
-            return self.builder.fcmp_ordered(COMPARISONS[type(c)], left, right)
+            return self.builder.fcmp_ordered(COMPARISONS[type(c).__name__], left, right)
         if isinstance(c, (sympy.And, sympy.Or)):
             value = self.condition(c.args[0])
             for other in c.args[1:]:

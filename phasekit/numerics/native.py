@@ -2,7 +2,7 @@
 
 A kernel that takes the right-hand side of a system as the address of its machine code is compiled
 once, for all systems. The same kernel interpreted (`py_func`) takes a Python function instead.
-`twin` gives a helper two bodies: NumPy for the interpreter, loops for the compiler. Vectors and
+Helpers have two bodies by `twin`: NumPy for the interpreter, loops for the compiler. Vectors and
 matrices are pieces of one flat array ``w``, named by the place where they begin.
 """
 
@@ -13,73 +13,17 @@ from collections.abc import Callable
 from typing import Any, cast
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 
-from phasekit.numerics.compile import OPTIONS, Array, Function, routine
-from phasekit.numerics.linked import link
+from phasekit.numerics.compile import Array, routine
+from phasekit.numerics.compile import twin as twin
+from phasekit.numerics.pointers import invoke, lapack_gesv
 
-
-def _numbas_lapack() -> tuple[Any, Any]:
-    """LAPACK's elimination as numba finds it, and the type of its integers; None without.
-
-    What `numpy.linalg.solve` puts round it for the compiler keeps no factors, whose sign is wanted
-    too, and took a third of a kernel's time to compile. numba does not publish these names.
-    """
-    try:
-        from numba._helperlib import c_helpers  # type: ignore[attr-defined]
-        from numba.np.linalg import F_INT_nbtype, F_INT_nptype
-    except ImportError:
-        return None, None
-    if "xgesv" not in c_helpers:
-        return None, None
-    reals: Any = types.CPointer(types.float64)  # type: ignore[no-untyped-call]
-    integers: Any = types.CPointer(F_INT_nbtype)  # type: ignore[no-untyped-call]
-    signature = types.intc(
-        types.char, types.intp, types.intp, reals, types.intp, integers, reals, types.intp
-    )
-    return types.ExternalFunction("numba_xgesv", signature), F_INT_nptype
-
-
-_gesv, _INTEGER = _numbas_lapack()
 #: Unknowns of systems up to which elimination as written here is faster than LAPACK.
-OWN = 32 if _gesv is not None else 1 << 30
-_DOUBLE = ord("d")
-
-
-def twin(compiled: Callable[..., Any]) -> Callable[[Function], Function]:
-    """Give a function that is interpreted as it stands another body for the compiler."""
-
-    def decorate(function: Function) -> Function:
-        link(function, compiled, forceinline=False, **OPTIONS)
-        return function
-
-    return decorate
-
-
-@intrinsic
-def _invoke(
-    typing_context: Any, address: Any, w: Any, x: Any, p: Any, z: Any, out: Any
-) -> tuple[Any, Any]:
-    """Call ``void (*)(double *x, double *p, double *z, double *out)``."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        pointer = ir.DoubleType().as_pointer()
-        function = ir.FunctionType(ir.VoidType(), [pointer] * 4)
-        address, w, x, p, z, out = args
-        data = context.make_array(signature.args[1])(context, builder, w).data
-        parameters = context.make_array(signature.args[3])(context, builder, p).data
-        x, z, out = (builder.gep(data, [place]) for place in (x, z, out))
-        where = builder.inttoptr(address, function.as_pointer())
-        builder.call(where, [x, parameters, z, out])
-        return context.get_dummy_value()
-
-    return types.void(address, w, types.intp, p, types.intp, types.intp), generate
+OWN = 32
 
 
 def _call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
-    _invoke(function, w, x, p, z, out)  # type: ignore[call-arg]
+    invoke(function, w[x:], p, w[z:], w[out:])
 
 
 @twin(_call)
@@ -88,7 +32,9 @@ def call(function: Any, w: Array, x: int, p: Array, z: int, out: int) -> None:
     function(w[x:], p, w[z:], w[out:])
 
 
-def _eliminate(w: Array, a: int, b: int, n: int) -> float:
+@routine
+def eliminate_large(w: Array, a: int, b: int, n: int) -> float:
+    """Solve as `solve` does, by LAPACK."""
     for i in range(n * n):
         if not np.isfinite(w[a + i]):
             return 0.0
@@ -97,11 +43,11 @@ def _eliminate(w: Array, a: int, b: int, n: int) -> float:
             value = w[a + i * n + j]
             w[a + i * n + j] = w[a + j * n + i]
             w[a + j * n + i] = value
-    matrix, right, swapped = w[a : a + n * n], np.empty(2 * n), np.empty(n, _INTEGER)
+    matrix, right, swapped = w[a : a + n * n], np.empty(2 * n), np.empty(n, np.int32)
     for i in range(n):
         right[i] = w[b + 2 * i]
         right[n + i] = w[b + 2 * i + 1]
-    if _gesv(_DOUBLE, n, 2, matrix.ctypes, n, swapped.ctypes, right.ctypes, n) != 0:
+    if lapack_gesv(n, 2, matrix, swapped, right) != 0:
         return 0.0
     sign = 1.0
     for i in range(n):
@@ -112,16 +58,9 @@ def _eliminate(w: Array, a: int, b: int, n: int) -> float:
     return sign
 
 
-def _not_needed(w: Array, a: int, b: int, n: int) -> float:
-    return 0.0  # below `OWN` unknowns, which all systems then are
-
-
-_large = routine(_not_needed if _gesv is None else _eliminate)
-
-
 def _solve(w: Array, a: int, b: int, n: int) -> float:
     if n > OWN:
-        return _large(w, a, b, n)
+        return eliminate_large(w, a, b, n)
     sign = 1.0
     for j in range(n):
         pivot = j

@@ -8,22 +8,26 @@ recurrences: a coefficient follows from those of the arguments, and its own of l
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, TypeAlias
-
-import sympy as sp
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from phasekit.numerics.lanes import LaneWriter
+from phasekit.numerics.later import later
+
+if TYPE_CHECKING:
+    import sympy as sp
+else:
+    sp = later("sympy")
 
 #: Each function with that which stands in its slope, and the sign of that slope.
 _PARTNERS = {
-    sp.exp: (sp.exp, 1),
-    sp.sin: (sp.cos, 1),
-    sp.cos: (sp.sin, -1),
-    sp.sinh: (sp.cosh, 1),
-    sp.cosh: (sp.sinh, 1),
+    "exp": ("exp", 1),
+    "sin": ("cos", 1),
+    "cos": ("sin", -1),
+    "sinh": ("cosh", 1),
+    "cosh": ("sinh", 1),
 }
 #: Functions with a recurrence.
-FUNCTIONS = {*_PARTNERS, sp.tanh, sp.log}
+FUNCTIONS = {*_PARTNERS, "tanh", "log"}
 #: Greatest power that is a product.
 POWER = 16
 
@@ -40,7 +44,7 @@ def has_series(expression: Any, varying: set[Any]) -> bool:
         # Products alone hold at zeros of the base.
         if power.free_symbols & varying or (power.is_Integer and power > POWER):
             return False
-    elif not (expression.is_Add or expression.is_Mul or type(expression) in FUNCTIONS):
+    elif not (expression.is_Add or expression.is_Mul or type(expression).__name__ in FUNCTIONS):
         return False
     return all(has_series(part, varying) for part in expression.args)
 
@@ -123,7 +127,8 @@ class Series:
         if type(e) is sp.tanh:  # its slope is 1 - tanh(u)^2
             first, rest = self._slope(u, k), self._integrated(u, lambda j: self._square(e, j), k)
             return self.over(self.total([first, self.negative(rest)]), k)
-        partner, sign = _PARTNERS[type(e)]
+        name, sign = _PARTNERS[type(e).__name__]
+        partner = getattr(sp, name)
         found = self.over(self._integrated(u, lambda j: self.term(partner(u), j), k), k)
         return found if sign > 0 else self.negative(found)
 

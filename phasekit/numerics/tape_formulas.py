@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
-
-import sympy
+from typing import TYPE_CHECKING, Any
 
 from phasekit.errors import ParameterError
+from phasekit.numerics.later import later
 from phasekit.numerics.machine_code import COMPARISONS, LIBRARY, LONGEST_POWER
 from phasekit.numerics.tape import Node, Tape
+
+if TYPE_CHECKING:
+    import sympy
+else:
+    sympy = later("sympy")
 
 
 def write(tape: Tape, expressions: Sequence[Any]) -> list[Node]:
@@ -55,7 +59,7 @@ class _Reader:
     def read(self, expressions: Sequence[Any]) -> list[Node]:
         """The places of expressions."""
         for e in parts(expressions):
-            self.made[id(e)] = self._made(e)
+            self.made[id(e)] = self._written(e)
         return [self._node(e) for e in expressions]
 
     def _node(self, e: Any) -> Node:
@@ -67,7 +71,7 @@ class _Reader:
         except TypeError:  # it is complex
             return self.tape.number(math.nan)
 
-    def _made(self, e: Any) -> Any:
+    def _written(self, e: Any) -> Any:
         """The place of an expression whose arguments are there, or itself if it is a number."""
         t = self.tape
         if e.is_Symbol:
@@ -99,8 +103,8 @@ class _Reader:
             for part, condition in reversed(e.args):
                 value = t.select(self._node(condition), self._node(part), value)
             return value
-        if type(e) in COMPARISONS:
-            return t.entry(COMPARISONS[type(e)], *args)
+        if type(e).__name__ in COMPARISONS:
+            return t.entry(COMPARISONS[type(e).__name__], *args)
         what = "function" if isinstance(e, sympy.Expr) else "condition"
         raise ParameterError(
             f"f: got the {what} {name}, wants elementary functions and comparisons; "

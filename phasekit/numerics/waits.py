@@ -35,8 +35,8 @@ def _in_terminal() -> bool:
 
 
 def tell(text: str) -> None:
-    """Say it to who waits."""
-    print(f"phasekit: {text}", file=sys.stderr, flush=True)
+    """Say it to who waits: as plain text in a notebook, where standard error looks like a fault."""
+    print(f"phasekit: {text}", file=sys.stdout if in_notebook() else sys.stderr, flush=True)
 
 
 def later(seconds: float, action: Any, *arguments: Any) -> threading.Timer:
@@ -78,19 +78,20 @@ class _Wait:
 
 
 @contextlib.contextmanager
-def said(what: str) -> Iterator[None]:
+def notice(what: str, *, logged: bool = False) -> Iterator[None]:
     """Say what is going on, if it takes long; where several are nested, the outermost speaks.
 
-    A line follows every ten seconds while `stage` tells of something new.
+    A line follows every ten seconds while `stage` tells of something new. With `logged` it is said
+    where nobody looks, too, but not in the processes of a pool.
 
     Examples
     --------
-    >>> with said("counting"):
+    >>> with notice("counting"):
     ...     sum(range(10))
     45
     """
     global _saying
-    if _saying or not watched():
+    if _saying or not (watched() or (logged and multiprocessing.parent_process() is None)):
         yield
         return
     stage("")

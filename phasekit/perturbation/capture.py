@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Loop, Validity
-from phasekit.laws.perturbed import PerturbedConservative, PerturbedTrigonometric
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
 from phasekit.perturbation.validity import error, greatest, rates, validity
@@ -43,9 +43,7 @@ def energy_size(points: Any) -> Array:
     return np.asarray(energies.max(axis=-1, initial=0.0))
 
 
-def capture(
-    law: PerturbedTrigonometric, *parameters: npt.ArrayLike, rotation: bool = False
-) -> Capture:
+def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture in the potential of (A, B, C): into the lobes of the lower saddle."""
     closed.refuse_prescribed(law, "capture")
     values = law.values(*parameters)
@@ -65,7 +63,7 @@ def capture(
 
 
 def weak(
-    found: tuple[Array, Array], law: PerturbedConservative, values: dict[str, Any], rate: Array,
+    found: tuple[Array, Array], law: PerturbedLaw, values: dict[str, Any], rate: Array,
     held: Any, exponent: Any,
 ) -> Capture:  # fmt: skip
     """Odds where damping and drive are weak and nothing else decides; NaN elsewhere."""
@@ -79,7 +77,7 @@ def weak(
 
 
 def capture_numerical(
-    law: PerturbedConservative, *parameters: npt.ArrayLike, rotation: bool = False
+    law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = False
 ) -> Capture:
     """Capture in any potential: lobes of the lowest saddle that has two, loops of the highest."""
     values = law.values(*parameters)
@@ -114,16 +112,13 @@ def of_loops(
     eights = eights & (height <= lowest + near)
     first = np.take_along_axis(loss, eights.argmax(-1)[..., None, None], -2)[..., 0, :]
     lobes = np.where(eights.any(-1, keepdims=True), first, np.nan)
-    winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC)) & circle
-    top = np.where(winds, height, -np.inf).max(-1, keepdims=True)
-    # A turn on a level of several saddles is an arc of each.
-    arcs = winds & (height >= top - near)
+    arcs = turning_arcs(loops, size, loss.shape[:-1]) & circle
     number = arcs.sum(axis=-1)
-    winding = np.where(number[..., None] > 0, _total(loss, arcs), np.nan)
+    winding = np.where(number[..., None] > 0, total(loss, arcs), np.nan)
     if push is not None:  # left and right are all that is there if each arc holds an eight
         each = (wells == 2 * number) & (eights.sum(axis=-1) == number)
         each &= (loop == Loop.LOBES).sum(axis=-1) == number
-        lobes = np.where(each[..., None], _total(loss, eights), np.nan)
+        lobes = np.where(each[..., None], total(loss, eights), np.nan)
     pair = (number == 2) & (wells == 2)
     if pair.any():  # both wells end in an arc of each saddle, there and back
         two = np.argsort(~arcs, axis=-1, kind="stable")[..., :2, None]
@@ -132,7 +127,16 @@ def of_loops(
     return regions(lobes, winding, (wells == number) & ~pair, push)
 
 
-def _total(loss: Array, saddles: Any) -> Array:
+def turning_arcs(loops: Any, size: Array, shape: tuple[int, ...]) -> Any:
+    """Saddles of the highest level that winds: a turn on it is an arc of each."""
+    height, loop = (np.broadcast_to(x, shape) for x in (loops.saddle_energy, loops.loop))
+    near = LEVEL * np.broadcast_to(size, shape[:-1])[..., None]
+    winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC))
+    top = np.where(winds, height, -np.inf).max(-1, keepdims=True, initial=-np.inf)
+    return winds & (height >= top - near)
+
+
+def total(loss: Array, saddles: Any) -> Array:
     """What is lost at some saddles together."""
     return np.asarray(np.where(saddles[..., None], loss, 0.0).sum(axis=-2))
 

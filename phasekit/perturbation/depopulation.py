@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import erfc
 
 from phasekit.numerics.contract import contract
 
@@ -95,6 +94,8 @@ def _solved(D: float, apart: float) -> tuple[float, float]:
 
     What arrives at either rim, over its equilibrium value: 1 deep in the well.
     """
+    from scipy.special import erfc
+
     width = np.sqrt(2.0 * D)
     depth = DEEP + D + 8.0 * width
     x, w = panels(np.linspace(-depth, 0.0, int(np.ceil(depth / (3.0 * width))) + 1))

@@ -10,8 +10,6 @@ import numpy.typing as npt
 
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.depopulation import NODES, WEIGHTS, panels
-from phasekit.phase.exact.potential import gradient
-from phasekit.phase.exact.under_torque import Saddle, saddle_at
 
 Array = npt.NDArray[np.float64]
 
@@ -43,16 +41,18 @@ def configuration(
     return np.asarray(total)
 
 
-def spatial_exponent(saddle: Saddle, left: Array, right: Array, kT: Array) -> Array:
+def spatial_exponent(
+    depth: Callable[[Array], Array], left: Array, right: Array, kT: Array
+) -> Array:
     """Exponent with which Kramers' rate at strong damping is exact at a finite barrier.
 
     ``sqrt(2 pi kT)/int exp((V - V_s)/kT)`` over the rim, from the center on one side to that on
-    the other: k where kT -> 0.
+    the other, by the depth below a saddle at distances from it: k where kT -> 0.
     """
     x, weight = panels(OUTWARDS)
     total = np.zeros(kT.shape)
     for way, length in ((-1.0, left), (1.0, right)):
-        level = np.exp(-saddle.spread().depth(way * length[..., None] * x) / kT[..., None])
+        level = np.exp(-depth(way * length[..., None] * x) / kT[..., None])
         total = total + length * contract(level, weight)
     with np.errstate(all="ignore"):
         return np.asarray(np.sqrt(2.0 * np.pi * kT) / total)
@@ -97,42 +97,34 @@ def passage(action: Callable[[Any, Array], Array], height: Array, damping: Array
 
 
 def action_in_well(
-    system: tuple[Array, ...], saddle: Saddle, center: Array, ends: tuple[Array, Array], x: Array
-) -> Array:
-    """Area inside the orbits of a tilted well, at parts x of the height of its lower saddle.
+    depth: Callable[[Array], Array], slope: Callable[[Array], Array], rise: Array,
+    center: Array, ends: tuple[Array, Array], x: Array,
+) -> Array:  # fmt: skip
+    """Area inside the orbits of a well, at parts x of the height of its lower saddle.
 
-    The center and the ends, which may lie higher, are angles from the saddle.
+    By the depth below that saddle and the slope of the potential at coordinates; the ends may lie
+    higher.
     """
-    A, B, C, N = (v[:, None] for v in system)
-    seen = saddle.spread()
-    at = center[:, None]
-    rise = seen.depth(at)
-    lost = rise * (1.0 - x)
+    lost = rise[:, None] * (1.0 - x)
     turns = []
     for end in ends:
-        low, high = np.broadcast_arrays(at, at + 0.0 * x)[1], end[:, None] + 0.0 * x
-        theta = 0.5 * (low + high)
+        low, high = center[:, None] + 0.0 * x, end[:, None] + 0.0 * x
+        at = 0.5 * (low + high)
         for _ in range(HALVINGS):
-            left = seen.depth(theta) - lost
-            low, high = np.where(left > 0.0, theta, low), np.where(left > 0.0, high, theta)
+            left = depth(at) - lost
+            low, high = np.where(left > 0.0, at, low), np.where(left > 0.0, high, at)
             with np.errstate(all="ignore"):
-                step = theta + left / (gradient(A, B, C, seen.phi + theta) - N)
+                step = at + left / slope(at)
             inside = (step - low) * (step - high) < 0.0
-            before, theta = theta, np.where(inside, step, 0.5 * (low + high))
-            if not (np.abs(theta - before) > 2.0**-52 * np.abs(theta)).any():
+            before, at = at, np.where(inside, step, 0.5 * (low + high))
+            if not (np.abs(at - before) > 2.0**-52 * np.abs(at)).any():
                 break
-        turns.append(theta)
+        turns.append(at)
     tau, weight = panels(ROUND)
     middle, half = 0.5 * (turns[0] + turns[1]), 0.5 * (turns[1] - turns[0])
-    theta = middle[..., None] + half[..., None] * np.sin(tau)
-    square = seen.spread().depth(theta) - lost[..., None]
+    square = depth(middle[..., None] + half[..., None] * np.sin(tau)) - lost[..., None]
     speed = np.sqrt(np.maximum(2.0 * square, 0.0))
     return np.asarray(2.0 * np.abs(half) * contract(speed, weight * np.cos(tau)))
-
-
-def saddles_of(A: Array, phi: Array, k: Array, torque: Array) -> Saddle:
-    """The saddles of cells, on a last axis."""
-    return saddle_at(A[:, None], phi, k, torque[:, None])
 
 
 def marks_of(phi: Array, saddle: Array, way: float) -> Array:

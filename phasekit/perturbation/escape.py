@@ -7,63 +7,77 @@ short of energy at low damping; how both are corrected is said in `rates`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EscapeRegime, Loop
-from phasekit.laws.perturbed import PerturbedTrigonometric
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation.depopulation import depopulation
 from phasekit.perturbation.diffusion import (
     TURN,
     configuration,
     marks_of,
     passage,
-    saddles_of,
     spatial_exponent,
     transition,
 )
-from phasekit.perturbation.escape_under_torque import escape_under_torque
 from phasekit.perturbation.rates import (
-    Cells,
     Escape,
     Exit,
+    Heat,
     combined,
+    empty,
     masked,
     place,
     returning,
 )
+from phasekit.perturbation.wells import escape_from_wells
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_energy
 from phasekit.phase.exact.potential import potential
 from phasekit.phase.exact.separatrices import phase_space
+from phasekit.phase.exact.under_torque import saddle_at
+from phasekit.phase.numerical import torqued
+from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.unpushed import merged
 
 Array = npt.NDArray[np.float64]
 
+#: Cells at a time, for memory.
+CELLS = 1024
 
-def escape_rate(
-    law: PerturbedTrigonometric, *parameters: npt.ArrayLike, center: int | None = None
-) -> Escape:
-    """Rates of escape from the well of a center (0 lower, 1 upper)."""
+
+@dataclass(frozen=True)
+class Cells(Heat):
+    """Wells of (A, B, C) in a row."""
+
+    A: Array
+    B: Array
+    C: Array
+
+
+def escape_rate(law: PerturbedLaw, *parameters: npt.ArrayLike, center: int | None = None) -> Escape:
+    """Rates of escape from the well of a center: its number (0 lower, 1 upper), or the lowest."""
     values = law.values(*parameters)
     shape = np.broadcast_shapes(*map(np.shape, values.values()))
-    A, B, C, torque, damping, kT = (
-        np.array(np.broadcast_to(x, shape), float).reshape(-1)
-        for x in (*law.coefficients(values), *(values[n] for n in ("torque", "damping", "kT")))
-    )
+    flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
+    damping, kT = flat["damping"], flat["kT"]
     # Without noise or friction nothing is thermal.
     usable = (damping > 0.0) & (kT > 0.0) & (driven(values, shape) == 0.0)
-    cells = Cells(A, B, C, torque, damping, np.where(usable, kT, np.nan))
-    number = 0 if center is None else center
-    level = torque == 0.0
-    found = cells.empty()
-    for part, function in ((level, level_escape), (~level, escape_under_torque)):
-        if part.any():
-            parts: tuple[Any, ...] = function(cells.at(part), number)
-            fields: tuple[Any, ...] = found
-            for field, one in zip(fields, parts, strict=True):
-                field[part] = one
-    return Escape._make(x.reshape(shape + (2, 2)) for x in found)
+    heat = Heat(damping, np.where(usable, kT, np.nan))
+    found: list[tuple[Any, Escape]] = []
+    if not isinstance(law.base, Formula):
+        level = np.flatnonzero(flat["torque"] == 0.0)
+        own = law.coefficients({name: x[level] for name, x in flat.items()})
+        few = Cells(*vars(heat.at(level)).values(), *map(np.asarray, own))
+        found.append((level, level_escape(few, center or 0)))
+    lines = torqued.grounds(law, [flat[name] for name in law.names], CELLS, lined=True)
+    for turns, part in lines:
+        found.append((part, escape_from_wells(turns, heat.at(part), center)))
+    fields = merged(found, damping.size)
+    return Escape._make(x.reshape(shape + x.shape[1:]) for x in fields)
 
 
 def driven(values: dict[str, Any], shape: tuple[int, ...]) -> Array:
@@ -81,9 +95,10 @@ def level_escape(cells: Cells, number: int) -> Escape:
     lower, upper = loops.saddle_phi[:, 0], loops.saddle_phi[:, 1]
     row = np.arange(len(A))
     arcs = loops.loop[:, 0] == Loop.HETEROCLINIC
-    saddles = saddles_of(A, loops.saddle_phi, loops.saddle_exponent, np.zeros(len(A)))
+    k = loops.saddle_exponent
+    saddles = saddle_at(A[:, None], loops.saddle_phi, k, np.zeros((len(A), 1))).spread()
     left, right = (marks_of(points.phi, loops.saddle_phi, w)[..., 0] for w in (-1.0, 1.0))
-    spatial = spatial_exponent(saddles, left, right, np.stack([kT, kT], -1))
+    spatial = spatial_exponent(saddles.depth, left, right, np.stack([kT, kT], -1))
 
     def lobe(i: int) -> tuple[Any, Array, Array, Array]:
         """Side of the lower saddle, rate, loss and its correction of a well that ends there."""
@@ -106,7 +121,7 @@ def level_escape(cells: Cells, number: int) -> Escape:
         np.isfinite(ratio * back), height, loss,
         loops.saddle_exponent[:, 0], spatial[:, 0],
     )  # fmt: skip
-    out = cells.empty()
+    out = empty(len(A), 2)
     place(out, combined(cells, rate, way), row, 0, side)
     mirror = arcs & np.isfinite(out.escape_rate[row, 0, side])
     # Over the winding saddle: out of one well, or out of both together.

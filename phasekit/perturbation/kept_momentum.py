@@ -10,24 +10,22 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import Loop, ParameterError, Validity
-from phasekit.laws.perturbed import PerturbedRouthian
+from phasekit.errors import Validity
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.mechanics.at_momentum import AtMomentum, Machines
 from phasekit.mechanics.steady import Steady, steady_at
-from phasekit.mechanics.two_degrees import TwoDegrees
 from phasekit.perturbation.capture import Capture, energy_size, of_loops, weak
 from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
 from phasekit.perturbation.quadrature import CELLS, POINTS, Paths, along, closed, times_of
 from phasekit.perturbation.validity import greatest
 from phasekit.phase.numerical import motion
-from phasekit.phase.numerical.arc_length import ArcLength
-from phasekit.phase.numerical.separatrices import SIDES, branch_of, saddles_of, separatrices
+from phasekit.phase.numerical.machines import NOTHING, Along, followed, widened
+from phasekit.phase.numerical.separatrices import SIDES, Separatrices, branch_of
 
 Array = npt.NDArray[np.float64]
 
@@ -40,19 +38,19 @@ class Loops(NamedTuple):
     loop: npt.NDArray[np.int8]
 
 
-def equilibria(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Steady:
+def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Steady:
     """All steady rotations under a constant torque on the shaft."""
     values = law.values(*parameters)
     one = _machines(law).at(values)
     return steady_at(one.machine, one.p, values["torque"] * one.machine.Jn)
 
 
-def melnikov(law: PerturbedRouthian, *parameters: npt.ArrayLike) -> Melnikov:
+def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     """Melnikov's function along the separatrices of the amended potential, in J."""
     return _along_separatrices(law, parameters)[2]
 
 
-def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
+def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = False) -> Capture:
     """Capture into the lobes of the lowest saddle that has two, or from rotation."""
     loops, size, found = _along_separatrices(law, parameters)
     values = law.values(*parameters)
@@ -69,33 +67,33 @@ def capture(law: PerturbedRouthian, *parameters: npt.ArrayLike, rotation: bool =
 # ------------------------------------------------------------------------- energies
 
 
-def potential(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+def potential(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Amended potential less torque times phi at phi, the last of the inputs, in J."""
     one, torque = _at(law, inputs[:-1])
     phi = np.asarray(inputs[-1], float)
     return np.asarray(one.potential(phi)[0] - torque * phi)
 
 
-def gradient(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+def gradient(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Its first derivative at phi, the last of the inputs."""
     one, torque = _at(law, inputs[:-1])
     return np.asarray(one.potential(np.asarray(inputs[-1], float))[1] - torque)
 
 
-def curvature(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+def curvature(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Its second derivative at phi, the last of the inputs."""
     one, torque = _at(law, inputs[:-1])
     return np.asarray(one.potential(np.asarray(inputs[-1], float))[2] + 0.0 * torque)
 
 
-def energy(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+def energy(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Energy of states (phi, dphi), the last of the inputs."""
     one, _ = _at(law, inputs[:-2])
     phi, speed = (np.asarray(x, float) for x in inputs[-2:])
     return np.asarray(0.5 * one.inertia(phi)[0] * speed * speed + potential(law, *inputs[:-1]))
 
 
-def phase_velocity(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) -> Array:
+def phase_velocity(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Speed at phi on the level of an energy, the last of the inputs; NaN where out of reach."""
     one, _ = _at(law, inputs[:-2])
     kinetic = np.asarray(inputs[-1], float) - potential(law, *inputs[:-1])
@@ -103,7 +101,7 @@ def phase_velocity(law: Machines | PerturbedRouthian, *inputs: npt.ArrayLike) ->
     return np.asarray(np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan) / inertia))
 
 
-def _at(law: Machines | PerturbedRouthian, parameters: Any) -> tuple[AtMomentum, Any]:
+def _at(law: Machines | PerturbedLaw, parameters: Any) -> tuple[AtMomentum, Any]:
     """The machines, and the torques on their shafts in N m."""
     if isinstance(law, Machines):
         return law.at(law.values(*parameters)), 0.0
@@ -112,7 +110,7 @@ def _at(law: Machines | PerturbedRouthian, parameters: Any) -> tuple[AtMomentum,
     return one, values["torque"] * one.machine.Jn
 
 
-def _machines(law: PerturbedRouthian) -> Machines:
+def _machines(law: PerturbedLaw) -> Machines:
     base = law.base
     assert isinstance(base, Machines)
     return base
@@ -121,14 +119,14 @@ def _machines(law: PerturbedRouthian) -> Machines:
 # ------------------------------------------------------------------------- separatrices
 
 
-def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops, Array, Melnikov]:
+def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Array, Melnikov]:
     """Separatrices of the cells, the size of their energies, and Melnikov's function."""
     refuse_prescribed(law, "melnikov")
     values = law.values(*parameters)
     shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
     flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
     one = _machines(law).at(flat)
-    columns = np.stack(np.broadcast_arrays(*one.machine, one.p, np.zeros(flat["torque"].shape)))
+    columns = np.stack([np.broadcast_to(x, flat["torque"].shape) for x in (*one.machine, one.p)])
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
     order = np.argsort(which.reshape(-1), kind="stable")
@@ -136,35 +134,36 @@ def _along_separatrices(law: PerturbedRouthian, parameters: Any) -> tuple[Loops,
     for start in range(0, order.size, CELLS):
         rows = order[start : start + CELLS]
         machines, own = np.unique(which.reshape(-1)[rows], return_inverse=True)
-        followed = [_followed(cells[:, i], cells.shape[1] == 1) for i in machines]
+        known = [followed(cells[:, i], cells.shape[1] == 1) for i in machines]
         own_values = {name: x[rows] for name, x in flat.items()}
         weight = np.asarray(one.machine.Jn).reshape(-1)[rows, None, None]
-        parts.append(_part(law, followed, own.reshape(-1), own_values, weight))
+        parts.append(_part(law, known, own.reshape(-1), own_values, weight))
     width = max((part[0].loop.shape[1] for part in parts), default=0)
     fields = zip(*((*loops, size, *found) for loops, size, found in parts), strict=True)
     back = np.argsort(order)
-    whole = [np.concatenate([_wide(x, width, 1) for x in field])[back] for field in fields]
+    whole = [np.concatenate([_across(x, width) for x in field])[back] for field in fields]
     shaped = [x.reshape(shape + x.shape[1:]) for x in whole]
     number = len(Loops._fields)
     return Loops(*shaped[:number]), shaped[number], Melnikov(*shaped[number + 1 :])
 
 
 def _part(
-    law: PerturbedRouthian, followed: Sequence[Followed], which: Any, values: dict[str, Array],
+    law: PerturbedLaw, known: Sequence[Along | None], which: Any, values: dict[str, Array],
     weight: Array,
 ) -> tuple[Loops, Array, Melnikov]:  # fmt: skip
     """The same of some cells in a row, each the machine of a number."""
-    width = max((len(each.loops.loop) for each in followed), default=0)
+    width = max((len(_loops(one).loop) for one in known), default=0)
     loops = Loops(
-        *(np.stack([_wide(getattr(each.loops, name), width) for each in followed])[which]
+        *(np.stack([widened(name, getattr(_loops(one), name), width) for one in known])[which]
           for name in Loops._fields)
     )  # fmt: skip
-    size = np.array([each.size for each in followed])[which]
+    sizes = [np.nan if one is None else float(energy_size(one.ground.points)[0]) for one in known]
+    size = np.array(sizes)[which]
     found: Melnikov | None = None
     for points in POINTS:
-        moved = [motions_of(each, points) for each in followed]
+        moved = [motions_of(one, points) for one in known]
         time, phi, dphi = (
-            np.stack([_wide(part, width) for part in parts])[which]
+            np.stack([widened("", part, width) for part in parts])[which]
             for parts in zip(*moved, strict=True)
         )
         better, lost = along(law, Paths(time, phi, dphi, []), values, weight)
@@ -181,80 +180,30 @@ def _part(
     return loops, size, found
 
 
-def _wide(values: Any, width: int, axis: int = 0) -> Any:
-    """Values of the saddles, and nothing for those that other machines have more."""
-    if values.ndim <= axis:
+def _across(values: Any, width: int) -> Any:
+    """Values of the saddles, on the second axis, of cells, and nothing where others have more."""
+    if values.ndim < 2:
         return values
-    empty: Any = Loop.ABSENT if values.dtype == np.int8 else np.nan
-    more = [(0, width - values.shape[i] if i == axis else 0) for i in range(values.ndim)]
-    return np.pad(values, more, constant_values=empty)
+    return np.moveaxis(widened("", np.moveaxis(values, 1, 0), width), 0, 1)
 
 
-@dataclass(frozen=True, eq=False)
-class Followed:
-    """The separatrices of one machine at a momentum, along arc length."""
-
-    loops: Loops
-    size: float
-    """Of the energies of its equilibria."""
-    path: ArcLength | None
-    ground: Any
-    columns: npt.NDArray[np.intp]
-    """Place of each saddle among the equilibria along arc length."""
-
-
-NOTHING = Followed(
-    Loops(np.empty(0), np.empty(0), np.empty(0, np.int8)),
-    np.nan,
-    None,
-    None,
-    np.empty(0, np.intp),
-)
-
-
-def _followed(column: Array, alone: bool) -> Followed:
-    """The machine of some constants; one of many may be invalid."""
-    try:
-        return separatrices_of(*map(float, column[:-1])) if np.isfinite(column).all() else NOTHING
-    except ParameterError:
-        if alone:
-            raise
-        return NOTHING
+def _loops(one: Along | None) -> Separatrices:
+    return NOTHING if one is None else one.separatrices
 
 
 @functools.lru_cache(maxsize=64)
-def separatrices_of(*constants: float) -> Followed:
-    """Separatrices of the machine of some constants, its momentum last.
-
-    Raises
-    ------
-    ParameterError
-        If its inertia or its energies are unusable.
-    """
-    path = ArcLength.of(AtMomentum(TwoDegrees(*constants[:-1]), constants[-1]))
-    ground = path.ground()
-    found = separatrices(ground)
-    phi = np.pi - np.mod(np.pi - path.place(found.saddle_phi[0]), 2.0 * np.pi)
-    order = np.argsort(phi)
-    fields = (found.saddle_energy, found.saddle_exponent, found.loop)
-    columns = saddles_of(ground)[1][order]
-    loops = Loops(*(field[0][order] for field in fields))
-    return Followed(loops, float(energy_size(ground.points)[0]), path, ground, columns)
-
-
-@functools.lru_cache(maxsize=64)
-def motions_of(one: Followed, points: int) -> tuple[Array, Array, Array]:
+def motions_of(one: Along | None, points: int) -> tuple[Array, Array, Array]:
     """Times, angles and angular velocities along each separatrix."""
-    k = one.loops.saddle_exponent
+    k = _loops(one).saddle_exponent
     time = times_of(k, points)
     phi, dphi = np.full((2, len(k), 2, points + 1), np.nan)
     rows = np.flatnonzero(k > 0.0)
-    if one.path is None or not rows.size:
+    if one is None or not rows.size:
         return time, phi, dphi
     ground = one.ground.take(np.zeros(rows.size, np.intp))
     owner = np.repeat(np.arange(rows.size), points + 1)
     for side, way in enumerate(SIDES):
-        branch = branch_of(ground, one.columns[rows], way)
+        branch = branch_of(ground, one.saddles[rows], way)
         found = motion.separatrix_motion(branch, owner, time[rows].reshape(-1))
         s, speed = (x.reshape(rows.size, -1) for x in found[:2])
         angle = one.path.place(s)

@@ -15,8 +15,7 @@ import numpy.typing as npt
 from phasekit.errors import Loop, Validity
 from phasekit.inputs import bad
 from phasekit.laws.perturbed import (
-    PerturbedConservative,
-    PerturbedTrigonometric,
+    PerturbedLaw,
     drift_name,
     modulation_names,
 )
@@ -45,7 +44,7 @@ class Melnikov(NamedTuple):
     threshold_validity: npt.NDArray[np.int8]
 
 
-def melnikov(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Melnikov:
+def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     """Melnikov's function along the separatrices of (A, B, C)."""
     refuse_prescribed(law, "melnikov")
     values = law.values(*parameters)
@@ -59,7 +58,7 @@ def melnikov(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Melniko
 
 
 def weak(
-    law: PerturbedConservative, values: dict[str, Any], found: Melnikov, area: Any, exponent: Any,
+    law: PerturbedLaw, values: dict[str, Any], found: Melnikov, area: Any, exponent: Any,
     held: Any,
 ) -> Melnikov:  # fmt: skip
     """Thresholds where damping and drive are weak, as the theory has it; NaN elsewhere."""
@@ -78,7 +77,7 @@ def weak(
     )
 
 
-def refuse_prescribed(law: PerturbedConservative, what: str) -> None:
+def refuse_prescribed(law: PerturbedLaw, what: str) -> None:
     """Refuse a function or table of time, which is no harmonic."""
     if law.prescribed is not None:
         hint = "use modulation={'omega1': pk.Harmonic(...)} or drift={'omega1': rate}"
@@ -101,7 +100,7 @@ def net_angles(loops: Separatrices) -> Array:
     return np.where(loops.loop[..., None] == Loop.LOBES, 0.0, net)
 
 
-def means(law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatrices) -> Array:
+def means(law: PerturbedLaw, values: dict[str, Any], loops: Separatrices) -> Array:
     """The mean: what damping takes, a torque gives, and drift takes as the area changes."""
     A, B, C = law.coefficients(values)
     each = {name: np.asarray(x)[..., None, None] for name, x in values.items()}
@@ -172,9 +171,7 @@ def cubes(A: Any, loops: Separatrices) -> Array:
     return np.asarray(passes * 0.5 * np.abs(whole) * contract(square, WEIGHTS))
 
 
-def oscillations(
-    law: PerturbedTrigonometric, values: dict[str, Any], loops: Separatrices
-) -> list[Part]:
+def oscillations(law: PerturbedLaw, values: dict[str, Any], loops: Separatrices) -> list[Part]:
     """The harmonics: those of the forcing, then those of modulated parameters."""
     A, B, C = law.coefficients(values)
     at = (A, B, C, loops.saddle_phi, loops.saddle_exponent, loops.loop)
@@ -192,7 +189,7 @@ def oscillations(
     return parts
 
 
-def undamped(law: PerturbedConservative, values: dict[str, Any]) -> Any:
+def undamped(law: PerturbedLaw, values: dict[str, Any]) -> Any:
     """Whether nothing makes the motion gain or lose energy on average."""
     rates = [values["damping"], values["quadratic"], *(values[drift_name(p)] for p in law.drifting)]
     return np.logical_and.reduce(np.broadcast_arrays(*(np.asarray(r) == 0.0 for r in rates)))
@@ -236,8 +233,10 @@ def _held(mean: Array) -> npt.NDArray[np.int8]:
     return np.full(mean.shape, Validity.HOLDS, np.int8)
 
 
-def quiet_frequency(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> Array:
-    """The least frequency of a torque that leaves a lobe as it is; its multiples do as well."""
+def quiet_frequencies(
+    law: PerturbedLaw, *parameters: npt.ArrayLike, number: int = 1
+) -> tuple[Array]:
+    """Frequencies of a torque that leave a lobe as it is: the least one and its multiples."""
     refuse_prescribed(law, "quiet_frequencies")
     values = law.values(*parameters)
     A, B, C = law.coefficients(values)
@@ -253,4 +252,5 @@ def quiet_frequency(law: PerturbedTrigonometric, *parameters: npt.ArrayLike) -> 
         root = np.sqrt(np.where(A >= 0.0, upright, level))
         x = np.arcsinh(np.hypot(k * k, q.real) / root)
         quiet = np.where(loops.loop == Loop.LOBES, np.pi * k / x, np.nan)
-    return np.repeat(quiet[..., None], 2, axis=-1)
+    both = np.repeat(quiet[..., None], 2, axis=-1)
+    return (both[..., None] * np.arange(1.0, number + 1.0),)

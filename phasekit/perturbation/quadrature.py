@@ -7,14 +7,16 @@ next to the real axis and decays at both ends.
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import Loop
 from phasekit.laws.formulas import symbols_of
-from phasekit.laws.perturbed import PerturbedConservative, drift_name, modulation_names
+from phasekit.laws.perturbed import PerturbedLaw, drift_name, modulation_names
+from phasekit.numerics.contract import contract
 from phasekit.perturbation.melnikov import (
     Melnikov,
     Part,
@@ -34,6 +36,8 @@ Complex = npt.NDArray[np.complex128]
 REACH = 36.0
 #: Points in time: as few as do, else many.
 POINTS = (3 << 7, 1 << 11)
+#: Frequencies over the exponent at which signs of the response are looked at.
+WAVES = np.linspace(0.0, 40.0, 801)[1:]
 #: Cells at a time, for the memory of their motions.
 CELLS = 256
 #: Greatest error of what is said, relative, and that of motions and sums relative to their size.
@@ -118,14 +122,14 @@ class Sum(NamedTuple):
         """Both together."""
         return Sum(*(one + more for one, more in zip(self, other, strict=True)))
 
-    def known(self) -> Any:
+    def has_digits(self) -> Any:
         """Whether it has not lost too many digits."""
         return self.error <= WORST * np.abs(self.value)
 
     def settled(self) -> Any:
         """The value, NaN where it has lost too many digits; 0 where it is but rounding of 0."""
         nothing = (np.abs(self.value) <= self.error) & (self.error <= 2.0 * ROUNDING * self.size)
-        return np.where(self.known(), self.value, np.where(nothing, 0.0, np.nan))
+        return np.where(self.has_digits(), self.value, np.where(nothing, 0.0, np.nan))
 
 
 def times_of(k: Array, points: int) -> Array:
@@ -144,40 +148,122 @@ def closed(phi: Array, dphi: Array) -> tuple[Array, Array]:
     return np.where(good, phi, np.nan), np.where(good, dphi, np.nan)
 
 
-def melnikov(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Melnikov:
+class Quiet(NamedTuple):
+    """Frequencies of a torque that leave a lobe as it is; the last axis is their order."""
+
+    quiet_frequency: Array
+    quiet_frequency_error: Array
+
+
+def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     """Melnikov's function along the separatrices of any potential."""
     refuse_prescribed(law, "melnikov")
+    return _by_cells(law, parameters, functools.partial(_melnikov, law))
+
+
+def quiet_frequencies(law: PerturbedLaw, *parameters: npt.ArrayLike, number: int = 1) -> Quiet:
+    """The least frequencies of a torque to which lobes do not respond, in any potential."""
+    refuse_prescribed(law, "quiet_frequencies")
+    return _by_cells(law, parameters, functools.partial(_quiet, law, number))
+
+
+Found = TypeVar("Found", Melnikov, Quiet)
+
+
+def _by_cells(
+    law: PerturbedLaw, parameters: Sequence[npt.ArrayLike],
+    function: Callable[[dict[str, Array], Separatrices], Found],
+) -> Found:  # fmt: skip
+    """What a function finds of values and separatrices, some cells at a time."""
     values = law.values(*parameters)
     formula: Any = law.base
     shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
     flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
-    loops = functions.separatrices(formula, *(flat[name] for name in formula.names))
+    loops: Any = functions.separatrices(formula, *(flat[name] for name in formula.names))
     size = loops.saddle_phi.shape[0] if formula.names else 1
     if not formula.names:  # a formula without parameters is one system
         loops = Separatrices._make(np.asarray(x)[None] for x in loops)
     cells = int(np.prod(shape, dtype=int))
-    found = []
+    found: list[Any] = []
     for start in range(0, cells, CELLS):
         part = slice(start, min(start + CELLS, cells))
         one = {name: x[part] for name, x in flat.items()}
-        own = Separatrices._make(x[part] if size == cells else x for x in loops)
-        own = Separatrices._make(np.broadcast_to(x, (part.stop - start, *x.shape[1:])) for x in own)
-        few, lost = _cells(law, formula, one, own, POINTS[0])
-        if lost.any():
-            rows = np.flatnonzero(lost)
-            left = Separatrices._make(x[rows] for x in own)
-            again = {name: x[rows] for name, x in one.items()}
-            many, _ = _cells(law, formula, again, left, POINTS[1])
-            fields: tuple[Any, ...] = few
-            for field, better in zip(fields, many, strict=True):
-                field[rows] = better
-        found.append(few)
-    whole = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    return Melnikov._make(x.reshape(shape + x.shape[1:]) for x in whole)
+        own = [_rows_of(field, part, cells if size == cells else 1) for field in loops]
+        found.append(function(one, Separatrices._make(own)))
+    fields: Any = zip(*found, strict=True)
+    whole = [np.concatenate(parts) for parts in fields]
+    kind: Any = type(found[0])
+    joined: Found = kind._make(field.reshape(shape + field.shape[1:]) for field in whole)
+    return joined
+
+
+def _rows_of(field: Any, part: slice, size: int) -> Any:
+    """Some rows of an array, of which there may be one for all."""
+    if size > 1:
+        return field[part]
+    return np.broadcast_to(field[:1], (part.stop - part.start, *field.shape[1:]))
+
+
+def _melnikov(law: PerturbedLaw, values: dict[str, Array], loops: Separatrices) -> Melnikov:
+    formula: Any = law.base
+    few, lost = _cells(law, formula, values, loops, POINTS[0])
+    if lost.any():
+        rows = np.flatnonzero(lost)
+        left = Separatrices._make(x[rows] for x in loops)
+        again = {name: x[rows] for name, x in values.items()}
+        many, _ = _cells(law, formula, again, left, POINTS[1])
+        fields: tuple[Any, ...] = few
+        for field, better in zip(fields, many, strict=True):
+            field[rows] = better
+    return few
+
+
+def _quiet(
+    law: PerturbedLaw, number: int, values: dict[str, Array], loops: Separatrices
+) -> Quiet:  # fmt: skip
+    """Zeros of the sine transform of the speed, which is odd about the turning point."""
+    formula: Any = law.base
+    paths = Paths.of(formula, [values[name] for name in formula.names], loops, POINTS[1])
+    shape = (*paths.dphi.shape[:-1], number)
+    found = Quiet(np.full(shape, np.nan), np.full(shape, np.nan))
+    ends = np.isin(loops.loop, (Loop.LOBE, Loop.LOBES))[..., None]
+    closed_ = ends & (np.abs(paths.phi[..., -1] - paths.phi[..., 0]) < 1e-6 * np.ptp(paths.phi, -1))
+    grid = np.linspace(-REACH, REACH, POINTS[1] + 1)
+    speeds = paths.dphi[closed_]
+    exponent = np.broadcast_to(loops.saddle_exponent[..., None], closed_.shape)[closed_]
+    response = contract(speeds, np.sin(np.outer(WAVES, grid)))
+    blur = 8.0 * ROUNDING * np.abs(speeds).sum(axis=-1)
+    for row, at in enumerate(zip(*np.nonzero(closed_), strict=True)):
+        waves, errors = _zeros(speeds[row], response[row], blur[row], number)
+        found.quiet_frequency[(*at, slice(waves.size))] = exponent[row] * waves
+        found.quiet_frequency_error[(*at, slice(waves.size))] = exponent[row] * errors
+    return found
+
+
+def _zeros(speed: Array, response: Array, blur: float, number: int) -> tuple[Array, Array]:
+    """The first zeros of the response to waves, and their errors: as far as signs are sure."""
+    grid = np.linspace(-REACH, REACH, speed.size)
+    sure = np.flatnonzero(np.abs(response) > blur)
+    # A zero may hide the sign of one wave; more of them in a row are noise.
+    apart = np.flatnonzero(np.diff(sure, prepend=sure[:1]) > 2)
+    sure = sure[: apart[0]] if apart.size else sure
+    turn = np.flatnonzero(np.diff(np.sign(response[sure])))[:number]
+    low, high = WAVES[sure[turn]], WAVES[sure[turn + 1]]
+    start = np.sign(response[sure[turn]])
+    for _ in range(52):
+        middle = 0.5 * (low + high)
+        same = np.sign(contract(np.sin(middle[:, None] * grid), speed)) == start
+        low, high = np.where(same, middle, low), np.where(same, high, middle)
+    waves = 0.5 * (low + high)
+    slope = contract(np.cos(waves[:, None] * grid) * grid, speed)
+    with np.errstate(all="ignore"):
+        errors = blur / np.abs(slope)
+    known = np.logical_and.accumulate(errors <= WORST * waves)
+    return waves[known], errors[known]
 
 
 def _cells(
-    law: PerturbedConservative, formula: Formula, values: dict[str, Array], loops: Separatrices,
+    law: PerturbedLaw, formula: Formula, values: dict[str, Array], loops: Separatrices,
     points: int,
 ) -> tuple[Melnikov, Any]:  # fmt: skip
     """Melnikov's function by so many points in time, and in which cells they were too few."""
@@ -191,7 +277,7 @@ def _cells(
 
 
 def along(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     paths: Paths,
     values: dict[str, Array],
     weight: Any = 1.0,
@@ -227,14 +313,14 @@ def along(
         drives.append((paths.transform(slope, nu), amplitude, nu, phase))
     sizes = [np.abs(a)[:, None, None] for _, a, _, _ in drives]
     responses = [
-        np.where(Z.known(), size * np.abs(Z.value), 0.0)
+        np.where(Z.has_digits(), size * np.abs(Z.value), 0.0)
         for (Z, *_), size in zip(drives, sizes, strict=True)
     ]
     parts: list[Part] = []
     for i, (Z, amplitude, nu, phase) in enumerate(drives):
         # What is small beside the others need not have digits of its own.
         others = [one for j, one in enumerate(responses) if j != i]
-        good = Z.known()
+        good = Z.has_digits()
         if others:
             good |= sizes[i] * Z.error <= WORST * np.max(others, axis=0)
         parts.append((weight * np.where(good, Z.value, np.nan), amplitude, nu, phase))

@@ -44,26 +44,23 @@ class Escape(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Cells:
-    """Wells in a row: coefficients, torque, damping and kT (NaN where nothing is thermal)."""
+class Heat:
+    """What is thermal in some cells: damping and kT (NaN where nothing is)."""
 
-    A: Array
-    B: Array
-    C: Array
-    torque: Array
     damping: Array
     kT: Array
 
-    def at(self, part: Any) -> Cells:
-        """Those of some cells."""
-        return Cells(*(x[part] for x in vars(self).values()))
+    def at(self, part: Any) -> Heat:
+        """That of some cells."""
+        return Heat(self.damping[part], self.kT[part])
 
-    def empty(self) -> Escape:
-        """Nothing, to be filled."""
-        shape = (len(self.A), 2, 2)
-        lost = [np.full(shape, np.nan) for _ in range(3)]
-        regime = np.full(shape, EscapeRegime.ABSENT, np.int8)
-        return Escape(lost[0], lost[1], regime, lost[2])
+
+def empty(cells: int, saddles: int) -> Escape:
+    """Nothing, to be filled."""
+    shape = (cells, saddles, 2)
+    lost = [np.full(shape, np.nan) for _ in range(3)]
+    regime = np.full(shape, EscapeRegime.ABSENT, np.int8)
+    return Escape(lost[0], lost[1], regime, lost[2])
 
 
 @dataclass(frozen=True)
@@ -95,7 +92,7 @@ def returning(loss: Array, beyond: Array) -> Array:
         return depopulation(loss) * depopulation(beyond) / depopulation(loss + beyond)
 
 
-def combined(cells: Cells, first: Array, way: Exit) -> tuple[Array, Array, Any, Array]:
+def combined(cells: Heat, first: Array, way: Exit) -> tuple[Array, Array, Any, Array]:
     """Rate, barrier, regime and relative error."""
     kT, damping, height = cells.kT, cells.damping, way.height
     with np.errstate(all="ignore"):

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from phasekit.errors import Loop
 from phasekit.numerics.compile import Outputs, inline, kernel
+from phasekit.numerics.elementary import hypot
 from phasekit.numerics.launch import launch
 
 Array = npt.NDArray[np.float64]
@@ -69,10 +70,11 @@ def double_pole(n: float, zeta: complex, sine: complex, cosine: complex) -> comp
     too.
     """
     sinh = cmath.sinh(zeta)
+    cube = sinh * sinh * sinh
     if abs(zeta) * max(n, 1.0) > SMALL:
         if n == 0.0:
-            return (zeta * cmath.cosh(zeta) - sinh) / sinh**3
-        return (cmath.cosh(zeta) * sine - n * sinh * cosine) / sinh**3
+            return (zeta * cmath.cosh(zeta) - sinh) / cube
+        return (cmath.cosh(zeta) * sine - n * sinh * cosine) / cube
     # (n^2 + 1) sum (-1)^(j+1) zeta^(2j+1)/(2j+1)! Im (n + i)^(2j), over n where n is 0
     power = complex(1.0)
     total = complex(0.0)
@@ -84,7 +86,14 @@ def double_pole(n: float, zeta: complex, sine: complex, cosine: complex) -> comp
         rise = 2.0 * j * (1.0 if j % 2 == 1 else -1.0) if n == 0.0 else power.imag
         total = total + factor * rise
     ratio = zeta / sinh if abs(zeta) > 0.0 else complex(1.0)
-    return (n * n + 1.0) * total * ratio**3
+    return (n * n + 1.0) * total * (ratio * ratio * ratio)
+
+
+@inline
+def root_of(a: float) -> complex:
+    """Root of a real number."""
+    size = math.sqrt(abs(a))
+    return complex(size, 0.0) if a >= 0.0 else complex(0.0, size)
 
 
 @inline
@@ -92,7 +101,7 @@ def of_lobe(S: float, k2: float, D: float, q: complex, n: float) -> tuple[comple
     """T_0 over -nu where n is 0, and the transforms of e^{i m theta} - 1, m = 1, 2, of a lobe."""
     k, root = math.sqrt(k2), math.sqrt(D)
     q = q if q.imag > 0.0 else -q
-    x = math.asinh(math.hypot(k2, q.real) / root)
+    x = math.asinh(hypot(k2, q.real) / root)
     y = math.atan2(q.imag, S)  # pi - Y
     plain = over_sinh(n, complex(n * y, 0.0))[0] if n > 0.0 else complex(y / PI)
     moved, even = over_sinh(n, complex(n * y, n * x) if n > 0.0 else complex(y, x))
@@ -100,7 +109,7 @@ def of_lobe(S: float, k2: float, D: float, q: complex, n: float) -> tuple[comple
     first = -4.0 * PI * k * unit * moved / q
     g = complex(-S, k2)
     order = n if n > 0.0 else 1.0
-    pole = 2j * PI * unit * (1j * order * even / (k * q * q) - g * moved / (k * q**3))
+    pole = 2j * PI * unit * (1j * order * even / (k * q * q) - g * moved / (k * q * q * q))
     return -4j * PI * math.sin(n * x) * plain, first, 2.0 * first - 4.0 * k2 * k2 * pole
 
 
@@ -110,7 +119,7 @@ def of_winding(S: float, k2: float, D: float, q: complex, n: float) -> tuple[com
     k, E = math.sqrt(k2), math.sqrt(-D)
     Q = q if q.real > 0.0 else -q
     sinh = 1j * Q / E
-    x = math.asinh(math.copysign(math.hypot(sinh.real, S / E), sinh.real if sinh.real else S))
+    x = math.asinh(math.copysign(hypot(sinh.real, S / E), sinh.real if sinh.real else S))
     delta = math.atan2(sinh.imag, k2 / E)
     zeta = complex(x, delta)
     ratio = zeta / sinh if abs(zeta) > 1e-8 else complex(1.0)
@@ -172,7 +181,7 @@ def moments(
     """T_0, T_1, T_-1, T_2, T_-2 on one side of a saddle, from ``theta = 0``."""
     way = 1.0 if side == 1 else -1.0
     k = math.sqrt(k2)
-    q = 1j * k * cmath.sqrt(complex(A)) * cmath.exp(1j * way * phi)
+    q = 1j * k * root_of(A) * cmath.exp(1j * way * phi)
     if loop == LOBES:
         plain, first, second = of_lobe(way * S, k2, D, q, n)
         t1, t2 = -n * k * first, -0.5 * n * k * second
@@ -196,7 +205,7 @@ def means(
 ) -> tuple[complex, complex]:
     """Integrals of ``e^{i m theta} - 1`` over time, m = 1, 2; NaN between two saddles."""
     way = 1.0 if side == 1 else -1.0
-    q = 1j * math.sqrt(k2) * cmath.sqrt(complex(A)) * cmath.exp(1j * way * phi)
+    q = 1j * math.sqrt(k2) * root_of(A) * cmath.exp(1j * way * phi)
     first, second = complex(math.nan), complex(math.nan)
     if loop == LOBES:
         _, first, second = of_lobe(way * S, k2, D, q, 0.0)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Validity
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.laws.perturbed import PerturbedLaw
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int8]
@@ -47,7 +47,7 @@ def error(rate: Array) -> Array:
 
 
 def validity(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     values: dict[str, Any],
     rate: Array,
     held: Any = True,

@@ -15,13 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Loop, ParameterError
-from phasekit.laws.ladder import Conservative, Law, Routhian, is_turn
-from phasekit.laws.perturbed import (
-    PerturbedConservative,
-    TiltedConservative,
-    TiltedRouthian,
-    TiltedTrigonometric,
-)
+from phasekit.laws.ladder import Conservative, Law, Routhian, Standing, Trait, is_turn
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.phase.exact import potential as closed_form
 from phasekit.phase.exact.orbits import orbits
@@ -107,13 +102,6 @@ def answers(law: Law, values: Mapping[str, float]) -> Answers:
     >>> answers(law, {"A": 2.0, "B": 1.0, "C": 0.0}).phi.round(3).tolist()
     [-1.047, 0.0, 1.047, 3.142]
     """
-    if isinstance(law, PerturbedConservative):
-        # At constant momenta a torque keeps an energy, too, but no orbits are known.
-        without = "without a torque" if isinstance(law, TiltedRouthian) else "whose energy stays"
-        raise ParameterError(
-            f"system: got {law.called}, wants one {without}, perturbed.system; "
-            "pk.plot.damped_portrait draws motions under damping and a torque"
-        )
     raise ParameterError(f"system: got {law.called}, wants one of one degree of freedom")
 
 
@@ -157,7 +145,18 @@ def _(law: Formula, values: Mapping[str, float]) -> Answers:
 
 
 @answers.register
-def _(law: TiltedTrigonometric, values: Mapping[str, float]) -> Answers:
+def _(law: PerturbedLaw, values: Mapping[str, float]) -> Answers:
+    if not law.standing.is_within(Standing(Conservative, Trait.TORQUED)):
+        # At constant momenta a torque keeps an energy, too, but no orbits are known.
+        alone = law.traits in Trait.TORQUED
+        without = "without a torque" if alone else "whose energy stays"
+        raise ParameterError(
+            f"system: got {law.called}, wants one {without}, perturbed.system; "
+            "pk.plot.damped_portrait draws motions under damping and a torque"
+        )
+    if not isinstance(law.base, Trigonometric):
+        law.check_searchable()
+        return _under_torque(law, values)
     A, B, C = map(float, law.coefficients({name: np.asarray(x) for name, x in values.items()}))
     N = values["torque"]
     if N and not np.isfinite(4.0 * (abs(A) + abs(B) + abs(C)) + 4.0 * law.base.period * abs(N)):
@@ -168,14 +167,8 @@ def _(law: TiltedTrigonometric, values: Mapping[str, float]) -> Answers:
     return _under_torque(law, values)
 
 
-@answers.register
-def _(law: TiltedConservative, values: Mapping[str, float]) -> Answers:
-    law.check_searchable()
-    return _under_torque(law, values)
-
-
 def _under_torque(
-    law: PerturbedConservative, values: Mapping[str, float], low: float | None = None
+    law: PerturbedLaw, values: Mapping[str, float], low: float | None = None
 ) -> Answers:
     """What is known under a torque: of the line, or of the turn that begins at a coordinate.
 

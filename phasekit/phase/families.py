@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, Loop, Topology
-from phasekit.laws.perturbed import PerturbedTrigonometric
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_gap
 from phasekit.phase.exact.separatrices import phase_space
 from phasekit.phase.numerical.functions import states_at_gap
@@ -89,7 +89,7 @@ def families(energy_max: float | None, A: Array, B: Array, C: Array, level: Arra
 
 
 def families_under_torque(
-    energy_max: float | None, law: PerturbedTrigonometric, *inputs: Array
+    energy_max: float | None, law: PerturbedLaw, *inputs: Array
 ) -> TorquedFamilies:
     """The same families where a torque may act; what rotates there has no period."""
     *parameters, level = np.broadcast_arrays(*inputs)

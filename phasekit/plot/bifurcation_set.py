@@ -70,14 +70,15 @@ def bifurcation_set(
     '$\\lambda$, lambda = B/A'
     """
     flag("counts", counts)
-    needs = ("curve_kind", "sign_of_A", "region_count")
+    needs = ("curve_kind", "region_count")
     ds = labels.dataset(dataset, "dataset", needs, "pk.bifurcation_set")
     ds, shown = Units.of_dataset(ds, angles, units)
     axes = style.axes_for(ax, legend=legend)
     names = (str(ds.attrs["x"]), str(ds.attrs["y"]))
+    signs = ds["sign_of_A"].values if "sign_of_A" in ds else np.zeros(ds.sizes["curve"], int)
     handles: dict[str, Artist] = {}
     for row in range(ds.sizes["curve"]):
-        kind, sign = str(ds["curve_kind"].values[row]), int(ds["sign_of_A"].values[row])
+        kind, sign = str(ds["curve_kind"].values[row]), int(signs[row])
         look = style.inked(style.LOCI.get((kind, sign)) or style.LOCI[kind, 0])
         x, y = (labels.shown(ds[name].isel(curve=row), shown)[0] for name in names)
         (line,) = axes.plot(x, y, zorder=2.5 if kind == "fold" else 2.0, clip_on=True, **look)

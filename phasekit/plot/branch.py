@@ -40,6 +40,29 @@ _UNSTABLE: style.Look = {
     "linewidth": 1.8,
     "label": "unstable",
 }
+#: Of periodic orbits, thick beside the lines of equilibria.
+_STABLE_CYCLE: style.Look = {
+    "color": style.GREEN,
+    "linestyle": "-",
+    "linewidth": 3.0,
+    "label": "stable cycle",
+}
+_UNSTABLE_CYCLE: style.Look = {
+    "color": style.ORANGE,
+    "linestyle": (0, (1.2, 0.9)),
+    "linewidth": 3.0,
+    "label": "unstable cycle",
+}
+#: What is said of a state of periodic orbits, and short names for narrow legends.
+_EXTREMES = ", max and min"
+_SHORT = {
+    f"{word}{more}": f"{short}{more.replace(' and ', '/')}"
+    for word, short in (
+        ("stable equilibrium", "stable"), ("unstable equilibrium", "unstable"),
+        ("stable cycle", "st. cycle"), ("unstable cycle", "unst. cycle"),
+    )
+    for more in ("", _EXTREMES)
+}  # fmt: skip
 _CURVES: dict[str, style.Look] = {
     "fold": {"color": style.BLACK, "linestyle": "-", "linewidth": 2.0, "label": "fold"},
     "hopf": {"color": style.GREEN, "linestyle": "-", "linewidth": 2.0, "label": "Hopf"},
@@ -88,7 +111,7 @@ def branch(
 
     Stable equilibria (centers of a conservative problem) are solid, unstable ones (saddles)
     dashed. Curves in two parameters are drawn in the plane of both. Of periodic orbits the largest
-    and the least value of a state are drawn.
+    and the least value of a state are drawn, thick where stable and thick dots where unstable.
 
     Parameters
     ----------
@@ -146,12 +169,19 @@ def branch(
     stretch = [shown.scale(*item) for item in held.items()]
     axes = style.axes_for(ax, legend=legend)
     handles: dict[str, Artist] = {}
+    mixed = len({one.kind for one in several}) > 1
     for one, pair in zip(several, columns, strict=True):
         for look, across, up in _pieces(one, pair, circle):
             if circle is not None:
                 up, across = circle.unrolled(up, across)
-            (line,) = axes.plot(across * stretch[0], up * stretch[-1], **style.inked(look))
-            handles.setdefault(str(look["label"]), line)
+            text = str(look["label"])
+            if one.kind == "cycle" and y in one.problem_state:
+                text += _EXTREMES
+            elif mixed and one.kind == "equilibrium" and text in ("stable", "unstable"):
+                text += " equilibrium"
+            own = {**style.inked(look), "label": text}
+            (line,) = axes.plot(across * stretch[0], up * stretch[-1], **own)
+            handles.setdefault(text, line)
     marks: dict[tuple[str, str], list[tuple[float, float]]] = {}  # by kind and name of an event
     for one, pair in zip(several, columns, strict=True):
         across, up = (column.values for column in pair)
@@ -183,7 +213,7 @@ def branch(
     axes.set_xlabel(words.label(columns[0][0], shown, style.letters(axes, "x")))
     axes.set_ylabel(words.label(columns[0][1], shown, style.letters(axes, "y")))
     if legend:
-        style.legend_below(axes, list(handles.values()))
+        style.legend_below(axes, list(handles.values()), _SHORT)
     return axes
 
 
@@ -297,7 +327,8 @@ def _looks(one: Branch) -> list[style.Look]:
             style.BRANCHES.get(EquilibriumKind(int(k)), style.BRANCHES[EquilibriumKind.SADDLE])
             for k in kinds
         ]
-    return [_STABLE if k == 0 else _UNSTABLE for k in points.n_unstable.values]
+    looks = (_STABLE_CYCLE, _UNSTABLE_CYCLE) if one.kind == "cycle" else (_STABLE, _UNSTABLE)
+    return [looks[int(k != 0)] for k in points.n_unstable.values]
 
 
 def _size(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> float:

@@ -14,14 +14,15 @@ from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
-from phasekit.bifurcation.exact.surface import equilibrium_surface
+from phasekit.bifurcation.along import view_of
+from phasekit.bifurcation.surface import equilibrium_surface
 from phasekit.errors import EquilibriumKind
-from phasekit.labelled.atlas import single
+from phasekit.labelled.atlas import resting
 from phasekit.labelled.bifurcation_set import bifurcation_set
 from phasekit.labels.arguments import bad, flag, pair, whole
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import Circle, multiple_of_pi, quarters
-from phasekit.plot.parts.units import SYMBOLS, Units
+from phasekit.plot.parts.units import SYMBOLS, Units, coordinate_symbol
 
 FloatArray = NDArray[np.float64]
 
@@ -56,7 +57,7 @@ def branch_surface(
     Parameters
     ----------
     system : system
-        A single system; its own values of the two parameters are not used.
+        A single system in a potential; its own values of the two parameters are not used.
     x, y : str
         Two different parameters on which the equilibria depend.
     xlim, ylim : (float, float)
@@ -88,9 +89,9 @@ def branch_surface(
 
     Notes
     -----
-    The surface is V'(phi) = 0, of [Veljovic2015] (12), on a grid; the folds and cusps on it are
-    those of `bifurcation_set`, exact. phi lives on a circle: the surface goes on from the top to
-    the bottom.
+    The surface is V'(phi) = 0, of [Veljovic2015] (12) or of any potential, on a grid; the folds and
+    cusps on it are those of `bifurcation_set`. Where phi lives on a circle the surface goes on from
+    the top to the bottom.
 
     Examples
     --------
@@ -112,25 +113,27 @@ def branch_surface(
         hint = 'plt.figure().add_subplot(projection="3d") makes one'
         raise bad("ax", ax, "a matplotlib 3-D Axes", hint)
     folds = bifurcation_set(system, x, y, xlim=xlim, ylim=ylim)
-    kind, values = single(system)
-
-    def coefficients(at_x: FloatArray, at_y: FloatArray) -> Any:
-        full = {name: np.full(at_x.shape, value) for name, value in values.items()}
-        return type(kind).valid_coefficients({**full, x: at_x, y: at_y})
-
+    _, law, values = resting(system, x, y, what="branch_surface")
+    box = [folds.attrs[ends] for ends in ("xlim", "ylim")]
+    seen = view_of(law, values, (x, y), (tuple(box[0]), tuple(box[1])))
     held = {name: str(folds[name].attrs.get("units", "")) for name in (x, y)}
     shown = Units.of(angles, units, held)
-    stretch = np.array([shown.scale(*item) for item in [*held.items(), ("phi", "rad")]])
-    circle = Circle.cut_at(cut, stretch[2])
-    box = [folds.attrs[ends] for ends in ("xlim", "ylim")]
+    place = str(folds["phi"].attrs["units"])
+    stretch = np.array([shown.scale(*item) for item in [*held.items(), ("phi", place)]])
+    circle = Circle(seen.ends[0], None)
+    if seen.period is not None:
+        circle = Circle.cut_at(cut, stretch[2], seen.period)
+    elif cut is not None:
+        raise bad("cut", cut, "None, for the coordinate is not on a circle")
+    top = circle.ends if seen.period is not None else seen.ends
     grids = [np.linspace(low, high, cells + 1) for low, high in box]
-    phi = np.linspace(*circle.ends, 2 * cells + 1)
-    surface = equilibrium_surface(coefficients, grids[0], grids[1], phi)
+    phi = np.linspace(*top, 2 * cells + 1)
+    surface = equilibrium_surface(seen.force, grids[0], grids[1], phi)
 
     axes: Any = ax
     if axes is None:
         axes = style.new_figure(1.1).add_subplot(projection="3d")
-    ends = np.array([[*grids[0][[0, -1]]], [*grids[1][[0, -1]]], circle.ends])
+    ends = np.array([[*grids[0][[0, -1]]], [*grids[1][[0, -1]]], top])
     handles: list[Artist] = []
     for code, triangles in zip(FACES, surface, strict=True):
         if triangles.size:
@@ -142,11 +145,12 @@ def branch_surface(
         getattr(axes, f"set_{which}lim")(*(limits * scale))
     axes.set_xlabel(_short(folds[x], shown))
     axes.set_ylabel(_short(folds[y], shown))
-    axes.set_zlabel(rf"$\varphi$ ({shown.text('phi', 'rad')})")
-    ticks = quarters(*circle.ends)
-    axes.set_zticks([tick * stretch[2] for tick in ticks])
-    if stretch[2] == 1.0:
-        axes.set_zticklabels([multiple_of_pi(tick) for tick in ticks])
+    axes.set_zlabel(_name(system, shown, place))
+    if place == "rad":
+        ticks = quarters(*top)
+        axes.set_zticks([tick * stretch[2] for tick in ticks])
+        if stretch[2] == 1.0:
+            axes.set_zticklabels([multiple_of_pi(tick) for tick in ticks])
     axes.yaxis.labelpad = 8.0
     if style.narrow(axes):
         axes.locator_params(axis="x", nbins=4)
@@ -158,6 +162,12 @@ def branch_surface(
     if legend and handles:
         axes.legend(handles=handles, loc="upper left", frameon=False, fontsize="small")
     return axes
+
+
+def _name(system: Any, units: Units, place: str) -> str:
+    """Return symbol and unit of the coordinate."""
+    own = coordinate_symbol(getattr(system, "coordinate", "phi"))
+    return labels.with_unit(f"${own}$", units.text("phi", place))
 
 
 def _short(values: Any, units: Units) -> str:
@@ -190,7 +200,8 @@ def _draw_folds(
             continue
         x, y, phi = (ds[name].values[row] for name in (*names, "phi"))
         phi = circle.home(phi)
-        seam = np.flatnonzero(np.abs(np.diff(phi)) > np.pi) + 1
+        torn = 0.5 * (circle.period or np.inf)
+        seam = np.flatnonzero(np.abs(np.diff(phi)) > torn) + 1
         points = np.insert(np.stack([x, y, phi]) * stretch[:, None], seam, np.nan, axis=1)
         look = style.inked(style.FOLD_CURVE if kind == "fold" else style.PITCHFORK_CURVE)
         (line,) = ax.plot(*points, zorder=10, **look)

@@ -11,14 +11,15 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
-from phasekit.labels.arguments import bad, one_of
+from phasekit.labels.arguments import bad, flag, one_of
 from phasekit.laws.equations import equations_of
-from phasekit.laws.ladder import Lawful
+from phasekit.laws.ladder import Lawful, Trait
 from phasekit.phase.answers import answers
 from phasekit.phase.level_curves import Arc, Level, LevelCurves
 from phasekit.plot.parts import color_bar, labels, strokes, style
 from phasekit.plot.parts.circle import Circle
 from phasekit.plot.parts.units import Units, coordinate_symbol, printed
+from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.system import as_system, single
 
 FloatArray = NDArray[np.float64]
@@ -42,10 +43,13 @@ def phase_portrait(
     cut: float | None = None,
     window: Any = None,
     duration: float | None = None,
+    plane: Any = None,
+    cycles: bool | None = None,
+    basins: bool = False,
     legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:
-    r"""Draw the phase portrait of one system on the cylinder, or of a planar flow.
+    r"""Draw the phase portrait of one system on the cylinder, or of any flow.
 
     Level curves of the energy integral :math:`h = \dot\varphi^2/2 + V(\varphi)` lie below, solid
     where they close and dotted where they run round the cylinder; separatrices lie on top; centers
@@ -53,9 +57,10 @@ def phase_portrait(
     the same line of the cylinder. Of a machine on a free support the levels are those of
     :math:`M\dot\varphi^2/2 + V_p(\varphi)`, in J, at one angular momentum :math:`p`.
 
-    Of a `Problem` of two states, or a system that states its rates: the direction of the flow, the
-    nullclines, the equilibria by kind, and the stable and unstable manifolds of saddles, in a
-    window.
+    Of a `Problem` of two states, a system that states its rates, or one with damping: the direction
+    of the flow, the nullclines, the equilibria by kind, the stable and unstable manifolds of
+    saddles, and all limit cycles, dashed where unstable, in a window. Of more states the
+    equilibria, manifolds and chosen motions, projected to a plane of two states.
 
     Parameters
     ----------
@@ -69,9 +74,10 @@ def phase_portrait(
         Energies (s^-2, or J) of the level curves. Left out, they are chosen evenly in speed between
         the centers and saddles and above them. An empty list draws none; an energy below the least
         potential has no curve.
-    orbits : array_like, optional
+    orbits : array_like, or mapping, optional
         Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs; the level
-        curve through each is drawn over the others and its start is marked.
+        curve through each is drawn over the others and its start is marked. Of a flow states of
+        one number each, or mappings by name, from which motions are drawn.
     color_by : {"period", "frequency", "action"}, optional
         Color the level curves by what their orbits have, on a logarithmic scale with a color bar;
         gray if left out. The period of a rotation is the time of one turn. Levels that are not
@@ -87,6 +93,13 @@ def phase_portrait(
         Of a flow: the part of the plane, by state; by default the system's window.
     duration : float, optional
         Of a flow: the time for which the motions of `orbits` are drawn.
+    plane : (str, str), optional
+        Of a flow: the two states to draw; by default the first two.
+    cycles : bool, optional
+        Of a planar flow: whether to look for limit cycles; by default unless f is a Python
+        function, of which that takes long.
+    basins : bool, default False
+        Of a planar flow: whether to shade the basins of attractors.
     legend : bool
         Whether to explain lines and markers under the axes.
     ax : matplotlib.axes.Axes, optional
@@ -119,18 +132,26 @@ def phase_portrait(
     ... )
     >>> ax = pk.plot.phase_portrait(predator, orbits=(0.6, 0.1))
     """
+    flag("basins", basins)
     found = system if isinstance(system, Lawful) else as_system(system)
-    if (law := equations_of(found)) is not None:
+    traits = getattr(getattr(found, "standing", None), "traits", None)
+    loses = traits is not None and traits not in Trait.TORQUED
+    if loses or equations_of(found) is not None:
         given = {"energies": energies, "color_by": color_by, "units": units, "cut": cut}
         for name, value in given.items():
             if value is not None:
                 raise bad(name, value, "nothing for a flow, which has no energy")
         from phasekit.plot.parts.flow_portrait import flow_portrait
 
+        problem = _flow(found)
+        if loses:
+            window = _window(found, problem, window)
         return flow_portrait(
-            found, law, window=window, orbits=orbits, duration=duration, legend=legend, ax=ax
-        )
-    for name, value in {"window": window, "duration": duration}.items():
+            problem, window=window, plane=plane, orbits=orbits, duration=duration, cycles=cycles,
+            shade=basins, legend=legend, ax=ax,
+        )  # fmt: skip
+    given = {"window": window, "duration": duration, "plane": plane, "cycles": cycles}
+    for name, value in {**given, "basins": basins or None}.items():
         if value is not None:
             raise bad(name, value, "nothing for a system in a potential")
     if color_by is not None:
@@ -156,6 +177,40 @@ def phase_portrait(
     if legend:
         style.legend_below(axes, handles)
     return axes
+
+
+def _flow(system: Any) -> Problem:
+    """The equations of a flow that can be drawn.
+
+    Raises
+    ------
+    ParameterError
+        If it is a map, or depends on time, or has one state.
+    """
+    problem = as_problem(system)
+    if problem.map or problem.time is not None or len(problem.state) < 2:
+        hint = "draw pk.flow(...) with pk.plot.time_history"
+        if problem.time is not None:
+            hint = "draw pk.plot.poincare_section of motions once a period"
+        raise bad("system", problem, "a flow of two states or more without forcing", hint)
+    return problem
+
+
+def _window(system: Any, problem: Problem, window: Any) -> Any:
+    """A window of a system with damping, where none is said: past its separatrices.
+
+    Under a torque it reaches past the speed at which damping holds that.
+    """
+    if window is not None and not isinstance(window, Mapping):
+        return window
+    land = curves_of(system.system)
+    x, v = problem.state[:2]
+    reach = 1.42 * land.fastest(land.summit) or 1.0
+    damping, torque = (abs(float(problem.parameters.get(n, 0.0))) for n in ("damping", "torque"))
+    if damping > 0.0:
+        reach = max(reach, 1.25 * torque / damping)
+    known = {} if x in problem.periods else {x: land.window}
+    return {**known, v: (-reach, reach), **(window or {})}
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import flag, named
 from phasekit.plot.parts import labels, strokes, style
-from phasekit.plot.parts.units import Units
+from phasekit.plot.parts.units import Units, coordinate_symbol
 
 TIME = "time"
 SYMBOLS = {"motion_phi": r"$\varphi$", "motion_dphi": r"$\dot\varphi$"}
@@ -22,7 +22,7 @@ MOST = len(style.ORBIT_COLORS) * len(style.ORBIT_DASHES)
 
 def time_history(
     dataset: xr.Dataset,
-    variable: str = "motion_phi",
+    variable: str | None = None,
     *,
     angles: style.Angles = "rad",
     units: Mapping[str, str] | None = None,
@@ -36,10 +36,11 @@ def time_history(
     Parameters
     ----------
     dataset : xarray.Dataset
-        What `flow` or `separatrix_motion` returns for times along the dim ``time``. Along other
-        dims there are several motions, of which each gets a line.
-    variable : str
-        The quantity to draw: motion_phi, motion_dphi, or any other number along ``time``.
+        What `flow` or `separatrix_motion` returns for times along the dim ``time``, of a map for
+        counts of iterations. Along other dims there are several motions, of which each gets a line.
+    variable : str, optional
+        The quantity to draw: motion_phi, motion_dphi, ``motion_`` and the name of a state, or any
+        other number along ``time``; by default the first state.
     angles : {"rad", "deg"}
         Unit in which angles and angular velocities are shown.
     units : mapping of str to str, optional
@@ -61,7 +62,8 @@ def time_history(
 
     Notes
     -----
-    The motions are those of [Veljovic2015] eq. (12), in closed form.
+    Those of a system in a potential are the motions of [Veljovic2015] eq. (12), in closed form.
+    Where the states have no units, the time is shown without one.
 
     Examples
     --------
@@ -86,6 +88,8 @@ def time_history(
             "dataset: got a Dataset without numbers along the dim 'time', wants motions over "
             "time, for example pk.flow(system, 0.5, 0.0, np.linspace(0.0, 10.0, 201))"
         )
+    if variable is None:
+        variable = next((name for name in offered if name.startswith("motion_")), offered[0])
     named("variable", variable, offered)
     flag("legend", legend)
     times = ds[TIME]
@@ -95,14 +99,18 @@ def time_history(
 
     held = str(ds[variable].attrs.get("units", ""))
     stretch, pace = shown.scale(variable, held), shown.scale(TIME, "s")
+    counted = str(times.attrs.get("units", "")) == "1"
     handles: list[Artist] = []
     for number, (name, motion) in enumerate(motions.items()):
         look = strokes.orbit_look(number) if len(motions) > 1 else style.MOTION
+        if counted:  # nothing is between two iterations
+            look = {**look, "marker": ".", "markersize": 5, "linewidth": 0.6}
         handles += axes.plot(times.values * pace, motion.values * stretch, label=name, **look)
     if held == "rad":
         style.unwrapped_axis(axes, "y", shown, variable)
     axes.set_xlim(*sorted((float(times[0]) * pace, float(times[-1]) * pace)))
-    axes.set_xlabel(f"$t$ ({shown.text(TIME, 's')})")
+    clock = "" if held in ("", "1") and variable not in SYMBOLS else f" ({shown.text(TIME, 's')})"
+    axes.set_xlabel("iteration" if counted else f"$t${clock}")
     axes.set_ylabel(_label(ds[variable], shown, style.letters(axes, "y")))
     if legend and len(motions) > 1:
         style.legend_below(axes, handles)
@@ -152,6 +160,9 @@ def motions_of(values: xr.DataArray, along: str, units: Units) -> dict[str, xr.D
 
 def _label(values: xr.DataArray, units: Units, width: int) -> str:
     name, held = str(values.name), str(values.attrs.get("units", ""))
-    if name not in SYMBOLS:
-        return labels.label(values, units, width)
-    return labels.with_unit(SYMBOLS[name], units.text(name, held))
+    if name in SYMBOLS:
+        return labels.with_unit(SYMBOLS[name], units.text(name, held))
+    if name.startswith("motion_"):
+        symbol = f"${coordinate_symbol(name.removeprefix('motion_'))}$"
+        return symbol if held in ("", "1") else labels.with_unit(symbol, units.text(name, held))
+    return labels.label(values, units, width)

@@ -9,8 +9,8 @@ import numpy as np
 
 from phasekit.constants import STANDARD_GRAVITY
 from phasekit.labels.arguments import NumberLike
-from phasekit.laws.perturbed import Rate
-from phasekit.laws.trigonometric import Values
+from phasekit.laws.terms import Rate
+from phasekit.laws.trigonometric import Values, turn
 from phasekit.systems.parameter import parameter
 from phasekit.systems.system import System
 
@@ -20,7 +20,7 @@ def _particle_euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
 
     The normal of the circle's plane points to the side to which omega turns its horizontal.
     """
-    sine = np.sin(v["tilt"])
+    sine = turn(v["tilt"])[0]
     return sine, v["offset"] * sine / v["radius"], v["normal_offset"] / v["radius"]
 
 

@@ -13,8 +13,9 @@ from phasekit.constants import STANDARD_GRAVITY
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import FloatArray, NumberLike, Value, bad
 from phasekit.labels.grid import combine
-from phasekit.laws.perturbed import Rate
-from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_mixing, disk_products
+from phasekit.laws.terms import Rate
+from phasekit.laws.trigonometric import turn
+from phasekit.mechanics.disk import disk_eccentricity, disk_inertia, disk_products, mixing
 from phasekit.systems.parameter import Parameter, attrs_of, parameter
 from phasekit.systems.system import System
 
@@ -28,7 +29,8 @@ INERTIA_NAMES = (
 
 def _euler(v: Mapping[str, Any]) -> tuple[Any, Any, Any]:
     """The torque of omega1' on a disk, ``-kappa cos phi``: Lagrange's equations."""
-    return 0.0, 0.0, -disk_mixing(v["r"], v["e"], v["beta"])
+    sine, cosine, _ = turn(v["beta"])
+    return 0.0, 0.0, -mixing(v["r"], v["e"], sine, cosine)
 
 
 def _eccentricity(e: FloatArray, beta: FloatArray) -> tuple[FloatArray]:

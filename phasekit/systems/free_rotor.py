@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,9 @@ from phasekit.systems.identity import parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.rotor_states import RotorStates
 from phasekit.systems.system import MODELS
+
+if TYPE_CHECKING:
+    from phasekit.systems.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +103,9 @@ class FreeGyroRotor(RotorStates):
         ),
     )
     rung: ClassVar[type[Law]] = Routhian
-    own_units: ClassVar[Mapping[str, str]] = {"state_energy": "J"}
+    own_units: ClassVar[Mapping[str, str]] = {
+        "state_energy": "J", "state_gap": "J", "state_action": "kg m2 s-1"
+    }  # fmt: skip
 
     def __post_init__(self) -> None:
         """Check that it is one machine, with all of its masses."""
@@ -227,6 +232,58 @@ class FreeGyroRotor(RotorStates):
     def __hash__(self) -> int:
         """Hash of the parameters; a machine that holds DataArrays has none."""
         return hash((type(self).__name__, self.disk, self.carrier_inertia, self.momentum))
+
+    def driven(
+        self,
+        torque1: Any = None,
+        torque2: Any = None,
+        *,
+        parameters: Mapping[str, NumberLike] | None = None,
+        period: Any = None,
+    ) -> Problem:
+        """The whole machine under torques: support and disk, four states, at no fixed momentum.
+
+        It goes wherever a `Problem` goes: `flow`, `poincare_section`, `stroboscopic`, `lyapunov`,
+        `sweep`, and at constant torques to branches.
+
+        Parameters
+        ----------
+        torque1, torque2 : float, str, sympy.Expr or callable, optional
+            Torques on the support, and on the disk by its shaft, N m: numbers, formulas of t, phi1,
+            phi, omega1, dphi and of `parameters`, or functions of (t, phi1, phi, omega1, dphi).
+        parameters : mapping of str to float or array_like, optional
+            Parameters of the formulas.
+        period : str, sympy.Expr or float, optional
+            The period in time of the torques.
+
+        Returns
+        -------
+        Problem
+            With the states ``phi1``, ``phi``, ``omega1``, ``dphi``. Motions begin with phi1 = 0 and
+            the disk's omega1 unless told otherwise. Where the torques are formulas motions give
+            ``motion_domega1``, ``motion_ddphi``, ``motion_torque1``, ``motion_torque2``,
+            ``motion_torque_power``, ``motion_mechanical_energy`` and ``motion_angular_momentum``.
+
+        Raises
+        ------
+        ParameterError
+            If a torque is unusable, or a name is one of the machine's.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> disk = pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.05, r=0.1, omega1=6.0, m=2.0)
+        >>> machine = pk.FreeGyroRotor(disk, carrier_inertia=0.02)
+        >>> motor = machine.driven("pull - slip*omega1", parameters={"pull": 0.5, "slip": 0.05})
+        >>> ds = pk.flow(motor, phi=0.5, dphi=0.0, t=[0.0, 1.0])
+        >>> lost = ds.motion_torque1 - (0.5 - 0.05 * ds.motion_omega1)
+        >>> abs(lost).max().item() < 1e-12
+        True
+        """
+        from phasekit.systems.driven_problem import driven_problem
+
+        self._machine  # noqa: B018 - of numbers alone
+        return driven_problem(self, (torque1, torque2), parameters, period)
 
     def amended(self, p: float) -> Amended:
         """Reduction to phi alone at an angular momentum that no torque changes.

@@ -24,7 +24,7 @@ SCHEMA = "phasekit_schema"
 @functools.cache
 def versions() -> dict[str, str]:
     """Return the versions of the libraries that made a result, as attributes."""
-    libraries = {name: importlib.metadata.version(name) for name in ("numpy", "numba", "xarray")}
+    libraries = {name: importlib.metadata.version(name) for name in ("numpy", "llvmlite", "xarray")}
     return {f"{name}_version": v for name, v in {"phasekit": __version__, **libraries}.items()}
 
 

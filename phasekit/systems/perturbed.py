@@ -19,20 +19,24 @@ from phasekit.labels.arguments import (
     same,
     unknown,
 )
-from phasekit.laws.ladder import Law
+from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Flow, Law, Standing, Trait
 from phasekit.laws.perturbed import (
     OWN,
-    PerturbedConservative,
+    PerturbedLaw,
     drift_name,
     forcing_names,
     modulation_names,
 )
+from phasekit.laws.terms import Own
 from phasekit.systems import perturbed_parts as parts
 from phasekit.systems.bases import named_model
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.identity import MODEL, parameter_values, refuse_another
 from phasekit.systems.parameter import Parameter
+from phasekit.systems.perturbed_problem import equations_in_results
 from phasekit.systems.system import MODELS, System
+from phasekit.systems.term import Term
 
 
 class Perturbed(System):
@@ -64,6 +68,9 @@ class Perturbed(System):
         and s^-1.
     kT : float or array_like, default 0.0
         Thermal energy in s^-2 of the white noise ``sqrt(2 damping kT) xi(t)``, >= 0.
+    terms : Term or sequence of Term, optional
+        Forces of one's own, per unit of inertia: formulas or functions of time and state, with
+        parameters, and states, of their own.
 
     Attributes
     ----------
@@ -73,6 +80,7 @@ class Perturbed(System):
     modulation, drift : dict
         By the name of the parameter.
     omega1 : callable, (times, values) or None
+    terms : tuple of Term
 
     Raises
     ------
@@ -114,7 +122,7 @@ class Perturbed(System):
     """
 
     declared: ClassVar[tuple[Parameter, ...]] = ()
-    rung: ClassVar[type[Law]] = PerturbedConservative
+    rung: ClassVar[type[Law]] = Flow
 
     system: System
     damping: Value
@@ -125,6 +133,9 @@ class Perturbed(System):
     modulation: Mapping[str, Harmonic]
     drift: Mapping[str, Value]
     omega1: Any
+    terms: tuple[Term, ...]
+    traits: Trait
+    _own: tuple[Own, ...]
 
     def __init__(
         self,
@@ -138,13 +149,16 @@ class Perturbed(System):
         drift: Mapping[str, NumberLike] | None = None,
         omega1: Callable[[float], float] | tuple[Any, Any] | None = None,
         kT: NumberLike = 0.0,
+        terms: Term | Sequence[Term] | None = None,
     ) -> None:
         base = parts.base_of(system)
         parts.refuse_varying(base, modulation=modulation, drift=drift, omega1=omega1)
         given = {"damping": damping, "quadratic": quadratic, "torque": torque, "kT": kT}
         own = {p.name: p.check(given[p.name]) for p in parts.OWN}
         drive = parts.Drive(base, forcing, modulation, drift)
+        kept, laws = parts.own_terms(terms, base)
         declared = [parts.worded(p, own[p.name]) for p in parts.OWN] + drive.declared
+        declared += [p for term in kept for p in term.declared]
         parts.refuse_taken(base, declared)
         varying = {*drive.modulation, *drive.drift}
         values = {
@@ -155,7 +169,9 @@ class Perturbed(System):
             "drift": MappingProxyType(drive.drift),
             "omega1": parts.prescribed(omega1, base, varying),
             "declared": (*base.declared, *declared),
-            "rung": parts.rung_of(base, own, bool(drive.declared) or omega1 is not None),
+            "terms": kept,
+            "traits": parts.traits_of(own, bool(drive.declared) or omega1 is not None, laws),
+            "_own": laws,
         }
         for key, value in values.items():
             object.__setattr__(self, key, value)
@@ -187,27 +203,46 @@ class Perturbed(System):
         for name, harmonic in self.modulation.items():
             values.update(zip(modulation_names(name), harmonic.values, strict=True))
         values.update({drift_name(name): rate for name, rate in self.drift.items()})
+        for term in self.terms:
+            values.update(term.parameters)
         return values
 
     @property
-    def law(self) -> PerturbedConservative:
-        """The law, and what is added to it."""
+    def standing(self) -> Standing:
+        """Where its law stands: the rung of the system's, and the traits of the terms."""
+        return Standing(self.system.rung, self.traits)
+
+    @property
+    def law(self) -> PerturbedLaw:
+        """The law of the system, and the terms that are added to it."""
         base: Any = self.system.law_of_parameters
-        rung: Any = self.rung
         known = self.system.parameters
-        law: PerturbedConservative = rung(
+        return PerturbedLaw(
             base=base,
             names=tuple(self.parameters),
             inputs=tuple(name for name in self.system.formula_inputs() if name in known),
-            harmonics=len(self.forcing),
-            modulated=tuple(self.modulation),
-            drifting=tuple(self.drift),
+            terms=parts.terms_of(
+                len(self.forcing), self.modulation, self.drift, self.omega1, self._own
+            ),
             rate=self.system.frame_rate,
-            prescribed=self.omega1,
             unit=self._driven_unit(),
-            torqued=not (isinstance(self.torque, float) and self.torque == 0.0),
+            traits=self.traits,
         )
-        return law
+
+    def equations(self) -> Equations:
+        """The law as first-order equations of phi, dphi and the states of its terms.
+
+        Returns
+        -------
+        Equations
+            Formulas, or a function where a term is one.
+
+        Raises
+        ------
+        ParameterError
+            If a force jumps, or omega1 is prescribed beside a force that is no formula.
+        """
+        return equations_in_results(self)
 
     def _driven_unit(self) -> str:
         modulated = [p.units for p in self.system.declared if p.name in list(self.modulation)[:1]]
@@ -284,7 +319,7 @@ class Perturbed(System):
     @property
     def arguments(self) -> dict[str, Any]:
         """The keyword arguments that rebuild it."""
-        names = ("system", *OWN, "forcing", "modulation", "drift", "omega1")
+        names = ("system", *OWN, "forcing", "modulation", "drift", "omega1", "terms")
         own = {name: getattr(self, name) for name in names}
         return {**own, "modulation": dict(self.modulation), "drift": dict(self.drift)}
 
@@ -299,6 +334,7 @@ class Perturbed(System):
             "phasekit_forcing": str(len(self.forcing)),
             "phasekit_modulation": " ".join(self.modulation),
             "phasekit_drift": " ".join(self.drift),
+            **({"phasekit_terms": parts.stored(self.terms)} if self.terms else {}),
         }
 
     @classmethod
@@ -341,6 +377,7 @@ class Perturbed(System):
             forcing=[Harmonic(*read(*forcing_names(i))) for i in range(int(number))],
             modulation={p: Harmonic(*read(*modulation_names(p))) for p in modulated.split()},
             drift={p: read(drift_name(p))[0] for p in drifting.split()},
+            terms=parts.restored(ds, lambda names: dict(zip(names, read(*names), strict=True))),
         )
 
     def __reduce__(self) -> Any:
@@ -365,6 +402,8 @@ class Perturbed(System):
             shown.append(f"drift={{{rates}}}")
         if self.omega1 is not None:
             shown.append(f"omega1={describe(self.omega1)}")
+        if self.terms:
+            shown.append(f"terms={list(self.terms)!r}")
         return f"Perturbed({', '.join(shown)})"
 
     def __eq__(self, other: object) -> bool:
@@ -377,6 +416,7 @@ class Perturbed(System):
             and list(mine) == list(theirs)
             and all(same(mine[name], theirs[name]) for name in mine)
             and parts.same_prescribed(self.omega1, other.omega1)
+            and self.terms == other.terms
         )
 
     def __hash__(self) -> int:

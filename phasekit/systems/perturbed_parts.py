@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,22 +12,13 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, describe, reals, unknown
-from phasekit.laws.ladder import Conservative, Law, Routhian
-from phasekit.laws.perturbed import (
-    PerturbedConservative,
-    PerturbedRouthian,
-    PerturbedTrigonometric,
-    TiltedConservative,
-    TiltedRouthian,
-    TiltedTrigonometric,
-    drift_name,
-    forcing_names,
-    modulation_names,
-)
-from phasekit.laws.trigonometric import Trigonometric
+from phasekit.laws import terms as laws
+from phasekit.laws.ladder import Conservative, Routhian, Trait
+from phasekit.laws.perturbed import drift_name, forcing_names, modulation_names
 from phasekit.systems.harmonic import Harmonic
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import System, as_system
+from phasekit.systems.term import Term, law_of, term_of
 
 OWN = (
     Parameter(name="damping", units="s-1", long_name="linear damping"),
@@ -53,7 +45,7 @@ def base_of(system: Any) -> System:
     """
     found = as_system(system)
     wants = "a system in a potential: a disk, an analogue, a pk.Potential, a pk.FreeGyroRotor"
-    if issubclass(found.rung, PerturbedConservative):
+    if found.standing.traits is not None:
         raise bad("system", found, wants, "it is perturbed already; use .replace(...)")
     if not issubclass(found.rung, (Conservative, Routhian)):
         raise bad("system", found, wants)
@@ -78,15 +70,50 @@ def refuse_varying(base: System, **arguments: Any) -> None:
             raise bad(name, value, f"nothing, of a {type(base).__name__}", hint)
 
 
-def rung_of(base: System, own: Mapping[str, Any], driven: bool) -> type[Law]:
-    """Rung of the ladder of laws: the most special one that holds for all values."""
-    still = all(isinstance(own[n], float) and own[n] == 0.0 for n in ("damping", "quadratic"))
-    alone = still and not driven
-    if issubclass(base.rung, Routhian):
-        return TiltedRouthian if alone else PerturbedRouthian
-    if not issubclass(base.rung, Trigonometric):
-        return TiltedConservative if alone else PerturbedConservative
-    return TiltedTrigonometric if alone else PerturbedTrigonometric
+def own_terms(terms: Any, base: System) -> tuple[tuple[Term, ...], tuple[laws.Own, ...]]:
+    """Terms of one's own, as they are and in the law of a system.
+
+    Raises
+    ------
+    ParameterError
+        If one is none, or two have parameters or states of one name.
+    """
+    several = terms if isinstance(terms, (list, tuple)) else () if terms is None else (terms,)
+    taken: set[str] = set()
+    for one in several:
+        if not isinstance(one, Term):
+            raise bad("terms", one, "a pk.Term(...), or a list of them")
+        for name in (*(p.name for p in one.declared), *one.states):
+            if name in taken:
+                raise bad("terms", name, "names that differ from term to term")
+            taken.add(name)
+    kept = tuple(several)
+    return kept, tuple(law_of(one, base, f"terms[{i}]") for i, one in enumerate(kept))
+
+
+def traits_of(own: Mapping[str, Any], driven: bool, terms: Sequence[laws.Own]) -> Trait:
+    """What terms bring in, for all values: those of numbers that are zero bring in nothing."""
+    found = Trait.DRIVEN if driven else Trait(0)
+    for one in terms:
+        found |= one.trait
+    for term in laws.STANDARD:
+        (name,) = term.names
+        if not (isinstance(own[name], float) and own[name] == 0.0):
+            found |= term.trait
+    # Noise is that of the damping.
+    return found if Trait.DAMPED in found else found & ~Trait.NOISY
+
+
+def terms_of(
+    harmonics: int, modulated: Any, drifting: Any, prescribed: Any, own: Sequence[laws.Own]
+) -> tuple[laws.Term, ...]:
+    """All terms, in the order in which their forces are added."""
+    terms = [*laws.STANDARD, *(laws.Forcing(forcing_names(i)) for i in range(harmonics))]
+    if prescribed is not None:
+        terms.append(laws.Prescribed((), "omega1", prescribed))
+    terms += [laws.Modulation(modulation_names(name), name) for name in modulated]
+    terms += [laws.Drift((drift_name(name),), name) for name in drifting]
+    return (*terms, *own)
 
 
 class Drive:
@@ -267,7 +294,18 @@ def parameters_of_drive(arguments: dict[str, Any], changes: dict[str, Any]) -> d
         modulation = {k: harmonic(one, modulation_names(k)) for k, one in modulation.items()}
     if isinstance(drift, Mapping):
         drift = {k: changes.pop(drift_name(k), rate) for k, rate in drift.items()}
-    return {**arguments, "forcing": forcing, "modulation": modulation, "drift": drift}
+    terms = arguments["terms"]
+    terms = [terms] if isinstance(terms, Term) else terms
+    if isinstance(terms, (list, tuple)):
+        terms = [changed(one, changes) for one in terms]
+    varied = {"forcing": forcing, "modulation": modulation, "drift": drift}
+    return {**arguments, **varied, "terms": terms}
+
+
+def changed(term: Any, changes: dict[str, Any]) -> Any:
+    """A term with those of the changes that are its own, which are taken out."""
+    names = [p.name for p in term.declared if p.name in changes] if isinstance(term, Term) else []
+    return term.replace(**{name: changes.pop(name) for name in names}) if names else term
 
 
 def attribute(ds: xr.Dataset, name: str) -> str:
@@ -285,3 +323,33 @@ def attribute(ds: xr.Dataset, name: str) -> str:
             "stored there; the Dataset is damaged: make the map again"
         )
     return value
+
+
+def stored(terms: Sequence[Term]) -> str:
+    """What maps hold of terms of one's own, beside their parameters' values."""
+    return json.dumps([term.specification for term in terms])
+
+
+def restored(ds: xr.Dataset, read: Callable[[Sequence[str]], dict[str, Any]]) -> list[Term]:
+    """The terms of one's own of a map.
+
+    Raises
+    ------
+    ParameterError
+        If one is a function, of which a map holds no code, or what it holds is damaged.
+    """
+    if "phasekit_terms" not in ds.attrs:
+        return []
+    try:
+        found = json.loads(attribute(ds, "terms"))
+        names = [[] if one is None else one["parameters"] for one in found]
+    except (TypeError, ValueError, KeyError):
+        raise ParameterError(
+            "ds: got a damaged attribute 'phasekit_terms', wants the one that phasekit wrote"
+        ) from None
+    if None in found:
+        raise ParameterError(
+            "ds: got results of a system with a term that is a function, of which a map holds no "
+            "code; make the system again: pk.Perturbed(system, terms=...)"
+        )
+    return [term_of(one, read(own)) for one, own in zip(found, names, strict=True)]

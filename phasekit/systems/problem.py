@@ -18,7 +18,6 @@ from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
-from phasekit.laws.perturbed import PerturbedConservative
 from phasekit.systems.moving_problem import moving_formulas, moving_words
 from phasekit.systems.perturbed_problem import formulas_of, words_of
 from phasekit.systems.problem_parts import (
@@ -31,9 +30,12 @@ from phasekit.systems.problem_parts import (
     jet_of,
     make_field,
     names_of,
+    noise_of,
+    observables_of,
     problem_of_dataset,
     refuse_arrays,
     refuse_of_maps,
+    start_of,
     window_of,
     words_checked,
     written,
@@ -71,7 +73,8 @@ class Problem(ProblemSources, System):
         Of a forced system, the name of time: a symbol in formulas, an argument like a parameter of
         a function.
     period : str, sympy.Expr or float, optional
-        The period of f in time, a number or a formula of the parameters; it comes with `time`.
+        The period of f in time, a number or a formula of the parameters. With `time` alone f
+        repeats itself never; motions can be followed then, and periodic orbits cannot.
     conservative : bool, default False
         Whether the system conserves energy: x'' = -V'(x) as (x, x'), or, with one state, f is the
         force -V'(x). Equilibria are then centers and saddles, not stable or unstable.
@@ -84,6 +87,16 @@ class Problem(ProblemSources, System):
         Names for formulas, to be used in formulas and in later definitions.
     functions : mapping of str to str or sympy.Expr, optional
         Functions by their form, ``{"s(x)": "1/(1 + exp(-x))"}``.
+    start : mapping of str to float, optional
+        States at t = 0 by name: where motions begin, and branches look for an equilibrium first,
+        unless something else is said.
+    observables : mapping of str to str or sympy.Expr, optional
+        Formulas of the states, the parameters and the time by name, of which motions give the
+        values beside those of the states.
+    noise : mapping of str to float, str or sympy.Expr, optional
+        White noise of states: its amplitude s, a number or a formula of the parameters, in
+        ``dx = f dt + s dW``. `flow` with ``paths=`` and `first_passage` follow it; all else is
+        answered without noise.
 
     Raises
     ------
@@ -121,8 +134,8 @@ class Problem(ProblemSources, System):
     """
 
     __slots__ = (
-        "_field", "_own", "_values", "conservative", "f", "jac", "map", "period", "periods",
-        "state", "system", "time", "times", "window", "words",
+        "_field", "_own", "_values", "conservative", "f", "jac", "map", "noise", "observables",
+        "period", "periods", "start", "state", "system", "time", "times", "window", "words",
     )  # fmt: skip
 
     rung: ClassVar[Any] = OfInstance(lambda problem: Map if problem.map else Flow, Flow)
@@ -132,6 +145,9 @@ class Problem(ProblemSources, System):
     jac: Callable[..., Any] | None
     state: tuple[str, ...]
     window: Mapping[str, tuple[float, float]]
+    start: Mapping[str, float]
+    observables: Mapping[str, Any]
+    noise: Mapping[str, Any]
     periods: Mapping[str, float]
     time: str | None
     period: Any
@@ -159,6 +175,9 @@ class Problem(ProblemSources, System):
         window: Mapping[str, tuple[float, float]] | None = None,
         definitions: Mapping[str, Any] | None = None,
         functions: Mapping[str, Any] | None = None,
+        start: Mapping[str, float] | None = None,
+        observables: Mapping[str, Any] | None = None,
+        noise: Mapping[str, Any] | None = None,
     ) -> None:
         if state is None:
             if not isinstance(f, Mapping):
@@ -172,7 +191,9 @@ class Problem(ProblemSources, System):
         angles = angles_of(periods, states)
         flag("conservative", conservative)
         flag("map", map)
-        refuse_of_maps(map, conservative=conservative or None, time=time, period=period)
+        refuse_of_maps(
+            map, conservative=conservative or None, time=time, period=period, noise=noise or None
+        )
         if jac is not None and not callable(jac):
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
@@ -180,7 +201,7 @@ class Problem(ProblemSources, System):
         # The first of arrays stands for all.
         first = {name: float(np.ravel(value)[0]) for name, value in values.items()}
         clock = clock_of(time, period, states, first)
-        if clock is not None and conservative:
+        if time is not None and conservative:
             raise bad("conservative", True, "False with time: a forced system has no energy")
         self._set("time", time)
         self._set("period", clock)
@@ -188,6 +209,7 @@ class Problem(ProblemSources, System):
         self._set("_values", values)
         self._set("periods", MappingProxyType(angles))
         self._set("window", MappingProxyType(window_of("window", window, states)))
+        self._set("start", MappingProxyType(start_of(start, states)))
         self._set("conservative", bool(conservative))
         self._set("map", bool(map))
         self._set("times", 1)
@@ -200,6 +222,9 @@ class Problem(ProblemSources, System):
         self._set("f", kept)
         self._set("_field", field)
         self._set("_own", own)
+        given = observables_of(observables, states, names, definitions, functions)
+        self._set("observables", MappingProxyType(given))
+        self._set("noise", MappingProxyType(noise_of(noise, states, values)))
 
     def _times(self) -> tuple[str, ...]:
         """The name of time, if f depends on it."""
@@ -227,7 +252,7 @@ class Problem(ProblemSources, System):
         return kind(
             self.state, tuple(self._values), self.f, self.periods, self.time, self.window,
             {name: units[name] for name in self.state if name in units}, self.times,
-            self.period,
+            self.period, self.start, self.noise,
         )  # fmt: skip
 
     def formula_inputs(self) -> tuple[str, ...]:  # type: ignore[override]
@@ -309,10 +334,12 @@ class Problem(ProblemSources, System):
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
         arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
         more = {name: getattr(self, name) for name in ("conservative", "time", "period", "map")}
-        more["window"] = dict(self.window)
+        more |= {
+            name: dict(getattr(self, name)) for name in ("window", "start", "observables", "noise")
+        }
         more["times"] = self.times
         words = {name: dict(one) for name, one in self.words.items()}
-        return _made, (type(self), *arguments, more, self.system, words)
+        return _restored, (type(self), *arguments, more, self.system, words)
 
     @property
     def field(self) -> Field:
@@ -491,7 +518,7 @@ class Problem(ProblemSources, System):
 MODELS["Problem"] = Problem
 
 
-def _made(
+def _restored(
     kind: type[Problem], f: Any, state: Any, parameters: Any, jac: Any, periods: Any,
     more: Any, system: Any, words: Mapping[str, Mapping[str, str]] = MappingProxyType({}),
 ) -> Problem:  # fmt: skip
@@ -525,8 +552,8 @@ def as_problem(problem: Any, *, moving: bool = False, arrays: bool = False) -> P
     """
     if isinstance(problem, Problem):
         return problem if arrays else refuse_arrays(problem)
-    if isinstance(problem, System) and issubclass(problem.rung, PerturbedConservative):
-        f, states, values, keywords = formulas_of(problem)
+    if isinstance(problem, System) and problem.standing.traits is not None:
+        f, states, values, keywords = formulas_of(problem, arrays=arrays)
         return Problem(f, states, values, **keywords).described(words_of(problem, states, values))
     in_time = (Conservative, Routhian) if moving else Routhian
     if isinstance(problem, System) and issubclass(problem.rung, in_time):

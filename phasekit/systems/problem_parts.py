@@ -98,6 +98,68 @@ def window_of(argument: str, window: Any, states: Sequence[str]) -> dict[str, tu
     return kept
 
 
+def start_of(start: Any, states: Sequence[str]) -> dict[str, float]:
+    """States at the start by name, of some or all states.
+
+    Raises
+    ------
+    ParameterError
+        If a name is no state, or a value is no number.
+    """
+    values = values_of("start", {} if start is None else start)
+    for name in values:
+        if name not in states:
+            raise unknown("start: state", name, states)
+    return values
+
+
+def observables_of(
+    observables: Any, states: Sequence[str], names: Sequence[str], definitions: Any, functions: Any
+) -> dict[str, Any]:
+    """Formulas of states, parameters and time by name, that motions have values of.
+
+    Raises
+    ------
+    ParameterError
+        If a name is taken, or a formula cannot be read.
+    """
+    if observables is None:
+        return {}
+    if not isinstance(observables, Mapping):
+        raise bad("observables", observables, "a mapping from names to formulas")
+    if not observables:
+        return {}
+    for name in names_of("observables", observables):
+        if name in states or name in names:
+            raise bad("observables", name, "a name that is neither a state nor a parameter")
+    given = expressions_of(
+        observables.values(), [*states, *names], "observables", states, definitions, functions
+    )
+    return dict(zip(observables, given, strict=True))
+
+
+def noise_of(noise: Any, states: Sequence[str], parameters: Iterable[str]) -> dict[str, Any]:
+    """Amplitudes of the noise of states, as formulas of the parameters.
+
+    Raises
+    ------
+    ParameterError
+        If a name is no state, or an amplitude depends on the states or the time.
+    """
+    if noise is None:
+        return {}
+    if not isinstance(noise, Mapping):
+        raise bad("noise", noise, "a mapping from states to amplitudes")
+    symbols = symbols_of(parameters)
+    declare = "noise is additive: its amplitude is a number or a formula of the parameters"
+    kept = {}
+    for name, amplitude in noise.items():
+        if name not in states:
+            raise unknown("noise: state", name, states)
+        kept[name] = take_formula(amplitude, symbols, f"noise[{name!r}]", declare)
+    return kept
+
+
 class OfInstance:
     """An attribute that each instance has of its own, and its class by default."""
 
@@ -134,6 +196,18 @@ def refuse_arrays(problem: Any) -> Any:
                 f"use .replace({name}=...) for one of them",
             )  # fmt: skip
     return problem
+
+
+def refuse_aperiodic(problem: Any) -> None:
+    """Refuse a right-hand side that depends on time and has no period.
+
+    Raises
+    ------
+    ParameterError
+    """
+    if problem.time is not None and problem.period is None:
+        hint = f"pk.Problem(..., time={problem.time!r}, period=...) says one"
+        raise bad("problem", problem, "an f with a period in time, or without time", hint)
 
 
 #: The attribute of maps that holds the equations.
@@ -174,12 +248,12 @@ def angles_of(periods: Any, states: Sequence[str]) -> dict[str, float]:
 
 
 def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str, float]) -> Any:
-    """The period of a forced right-hand side as a formula of the parameters; None without time.
+    """The period of a forced right-hand side as a formula of the parameters; None without one.
 
     Raises
     ------
     ParameterError
-        If one of both is missing, or the period is no positive number at the parameters.
+        If there is a period without a time, or it is no positive number at the parameters.
     """
     if time is None and period is None:
         return None
@@ -189,7 +263,7 @@ def clock_of(time: Any, period: Any, states: Sequence[str], values: Mapping[str,
     if time in states or time in values:
         raise bad("time", time, "a name that is neither a state nor a parameter")
     if period is None:
-        raise bad("period", period, f"the period of f in {time}: a number or a formula")
+        return None
     symbols = symbols_of(values)
     if isinstance(period, str) or hasattr(period, "free_symbols"):
         formula = take_formula(period, symbols, "period", "declare it in parameters")
@@ -357,7 +431,9 @@ def written(problem: Any) -> str:
     notes += [f"{name}={brief(value)}" for name, value in problem.parameters.items()]
     notes += [f"{name} modulo {value:.6g}" for name, value in problem.periods.items()]
     if problem.time is not None:
-        notes.append(f"{problem.time} modulo {problem.period}")
+        known = problem.period is not None
+        notes.append(f"{problem.time} modulo {problem.period}" if known else f"time {problem.time}")
+    notes += [f"noise {amplitude} in {name}" for name, amplitude in problem.noise.items()]
     notes += ["conservative"] * problem.conservative
     return f"{equations}{'; ' if notes else ''}{', '.join(notes)}"
 
@@ -376,11 +452,18 @@ def specified(problem: Any, values: bool = True) -> dict[str, Any]:
         "conservative": problem.conservative,
     }
     if problem.time is not None:
-        spec.update(time=problem.time, period=write_formula(problem.period))
+        known = problem.period is not None
+        spec.update(time=problem.time, period=write_formula(problem.period) if known else None)
     if problem.map:
         spec["map"] = True
     if problem.window:
         spec["window"] = {name: list(ends) for name, ends in problem.window.items()}
+    if problem.start:
+        spec["start"] = dict(problem.start)
+    if problem.observables:
+        spec["observables"] = {n: write_formula(e) for n, e in problem.observables.items()}
+    if problem.noise:
+        spec["noise"] = {n: write_formula(e) for n, e in problem.noise.items()}
     if problem.times > 1:
         spec["times"] = problem.times
     if problem.words:

@@ -106,6 +106,138 @@ class ProblemSources:
         kept: Self = problem
         return kept
 
+    @classmethod
+    def from_ode(cls, path: Any) -> Self:
+        """The problem of a file of XPPAUT (.ode).
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+
+        Returns
+        -------
+        Problem
+            Its states, parameters and equations, with initial data as ``start``, ``aux`` as
+            ``observables``, the axes of its first picture as ``window`` and folded states as
+            ``periods``.
+
+        Raises
+        ------
+        ParameterError
+            If it holds what is no flow and no map, such as delays, integrals over the past, Markov
+            processes, jumps, algebraic equations, tables and random numbers; with the line.
+
+        Notes
+        -----
+        Formulas have the meaning that XPPAUT gives them [Ermentrout2002]: ``2^3^2`` is 64,
+        comparisons are 0 or 1, ``heav(0)`` is 1, and case does not matter. Time that enters through
+        sines and cosines of a common period makes the system forced.
+
+        Examples
+        --------
+        >>> import pathlib, tempfile
+        >>> import phasekit as pk
+        >>> file = pathlib.Path(tempfile.mkdtemp()) / "fhn.ode"
+        >>> written = file.write_text('''
+        ... dv/dt=f(v)-w+I
+        ... w'=eps*(v-gamma*w)
+        ... f(v)=v*(1-v)*(v-a)
+        ... par I=0,a=.25,eps=.1,gamma=1
+        ... init v=.3
+        ... done
+        ... ''')
+        >>> neuron = pk.Problem.from_ode(file)
+        >>> neuron.state, neuron.parameters["gamma"], dict(neuron.start)
+        (('v', 'w'), 1.0, {'v': 0.3, 'w': 0.0})
+        >>> neuron([0.5, 0.0]).tolist()
+        [0.0625, 0.05]
+        """
+        from phasekit.systems.ode_problem import read_ode
+
+        made: Self = read_ode(path, cls).problem
+        return made
+
+    @classmethod
+    def from_sbml(cls, path: Any) -> Self:
+        """The problem of a model of reactions in SBML; needs the extra ``phasekit[sbml]``.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+
+        Returns
+        -------
+        Problem
+            Its states are the species that reactions or rules change, as concentrations, or as
+            amounts where the model says so. Amounts that are conserved are parameters,
+            ``total_A``, and as many species ``observables``. Initial values are its ``start``.
+
+        Raises
+        ------
+        ParameterError
+            If libsbml is not installed, the file is no valid SBML, or it holds what is no flow:
+            events, delays, algebraic rules, functions with jumps, varying compartments.
+
+        Notes
+        -----
+        Of the stoichiometry N the conserved sums are a basis of the g with g N = 0, exact, with
+        coefficients >= 0 where these span it [SchusterHofer1991].
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> pk.Problem.from_sbml("none.xml")
+        Traceback (most recent call last):
+        ...
+        phasekit.errors.ParameterError: path: got 'none.xml', wants the path of an SBML file; No...
+        """
+        from phasekit.systems.sbml_problem import read_sbml
+
+        made: Self = read_sbml(path, cls)
+        return made
+
+    @classmethod
+    def from_antimony(cls, text: Any) -> Self:
+        """The problem of a model of reactions in Antimony; needs the extra ``phasekit[sbml]``.
+
+        Parameters
+        ----------
+        text : str or path
+            The model, or the path of its file.
+
+        Returns
+        -------
+        Problem
+            As of `from_sbml`.
+
+        Raises
+        ------
+        ParameterError
+            As of `from_sbml`.
+
+        Notes
+        -----
+        Antimony's own library makes SBML of it.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> binding = '''
+        ... A + B -> AB; on*A*B
+        ... AB -> A + B; off*AB
+        ... A = 3; B = 2; on = 1; off = 0.5
+        ... '''
+        >>> model = pk.Problem.from_antimony(binding)  # doctest: +SKIP
+        >>> model.state, model.parameters["total_A"]  # doctest: +SKIP
+        (('A',), 3.0)
+        """
+        from phasekit.systems.sbml_problem import read_antimony
+
+        made: Self = read_antimony(text, cls)
+        return made
+
     def specification(self, *, values: bool = True) -> dict[str, Any]:
         """What is needed to make the problem again, as plain values; f is None if it is code.
 
@@ -149,6 +281,8 @@ class ProblemSources:
             spec["f"], spec["state"], spec["parameters"], periods=spec["periods"],
             conservative=spec["conservative"], time=spec.get("time"), period=spec.get("period"),
             map=bool(spec.get("map", False)), window=spec.get("window"),
+            start=spec.get("start"), observables=spec.get("observables"),
+            noise=spec.get("noise"),
         )  # fmt: skip
         times = spec.get("times", 1)
         made = made.iterated(times) if times != 1 else made

@@ -234,6 +234,9 @@ def stated(cls: type, declared: Sequence[Parameter]) -> Stated | None:
         given.remove("potential")
     if len(given) > 1:
         raise ParameterError(f"{title}: got {' and '.join(given)}, wants one law")
+    if isinstance(own.get("inertia"), str):
+        hint = "state the rates of the coordinate and its velocity as formulas"
+        raise bad(f"inertia of {title}", own["inertia"], "1, over which a potential is", hint)
     if not given or given == ["products"]:
         return None
     (name,) = given

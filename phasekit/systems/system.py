@@ -7,10 +7,8 @@ validation, sweeps, coordinates of maps and rebuilding from a map all follow fro
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import FrozenInstanceError
-from typing import Any, ClassVar, NamedTuple, NoReturn, Self, dataclass_transform
+from typing import Any, ClassVar, NamedTuple, dataclass_transform
 
 import numpy as np
 
@@ -18,24 +16,24 @@ from phasekit.errors import ParameterError
 from phasekit.labels.arguments import (
     FloatArray,
     NumberLike,
-    Value,
     bad,
     brief,
     describe,
     named_arguments,
     same,
-    unknown,
 )
 from phasekit.labels.grid import combine
-from phasekit.laws.ladder import Law, Lawful
-from phasekit.laws.perturbed import PerturbedConservative, Rate, TiltedConservative
+from phasekit.laws.ladder import ANY, PERTURBED, Conservative, Law, Lawful, Standing, Trait
+from phasekit.laws.terms import Rate
 from phasekit.laws.trigonometric import Trigonometric, Values, checked_products
 from phasekit.laws.trigonometric import law as make_law
-from phasekit.systems.parameter import REQUIRED, Parameter, attrs_of, parameter
+from phasekit.systems.parameter import Parameter, attrs_of, parameter
 from phasekit.systems.reduced_form import reduced_form
-from phasekit.systems.statement import Stated, refuse_name, stated
+from phasekit.systems.statement import LAWS, Stated, stated
 from phasekit.systems.value import ModelValue
 
+#: What terms of one's own bring in.
+OWN_TRAITS = ANY & ~PERTURBED
 #: Every model by its name, as maps store it.
 MODELS: dict[str, type[System]] = {}
 
@@ -119,19 +117,17 @@ class System(ModelValue):
     frame_rate: ClassVar[Rate | None] = None
     #: The law that the class states beside products.
     stated: ClassVar[Stated | None] = None
-    declared: ClassVar[tuple[Parameter, ...]] = ()
+    kind_of_value: ClassVar[str] = "system"
 
-    def __init_subclass__(cls, *, kw_only: bool = True, **keywords: Any) -> None:
+    @classmethod
+    def _states_itself(cls) -> bool:
+        """Whether the body of the class declares parameters or states a law."""
+        return super()._states_itself() or not vars(cls).keys().isdisjoint(LAWS)
+
+    def __init_subclass__(cls, **keywords: Any) -> None:
         """Read the fields and the law, refuse what is none, and register the class."""
         super().__init_subclass__(**keywords)
-        own = {name: one for name, one in vars(cls).items() if isinstance(one, Parameter)}
-        for name in own:
-            refuse_name(f"parameter of {cls.__name__}", name)
-            if hasattr(System, name):
-                wants = f"another name, because every system has {name!r}"
-                raise bad(f"parameter of {cls.__name__}", name, wants)
-        if own:
-            cls.declared = tuple({**{p.name: p for p in cls.declared}, **own}.values())
+        own = [name for name, one in vars(cls).items() if isinstance(one, Parameter)]
         law = vars(cls).get("products")
         if law is not None:
             units = {parameter.name: parameter.units for parameter in cls.declared}
@@ -144,32 +140,14 @@ class System(ModelValue):
             for name, one in statement.kept.items():
                 setattr(cls, name, one)
         if own and cls.stated is None and cls.products is System.products:
-            raise bad(cls.__name__, list(own), "a law: products, potential, rates or step")
+            raise bad(cls.__name__, own, "a law: products, potential, rates or step")
         if own or law is not None or statement is not None:
-            if "__init__" not in vars(cls) and "__new__" not in vars(cls):
-                cls.__signature__ = _signature(cls.declared, kw_only)  # type: ignore[attr-defined]
             MODELS[cls.__name__] = cls
 
     def __init__(self, *args: Any, **parameters: Any) -> None:
-        title = type(self).__name__
         if not self.declared and type(self) is System:
             raise ParameterError("System: wants a class of your own that states a law")
-        signature = inspect.signature(type(self))
-        for name in parameters:
-            if name not in signature.parameters:
-                raise unknown(f"parameter of {title}", name, signature.parameters)
-        try:
-            given = signature.bind(*args, **parameters)
-        except TypeError as error:
-            names = ", ".join(signature.parameters)
-            raise ParameterError(f"{title}: {error}; its parameters are {names}") from None
-        given.apply_defaults()
-        for declared in self.declared:
-            value = given.arguments[declared.name]
-            if value is not None or not declared.optional:
-                value = declared.check(value)
-            object.__setattr__(self, declared.name, value)
-        self.check()
+        super().__init__(*args, **parameters)
 
     def check(self) -> None:
         """Refuse parameters that go together badly; each alone has been checked.
@@ -228,14 +206,6 @@ class System(ModelValue):
         """What messages say of a system that a function cannot take."""
         return "" if self.stated is None else self.stated.answered_by
 
-    def __setattr__(self, name: str, value: Any) -> NoReturn:
-        """Refuse to change a system, with what to write instead."""
-        raise FrozenInstanceError(f"a {type(self).__name__} is frozen; use .replace({name}=...)")
-
-    def __delattr__(self, name: str) -> NoReturn:
-        """Refuse to take a part of a system away."""
-        raise FrozenInstanceError(f"a {type(self).__name__} is frozen; it keeps {name}")
-
     @classmethod
     def formula_inputs(cls) -> tuple[str, ...]:
         """Names of the parameters on which the law depends.
@@ -245,12 +215,6 @@ class System(ModelValue):
         tuple of str
         """
         return cls.trigonometric().parameters if cls.stated is None else cls.stated.inputs
-
-    @property
-    def parameters(self) -> dict[str, Value]:
-        """The parameters by name, without those that are None."""
-        values = {p.name: getattr(self, p.name) for p in self.declared}
-        return {name: value for name, value in values.items() if value is not None}
 
     @classmethod
     def valid_coefficients(
@@ -324,42 +288,6 @@ class System(ModelValue):
         """
         attrs = attrs_of(*self.declared, *Reduced.declared)
         return Reduced(*reduced_form(*self.coefficients(), attrs))
-
-    def replace(self, **changes: Any) -> Self:
-        """Return a copy with some parameters changed.
-
-        Parameters
-        ----------
-        **changes : float, 1-D array_like or xarray.DataArray
-            New values, by the parameters' names.
-
-        Returns
-        -------
-        System
-            Of the same class; this one stays as it is.
-
-        Raises
-        ------
-        ParameterError
-            If a name is not one of the model's parameters, or a value is unusable.
-        """
-        names = [parameter.name for parameter in self.declared]
-        for name in changes:
-            if name not in names:
-                raise unknown(f"parameter of {type(self).__name__}", name, names)
-        return type(self)(**{**{n: getattr(self, n) for n in names}, **changes})
-
-
-def _signature(declared: Iterable[Parameter], kw_only: bool) -> inspect.Signature:
-    """The call that makes a system; values by name alone, where order would mean nothing."""
-    kind: Any = inspect.Parameter
-    how = kind.KEYWORD_ONLY if kw_only else kind.POSITIONAL_OR_KEYWORD
-    return inspect.Signature(
-        [
-            kind(p.name, how, default=kind.empty if p.default is REQUIRED else p.default)
-            for p in declared
-        ]
-    )
 
 
 class _ABC(NamedTuple):
@@ -516,7 +444,7 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         If it is not a system, with the way from what it is to one.
     """
     if isinstance(system, System):
-        return system if issubclass(system.rung, rung) else stands_on(system, rung, what)
+        return stands_on(system, rung, what)
     if not isinstance(system, type) and callable(getattr(system, "coefficients", None)):
         coefficients = system.coefficients()
         if isinstance(coefficients, tuple) and len(coefficients) == 3:
@@ -534,7 +462,9 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
     raise bad("system", system, f"one of {', '.join(names)}", hint)
 
 
-def stands_on(system: System, rung: type[Law], what: str, *, tilted: bool = False) -> System:
+def stands_on(
+    system: System, where: type[Law] | Standing, what: str, *, tilted: bool = False
+) -> System:
     """Return a system whose law stands on a rung, or on a more special one.
 
     Raises
@@ -542,21 +472,29 @@ def stands_on(system: System, rung: type[Law], what: str, *, tilted: bool = Fals
     ParameterError
         If it does not.
     """
-    if issubclass(system.rung, rung):
+    if system.standing.is_within(where):
         return system
-    if issubclass(system.rung, PerturbedConservative):
+    wanted = Standing.of(where)
+    if system.standing.traits is not None:
+        more = system.standing.traits & ~(wanted.traits or Trait(0)) & OWN_TRAITS
+        if more and wanted.traits is not None:
+            raise ParameterError(
+                f"system: got {system!r}, wants one without terms of your own for {what}; flow, "
+                "equilibria, continuation, poincare_section, stroboscopic and lyapunov take them"
+            )
         # What is a function of the potential alone.
-        if issubclass((getattr(system, "system", None) or system).rung, rung):
+        if issubclass(system.standing.rung, wanted.rung):
             hint = ""
-            if issubclass(system.rung, TiltedConservative):
+            pushed = system.standing.is_within(Standing(Conservative, Trait.TORQUED))
+            if pushed and not system.standing.rung.labels_fixed:
                 hint = "; on a line, the torque can be a part of its potential: V - torque*x"
             raise ParameterError(
                 f"system: got {system!r}, wants a system without damping and drive"
                 f"{' but a constant torque' * tilted} for {what}; perturbed.system has none{hint}"
             )
-    because = f"because {what} is in closed form" if rung.labels_fixed else f"for {what}"
+    because = f"because {what} is in closed form" if wanted.rung.labels_fixed else f"for {what}"
     hint = f"; {system.answered_by}" if system.answered_by else ""
-    raise ParameterError(f"system: got {system!r}, wants {rung.called}, {because}{hint}")
+    raise ParameterError(f"system: got {system!r}, wants {wanted.called}, {because}{hint}")
 
 
 def single(system: Any) -> tuple[Law, dict[str, float]]:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 import xarray as xr
-from scipy.integrate import OdeSolution
 
 from phasekit.labels.arguments import FloatArray, NumberLike, bad, numeric
 from phasekit.labels.grid import LABEL_DTYPE, variable
@@ -17,6 +16,9 @@ from phasekit.motion.events import Event
 from phasekit.motion.integrate import Occurrences, integrate
 from phasekit.motion.sections import Section
 from phasekit.motion.steps import InitialValue
+
+if TYPE_CHECKING:
+    from scipy.integrate import OdeSolution
 
 #: Units, long_name and equation of a variable.
 Row: TypeAlias = tuple[str, str, str]

@@ -12,7 +12,6 @@ import itertools
 from collections.abc import Iterator, Mapping
 
 from phasekit.laws.ladder import Law, Routhian
-from phasekit.laws.perturbed import PerturbedRouthian
 from phasekit.table import loads, motion, numerical, orbits, perturbed, phase_space, steady
 from phasekit.table.row import Quantity, Table
 
@@ -41,7 +40,7 @@ ROWS, select, add = TABLE.rows, TABLE.select, TABLE.add
 
 def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
     """What is said of a row on a rung below that of (A, B, C): equation, source, units, ..."""
-    if issubclass(rung, (Routhian, PerturbedRouthian)):
+    if issubclass(rung, Routhian):
         return steady.ROUTH.get(row.name, {})
     return {"equation": row.general} if row.general else {}
 

@@ -20,7 +20,7 @@ import numpy as np
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown
 from phasekit.labels.coordinates import LABELS, STATES, Labels
-from phasekit.laws.ladder import Law
+from phasekit.laws.ladder import Law, Standing
 from phasekit.laws.trigonometric import Trigonometric
 
 #: Among the inputs of a pass: the law, and its parameters.
@@ -34,6 +34,7 @@ STATE = ("state_phi", "state_dphi")
 BRANCHES = ("equilibrium",)
 SADDLES = ("saddle",)
 SIDES = ("saddle", "side")
+DIRECTION = ("direction",)
 
 #: Sources that many rows have.
 FROM_ENERGY = "[Veljovic2015] (14), corrected coefficients"
@@ -56,12 +57,14 @@ class Quantity:
     equation: str
     source: str
     flags: type[IntEnum] | None = None
-    #: The most general rung of the ladder of laws on which it is computed.
-    of: type[Law] = Law
+    #: The most general rung of the ladder of laws on which it is computed, with the traits.
+    of: type[Law] | Standing = Law
     #: The equation in any potential, where `equation` is that of (A, B, C).
     general: str = ""
     #: Labels of the row's dims where they are not those of the table.
     labels: Mapping[str, Labels] | None = field(default=None, compare=False)
+    #: Cells of a tile at most, few where one takes long: tiles are what is shared and resumed.
+    most_cells: int = 1 << 20
 
     @property
     def attrs(self) -> dict[str, Any]:
@@ -106,14 +109,21 @@ class Pass:
     function: str | Callable[..., Any]  # "module:name", imported when it is first needed
     inputs: tuple[str, ...]
     groups: tuple[str, ...]
-    #: The rung of the ladder of laws for which it holds.
-    of: type[Law] = Trigonometric
+    #: The rung of the ladder of laws for which it holds; of laws with terms also the traits.
+    of: type[Law] | Standing = Trigonometric
     #: Keywords that a call has to say: numbers of a center or saddle, a side.
     options: tuple[str, ...] = ()
     #: States that it can do without, with their keywords.
     optional: tuple[tuple[str, str], ...] = ()
+    #: The rows that it computes, where these are those of one system and not of the table.
+    rows: tuple[Quantity, ...] = ()
     #: Lines for the same system that compute the quantities among its inputs, and theirs.
     behind: tuple[Pass, ...] = ()
+
+    @property
+    def standing(self) -> Standing:
+        """The rung for which it holds, and the traits that it bears."""
+        return Standing.of(self.of)
 
     @property
     def resolved(self) -> Callable[..., Any]:
@@ -146,11 +156,6 @@ def _with_keywords(function: Any, keywords: tuple[str, ...], *arrays: Any, **opt
     """Call a function whose last arrays go by keyword."""
     own = len(arrays) - len(keywords)
     return function(*arrays[:own], **dict(zip(keywords, arrays[own:], strict=True)), **options)
-
-
-def depth(rung: type) -> int:
-    """How special a rung is."""
-    return len(rung.__mro__)
 
 
 class Table:
@@ -206,11 +211,11 @@ class Table:
         return {name: row for name, row in self.rows.items() if row.group in computed}
 
     def select(
-        self, of: str | Iterable[str], rung: type[Law] | None = None
+        self, of: str | Iterable[str], where: Standing | None = None
     ) -> tuple[Quantity, ...]:
         """Return the rows that `of` names: groups, quantities, or several of either.
 
-        With a rung, only those of them that are computed there.
+        With a standing, only those of them that are computed there.
 
         Raises
         ------
@@ -235,8 +240,8 @@ class Table:
                 valid = [*groups, *offered]
                 raise unknown("of: the quantity", name, valid, listed="pk.quantities()")
         whole = {name for name in names if name not in offered}
-        if rung is not None:
-            able = {g for one in self.passes if issubclass(rung, one.of) for g in one.groups}
+        if where is not None:
+            able = {g for one in self.passes if where.is_within(one.of) for g in one.groups}
             groups = {group: None for group in groups if group in able}
         return tuple(
             row
@@ -244,21 +249,24 @@ class Table:
             if row.group in groups and (row.name in names or row.group in whole)
         )
 
-    def rungs_of(self, group: str) -> set[type[Law]]:
-        """The rungs on which a group is computed."""
-        return {one.of for one in self.passes if group in one.groups}
+    def standings_of(self, group: str) -> set[Standing]:
+        """Where a group is computed."""
+        return {one.standing for one in self.passes if group in one.groups}
 
-    def offers(self, rung: type[Law], group: str) -> bool:
-        """Whether a group is computed on a rung."""
-        return any(issubclass(rung, one) for one in self.rungs_of(group))
+    def offers(self, where: type[Law] | Standing, group: str) -> bool:
+        """Whether a group is computed on a rung, or where a law stands."""
+        where = Standing.of(where)
+        return any(where.is_within(one) for one in self.standings_of(group))
 
-    def plan(self, rows: Iterable[Quantity], rung: type[Law] = Trigonometric) -> tuple[Pass, ...]:
-        """Return the passes that compute the rows on a rung, as few as the table has.
+    def plan(
+        self, rows: Iterable[Quantity], where: type[Law] | Standing = Trigonometric
+    ) -> tuple[Pass, ...]:
+        """Return the passes that compute the rows where a law stands, as few as the table has.
 
         Groups that are not computed there are left out.
         """
         missing = {row.group for row in rows}
-        lines, chosen = self.fitting(rung), list[Pass]()
+        lines, chosen = self.fitting(Standing.of(where)), list[Pass]()
         for candidate in lines:
             if missing.issuperset(candidate.groups):
                 chosen.append(candidate)
@@ -268,20 +276,20 @@ class Table:
                 chosen += [one for one in reversed(lines) if group in one.groups][:1]
         return tuple(chosen)
 
-    def fitting(self, rung: type[Law]) -> list[Pass]:
-        """Return the lines for a rung: of each group the most special ones."""
-        able = [one for one in self.passes if issubclass(rung, one.of) and not one.options]
-        special = {group: max(depth(one.of) for one in able if group in one.groups)
+    def fitting(self, where: Standing) -> list[Pass]:
+        """Return the lines for where a law stands: of each group the most special ones."""
+        able = [one for one in self.passes if where.is_within(one.of) and not one.options]
+        special = {group: max(one.standing.depth for one in able if group in one.groups)
                    for group in {group for one in able for group in one.groups}}  # fmt: skip
-        return [one for one in able if all(depth(one.of) == special[g] for g in one.groups)]
+        return [one for one in able if all(one.standing.depth == special[g] for g in one.groups)]
 
-    def behind(self, one: Pass, rung: type[Law]) -> tuple[list[Pass], str | None]:
-        """Return the lines for the quantities from which a line starts, in the end, on a rung.
+    def behind(self, one: Pass, where: Standing) -> tuple[list[Pass], str | None]:
+        """Return the lines for the quantities from which a line starts, in the end.
 
         Each is the one that computes the least. Besides the group that nothing there computes.
         """
         left, found = [name for name in one.inputs if name in self.rows], list[Pass]()
-        lines = self.fitting(rung)[::-1] if left else []
+        lines = self.fitting(where)[::-1] if left else []
         while left:
             group = self.rows[left.pop()].group
             if any(group in other.groups for other in found):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phasekit.laws.ladder import Routhian
-from phasekit.table.row import BRANCHES, Pass, Quantity
+from phasekit.table.row import BRANCHES, LAW, STATE, Pass, Quantity
 
 ROUTH_OF = "Routh's reduction; [Veljovic2015] (11) with omega1 free, corrected"
 
@@ -38,13 +38,40 @@ ROUTH: dict[str, dict[str, str]] = {
     "energy_integral": {"units": "J", "long_name": "energy at the momentum",
                         "equation": "(M22 - M12^2/M11) phi'^2/2 + V_p"},
     "phase_velocity": {"equation": "sqrt(2 (h - V_p)/(M22 - M12^2/M11))"},
+    "saddle_energy": {"units": "J", "equation": "h_s = V_p(phi_s)"},
+    "saddle_exponent": {"equation": "sqrt(-V_p''/(M22 - M12^2/M11))"},
+    "winding_area": {"units": "kg m2 s-1", "equation": "int M phi' dphi, M = M22 - M12^2/M11"},
+    "lobe_area": {"units": "kg m2 s-1", "equation": "oint M phi' dphi, M = M22 - M12^2/M11"},
+    "winding_area_error": {"units": "kg m2 s-1"},
+    "lobe_area_error": {"units": "kg m2 s-1"},
+    "turning_phi": {"equation": "V_p(phi_t) = h_s"},
+    "orbit_energy": {"units": "J", "equation": "h = M phi'^2/2 + V_p, M = M22 - M12^2/M11"},
+    "period": {"equation": "oint dphi/phi'"},
+    "action": {"units": "kg m2 s-1", "equation": "oint M phi' dphi/(2 pi)"},
+    "action_error": {"units": "kg m2 s-1"},
+    "phi_min": {"equation": "V_p(phi_min) = h"},
+    "phi_max": {"equation": "V_p(phi_max) = h"},
     "motion_phi": {"equation": "M phi'' + M' phi'^2/2 + V_p' = 0, M = M22 - M12^2/M11"},
     "motion_dphi": {"equation": "M phi'' + M' phi'^2/2 + V_p' = 0, M = M22 - M12^2/M11"},
 }  # fmt: skip
 for _words in ROUTH.values():
     _words["source"] = ROUTH_OF
 
+_MACHINES = "phasekit.phase.numerical.machines:"
+
 PASSES: tuple[Pass, ...] = (
+    *(
+        Pass(_MACHINES + name, (LAW, *states), (group,), Routhian, options)
+        for name, states, group, options in (
+            ("separatrices", (), "separatrices", ()),
+            ("orbits", STATE, "orbits", ()),
+            ("orbits_at_energy", ("state_energy",), "orbits", ("center",)),
+            ("orbits_at_gap", ("state_gap",), "orbits", ("saddle", "side")),
+            ("angles", STATE, "action_angle", ()),
+            ("state_of", ("state_action", "state_angle", "state_family"), "state_of", ()),
+            ("separatrix_motion_with_errors", ("time",), "motion", ("saddle", "side")),
+        )
+    ),
     *(
         Pass(f"phasekit.mechanics.steady:{name}", (*_FREE, *more), groups, Routhian, (), _KEPT)
         for name, more, groups in (

@@ -27,7 +27,7 @@ LARGE = (
 
 def seconds(code: str, cache: Path, repeats: int = 3) -> float:
     """Least wall time of a fresh interpreter that runs the code."""
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
+    environment = {**os.environ, "PHASEKIT_CACHE_DIR": str(cache)}
     times = []
     for _ in range(repeats):
         start = time.perf_counter()

@@ -198,7 +198,7 @@ class OneTile:
     def __init__(self, subject: str, dtype: str | None = None) -> None:
         disk = pk.GyroRotorDisk(**DISK)
         rows = tuple(
-            row for row in TABLE.select(SUBJECTS[subject]) if issubclass(disk.rung, row.of)
+            row for row in TABLE.select(SUBJECTS[subject]) if disk.standing.is_within(row.of)
         )
         if dtype is not None:
             from dataclasses import replace

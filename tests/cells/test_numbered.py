@@ -1,6 +1,5 @@
 """Columns of numbered equilibria: found once, and what is said of what could not be computed."""
 
-import functools
 import warnings
 from typing import NamedTuple
 
@@ -10,7 +9,7 @@ import xarray as xr
 
 import phasekit as pk
 from phasekit.cells import evaluate
-from phasekit.cells.numbered import _told
+from phasekit.cells.numbered import _with_warning
 from phasekit.phase.numerical import differences, functions
 
 NAN = np.nan
@@ -32,7 +31,9 @@ class Pass:
 
 def test_actions_that_are_not_known_are_told():
     with warnings.catch_warnings(record=True, action="always") as caught:
-        _told(Pass(), "V", [1.0, NAN, NAN], [NAN, NAN, NAN], [0.0, 0.1, NAN], [0.2, 0.3, NAN])
+        _with_warning(
+            Pass(), "V", [1.0, NAN, NAN], [NAN, NAN, NAN], [0.0, 0.1, NAN], [0.2, 0.3, NAN]
+        )
     said = [str(warning.message) for warning in caught]
     assert len(said) == 2
     assert (
@@ -52,7 +53,8 @@ BOTH = ("equilibria", "separatrices")
 @pytest.fixture
 def small_tiles(monkeypatch):
     """Maps in memory are computed in tiles of three cells."""
-    monkeypatch.setattr(evaluate, "tiles", functools.partial(evaluate.tiles, cells=3))
+    tiles = evaluate.tiles
+    monkeypatch.setattr(evaluate, "tiles", lambda sizes, *_, **__: tiles(sizes, cells=3))
 
 
 @pytest.mark.parametrize("of", ["equilibria", "separatrices", BOTH, ["phi", "topology"]])

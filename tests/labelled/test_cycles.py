@@ -282,7 +282,6 @@ def test_forced_problems():
 @pytest.mark.parametrize(
     ("arguments", "word"),
     [
-        ({"time": "t"}, "period"),
         ({"period": 1.0}, "time"),
         ({"time": "x", "period": 1.0}, "time"),
         ({"time": "t", "period": "2*pi/q"}, "period"),

@@ -1,10 +1,13 @@
 """Names: of states in every function, of the coordinate of any potential, of turning points."""
 
+import inspect
+
 import numpy as np
 import pytest
 import xarray as xr
 
 import phasekit as pk
+from phasekit.spellings import DEPRECATED
 
 SYSTEM = pk.Coefficients(4.0, 1.0, 0.5)
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0, m=2.0, half_span=0.15)
@@ -84,8 +87,8 @@ DRIVEN = pk.Perturbed(SYSTEM, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
         (lambda: pk.orbits(SYSTEM, energi=1.0), "did you mean 'energy'"),
         (lambda: pk.orbit_families(SYSTEM, energymax=1.0), "did you mean 'energy_max'"),
         (lambda: pk.escape_rate(DRIVEN, centre="lower_center"), "did you mean 'center'"),
-        (lambda: pk.capture(DRIVEN, "rotation"), "capture.*arguments are perturbed, start"),
-        (lambda: pk.melnikov(DRIVEN, saddle="lower"), "'saddle'; its arguments are perturbed$"),
+        (lambda: pk.capture(DRIVEN, "rotation"), "capture.*arguments are system, start"),
+        (lambda: pk.melnikov(DRIVEN, saddle="lower"), "'saddle'; its arguments are system$"),
         (lambda: pk.resonances(DRIVEN), "resonances.*missing a required.* argument: 'n'"),
         (lambda: pk.stroboscopic(DRIVEN, 0.1, 0.0), "stroboscopic.*'n'"),
         (lambda: pk.lyapunov(DRIVEN, 0.1, 0.0, t=3.0), "lyapunov.*'t'; its arguments"),
@@ -128,7 +131,21 @@ def test_critical_values_in_the_parameters_of_the_analogues():
 
 def test_calls_by_the_first_argument_s_old_name_go_on_working():
     start = {"phi0": 0.1, "dphi0": 0.0}
-    for function, more in ((pk.stroboscopic, {"n": 2}), (pk.lyapunov, {"time": 3.0})):
+    for function, more in ((pk.stroboscopic, {"n": 2}), (pk.lyapunov, {"duration": 3.0})):
         with pytest.warns(DeprecationWarning, match=r"\(system=\.\.\.\)"):
             old = function(perturbed=DRIVEN, **start, **more)
         assert old.identical(function(DRIVEN, **start, **more))
+    with pytest.warns(DeprecationWarning, match=r"lyapunov\(time=.* is now lyapunov\(duration="):
+        pk.lyapunov(DRIVEN, **start, time=3.0)
+    with pytest.raises(pk.ParameterError, match="time: got it besides duration"):
+        pk.lyapunov(DRIVEN, **start, time=3.0, duration=2.0)
+    with pytest.warns(DeprecationWarning, match=r"melnikov\(perturbed=.* is now melnikov\(system="):
+        assert pk.melnikov(perturbed=DRIVEN).identical(pk.melnikov(DRIVEN))
+
+
+def test_no_old_spelling_is_one_of_now():
+    for name, spellings in DEPRECATED.items():
+        function = getattr(pk, name, None) or getattr(pk.plot, name)
+        names = inspect.signature(function).parameters
+        assert spellings.keys().isdisjoint(names)
+        assert names.keys() >= set(spellings.values())

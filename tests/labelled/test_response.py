@@ -119,7 +119,7 @@ def test_harmonics_keep_their_ratio():
 @pytest.mark.parametrize(
     ("added", "message"),
     [
-        ({"modulation": {"g": pk.Harmonic(0.1, 1.0)}}, "^modulation: got .*wants none"),
+        ({"modulation": {"g": pk.Harmonic([0.1, 0.2], 1.0)}}, "^modulation_g_amplitude: got"),
         ({"drift": {"g": 0.1}}, "^drift: got .*wants none"),
         ({"kT": 0.1}, "^kT: got 0.1, wants 0.0"),
         ({"damping": [0.1, 0.2]}, "^damping: got .*a single number"),

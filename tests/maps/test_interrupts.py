@@ -196,7 +196,7 @@ def test_notes_are_kept_until_the_end():
     steps = []
 
     def work():
-        with interrupts.noted():
+        with interrupts.deferred_interrupts():
             signal.raise_signal(signal.SIGINT)
             steps.append("after")
 

@@ -361,7 +361,7 @@ def test_a_store_made_by_other_versions_of_libraries(part, expected):
     """Of one schema, so it is continued."""
 
     def version(data):
-        data["attributes"]["numba_version"] = "0.1"
+        data["attributes"]["llvmlite_version"] = "0.1"
 
     change(part / "zarr.json", version)
     SHAPE.sweep(part, workers=1)

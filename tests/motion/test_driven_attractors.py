@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
-from phasekit.motion.attractors import DrivenSearch
+from phasekit.motion.strobed import StrobedSearch
 
 PENDULUM = pk.Coefficients(0.0, 1.0, 0.0)
 WELL = pk.Potential("x^4/4 - x^2/2", "x")
@@ -160,8 +160,8 @@ def test_a_quasi_periodic_motion_by_scipy():
 
 
 def test_what_is_not_sure_is_unknown_and_has_no_error_of_its_share(monkeypatch):
-    monkeypatch.setattr(DrivenSearch, "_exponent", lambda self, state: (0.01, 0.01))
-    monkeypatch.setattr(DrivenSearch, "_is_closed", lambda self, found, turns: False)
+    monkeypatch.setattr(StrobedSearch, "_exponent", lambda self, state: (0.01, 0.01))
+    monkeypatch.setattr(StrobedSearch, "_is_closed", lambda self, found, turns: False)
     with pytest.warns(RuntimeWarning, match="nor have an exponent that is surely positive"):
         ds = quietly(CHAOTIC, np.linspace(-1.0, 1.0, 3), [-0.5, 0.5])
     assert ds.attractor_kind.values.tolist() == [KIND.UNKNOWN]

@@ -144,7 +144,7 @@ def test_a_drive_of_any_frequency(frequency):
 @pytest.mark.parametrize("damping", [-0.05, 1e-12, 50.0, 1e3])
 def test_exponents_add_up_however_strong_the_damping(damping):
     system = pk.Perturbed(EIGHT, damping=damping, forcing=DRIVE)
-    ds = pk.lyapunov(system, [0.1, 1.0], 0.0, time=2.0)
+    ds = pk.lyapunov(system, [0.1, 1.0], 0.0, duration=2.0)
     total = ds.lyapunov_exponent.sum("exponent").values
     assert total.shape == (2,)
     assert np.abs(total + damping).max() < 1e-10
@@ -152,15 +152,15 @@ def test_exponents_add_up_however_strong_the_damping(damping):
 
 
 def test_exponents_of_a_fast_disk_add_up():
-    ds = pk.lyapunov(pk.Perturbed(disk(1e4), damping=0.3), 0.1, 0.0, time=0.2)
+    ds = pk.lyapunov(pk.Perturbed(disk(1e4), damping=0.3), 0.1, 0.0, duration=0.2)
     assert abs(ds.lyapunov_sum.item() + 0.3) < 1e-9
 
 
 def test_a_time_without_value_has_no_exponent():
     system = pk.Perturbed(EIGHT, damping=0.1, forcing=DRIVE)
-    ds = pk.lyapunov(system, 0.1, 0.0, time=[10.0, np.nan, 20.0])
+    ds = pk.lyapunov(system, 0.1, 0.0, duration=[10.0, np.nan, 20.0])
     assert np.isnan(ds.lyapunov_sum.values).tolist() == [False, True, False]
-    alone = pk.lyapunov(system, 0.1, 0.0, time=20.0)
+    alone = pk.lyapunov(system, 0.1, 0.0, duration=20.0)
     assert ds.lyapunov_sum.values[2] == pytest.approx(alone.lyapunov_sum.item(), rel=1e-12)
 
 
@@ -170,7 +170,7 @@ def test_sections_and_exponents_say_which_motions_have_no_end():
         ds = pk.stroboscopic(system, [1.0, 0.0], 0.0, n=2)
     assert np.isnan(ds.section_phi.values).tolist() == [[False, True], [False, False]]
     with pytest.warns(RuntimeWarning, match="lyapunov_exponent: 1 of 2 motions end before"):
-        ds = pk.lyapunov(system, [1.0, 0.0], 0.0, time=20.0)
+        ds = pk.lyapunov(system, [1.0, 0.0], 0.0, duration=20.0)
     assert np.isnan(ds.lyapunov_sum.values).tolist() == [True, False]
 
 
@@ -208,9 +208,9 @@ def test_sections_and_exponents_are_the_same_alone_and_among_others():
     for several in (system, others):
         found = pk.stroboscopic(several, 0.3, 0.1, n=20, period=2.0 * np.pi).section_phi.values
         assert np.array_equal(found[1], want)
-        grown = pk.lyapunov(several, 0.3, 0.1, time=10.0).lyapunov_exponent.values
+        grown = pk.lyapunov(several, 0.3, 0.1, duration=10.0).lyapunov_exponent.values
         assert np.array_equal(
-            grown[1], pk.lyapunov(alone, 0.3, 0.1, time=10.0).lyapunov_exponent.values
+            grown[1], pk.lyapunov(alone, 0.3, 0.1, duration=10.0).lyapunov_exponent.values
         )
 
 

@@ -442,10 +442,26 @@ def test_events_of_any_size_at_any_time():
     assert np.isnan(found.motion_phi.values).tolist() == [True, False]
 
 
+def test_events_of_many_motions_are_those_of_each():
+    system = pk.Perturbed(EIGHT, damping=[0.1, 0.3])
+
+    def turns(t, phi, dphi):
+        return dphi
+
+    turns.terminal = 2
+    for event in (turns, pk.Event("dphi", terminal=2)):
+        ds = pk.flow(system, [0.1, 0.7], 0.0, [0.0, 3.0, 30.0], events={"turn": event})
+        assert ds.event_time.dims == ("damping", "point", "event")
+        assert ds.n_events.values.tolist() == [[2, 2], [2, 2]]
+        assert np.isnan(ds.motion_phi.isel(time=-1)).all()
+        one = pk.flow(system.replace(damping=0.3), 0.7, 0.0, [30.0], events=turns)
+        own = ds.isel(damping=1, point=1)
+        assert own.event_time.values == pytest.approx(one.event_time.values, rel=1e-8)
+        assert own.event_phi.values == pytest.approx(one.event_phi.values, rel=1e-8)
+
+
 def test_events_of_what_has_none_are_refused():
     system = pk.Perturbed(EIGHT, damping=0.1)
-    with pytest.raises(pk.ParameterError, match="wants nothing, or one motion"):
-        pk.flow(system, [0.1, 0.2], 0.0, 1.0, events=lambda t, phi, dphi: dphi)
     with pytest.raises(pk.ParameterError, match=r"a function of \(t, phi, dphi\)"):
         pk.flow(system, 0.1, 0.0, 1.0, events=lambda t: t)
     with pytest.raises(pk.ParameterError, match="events: got"):

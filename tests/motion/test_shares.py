@@ -86,10 +86,10 @@ def test_the_numbers_of_attractors_do_not_depend_on_where_the_search_begins():
     states = np.random.default_rng(5).uniform(-2.0, 2.0, (60, 2))
     one = find(law, values, 2.0 * np.pi, states).result()
     other = find(law, values, 2.0 * np.pi, states[::-1]).result()
-    assert len(one.attractor_phi) > 2
-    assert one.attractor_period.tolist() == other.attractor_period.tolist()
-    np.testing.assert_allclose(one.attractor_phi, other.attractor_phi, atol=1e-8)
-    np.testing.assert_allclose(one.attractor_multiplier, other.attractor_multiplier, rtol=1e-6)
+    assert len(one.state) > 2
+    assert one.period.tolist() == other.period.tolist()
+    np.testing.assert_allclose(one.state[..., 0], other.state[..., 0], atol=1e-8)
+    np.testing.assert_allclose(one.multiplier, other.multiplier, rtol=1e-6)
 
 
 def test_motions_that_take_too_many_steps_are_undecided_and_not_away(monkeypatch):
@@ -105,7 +105,7 @@ def test_motions_that_take_too_many_steps_are_undecided_and_not_away(monkeypatch
         return found._replace(code=np.array([-1, -1]), status=status)
 
     monkeypatch.setattr(basins, "strobe", worn)
-    found = basins.basins(search, np.array([0.5]), np.array([0.0, 0.1]))
+    found = basins.basins(search, {0: np.array([0.5]), 1: np.array([0.0, 0.1])})
     assert found.basin.tolist() == [[basins.UNDECIDED, basins.ESCAPED]]
 
 

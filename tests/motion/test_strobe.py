@@ -36,8 +36,8 @@ def test_mathieus_boundaries_by_the_trace_of_the_map(order, q):
 def test_mathieus_tongue_by_the_exponent():
     q = 1.0
     low, high = float(mathieu_b(1, q)), float(mathieu_a(1, q))
-    inside = pk.lyapunov(mathieu(0.5 * (low + high), q), 0.0, 0.0, time=400.0)
-    stable = pk.lyapunov(mathieu(high + 0.5, q), 0.0, 0.0, time=4000.0)
+    inside = pk.lyapunov(mathieu(0.5 * (low + high), q), 0.0, 0.0, duration=400.0)
+    stable = pk.lyapunov(mathieu(high + 0.5, q), 0.0, 0.0, duration=4000.0)
     ds = pk.stroboscopic(
         mathieu(0.5 * (low + high), q), [1.0, 0.0], [0.0, 1.0], n=2, rtol=1e-12, atol=1e-14
     )
@@ -52,7 +52,7 @@ def test_the_exponents_of_any_linearly_damped_motion_add_up_to_the_damping():
     modulated = pk.Perturbed(disk, damping=0.3, modulation={"omega1": pk.Harmonic(0.8, 1.7)})
     eight = pk.Perturbed(EIGHT, damping=0.1, torque=0.2, forcing=pk.Harmonic(0.7, 0.9))
     for system, damping in ((CHAOTIC, 0.25), (modulated, 0.3), (eight, 0.1)):
-        ds = pk.lyapunov(system, [0.1, 1.0], [0.3, -0.2], time=300.0)
+        ds = pk.lyapunov(system, [0.1, 1.0], [0.3, -0.2], duration=300.0)
         assert ds.lyapunov_sum.shape == (2,)
         assert np.abs(ds.lyapunov_sum + damping).max() < 1e-8
         total = ds.lyapunov_exponent.sum("exponent")
@@ -66,12 +66,12 @@ def test_exponents_at_equilibria():
     saddle = found.sel(equilibrium="lower_saddle")
     k = saddle.exponent.item()
     expected = -0.5 * damping + np.array([1, -1]) * np.sqrt(k * k + 0.25 * damping**2)
-    ds = pk.lyapunov(system, saddle.phi.item(), 0.0, time=20.0)
+    ds = pk.lyapunov(system, saddle.phi.item(), 0.0, duration=20.0)
     off = np.abs(ds.lyapunov_exponent - expected)
     assert (off < 1e-3).all()
     assert (off <= 3.0 * ds.lyapunov_error).all()
     center = found.phi.sel(equilibrium="lower_center").item()
-    ds = pk.lyapunov(system, center, 0.0, time=2000.0)
+    ds = pk.lyapunov(system, center, 0.0, duration=2000.0)
     off = np.abs(ds.lyapunov_exponent + 0.5 * damping)
     assert (off < 1e-3).all()
     assert (off <= 3.0 * ds.lyapunov_error).all()
@@ -79,7 +79,7 @@ def test_exponents_at_equilibria():
 
 def test_the_exponent_of_a_chaotic_motion():
     # Published for this oscillator: 0.16 (x'' + 0.25 x' - x + x^3 = 0.4 cos t is chaotic).
-    ds = pk.lyapunov(CHAOTIC, [0.1, 0.5, 1.0], 0.0, time=3000.0)
+    ds = pk.lyapunov(CHAOTIC, [0.1, 0.5, 1.0], 0.0, duration=3000.0)
     assert (ds.lyapunov_exponent.sel(exponent=1) > 0.1).all()
     spread = float(np.ptp(ds.lyapunov_exponent.sel(exponent=1).values))
     assert spread < 6.0 * ds.lyapunov_error.max().item()
@@ -93,7 +93,7 @@ def test_the_exponent_of_a_chaotic_motion():
 
 def test_exponents_of_quadratic_damping_are_negative_where_it_moves():
     system = pk.Perturbed(EIGHT, quadratic=0.5, forcing=pk.Harmonic(0.5, 1.0))
-    ds = pk.lyapunov(system, 0.1, 0.0, time=300.0)
+    ds = pk.lyapunov(system, 0.1, 0.0, duration=300.0)
     t = np.linspace(30.0, 300.0, 27001)
     speed = np.abs(pk.flow(system, 0.1, 0.0, t).motion_dphi.values)
     mean = -2.0 * 0.5 * np.trapezoid(speed, t) / 270.0
@@ -248,8 +248,8 @@ def test_what_cannot_be_searched_is_refused():
         pk.basins(pk.Perturbed(WELL, damping=[0.1, 0.2]), **grid)
     with pytest.raises(pk.ParameterError, match="phi: got"):
         pk.basins(DUFFING, phi=[1.0, 0.0], dphi=[0.0])
-    with pytest.raises(pk.ParameterError, match="time: got 0.0"):
-        pk.lyapunov(DUFFING, 0.0, 0.0, time=0.0)
+    with pytest.raises(pk.ParameterError, match="duration: got 0.0"):
+        pk.lyapunov(DUFFING, 0.0, 0.0, duration=0.0)
     with pytest.raises(pk.ParameterError, match="n: got 0"):
         pk.stroboscopic(DUFFING, 0.0, 0.0, n=0)
 
@@ -261,6 +261,6 @@ def test_exponents_are_swept_and_stored(tmp_path):
                   state_dphi=0.0, time=100.0, store=tmp_path / "map.zarr")  # fmt: skip
     assert ds.lyapunov_exponent.sizes == {"forcing_amplitude": 3, "exponent": 2}
     for i, amplitude in enumerate(amplitudes):
-        one = pk.lyapunov(system.replace(forcing_amplitude=amplitude), 0.1, 0.0, time=100.0)
+        one = pk.lyapunov(system.replace(forcing_amplitude=amplitude), 0.1, 0.0, duration=100.0)
         stored = ds.lyapunov_exponent.values[i]
         assert stored == pytest.approx(one.lyapunov_exponent.values, abs=1e-12)

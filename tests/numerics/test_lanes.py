@@ -1,19 +1,19 @@
 """Machine code of eight lanes against mpmath and NumPy."""
 
 import mpmath as mp
-import numba
 import numpy as np
 import pytest
 import sympy as sp
 
 from phasekit.errors import ParameterError
 from phasekit.laws.formulas import read_formula
+from phasekit.numerics.compile import kernel
 from phasekit.numerics.lanes import LANES, LARGE, compile_lanes, invoke
 
 X, Y = sp.symbols("x y", real=True)
 
 
-@numba.njit
+@kernel
 def run(address, x, p, z, out):
     invoke(address, x, p, z, out)
 

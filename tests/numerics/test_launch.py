@@ -44,10 +44,10 @@ def test_slow_cells_are_not_interpreted_for_long(clock):
 
 
 def test_quick_cells_are_interpreted(clock):
-    kernel = Kernel(clock, 1e-4)
+    kernel = Kernel(clock, 1e-5)
     launch(kernel, (), 3000, (), None)
     assert kernel.cells("interpreted") == list(range(3000))
-    launch(kernel, (), 3000, (), None)
+    launch(kernel, (), 3000, (), None)  # too many together
     assert kernel.cells("compiled") == list(range(3000))
 
 

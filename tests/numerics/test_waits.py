@@ -5,77 +5,97 @@ import sys
 import time
 import types
 
-import numba
 import pytest
-from numba.core import event
 
 import phasekit as pk
 from phasekit.cells import progress
-from phasekit.numerics import compiling, waits
+from phasekit.numerics import forms, waits
+from phasekit.numerics.compile import kernel
+from phasekit.numerics.compiler import machine
+from phasekit.numerics.compiler.kinds import FLOAT
 
 
 @pytest.fixture
 def terminal(monkeypatch):
     monkeypatch.setattr(waits, "watched", lambda: True)
     monkeypatch.setattr(waits, "PATIENCE", 0.01)
-    monkeypatch.setattr(compiling._COMPILING, "told", False)
 
 
-def compiled(module, seconds=0.0):
-    """Compile a function of a module, which takes at least so long."""
-    space = {"__name__": module}
-    exec("def double(x):\n    return 2 * x", space)
-
-    class Slow(event.Listener):
-        def on_start(self, started):
-            time.sleep(seconds)
-
-        def on_end(self, ended):
-            pass
-
-    with event.install_listener("numba:compile", Slow()):
-        assert numba.njit(space["double"])(2) == 4
+@kernel
+def doubled(x):
+    return 2.0 * x
 
 
-def test_compiling_is_said_once(terminal, capfd):
-    compiled("phasekit.made_up", 0.3)
-    compiled("phasekit.made_up", 0.3)
-    text = "phasekit: compiling once for this machine, which takes up to half a minute\n"
-    assert capfd.readouterr().err == text
+@pytest.fixture
+def slow(monkeypatch, tmp_path):
+    """Let the finished form of a kernel take at least so long, as one of so many lines would."""
+    monkeypatch.setenv("PHASEKIT_CACHE_DIR", str(tmp_path))
+    assemble = machine.assemble
+
+    def slowly(text, effort):
+        time.sleep(0.3)
+        return assemble(text, effort)
+
+    def make(seconds):
+        kinds = (FLOAT,)
+        forms.python_function(doubled.py_func, kinds, 0, make=True)
+        monkeypatch.setattr(machine, "assemble", slowly)
+        lines = forms._LINES[doubled.py_func, kinds]
+        monkeypatch.setattr(forms, "_SECONDS_A_LINE", seconds / lines)
+        assert forms.python_function(doubled.py_func, kinds, 1, make=True)(2.0) == 4.0
+
+    return make
 
 
-def test_many_functions_that_are_compiled_one_after_the_other_are_one_wait(
-    terminal, monkeypatch, capfd
-):
-    monkeypatch.setattr(waits, "PATIENCE", 0.4)
-    for _ in range(4):
-        compiled("phasekit.made_up", 0.2)
-    assert capfd.readouterr().err.count("compiling") == 1
+def test_how_long_compiling_takes_is_said(terminal, slow, monkeypatch, capfd):
+    slow(12.0)
+    lines = capfd.readouterr().err.splitlines()
+    assert lines == ["phasekit: compiling, about 12 s, once on this machine"]
+
+
+def test_it_is_said_where_nobody_looks_but_not_in_pools(slow, monkeypatch, capfd):
+    """Into the log of a script; on standard error, so that what commands print stays clean."""
+    monkeypatch.setattr(waits, "PATIENCE", 0.01)
+    assert not waits.watched()
+    slow(1.0)
+    out, err = capfd.readouterr()
+    assert "compiling" in err
+    assert out == ""
+    monkeypatch.setattr(waits.multiprocessing, "parent_process", lambda: object())
+    with waits.notice("compiling", logged=True):
+        time.sleep(0.1)
+    assert capfd.readouterr().err == ""
+
+
+def test_a_notebook_shows_plain_text(monkeypatch, capfd):
+    notebook(monkeypatch, {"IPKernelApp": {}})
+    waits.tell("compiling")
+    assert capfd.readouterr() == ("phasekit: compiling\n", "")
 
 
 def test_what_takes_long_is_said_once_by_the_outermost(terminal, capfd):
-    with waits.said("counting sheep"), waits.said("counting legs"):
+    with waits.notice("counting sheep"), waits.notice("counting legs"):
         time.sleep(0.1)
-    with waits.said("counting wolves"):
+    with waits.notice("counting wolves"):
         pass
     assert capfd.readouterr().err == "phasekit: counting sheep\n"
-    with pytest.raises(KeyboardInterrupt), waits.said("counting sheep"):
+    with pytest.raises(KeyboardInterrupt), waits.notice("counting sheep"):
         raise KeyboardInterrupt
-    with waits.said("counting again"):
+    with waits.notice("counting again"):
         time.sleep(0.1)
     assert capfd.readouterr().err == "phasekit: counting again\n"
 
 
 def test_how_far_it_is_is_said_again_and_again(terminal, monkeypatch, capfd):
     monkeypatch.setattr(waits, "AGAIN", 0.1)
-    with waits.said("counting sheep"):
+    with waits.notice("counting sheep"):
         for count in range(1, 4):
             waits.stage(f"{count} sheep")
             time.sleep(0.25)
     time.sleep(0.2)
     lines = capfd.readouterr().err.splitlines()
     assert lines == [f"phasekit: counting sheep: {count} sheep" for count in (1, 2, 3)]
-    with waits.said("counting legs"):
+    with waits.notice("counting legs"):
         time.sleep(0.05)
     assert capfd.readouterr().err == "phasekit: counting legs\n"
 
@@ -101,17 +121,10 @@ def test_a_branch_says_how_many_points_it_has(terminal, monkeypatch, capfd, movi
     assert " points" in text
 
 
-def test_functions_of_others_and_quick_ones_are_not_said(terminal, monkeypatch, capfd):
-    compiled("somebody.elses", 0.3)
+def test_what_is_quick_is_not_said(terminal, monkeypatch, capfd):
     monkeypatch.setattr(waits, "PATIENCE", 60.0)
-    compiled("phasekit.made_up")
-    assert capfd.readouterr().err == ""
-
-
-def test_nothing_is_said_where_nobody_looks(monkeypatch, capfd):
-    monkeypatch.setattr(waits, "PATIENCE", 0.01)
-    assert not waits.watched()
-    compiled("phasekit.made_up", 0.1)
+    with waits.notice("counting sheep", logged=True):
+        pass
     assert capfd.readouterr().err == ""
 
 

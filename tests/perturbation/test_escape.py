@@ -222,6 +222,31 @@ def test_cold_wells_are_left_at_the_least_rates_that_there_are():
         assert rate[0] == 0.0 < rate[-1]
 
 
+def test_any_well_in_the_limits_of_kramers():
+    """A well of a cubic, open on one side; the middle one of three, over either side."""
+    cubic = pk.Potential("x^2/2 - x^3/3", "x")
+    kT = 1.0 / 6.0 / 40.0
+    for damping in (0.5, 20.0):
+        ds = pk.escape_rate(pk.Perturbed(cubic, damping=damping, kT=kT))
+        at = ds.isel(saddle=0).sel(side="left")
+        assert at.barrier.item() == pytest.approx(1.0 / 6.0, rel=1e-14)
+        kramers = np.hypot(1.0, 0.5 * damping) - 0.5 * damping
+        want = kramers * np.exp(-40.0) / (2.0 * np.pi)
+        assert at.escape_rate.item() == pytest.approx(want, rel=0.03)
+        assert np.isnan(ds.escape_rate.sel(side="right")).all()
+    # at low damping the loss of a round of the separatrix, of area 6/5, over kT
+    slow = pk.escape_rate(pk.Perturbed(cubic, damping=1e-6, kT=kT)).escape_rate.values[0, 0]
+    assert slow == pytest.approx(1e-6 * 1.2 / kT * np.exp(-40.0) / (2.0 * np.pi), rel=0.06)
+    three = pk.Potential("x^2*(x^2 - 1)^2*(1 + a*x)", "x", {"a": 0.01}, interval=(-9.0, 9.0))
+    kT = 0.004
+    points = pk.equilibria(three)
+    middle = int(abs(points.phi.values).argmin())
+    ds = pk.escape_rate(pk.Perturbed(three, damping=1.0, kT=kT), center=middle)
+    assert np.isfinite(ds.escape_rate).sum() == 2
+    heights = points.energy.values[points.kind == pk.EquilibriumKind.SADDLE]
+    assert sorted(ds.barrier.values[np.isfinite(ds.barrier)])[0] == pytest.approx(heights.min())
+
+
 @pytest.mark.skipif(not MORE, reason="slow: PHASEKIT_ENSEMBLES=1500 runs so many paths")
 @pytest.mark.parametrize("loss", [0.3, 1.0, 3.0, 10.0])
 @pytest.mark.parametrize("torque", [0.0, 0.02])

@@ -273,7 +273,7 @@ def test_states_once_a_period_and_exponents():
     ds = pk.stroboscopic(driven, 0.4, 0.2, n=4)
     want = free_support.integrate(ROTOR, P, push(driven), (0.4, 0.2), t).y
     assert ds.section_dphi.values == pytest.approx(want[2], abs=1e-7)
-    settled = pk.lyapunov(driven.replace(forcing_amplitude=0.0), 0.73, 0.0, time=40.0)
+    settled = pk.lyapunov(driven.replace(forcing_amplitude=0.0), 0.73, 0.0, duration=40.0)
     center = pk.equilibria(ROTOR).sel(equilibrium=3)
     # at rest areas shrink by damping over the part of the inertia that is left
     amended = ROTOR.amended(P)

@@ -131,8 +131,9 @@ def test_on_a_line_it_is_a_part_of_the_potential():
     )
     for call in calls:
         found, want = call(torqued), call(plain)
-        assert set(want.data_vars) <= set(found.data_vars)
-        for name in want.data_vars:
+        names = set(want.data_vars) - {"orbit_family"}  # are not numbered under a torque
+        assert names <= set(found.data_vars)
+        for name in names:
             assert found[name].values == pytest.approx(want[name].values, rel=1e-12, nan_ok=True)
     assert np.isnan(pk.separatrices(torqued).energy_per_turn)
     both = pk.orbits(pk.Perturbed(base, torque=[0.0, 0.1]), 0.3, 0.1)

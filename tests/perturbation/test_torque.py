@@ -69,6 +69,34 @@ def test_the_diode():
     assert free.critical_torque.values.tolist() == [0.0, 0.0]
 
 
+def test_extremes_of_any_potential():
+    """Of exp(cos x) at cos x = (sqrt 5 - 1)/2; of a double well at its inflections, or the ends."""
+    golden = 0.5 * (5.0**0.5 - 1.0)
+    top = (1.0 - golden**2) ** 0.5 * np.exp(golden)
+    found = pk.critical_torque(pk.Potential("s*exp(cos(x))", "x", {"s": [1.0, -2.0]}, "2*pi"))
+    assert found.critical_complete.all()
+    error = abs(
+        found.critical_torque
+        - xr.DataArray([[-top, top], [-2 * top, 2 * top]], dims=found.critical_torque.dims)
+    )
+    assert (error <= found.critical_torque_error).all()
+    assert found.critical_torque_error.max() < 1e-14
+    error = abs(abs(found.critical_phi) - np.arccos(golden))
+    assert (error <= found.critical_phi_error + 3e-16).all()
+    well = pk.Potential("x^4/4 - x^2/2", "x", interval=(-1.0, 1.2))
+    found = pk.critical_torque(well)
+    assert found.critical_torque.values == pytest.approx([-(12.0**0.5) / 9.0, 0.528], rel=1e-15)
+    assert found.critical_phi.values == pytest.approx([3.0**-0.5, 1.2], rel=1e-15)
+    with pytest.warns(RuntimeWarning, match="in 1 of 1 systems it is not proved"):
+        found = pk.critical_torque(pk.Potential("besselj(0.5, x)", "x", interval=(0.5, 6.0)))
+    assert not found.critical_complete
+    # Without ends an odd power has no bound, an even one on one side, and a line is one.
+    lines = {"x^4/4 - x^2/2": (-np.inf, np.inf), "x - x^3/3": (-np.inf, 1.0), "2*x": (2.0, 2.0)}
+    for line, ends in lines.items():
+        found = pk.critical_torque(pk.Perturbed(pk.Potential(line, "x"), torque=0.1, damping=0.2))
+        assert tuple(found.critical_torque.values) == ends
+
+
 def test_beyond_the_critical_torque_there_is_no_equilibrium():
     pendulum = pk.Pendulum(length=1.0, g=1.0)
     assert pk.equilibria(pk.Perturbed(pendulum, torque=1.5)).n_equilibria == 0

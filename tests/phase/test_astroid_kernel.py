@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from numba import njit
 
+from phasekit.numerics.compile import kernel
 from phasekit.numerics.exact import exact_discriminant
 from phasekit.phase.exact.kernels.astroid import discriminant
 
@@ -26,7 +26,7 @@ def systems_next_to_the_astroid(size):
     return a, a * np.cos(theta) ** 3 * off, a * np.abs(np.sin(theta)) ** 3 * off
 
 
-@njit
+@kernel
 def loop(a, b, c, delta, decided):
     for i in range(a.size):
         delta[i], decided[i] = discriminant(a[i], b[i], c[i])

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 import phasekit as pk
 from phasekit.errors import EquilibriumKind
 from phasekit.phase.numerical import functions
-from phasekit.phase.numerical.extended import extended
+from phasekit.phase.numerical.digits import doubled, values
 from phasekit.phase.numerical.formula import make_formula
-from phasekit.phase.numerical.intervals import Bounds, bounds_of_slopes
+from phasekit.phase.numerical.formula_bounds import slope_bounds
+from phasekit.phase.numerical.systems import make_systems
 
 EXAMPLES = int(os.environ.get("PHASEKIT_POTENTIALS", "30"))
 CENTER, SADDLE = EquilibriumKind.CENTER, EquilibriumKind.SADDLE
@@ -240,8 +241,7 @@ def test_a_leading_coefficient_that_cancels_leaves_the_degree_open():
 
 def test_slopes_are_bounded_with_the_digits_of_the_formula():
     """3 times the double 0.1 is no double."""
-    found = bounds_of_slopes(sp.Float(0.1) * X**3, ("x",))
-    assert isinstance(found, Bounds)
+    found = slope_bounds(make_formula(sp.Float(0.1) * X**3, "x", (), None, None))
     ((low, high), _), _ = found((np.ones(1), np.ones(1)))
     assert Fraction(low[0]) <= 3 * Fraction(0.1) <= Fraction(high[0])
     assert 3.0 * 0.1 != float(low[0])
@@ -249,20 +249,34 @@ def test_slopes_are_bounded_with_the_digits_of_the_formula():
 
 def test_values_in_double_double_arithmetic_have_30_digits():
     formula = make_formula("(x - 1/3)^7/(a + x^2) - 2*a*x", "x", ("a",), None, (0.0, 1.0))
-    function = extended(formula, (0, 1, 2))
-    assert function is not None
     a, x = sp.Symbol("a", real=True), sp.Symbol("x", real=True)
     place, own = np.array([0.3333, -7.25, 812.5]), np.array([0.1, 3.7, 1e-8])
-    zero = np.zeros(3)
-    found, _ = function((place, zero), (own, zero))
-    for order, (high, low) in enumerate(found):
+    systems, _ = make_systems(formula, (own,))
+    found = doubled(systems, place, 0, 1, 2)
+    for order, (high, low, _) in enumerate(found):
         true = formula.expression.diff(x, order)
         for i in range(3):
             numbers = {x: sp.Rational(place[i]), a: sp.Rational(own[i])}
             want = true.xreplace(numbers)
             off = sp.Rational(high[i]) + sp.Rational(low[i]) - want
             assert abs(off / want) < 1e-28
-    assert extended(make_formula("cos(x)", "x", (), 2.0 * np.pi, None), (0,)) is None
+
+
+def test_values_of_other_formulas_have_30_digits_and_say_how_many():
+    formula = make_formula("exp(-x^2)*besselj(0, a*x) - cos(x)^3", "x", ("a",), None, (0.0, 1.0))
+    place, own = np.array([1e-9, 0.7, 5.25, np.nan]), np.array([3.7, 0.1, 1e-8, 1.0])
+    systems, _ = make_systems(formula, (own,))
+    assert doubled(systems, place, 0) is None
+    found = values(systems, place, 0, 1)
+    x, a = sp.symbols("x a", real=True)
+    for order, (high, low, off) in enumerate(found):
+        exact = sp.lambdify((x, a), formula.expression.diff(x, order), "mpmath")
+        assert np.isnan(high[3])
+        with mpmath.workdps(60):
+            for i in range(3):
+                want = exact(mpmath.mpf(place[i]), mpmath.mpf(own[i]))
+                error = abs(mpmath.mpf(high[i]) + mpmath.mpf(low[i]) - want)
+                assert error <= off[i] <= 1e-30 * abs(want) + 1e-60
 
 
 def test_many_systems_have_the_places_of_each_alone():

@@ -6,11 +6,11 @@ import pytest
 import sympy as sp
 
 from phasekit.errors import ConvergenceError, EquilibriumKind
-from phasekit.laws.derivatives import SphericalJ0, SphericalJ1
+from phasekit.laws.derived import SphericalJ0, SphericalJ1
+from phasekit.numerics.intervals.bounds import Bounds
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical.code import array_code
 from phasekit.phase.numerical.formula import make_formula
-from phasekit.phase.numerical.intervals import Bounds
 
 CENTER, SADDLE = EquilibriumKind.CENTER, EquilibriumKind.SADDLE
 X = sp.Symbol("x", real=True)

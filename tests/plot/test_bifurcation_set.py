@@ -6,7 +6,8 @@ import pytest
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import phasekit as pk
-from phasekit.bifurcation.exact.surface import equilibrium_surface
+from phasekit.bifurcation.along import view_of
+from phasekit.bifurcation.surface import equilibrium_surface
 from phasekit.labelled.atlas import branches
 from phasekit.labelled.bifurcation_set import bifurcation_set
 from phasekit.plot.parts import style
@@ -119,12 +120,11 @@ def test_the_atlas_of_another_quantity():
 
 
 def test_the_surface_consists_of_equilibria():
-    def coefficients(x, y):
-        return np.ones_like(x), x, y
-
+    law, values = pk.Coefficients.trigonometric(), {"A": 1.0, "B": 0.0, "C": 0.0}
+    force = view_of(law, values, ("B", "C"), ((0.0, 1.5), (-0.6, 0.6))).force
     x, y = np.linspace(0.0, 1.5, 31), np.linspace(-0.6, 0.6, 25)
     phi = np.linspace(-np.pi, np.pi, 61)
-    centers, saddles = equilibrium_surface(coefficients, x, y, phi)
+    centers, saddles = equilibrium_surface(force, x, y, phi)
     for triangles, sign in ((centers, 1), (saddles, -1)):
         B, C, angle = np.moveaxis(triangles[..., :3].mean(axis=1), -1, 0)
         slope = (B - np.cos(angle)) * np.sin(angle) - C * np.cos(angle)
@@ -155,6 +155,27 @@ def test_the_branch_surface():
     assert ax.get_zlim() == (-180.0, 180.0)
     assert legend(ax) == ["center", "saddle", "fold", "cusp"]
     ax.figure.canvas.draw()
+
+
+def test_the_surface_of_any_potential():
+    """Over a line it reaches a little beyond its equilibria, here from the fold at m = 2."""
+    well = pk.Potential("x^4/4 - m*x^2/2 + h*x", "x", {"m": 1.0, "h": 0.0})
+    box = {"xlim": (-1.0, 2.0), "ylim": (-1.0, 1.0)}
+    ax = pk.plot.branch_surface(well, "m", "h", **box, cells=8)
+    assert {line.get_label() for line in ax.lines} == {"fold", "cusp"}
+    assert ax.get_zlabel() == "$x$"
+    ends = np.sort(np.roots([1.0, 0.0, -2.0, -1.0]).real)[[0, -1]]
+    reach = max(ends)
+    assert ax.get_zlim() == pytest.approx((-1.2 * reach, 1.2 * reach), rel=1e-6)
+    with pytest.raises(pk.ParameterError, match="cut: got 1.0, wants None"):
+        pk.plot.branch_surface(well, "m", "h", **box, cells=8, cut=1.0)
+
+
+def test_the_picture_of_a_plane_of_any_potential():
+    narrow = pk.Potential("x^4/4 - m*x^2/2 + h*x", "x", {"m": 1.0, "h": 0.0}, interval=(-1.2, 1.0))
+    ds = pk.bifurcation_set(narrow, "m", "h", xlim=(-1.0, 2.0), ylim=(-1.0, 1.0))
+    ax = pk.plot.bifurcation_set(ds)
+    assert legend(ax) == ["fold", "leaves the interval", "centers of equal energy", "cusp"]
 
 
 def test_the_surface_takes_axes_of_three_dimensions_only(ax):

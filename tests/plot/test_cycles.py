@@ -21,7 +21,7 @@ def test_largest_and_least_values_with_stability(ax):
     assert np.isclose(np.nanmax(values), float(cycles.points.x_max.max()))
     assert np.isclose(np.nanmin(values), float(cycles.points.x_min.min()))
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert {"stable", "unstable", "LPC"} <= set(labels)
+    assert {"stable equilibrium", "unstable cycle, max and min", "LPC"} <= set(labels)
     ax.clear()
     cycles.plot(ax=ax, y="period")
     assert ax.get_ylabel() == "period of the orbit"

@@ -48,6 +48,10 @@ def the_loop():
     return pk.quasi_static(DISK.replace(beta=1.2), omega1=np.linspace(5.0, 40.0, 9), phi0=3.0)
 
 
+NERVE = pk.Problem(
+    {"v": "v - v^3/3 - w + 0.5", "w": "v + 0.7 - 0.8*w"},
+    window={"v": (-2.5, 2.5), "w": (-1.0, 2.0)},
+).described({"v": {"units": "m"}, "w": {"units": "s"}})
 SWINGS = pk.Problem(
     ["v", "-a*v - sin(phi) + 0.2*cos(t)"], ("phi", "v"), {"a": 0.3}, periods={"phi": 2 * np.pi},
     time="t", period=2 * np.pi,
@@ -88,7 +92,13 @@ STATE_UNITS = ({"phi": "deg", "dphi": "rpm"}, (DEG, RPM), ("(°)", "(rpm)"))
 P = pk.plot
 SPAN = {"xlim": (0.2, 1.5), "ylim": (-0.05, 0.05), "cells": 4, "legend": False}
 
+
 #: A picture, the units asked for, what both axes are multiplied by, and words at them.
+def pendulums():
+    """Pendulums of three lengths."""
+    return pk.flow(pk.Pendulum(length=[0.5, 1.0, 2.0]), 0.5, 0.0, np.linspace(0.0, 20.0, 201))
+
+
 CASES = {
     "basins": (lambda **o: P.basins(the_fates(), **o), *STATE_UNITS),
     "damped_portrait": (
@@ -191,6 +201,24 @@ CASES = {
         {"frequency": "rpm"},
         (1.0, RPM),
         ("(rad$^2$/s)", "(rpm)"),
+    ),
+    "spectrum": (
+        lambda **o: P.spectrum(pk.spectrum(pendulums()).isel(length=0), "amplitude_phi", **o),
+        {"frequency": "rpm", "amplitude_phi": "deg"},
+        (RPM, 1.0 / pk.deg),
+        ("(rpm)", "(°)"),
+    ),
+    "waterfall": (
+        lambda **o: P.waterfall(pk.spectrum(pendulums(), "phi"), **o),
+        {"frequency": "rpm", "length": "mm"},
+        (RPM, 1e3),
+        ("(rpm)", "(mm)"),
+    ),
+    "nullclines": (
+        lambda **o: P.nullclines(NERVE, **o),
+        {"v": "mm", "w": "ms"},
+        (1e3, 1e3),
+        ("(mm)", "(ms)"),
     ),
     "time_history": (
         lambda **o: P.time_history(the_motion(), "motion_dphi", **o),

@@ -283,6 +283,20 @@ def well() -> Any:
     return pk.Potential("x^4/4 - mu*x^2/2", "x", {"mu": 1.0})
 
 
+@functools.cache
+def bistable() -> Any:
+    """A flow with two attractors, and with noise."""
+    law = {"x": "x - x^3"}
+    return pk.Problem(law, parameters={"s": 0.1}, noise={"x": "s"}, window={"x": (-2.0, 2.0)})
+
+
+@functools.cache
+def planar() -> Any:
+    """A flow of two states in a window."""
+    window = {"x": (-2.0, 2.0), "y": (-2.0, 2.0)}
+    return pk.Problem({"x": "y", "y": "x - x^3 - 0.1*y"}, window=window)
+
+
 #: Arguments that fit, by the name of the callable's argument ...
 GOOD: dict[str, Callable[[], Any]] = {
     "system": lambda: pk.Coefficients(2.0, 1.0, 0.3),
@@ -414,7 +428,19 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "lyapunov": {"time": lambda: 5.0},
     "attractors": {"phi": lambda: [-1.0, 1.0], "dphi": lambda: [0.0], "period": lambda: None},
     "basins": {"phi": lambda: [-1.0, 1.0], "dphi": lambda: [0.0], "periods": lambda: 100},
-    "poincare_section": {"section": lambda: 0.5, "dphi0": lambda: 0.2},
+    "poincare_section": {"section": lambda: 0.5, "dphi0": lambda: 0.2, "n": lambda: 2},
+    "warm": {"subjects": lambda: ()},
+    "fourier": {"formula": lambda: "x", "order": lambda: 1},
+    "edge_state": {"system": bistable, "a": lambda: {"x": -0.5}, "b": lambda: {"x": 0.5}},
+    "first_passage": {
+        "system": lambda: bistable().replace(s=0.5), "x0": lambda: {"x": -1.0},
+        "target": lambda: "x", "longest": lambda: 2.0, "paths": lambda: 5, "step": lambda: 0.01,
+    },
+    "spectrum": {"motion": lambda: pk.flow(disk(), 0.3, 0.2, np.linspace(0.0, 1.0, 33))},
+    "Event": {"function": lambda: "phi"},
+    "nullclines": {"system": planar},
+    "plot.nullclines": {"what": planar},
+    "Problem.from_antimony": {"text": lambda: "model m; A -> ; 0.1*A; A = 1; end"},
     "resonances": {"n": lambda: 2},
     "quiet_frequencies": {"n": lambda: 2},
     "escape_rate": {"perturbed": lambda: pk.Perturbed(GOOD["system"](), damping=0.5, kT=0.1)},
@@ -437,6 +463,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "FreeGyroRotor": {"disk": lambda: rotor().disk},
     "FreeGyroRotor.trajectory": {"span": lambda: (0.0, 0.5)},
     "Potential": {"parameters": dict},
+    "Term": {"force": lambda: "-0.1*dphi", "parameters": dict},
     "Problem.from_potential": {"parameters": dict},
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
@@ -469,6 +496,8 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "Perturbed": driven,
     "Harmonic": lambda: pk.Harmonic(0.1, 1.0),
     "JosephsonJunction": lambda: pk.JosephsonJunction(plasma_frequency=1.0),
+    "Event": lambda: pk.Event("phi"),
+    "Term": lambda: pk.Term("-mu*dphi", {"mu": 0.1}),
     "SpinOrbit": lambda: pk.SpinOrbit(mean_motion=1.0, asymmetry=1e-4),
     "Explorer": page,
     "FreeGyroRotor": rotor,
@@ -498,7 +527,7 @@ LONG = {(name, "huge in list") for name in ("bifurcation_set", "plot.branch_surf
 _MOTIONS = ("attractors", "basins", "lyapunov", "poincare_section", "run_up", "stroboscopic")
 LONG |= {(name, value) for name in _MOTIONS for value in ("1e16", "1e200", "huge in list")}
 #: Warnings that are part of an answer, by how they begin: the grid is too coarse, motions are lost.
-ANNOUNCED = ("basin: ", "motion_phi: ", "the branch in .* is not complete")
+ANNOUNCED = ("basin: ", "edge_state: ", "motion_phi: ", "the branch in .* is not complete")
 
 
 def callables() -> dict[str, Callable[..., Any]]:

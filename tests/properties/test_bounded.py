@@ -41,7 +41,7 @@ def swept(system, group, rng):
 
 
 GROUPS = dict.fromkeys(
-    row.group for row in pk.quantities().values() if TABLE.offers(DISK.rung, row.group)
+    row.group for row in pk.quantities().values() if TABLE.offers(DISK.standing, row.group)
 )
 LOADS = [group for group in GROUPS if "forces" in group or "rotators" in group]
 

@@ -39,7 +39,7 @@ def sample(seed: str) -> list[str]:
     return [str(name) for name in rng.permutation(names)[:EACH]]
 
 
-def attempt(function: Callable[..., Any], *args: Any, **kwargs: Any) -> None:
+def attempt(function: Callable[..., Any], /, *args: Any, **kwargs: Any) -> None:
     """Call with every undocumented warning an error; the documented exceptions pass."""
     with (
         warnings.catch_warnings(),

@@ -454,3 +454,33 @@ def test_particle_over_the_axis_of_a_support_without_inertia():
     # with momentum it never gets there
     motion = pendulum.simulate(1.0, 0.0, (0.0, 10.0), omega1=2.0)
     assert np.ptp(motion.mechanical_energy.values) < 1e-8
+
+
+def test_the_whole_machine_is_a_problem():
+    """Formulas of Lagrange's equations against the arrays that simulate, and the same by code."""
+    machine = pk.FreeGyroRotor(
+        pk.GyroRotorDisk(beta=1.0, e=0.1, a=0.05, r=0.1, omega1=6.0, m=2.0), carrier_inertia=0.02
+    )
+    t = np.linspace(0.0, 2.0, 5)
+
+    def curve(t, phi1, phi, omega1, dphi):
+        return 0.5 - 0.05 * omega1
+
+    old = machine.simulate(0.5, 0.0, t, torque1=curve, torque2=-0.01)
+    motor = machine.driven("pull - slip*omega1", -0.01, parameters={"pull": 0.5, "slip": 0.05})
+    for driven in (motor, machine.driven(curve, -0.01)):
+        new = pk.flow(driven, phi=0.5, dphi=0.0, t=t)
+        for name in ("phi1", "phi", "omega1", "dphi"):
+            name = f"motion_{name}"
+            np.testing.assert_allclose(new[name], old[name], rtol=1e-8, atol=1e-8)
+    new = pk.flow(motor, phi=0.5, dphi=0.0, t=t)
+    for name in ("torque1", "torque_power", "mechanical_energy", "angular_momentum"):
+        np.testing.assert_allclose(new[f"motion_{name}"], old[name], rtol=1e-8, atol=1e-8)
+    swept = pk.flow(motor.replace(slip=[0.05, 0.1]), phi=0.5, dphi=0.0, t=2.0)
+    assert swept.motion_omega1.dims == ("slip",)
+    exponents = pk.lyapunov(
+        machine.driven(), {"phi1": 0.0, "phi": 0.5, "omega1": 6.0, "dphi": 0.0}, duration=30.0
+    )
+    assert abs(exponents.lyapunov_sum) < 1e-2  # nothing is lost
+    with pytest.raises(pk.ParameterError, match="a name that the machine has not"):
+        machine.driven("e*omega1", parameters={"e": 1.0})

@@ -8,7 +8,7 @@ import pytest
 import sympy as sp
 
 import phasekit as pk
-from phasekit.laws.perturbed import Rate
+from phasekit.laws.terms import Rate
 from phasekit.systems.system import MODELS
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.024, r=0.2, omega1=30.0)

@@ -139,7 +139,6 @@ def test_rates_may_be_a_function_and_a_step_is_a_map():
     [
         lambda s: pk.orbits(s, *STATE),
         lambda s: pk.separatrices(s),
-        lambda s: pk.sweep(s, **{s.declared[0].name: [0.1, 0.2]}),
         lambda s: pk.sweep(s, **{s.declared[0].name: [0.1, 0.2]}, of="capture"),
         lambda s: pk.basins(s, phi=[0.0, 1.0], dphi=[0.0, 1.0]),
         lambda s: pk.attractors(s, phi=[0.0, 1.0], dphi=[0.0, 1.0]),
@@ -154,7 +153,9 @@ def test_rates_may_be_a_function_and_a_step_is_a_map():
 )
 @pytest.mark.parametrize("system", [Nerve(), Logistic()], ids=["flow", "map"])
 def test_what_needs_a_potential_says_so(call, system):
-    with pytest.raises(pk.ParameterError, match=r"^(system|perturbed|disk)?: ?got"):
+    with pytest.raises(
+        pk.ParameterError, match=r"^((system|perturbed|disk|phi)?: ?got|of: .*capture)"
+    ):
         call(system)
 
 
@@ -280,3 +281,12 @@ def test_coordinates_are_checked_where_they_are_declared():
     with pytest.raises(pk.ParameterError, match="interval: got"):
         pk.coordinate("x", interval=(1.0, 0.0))
     assert pk.coordinate("x", interval=[-1, 2]).interval == (-1.0, 2.0)
+
+
+def test_an_inertia_of_ones_own_is_refused_and_not_left_out():
+    with pytest.raises(pk.ParameterError, match="inertia of Rod: got .*; state the rates"):
+
+        class Rod(pk.System):
+            coordinate = pk.angle("q")
+            potential = "-cos(q)"
+            inertia = "1 + cos(q)^2/2"

@@ -84,11 +84,10 @@ def test_quantities_are_a_table_in_notebooks():
 
 def test_saying_it_compiles_nothing():
     code = (
+        "import sys\n"
         "import phasekit as pk\n"
-        "from numba.core import event\n"
-        "with event.install_recorder('numba:compile') as rec:\n"
-        f"    print(pk.{DISK!r})\n"
-        "assert not rec.buffer\n"
+        f"print(pk.{DISK!r})\n"
+        "assert 'llvmlite' not in sys.modules\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")

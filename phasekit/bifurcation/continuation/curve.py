@@ -20,8 +20,8 @@ from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVEN
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.rows import largest
-from phasekit.bifurcation.continuation.stops import NOT_BEGUN, said
 from phasekit.bifurcation.continuation.stops import Stop as Stop
+from phasekit.bifurcation.continuation.stops import said
 from phasekit.numerics import differences
 from phasekit.numerics.waits import stage
 
@@ -63,6 +63,24 @@ class Track:
     slopes: Array
     state: Array
     stop: Stop
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.record)
+
+    def first(self, count: int, stop: Stop) -> Track:
+        """Its first points, for what it ends there."""
+        return replace(self, record=self.record[:count], slopes=self.slopes[:count], stop=stop)
+
+    def joined(self, more: Track) -> Track:
+        """It and what follows."""
+        record = np.concatenate([self.record, more.record])
+        return Track(record, np.concatenate([self.slopes, more.slopes]), more.state, more.stop)
+
+    def at(self, state: Array) -> Track:
+        """The same with another state to go on from."""
+        return replace(self, state=state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -432,12 +450,6 @@ class Curve:
             # Newton's last step led out of the domain of f.
             record, slopes = record[:-1], slopes[:-1]
         return Track(record, slopes, w[: state.size].copy(), self.stop_of(reason, which, w))
-
-    def not_begun(self, start: Array, tangent: Array) -> Track:
-        """A track without points, to go on from."""
-        columns = 2 * self.size + trace.RECORDED
-        slopes = np.empty((0, self.n * self.m if self.keeps else 0))
-        return Track(np.empty((0, columns)), slopes, self.start_state(start, tangent), NOT_BEGUN)
 
     def stop_of(self, reason: int, which: int, w: Array) -> Stop:
         """Say why a track ends in the state w."""

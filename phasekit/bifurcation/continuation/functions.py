@@ -78,7 +78,8 @@ class Formula:
 
     def bounds(self, curve: Unknowns) -> Callable[[Array, Array], Array] | None:
         """What tells of boxes (lows, highs) whether it may vanish there; None if nothing does."""
-        from phasekit.phase.numerical.intervals import Bounds, NoRule
+        from phasekit.numerics.intervals.bounds import Bounds
+        from phasekit.numerics.intervals.program import NoRule
 
         u, _ = unknowns_of(self.states, self.parameters, curve.active)
         fixed = [i for i in range(len(self.parameters)) if i not in curve.active]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,17 @@ class Path:
     def closed(self) -> bool:
         """Whether the path ends on its start."""
         return self.stops[1].reason == "closed"
+
+    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> Path:
+        """Points of it, between the special points at which it ends."""
+        kept, slopes = slice(first, last), self.slopes
+        u = self.u[kept]
+        return replace(
+            self, u=u, tangent=self.tangent[kept], info=self.info[kept],
+            slopes=slopes[kept] if isinstance(slopes, np.ndarray) else replace(slopes, u=u),
+            start=self.start - first, residual=self.residual[kept], ends=ends,
+            eigenvalues=None if self.eigenvalues is None else self.eigenvalues[kept],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,16 @@ class Placed:
     along: float
     special: Special
 
+    @property
+    def kind(self) -> str:
+        """Of the registry of special points."""
+        return self.special.kind
+
+    @property
+    def name(self) -> str:
+        """Of an event, else empty."""
+        return self.special.name
+
 
 def unique(curve: Curve, path: Path, placed: list[Placed]) -> list[Placed]:
     """In order along the path, each once: next to some, all test functions change their signs."""

@@ -19,7 +19,7 @@ from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, in
 from phasekit.bifurcation.continuation.points.event import events_of
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.two_parameters import find_on
-from phasekit.bifurcation.special_points import KINDS
+from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,7 @@ def find(curve: Curve, path: Path) -> Specials:
             f"neutral saddles were not looked for, of {curve.n} states there may be very many: "
             f"detect={[*curve.detect, 'neutral_saddle']} looks for them",
         )
-    every = sorted([*placed, *events], key=lambda one: (one.index, one.along))
+    every = sorted([*placed, *events], key=_place)
     return Specials(every, eigenvalues, messages)
 
 
@@ -72,6 +72,19 @@ def _find(
         assert path.eigenvalues is not None
         placed, messages = find_on(curve, path)
         return placed, path.eigenvalues, messages
+    placed, zeros = find_on(curve, path) if looked_for(EQUILIBRIUM) else ([], ())
+    found, eigenvalues, messages = _bifurcations(curve, path)
+    return sorted([*found, *placed], key=_place), eigenvalues, (*messages, *zeros)
+
+
+def _place(one: Placed) -> tuple[int, float]:
+    return one.index, one.along
+
+
+def _bifurcations(
+    curve: Curve, path: Path
+) -> tuple[list[Placed], npt.NDArray[np.complex128], tuple[str, ...]]:
+    """What eigenvalues tell of along a branch."""
     detect = curve.detect
     if not detect:
         if path.eigenvalues is None:  # nothing is asked for that takes long

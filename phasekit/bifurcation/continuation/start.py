@@ -1,20 +1,13 @@
-"""From a guess to a curve: the first equilibrium, its tangent, and both ways from it."""
+"""From a guess to a curve: the first equilibrium and its tangent."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.acceptance import rounded
-from phasekit.bifurcation.continuation.conserved import deficient, not_isolated
-from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.ending import followed
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
-from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.points.branch_point import directions_at
-from phasekit.bifurcation.continuation.stops import UNFINISHED, place_of, wished
 from phasekit.bifurcation.continuation.units import nullspace
 from phasekit.errors import ConvergenceError
 
@@ -141,64 +134,3 @@ def tangent_of(curve: Curve, u: Array) -> Array:
     t = t / curve.length(t)
     lead = t[n] if abs(t[n]) > 1e-9 * curve.scale[n] else t[np.argmax(np.abs(t[:n]))]
     return np.asarray(-t if lead < 0.0 else t)
-
-
-def run(curve: Curve, start: Sample, directions: str) -> tuple[Track | None, Track | None]:
-    """Follow a curve from its start, backward and forward; None where it was not asked for."""
-    points = curve.options.max_points
-    forward = backward = None
-    if curve.kind == EQUILIBRIUM and deficient(curve, start.u, start.slopes):
-        why = not_isolated(curve, start.u[: curve.m], place_of(curve, start.u))
-        if why:  # there is no branch to follow
-            still = replace(curve.not_begun(start.u, start.tangent), stop=Stop("stuck", why))
-            return (None if directions == "forward" else still), (
-                None if directions == "backward" else still
-            )
-    if directions != "backward":
-        forward = followed(curve, start, curve.start_state(start.u, start.tangent), points)
-    closed = forward is not None and forward.stop.reason == "closed"
-    if directions != "forward" and not closed:
-        start = _turned(start)
-        if forward is not None and forward.stop.reason == "interrupted":
-            return curve.not_begun(start.u, start.tangent), forward
-        backward = followed(curve, start, curve.start_state(start.u, start.tangent), points)
-    return backward, forward
-
-
-def go_on(
-    curve: Curve, start: Sample, tracks: tuple[Track | None, Track | None], points: int
-) -> tuple[Track | None, Track | None]:
-    """More points of tracks that can be longer, exactly as if they had never stopped."""
-    backward, forward = (
-        track
-        if track is None or not goes_on(curve, track)
-        else followed(curve, begin, *_left(curve, begin, track, points))
-        for begin, track in zip((_turned(start), start), tracks, strict=True)
-    )
-    if forward is not None and forward.stop.reason == "closed":
-        backward = None
-    return backward, forward
-
-
-def goes_on(curve: Curve, track: Track) -> bool:
-    """Whether a track can be longer: it was cut, or a bound is no longer where it met it."""
-    reason = track.stop.reason
-    if reason != "bound":
-        return reason in UNFINISHED or wished(track.stop, curve.ends)
-    u = track.state[: len(curve.low)]  # vectors of curves in two parameters have bounds as well
-    return bool(np.all((u > curve.low) & (u < curve.high)))
-
-
-def _left(curve: Curve, start: Sample, track: Track, points: int) -> tuple[Array, int, Track]:
-    """What `followed` goes on from: the state behind the last point.
-
-    Where the track was cut at a special point, it is followed again up to there.
-    """
-    if wished(track.stop, curve.ends) and len(track.record):
-        state = curve.start_state(start.u, start.tangent)
-        track = replace(track, state=curve.follow(state, len(track.record)).state)
-    return track.state, points, track
-
-
-def _turned(start: Sample) -> Sample:
-    return Sample(start.u, -start.tangent, start.slopes)

@@ -11,7 +11,7 @@ from phasekit.bifurcation.continuation.normal_form import zero_along
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
 from phasekit.bifurcation.continuation.placed import Placed, unique
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
-from phasekit.bifurcation.continuation.points.curve_tests import tests_of
+from phasekit.bifurcation.continuation.points.curve_tests import looked_for_on
 from phasekit.bifurcation.continuation.points.special import (
     CONVERGED,
     GUESS,
@@ -73,7 +73,7 @@ def find_on(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
     found: list[Placed] = []
     messages: list[str] = []
     m = curve.m
-    for test in tests_of(curve):
+    for test in looked_for_on(curve):
         values = test.values(curve, path.u, path.slopes[:])
         if _vanishes(values):
             messages.append(zero_along(test.coefficient, test.kind))

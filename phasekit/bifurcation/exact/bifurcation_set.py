@@ -10,52 +10,39 @@ of its crossings by exact arithmetic.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.curves import Cusp, Locus
 from phasekit.bifurcation.exact.line import Path
-from phasekit.bifurcation.exact.normal_forms import fold_angle
+from phasekit.bifurcation.exact.normal_forms import (
+    cubic_coefficient,
+    fold_angle,
+    quadratic_coefficient,
+)
 from phasekit.bifurcation.exact.plane import TURN, Plane
-from phasekit.bifurcation.exact.real_roots import add
-from phasekit.bifurcation.exact.tracing import EDGE, Equations, Trace, newton, solve, trace
+from phasekit.bifurcation.tracing import (
+    EDGE,
+    Equations,
+    Trace,
+    extends,
+    last_point,
+    new_curve,
+    solve,
+)
 from phasekit.laws.trigonometric import Factor
 
 Array = npt.NDArray[np.float64]
 
-# Chords lie this near to their curve, in units of the plane; two points this near are the same.
-NEAR, SAME = 2e-3, 1e-8
 LOST = 1e-12
 
 
-@dataclass(frozen=True)
-class Piece:
-    """One curve: both parameters, the degenerate angle (folds and pitchforks), and its type."""
-
-    kind: str
-    x: Array
-    y: Array
-    phi: Array
-    sign_of_A: int
-    closed: bool
-
-
-@dataclass(frozen=True)
-class Cusp:
-    """A point where three equilibria merge; `like` is what they become."""
-
-    x: float
-    y: float
-    phi: float
-    like: str
-
-
-def loci(plane: Plane) -> tuple[list[Piece], list[Cusp]]:
+def loci(plane: Plane) -> tuple[list[Locus], list[Cusp]]:
     """All curves of a plane, and the cusps of its fold set."""
     A_flat, B_flat, C_flat = plane.flat
-    pieces: list[Piece] = []
+    pieces: list[Locus] = []
     cusps: list[Cusp] = []
     if not A_flat:
         if B_flat and C_flat:
@@ -76,21 +63,21 @@ def loci(plane: Plane) -> tuple[list[Piece], list[Cusp]]:
 # ------------------------------------------------------------------------------ folds
 
 
-def _folds(plane: Plane, cusps: list[Cusp]) -> list[Piece]:
+def _folds(plane: Plane, cusps: list[Cusp]) -> list[Locus]:
     corners = np.arange(-40, 41) / 4.0
-    pieces: list[Piece] = []
+    pieces: list[Locus] = []
     curves: list[Trace] = []
     for fixed, u, point in plane.crossings(lambda path: path.discriminant):
         A, B, C, _ = plane.law(plane.values_at(point))
         if A == 0.0:
             continue
         guess = np.append(point, fold_angle(A, B, C) / TURN)
-        curve = _new(curves, plane.fold, solve(plane.fold, guess, fixed, u), guess, corners)
+        curve = new_curve(curves, plane.fold, solve(plane.fold, guess, fixed, u), guess, corners)
         if curve is None:
             continue
         for cut, sign, whole in _by_sign(plane, plane.fold, curve):
             part = _off_corners(plane, cut)
-            if sign and _extends(part):
+            if sign and extends(part):
                 phi = TURN * part[:, 2]
                 pieces.append(_piece(plane, "fold", part, whole, sign=sign, phi=phi))
         at = curve.vertices[np.isin(curve.vertices[:, 2], corners)]
@@ -113,48 +100,6 @@ def _off_corners(plane: Plane, vertices: Array) -> Array:
     return vertices
 
 
-def _new(
-    curves: list[Trace],
-    equations: Equations,
-    start: Array | None,
-    guess: Array,
-    corners: Array | None = None,
-) -> Trace | None:
-    """Trace the curve through a point of the net, unless it is known; add it to the curves."""
-    if start is None or np.abs(start - guess).max() > 0.01 or _on(curves, equations, start):
-        return None
-    curve = trace(equations, start, corners)
-    if not _extends(curve.vertices):  # it touches a corner of the plane
-        return None
-    curves.append(curve)
-    return curve
-
-
-def _extends(vertices: Array) -> bool:
-    return len(vertices) > 1 and bool(np.ptp(vertices[:, :2], axis=0).max() > SAME)
-
-
-def _on(curves: list[Trace], equations: Equations, point: Array) -> bool:
-    """Whether a point of the set lies on one of the curves."""
-    for curve in curves:
-        shift = point - curve.vertices
-        shift[:, 2:] -= np.round(shift[:, 2:])
-        chord = np.diff(curve.vertices, axis=0)
-        along = (shift[:-1] * chord).sum(axis=1) / (chord * chord).sum(axis=1).clip(1e-300)
-        off = shift[:-1] - np.clip(along, 0.0, 1.0)[:, None] * chord
-        distance = (off * off).sum(axis=1)
-        k = int(distance.argmin())
-        if distance[k] > NEAR * NEAR:
-            continue
-        # The curve itself, over the foot of the point on its chord.
-        start, way = curve.vertices[k], chord[k]
-        level = float(way @ (start + shift[k]))
-        there = newton(equations, start + along[k] * way, way, level)
-        if there is not None and np.abs(there - start - shift[k]).max() < SAME:
-            return True
-    return False
-
-
 def _by_sign(plane: Plane, equations: Equations, curve: Trace) -> Iterator[tuple[Array, int, bool]]:
     """Cut a curve where there is no force: parts, the sign of A on each, whether it is closed."""
 
@@ -171,27 +116,11 @@ def _by_sign(plane: Plane, equations: Equations, curve: Trace) -> Iterator[tuple
 
     for k, (z, s) in enumerate(zip(curve.vertices, signs, strict=True)):
         if s != before:
-            cut = _last(equations, curve.vertices[k - 1], z, unchanged)
+            cut = last_point(equations, curve.vertices[k - 1], z, unchanged)
             yield np.array([*part, cut]), before, False
             part, before = [cut], s
         part.append(z)
     yield np.array(part), signs[-1], whole
-
-
-def _last(
-    equations: Equations, inner: Array, outer: Array, holds: Callable[[Array], bool]
-) -> Array:
-    """Return the last point of a curve between two of its vertices where a condition holds."""
-    chord = outer - inner
-    low, high = 0.0, 1.0
-    point = inner
-    for _ in range(60):
-        share = 0.5 * (low + high)
-        guess = inner + share * chord
-        found = newton(equations, guess, chord, float(chord @ guess))
-        point = guess if found is None else found
-        low, high = (share, high) if holds(point) else (low, share)
-    return point
 
 
 def _cusp(plane: Plane, row: Array) -> Cusp:
@@ -199,15 +128,27 @@ def _cusp(plane: Plane, row: Array) -> Cusp:
     A = float(plane.law(plane.values_at(row))[0])
     phi = float(np.pi - (np.pi - TURN * row[2]) % TURN)
     along_B = abs(np.cos(phi)) > 0.5
-    return Cusp(float(x), float(y), phi, "center" if along_B == (A > 0.0) else "saddle")
+    like = "center" if along_B == (A > 0.0) else "saddle"
+    cubic = cubic_coefficient(plane.A(np.array([x]), np.array([y])), phi)
+    return Cusp(float(x), float(y), phi, like, float(cubic[0]))
 
 
 def _piece(
     plane: Plane, kind: str, vertices: Array, closed: bool, *, sign: int, phi: Array | None = None
-) -> Piece:
+) -> Locus:
     x, y = plane.parameters(vertices).T
-    angles = np.full(x.size, np.nan) if phi is None else phi
-    return Piece(kind, x, y, angles, sign, closed)
+    angles = quadratic = np.full(x.size, np.nan)
+    merging = ""
+    if phi is not None:
+        angles, merging = phi, "lower_saddle upper_center"
+    if kind == "fold":
+        quadratic = quadratic_coefficient(plane.A(x, y), angles)
+    elif kind == "pitchfork":
+        along_B = abs(np.cos(angles[0])) > 0.5
+        merging = "lower_saddle upper_center upper_saddle"
+        if along_B == (sign > 0):
+            merging = "lower_center lower_saddle upper_center"
+    return Locus(kind, x, y, angles, closed, quadratic, merging, sign)
 
 
 # ------------------------------------------------------------------------------ zeros
@@ -231,11 +172,11 @@ def _A_turns(plane: Plane, curve: Trace) -> bool:
 def _curves(plane: Plane, equation: Equations, polynomial: Callable[[Path], Any]) -> list[Trace]:
     curves: list[Trace] = []
     for fixed, u, point in plane.crossings(polynomial):
-        _new(curves, equation, solve(equation, point, fixed, u), point)
+        new_curve(curves, equation, solve(equation, point, fixed, u), point)
     return curves
 
 
-def _pitchforks(plane: Plane, name: str) -> list[Piece]:
+def _pitchforks(plane: Plane, name: str) -> list[Locus]:
     """Pitchforks of a plane in which B or C vanishes: the other one, `name`, is A or -A."""
     place = "ABC".index(name)
     pieces = []
@@ -246,7 +187,7 @@ def _pitchforks(plane: Plane, name: str) -> list[Piece]:
             return products[place] - sign * products[0]
 
         def along(path: Path, sign: int = sign) -> Any:
-            return add(path.products[place], path.products[0], -sign)
+            return path.products[place] - sign * path.products[0]
 
         def relative(z: Array, sign: int = sign) -> tuple[Array, Array]:
             abc, dx, dy = plane._derivatives(lambda v: plane.law(v)[:3], z)
@@ -258,7 +199,7 @@ def _pitchforks(plane: Plane, name: str) -> list[Piece]:
             # Where B = sign A the merged angle is 0 or pi, where C = sign A it is -+pi/2.
             angle = (0.0 if sign > 0 else np.pi) if name == "B" else -sign * np.pi / 2
             for part, s, whole in _by_sign(plane, relative, curve):
-                if s and _extends(part):
+                if s and extends(part):
                     phi = np.full(len(part), angle)
                     pieces.append(_piece(plane, "pitchfork", part, whole, sign=s, phi=phi))
     return pieces
@@ -267,7 +208,7 @@ def _pitchforks(plane: Plane, name: str) -> list[Piece]:
 # ------------------------------------------------------------------------------ equal energies
 
 
-def _equal_energies(plane: Plane) -> list[Piece]:
+def _equal_energies(plane: Plane) -> list[Locus]:
     """Curves where both saddles, or both centers, have the same energy.
 
     They are the parts inside the fold set of the curves on which B or C vanishes.
@@ -283,7 +224,7 @@ def _equal_energies(plane: Plane) -> list[Piece]:
     return pieces
 
 
-def _inside(plane: Plane, factor: Factor, vertices: Array, of_B: bool, of_C: bool) -> list[Piece]:
+def _inside(plane: Plane, factor: Factor, vertices: Array, of_B: bool, of_C: bool) -> list[Locus]:
     def measured(z: Array) -> tuple[int, float]:
         """Sign of A, and how far inside the fold set: (|A| - |B + C|)/sum, as one of them is 0."""
         A, B, C, _ = plane.law(plane.values_at(z))
@@ -293,7 +234,7 @@ def _inside(plane: Plane, factor: Factor, vertices: Array, of_B: bool, of_C: boo
 
     equation = plane.zero(factor)
     codes = [measured(z) for z in vertices]
-    pieces: list[Piece] = []
+    pieces: list[Locus] = []
     run: list[Array] = []
     run_sign = 0
 
@@ -309,7 +250,7 @@ def _inside(plane: Plane, factor: Factor, vertices: Array, of_B: bool, of_C: boo
             sign, gap = measured(z)
             return gap > 0.0 and sign == run_sign
 
-        return _last(equation, inner, outer, holds)
+        return last_point(equation, inner, outer, holds)
 
     for k, (z, (sign, gap)) in enumerate(zip(vertices, codes, strict=True)):
         inside = gap > 1e-13

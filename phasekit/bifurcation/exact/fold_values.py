@@ -7,16 +7,17 @@ half an angle, all roots of the discriminant that are not negative are isolated.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq_poly
 
 from phasekit.bifurcation.exact.critical import Critical
 from phasekit.bifurcation.exact.line import Path
-from phasekit.bifurcation.exact.real_roots import Rational, multiply, unit_roots, value, whole
 from phasekit.laws.trigonometric import Trigonometric
+from phasekit.numerics.real_roots import rational, unit_roots
 
 # Roots in (2^-OCTAVES, 1] are found to 2^-FINEST, which leaves 60 bits to each.
 OCTAVES, FINEST = 20, 80
@@ -71,8 +72,8 @@ def _of_one(law: Trigonometric, parameter: str, values: dict[str, float]) -> lis
     span = (low, high) if parameter in law.angles else (0.0, 1.0)
     path = Path(law, values, parameter, span)
     A, B, C = path.products
-    whole_A = multiply(A, path.common)
-    flat = not any(B) and not any(C)
+    whole_A = A * path.common
+    flat = not B and not C
     at_zero = [x for x in _non_negative_roots(whole_A) if _turns(whole_A, x)]
     folds: tuple[list[Fraction], list[Fraction]] = (at_zero, at_zero) if flat else ([], [])
     if not flat:
@@ -90,35 +91,35 @@ def _at(path: Path, x: Fraction) -> float:
     return path.at(x) if x <= 1 else math.nan
 
 
-def _turns(polynomial: Sequence[Rational], x: Fraction) -> bool:
+def _turns(polynomial: fmpq_poly, x: Fraction) -> bool:
     """Whether a polynomial has different signs on both sides of a root."""
     gap = Fraction(1, 1 << (FINEST // 2))
     step = gap * x if x else gap**20
-    left, right = value(polynomial, x - step), value(polynomial, x + step)
+    left, right = (polynomial(rational(place)) for place in (x - step, x + step))
     return (left < 0) != (right < 0)
 
 
-def _non_negative_roots(polynomial: Sequence[Rational]) -> list[Fraction]:
+def _non_negative_roots(polynomial: fmpq_poly) -> list[Fraction]:
     """All roots >= 0 of a polynomial in rising order, each to full relative precision."""
-    power = whole(polynomial)
-    if len(power) < 2:
+    if polynomial.degree() < 1:
         return []
-    roots = _roots_to_one(power) + [1 / x for x in _roots_to_one(power[::-1]) if x]
+    turned = fmpq_poly(polynomial.coeffs()[::-1])
+    roots = _roots_to_one(polynomial) + [1 / x for x in _roots_to_one(turned) if x]
     return sorted(set(roots))
 
 
-def _roots_to_one(power: list[int]) -> list[Fraction]:
+def _roots_to_one(power: fmpq_poly) -> list[Fraction]:
     """Roots in [0, 1], those near zero magnified before they are found."""
-    at_zero = next((k for k, c in enumerate(power) if c), 0)
-    power = power[at_zero:]
-    roots = [Fraction(0)] if at_zero else []
+    roots = [] if power(0) else [Fraction(0)]
+    while not power(0):
+        power = power.right_shift(1)
     unit = Fraction(1)
-    while len(power) > 1:
+    while power.degree() > 0:
         found = unit_roots(power, FINEST)
         near = Fraction(1, 1 << OCTAVES)
         roots += [x * unit for x in found if x > near]
         if not any(x <= near for x in found):
             break
-        power = whole([c * near**k for k, c in enumerate(power)])
+        power = power(fmpq_poly([0, rational(near)]))
         unit *= near
     return roots

@@ -7,24 +7,16 @@ and C, and without force, where A, B and C have a common root, everything is an 
 
 from __future__ import annotations
 
+import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from phasekit.bifurcation.exact.real_roots import (
-    Polynomial,
-    Rational,
-    add,
-    common_divisor,
-    interpolate,
-    multiply,
-    quotient,
-    value,
-    whole,
-)
+from flint import fmpq, fmpq_poly
+
 from phasekit.laws.trigonometric import Factor, Trigonometric, Values, exact
+from phasekit.numerics.real_roots import interpolate, rational
 
 
 @dataclass(frozen=True)
@@ -37,37 +29,34 @@ class Path:
     span: tuple[float, float]
 
     @cached_property
-    def products(self) -> tuple[list[int], list[int], list[int]]:
+    def products(self) -> tuple[fmpq_poly, fmpq_poly, fmpq_poly]:
         """A, B, C as polynomials of x in [0, 1] along the span, up to a common positive factor."""
-        parts = [quotient(p, self.common) for p in self._products]
-        unit = math.lcm(*(c.denominator for p in parts for c in p))
-        A, B, C = ([int(c * unit) for c in p] for p in parts)
+        A, B, C = (p // self.common for p in self._products)
         return A, B, C
 
     @cached_property
-    def common(self) -> list[int]:
+    def common(self) -> fmpq_poly:
         """The divisor that A, B and C had in common; where it vanishes there is no force."""
-        divisor = common_divisor(*self._products)
-        return divisor if len(divisor) > 1 else [1]
+        divisor = functools.reduce(fmpq_poly.gcd, self._products)
+        return divisor if divisor.degree() > 0 else fmpq_poly([1])
 
     @cached_property
-    def discriminant(self) -> list[int]:
+    def discriminant(self) -> fmpq_poly:
         """Delta, negative where four equilibria exist; of the parts that vanish only a factor."""
-        a, b, c = (multiply(p, p) for p in self.products)
-        sum_ = add(add(b, c), a, -1)
-        if not any(b) or not any(c):
-            return whole(sum_)  # Delta is its cube
-        product = multiply(multiply(a, b), c)
-        return whole(add(multiply(multiply(sum_, sum_), sum_), product, 27))
+        a, b, c = (p * p for p in self.products)
+        sum_ = b + c - a
+        if not b or not c:
+            return sum_  # Delta is its cube
+        return sum_**3 + 27 * a * b * c
 
     @cached_property
-    def _products(self) -> list[Polynomial]:
-        def place(i: int) -> Polynomial:
+    def _products(self) -> list[fmpq_poly]:
+        def place(i: int) -> fmpq_poly:
             return self.polynomial(lambda v: self.law.products(v)[i])
 
         return [place(i) for i in range(3)]
 
-    def polynomial(self, factor: Factor) -> Polynomial:
+    def polynomial(self, factor: Factor) -> fmpq_poly:
         """Return a factor of the law as a polynomial of x."""
         fixed = exact(self.law.turned({**self.values, self.parameter: self.span[0]}))
         low, high = (Fraction(end) for end in self._ends)
@@ -76,7 +65,7 @@ class Path:
             u = low + (high - low) * k
             here = self.law.half_angle(self.parameter, u) if self._turns else u
             values.append(Fraction(factor({**fixed, self.parameter: here})))
-        return interpolate([Fraction(v) for v in values])
+        return interpolate([rational(v) for v in values])
 
     def at(self, x: Fraction) -> float:
         """Return the parameter at x."""
@@ -86,14 +75,14 @@ class Path:
             u = self.law.middle(self.parameter) + 2.0 * math.atan(u)
         return min(max(u, self.span[0]), self.span[1])
 
-    def value(self, polynomial: Sequence[Rational], x: Fraction) -> Fraction:
+    def value(self, polynomial: fmpq_poly, x: Fraction) -> fmpq:
         """Return a polynomial at x relative to the largest of its kind, exactly."""
-        top = max(abs(Fraction(value(p, x))) for p in self.products)
-        return Fraction(value(polynomial, x)) / top if top else Fraction(0)
+        top = max(abs(p(rational(x))) for p in self.products)
+        return polynomial(rational(x)) / top if top else fmpq(0)
 
-    def sign(self, polynomial: Sequence[Rational], x: Fraction) -> int:
+    def sign(self, polynomial: fmpq_poly, x: Fraction) -> int:
         """Return the sign of a polynomial at x, exactly."""
-        result = value(polynomial, x)
+        result = polynomial(rational(x))
         return (result > 0) - (result < 0)
 
     @property

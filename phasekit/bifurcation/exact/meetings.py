@@ -8,15 +8,15 @@ pitchfork, a change of sign of B or C hands labels over.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
 
+from phasekit.bifurcation.curves import End, Joints, Meeting
 from phasekit.bifurcation.exact.line import Path
-from phasekit.bifurcation.exact.normal_forms import NormalForm, fold_angle, normal_form
-from phasekit.bifurcation.exact.real_roots import unit_roots
+from phasekit.bifurcation.exact.normal_forms import fold_angle, normal_form
+from phasekit.numerics.real_roots import unit_roots
 from phasekit.phase.exact.equilibria import equilibria
 
 LOWER_CENTER, LOWER_SADDLE, UPPER_CENTER, UPPER_SADDLE = range(4)
@@ -50,48 +50,6 @@ class Interval(NamedTuple):
     def labels(self) -> tuple[int, ...]:
         """Labels that exist; a pair that is merged all along stands as lower saddle."""
         return {4: (0, 1, 2, 3), 3: (0, 1, 3), 2: (0, 3), 0: ()}[self.number]
-
-
-class End(NamedTuple):
-    """One end of an arc: interval, label, and side 0 (left) or 1 (right)."""
-
-    interval: int
-    label: int
-    side: int
-
-    @property
-    def far(self) -> End:
-        """The other end."""
-        return self._replace(side=1 - self.side)
-
-
-class Meeting(NamedTuple):
-    """A special point: where arcs meet, begin or end."""
-
-    at: float
-    phi: float
-    kind: str
-    normal_form: NormalForm = NormalForm(np.nan, np.nan, np.nan)
-
-
-@dataclass
-class Joints:
-    """How the ends of arcs are linked, and where."""
-
-    partner: dict[End, End] = field(default_factory=dict)
-    place: dict[End, int] = field(default_factory=dict)
-    meetings: list[Meeting] = field(default_factory=list)
-
-    def link(self, one: End, other: End, place: int | None = None) -> None:
-        """Make two ends one curve, at a special point if `place` is given."""
-        self.partner[one], self.partner[other] = other, one
-        if place is not None:
-            self.place[one] = self.place[other] = place
-
-    def note(self, meeting: Meeting) -> int:
-        """Add a special point."""
-        self.meetings.append(meeting)
-        return len(self.meetings) - 1
 
 
 def survey(path: Path) -> tuple[list[Event], list[Interval]]:

@@ -15,25 +15,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.curves import NormalForm
 from phasekit.laws.trigonometric import Trigonometric
 
 Array = npt.NDArray[np.float64]
 
 #: Imaginary step: derivatives are exact to rounding for every size of it.
 STEP = 1e-30
-
-
-class NormalForm(NamedTuple):
-    """Coefficients of the normal form; 0 or NaN where a term does not belong to it."""
-
-    unfolding: float
-    quadratic: float
-    cubic: float
 
 
 def fold_angle(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike) -> Array:

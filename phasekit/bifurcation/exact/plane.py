@@ -16,9 +16,10 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.normal_forms import STEP
-from phasekit.bifurcation.exact.real_roots import unit_roots
-from phasekit.bifurcation.exact.tracing import Equations
+from phasekit.bifurcation.regions import components, depths
+from phasekit.bifurcation.tracing import Equations
 from phasekit.laws.trigonometric import Factor, Trigonometric
+from phasekit.numerics.real_roots import unit_roots
 
 Array = npt.NDArray[np.float64]
 Limits = tuple[float, float]
@@ -60,6 +61,13 @@ class Plane:
         """Return a parameter in units of the plane."""
         low, high = self.limits[i]
         return (value - low) / (high - low)
+
+    def A(self, x: Array, y: Array) -> Array:
+        """A at values of both parameters."""
+        values = {name: np.full(x.shape, value) for name, value in self.values.items()}
+        with np.errstate(all="ignore"):
+            found: Array = self.law.coefficients({**values, self.names[0]: x, self.names[1]: y})[0]
+        return found
 
     # ---------------------------------------------------------------- equations
 
@@ -152,41 +160,11 @@ def regions(plane: Plane, cells: int = 160) -> list[tuple[float, float, int, flo
     for sign in (np.sign(f).reshape(cells, cells) for f in (A, B, C)):
         clear[1:] &= sign[1:] == sign[:-1]
         clear[:, 1:] &= sign[:, 1:] == sign[:, :-1]
-    labels = _components(number)
-    depth = _depth(labels, clear)
+    labels = components(number)
+    depth = depths(labels, clear)
     found = []
     for label in np.unique(labels):
         i = int(np.where(labels == label, depth, -1).argmax())
         n = int(number.flat[i])
         found.append((float(x[i]), float(y[i]), n, float(depth.flat[i]) / cells))
     return found
-
-
-def _components(codes: npt.NDArray[np.int_]) -> npt.NDArray[np.int_]:
-    """Number the connected parts of equal codes: each cell by the greatest index of its part."""
-    labels = np.arange(codes.size).reshape(codes.shape)
-    along = codes[1:] == codes[:-1], codes[:, 1:] == codes[:, :-1]
-    while True:
-        before = labels.copy()
-        for axis, same in enumerate(along):
-            view, joined = (labels, same) if axis == 0 else (labels.T, same.T)
-            # One sweep each way carries a label to the end of its column.
-            for k in (*range(1, len(view)), *range(-2, -len(view) - 1, -1)):
-                other = k - 1 if k > 0 else k + 1
-                link = joined[k - 1] if k > 0 else joined[k + 1]
-                view[k] = np.where(link, np.maximum(view[k], view[other]), view[k])
-        if np.array_equal(before, labels):
-            return labels
-
-
-def _depth(labels: npt.NDArray[np.int_], clear: npt.NDArray[np.bool_]) -> npt.NDArray[np.int_]:
-    """Number of cells from each cell to the next one that is not clear or of another part."""
-    alive = np.zeros(np.add(labels.shape, 2), bool)
-    alive[1:-1, 1:-1] = clear
-    alive[1:-2, 1:-1] &= labels[1:] == labels[:-1]
-    alive[1:-1, 1:-2] &= labels[:, 1:] == labels[:, :-1]
-    depth = alive.astype(int)
-    while alive.any():
-        alive[1:-1, 1:-1] &= alive[:-2, 1:-1] & alive[2:, 1:-1] & alive[1:-1, :-2] & alive[1:-1, 2:]
-        depth += alive
-    return depth[1:-1, 1:-1]

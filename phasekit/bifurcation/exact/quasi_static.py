@@ -18,12 +18,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq_poly
 
 from phasekit.bifurcation.exact.line import Path
 from phasekit.bifurcation.exact.meetings import Event, Interval, survey
-from phasekit.bifurcation.exact.real_roots import Polynomial, interpolate
 from phasekit.errors import EquilibriumKind
 from phasekit.laws.trigonometric import Factor, Values, exact
+from phasekit.numerics.real_roots import interpolate, rational
 from phasekit.phase.exact.equilibria import Equilibria
 from phasekit.phase.exact.potential import gradient
 
@@ -39,7 +40,7 @@ class Segment(Path):
 
     ends: tuple[Values, Values] = ({}, {})
 
-    def polynomial(self, factor: Factor) -> Polynomial:
+    def polynomial(self, factor: Factor) -> fmpq_poly:
         """Return a factor of the law as a polynomial of x."""
         fixed = exact(self.law.turned(self.values))
         first, last = ({k: Fraction(v) for k, v in end.items()} for end in self.ends)
@@ -48,7 +49,7 @@ class Segment(Path):
         for k in range(degree + 1):
             here = {name: first[name] + (last[name] - first[name]) * k for name in first}
             values.append(Fraction(factor({**fixed, **here})))
-        return interpolate(values)
+        return interpolate([rational(v) for v in values])
 
     def at(self, x: Fraction) -> float:
         """Return x: how far along the line."""

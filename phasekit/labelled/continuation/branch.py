@@ -15,7 +15,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.ending import cut
+from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.gaps import narrow
 from phasekit.bifurcation.continuation.kernels.defining import (
     BRANCH,
@@ -30,8 +30,8 @@ from phasekit.bifurcation.continuation.path import Path, Sample, join
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
-from phasekit.bifurcation.continuation.start import go_on, goes_on
 from phasekit.bifurcation.continuation.stops import SEARCHED
+from phasekit.bifurcation.continuation.walk import Walker, cut, go_on, goes_on
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch_points import Table, points_of
@@ -42,7 +42,7 @@ from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -304,14 +304,14 @@ class Branch:
         most = curve.options.max_points if points is None else points
         count = whole("points", most, "a whole number >= 1")
         wider = self._wider(span, bounds)
-        widened = curve.replace(**wider)
-        if not any(track is not None and self._goes_on(widened, track) for track in self.tracks):
+        widened = self._walker(**wider)
+        if not any(goes_on(widened, track) for track in self.tracks):
             reasons = "; ".join(stop.message for stop in self.stops)
             raise ParameterError(
                 f"extend: the branch ended for other reasons than max_points: {reasons}; where it "
                 "met a bound, give a wider span= or bounds="
             )
-        with said(f"extending the branch along {self.parameter}"):
+        with notice(f"extending the branch along {self.parameter}"):
             return announced(self._longer(count, wider))
 
     def _wider(
@@ -347,14 +347,14 @@ class Branch:
         """What the bounds of the curve are bounds of."""
         return [*self.curve.field.states, *self.free]
 
-    @staticmethod
-    def _goes_on(curve: Any, track: Any) -> bool:
-        return goes_on(curve, track)
+    def _walker(self, **changes: Any) -> Walker:
+        """How it is followed, with changes of what defines it."""
+        return CurveWalk(self.curve.replace(**changes))
 
     def _longer(self, count: int, bounds: Mapping[str, Any]) -> Self:
         curve, problem = self.known()
         curve = curve.replace(**bounds)
-        backward, forward = go_on(curve, self.start, self.tracks, count)
+        backward, forward = go_on(CurveWalk(curve), self.start, self.tracks, count)
         made = make_branch(problem, curve, self.start, backward, forward, self.record)
         return cast(Self, made)
 
@@ -473,7 +473,7 @@ def make_branch(
     try:
         path = join(curve, start, backward, forward)
         found, gaps = find(curve, path), narrow(curve, path)
-        return _made(problem, curve, start, (backward, forward), path, found, gaps, record)
+        return _branch_of(problem, curve, start, (backward, forward), path, found, gaps, record)
     except KeyboardInterrupt:  # what was followed is kept
         backward, forward = (
             None if track is None else replace(track, stop=SEARCHED)
@@ -481,10 +481,10 @@ def make_branch(
         )
         path = join(curve, start, backward, forward)
         found, gaps = not_searched(path, curve.n), ()
-        return _made(problem, curve, start, (backward, forward), path, found, gaps, record)
+        return _branch_of(problem, curve, start, (backward, forward), path, found, gaps, record)
 
 
-def _made(
+def _branch_of(
     problem: Problem,
     curve: Curve,
     start: Sample,
@@ -495,11 +495,13 @@ def _made(
     record: Record,
 ) -> Branch:
     """A branch of a path and the special points that were found on it."""
-    path, (placed, eigenvalues, doubts) = cut(curve, path, found)
+    found_at, eigenvalues, doubts = found
+    path = replace(path, eigenvalues=eigenvalues)
+    path, placed = cut(CurveWalk(curve), start, path, found_at)
     names = tuple(curve.field.parameters[i] for i in curve.active)
     specials = [*placed, *_ends(curve, path)]
     specials.sort(key=lambda one: (one.index, one.along))
-    table, places, values = points_of(problem, curve, path, specials, eigenvalues, record)
+    table, places, values = points_of(problem, curve, path, specials, record)
     branch = Branch(
         problem, names, curve.field.states, curve, start, tracks, table, (),
         path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
@@ -529,7 +531,7 @@ def _ends(curve: Curve, path: Path) -> list[Placed]:
     found = []
     for i, along, stop in ((0, -np.inf, path.stops[0]), (path.count - 1, np.inf, path.stops[1])):
         there = path.ends[0 if along < 0.0 else 1]
-        u = path.u[i, : curve.m] if there is None else there.u
+        u = path.u[i, : curve.m] if there is None else there.special.u
         at = float(u[curve.n])
         residual = float(np.max(np.abs(curve.at(u)[0])))
         special = Special(

@@ -40,7 +40,6 @@ def points_of(
     curve: Curve,
     path: Path,
     specials: list[Placed],
-    eigenvalues: npt.NDArray[np.complex128],
     record: Record,
 ) -> tuple[Table, list[int], npt.NDArray[np.complex128]]:
     """The points of a path with its special points, the places of these, and their eigenvalues.
@@ -65,7 +64,7 @@ def points_of(
         path.u[:, :m],
         path.tangent[:, :m],
         path.info,
-        eigenvalues,
+        path.eigenvalues,
     )
     label = np.full(total, "", dtype=np.dtypes.StringDType())
     for i, one in zip(mine, inner, strict=True):

@@ -9,11 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.bifurcation.continuation.scales import guessed, scaled
-from phasekit.bifurcation.continuation.start import run, settle, tangent_of
+from phasekit.bifurcation.continuation.start import settle, tangent_of
+from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch import Branch, make_branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
@@ -21,8 +23,9 @@ from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, numeric, unknown
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem, system_of
+from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.system import System
 
 FloatArray = npt.NDArray[np.float64]
@@ -54,7 +57,8 @@ def continuation(
     parameter : str
         The parameter that varies. It starts at the problem's own value.
     x0 : array_like or str, optional
-        The state to start from, which is corrected to an equilibrium first; default zeros. Fixed
+        The state to start from, which is corrected to an equilibrium first; default the problem's
+        own `start`, else zeros. Fixed
         points of a map of angles are those of f itself, without whole turns added. Of a
         system also one of its labels: lower_center (the default), lower_saddle, upper_center,
         upper_saddle, or, where equilibria are numbered, "0" (the default), "1", ...
@@ -126,12 +130,13 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
+        refuse_aperiodic(problem)
         if problem.map:
             raise bad(
                 "orbit", orbit, "None of a map",
                 "orbits of a map are fixed points of problem.iterated(times)",
             )  # fmt: skip
-        with said(f"following periodic orbits along {parameter}"):
+        with notice(f"following periodic orbits along {parameter}"):
             return announced(continue_orbit(
                 problem, parameter, orbit, span, _record(problem, record), options, fix, events,
                 stop,
@@ -159,8 +164,8 @@ def continuation(
     u = settle(curve, u, where)
     curve = scaled(curve, u, given)
     start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
-    with said(f"following equilibria along {parameter}"):
-        backward, forward = run(curve, start, options.directions)
+    with notice(f"following equilibria along {parameter}"):
+        backward, forward = run(CurveWalk(curve), start, options.directions)
         branch = make_branch(problem, curve, start, backward, forward, _record(problem, record))
     return announced(branch)
 
@@ -219,7 +224,7 @@ def _start(problem: Problem, x0: Any, given: Any) -> FloatArray:
     if system is not None and problem.time is None and (x0 is None or isinstance(x0, str)):
         return np.append(_labelled_start(system, x0), np.zeros(n - 1))  # at rest
     if x0 is None:
-        return np.zeros(n)
+        return np.array([problem.start.get(name, 0.0) for name in problem.state])
     if isinstance(x0, Mapping):
         missing = [name for name in problem.state if name not in x0]
         extra = [name for name in x0 if name not in problem.state]

@@ -13,14 +13,15 @@ import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk, in_order
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.ending import cut, go_on, goes_on, in_order
 from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Tracks, join
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.periodic.vertical import said_of
 from phasekit.bifurcation.continuation.specials import NOT_SEARCHED
 from phasekit.bifurcation.continuation.stops import SEARCHED
+from phasekit.bifurcation.continuation.walk import Walker, cut, go_on
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch
@@ -146,9 +147,8 @@ class CycleBranch(Branch):
     def _bounded(self) -> list[str]:
         return list(self.free)
 
-    @staticmethod
-    def _goes_on(curve: Any, track: Any) -> bool:
-        return goes_on(curve, track)
+    def _walker(self, **changes: Any) -> Walker:
+        return CycleWalk(self.curve.replace(**changes))
 
     def _wider(
         self, span: Sequence[float] | None, bounds: Mapping[str, Sequence[float]] | None
@@ -168,13 +168,7 @@ class CycleBranch(Branch):
     def _longer(self, count: int, bounds: Mapping[str, Any]) -> Self:
         cycles, problem = self.known()
         cycles = cycles.replace(**bounds)
-        backward, forward = (
-            go_on(cycles, track, count, self.start, forward)
-            for track, forward in zip(self.tracks, (False, True), strict=True)
-        )
-        if forward is not None and forward.stop.reason == "closed":
-            backward = None
-        made = (backward, forward)
+        made = go_on(CycleWalk(cycles), self.start, self.tracks, count)
         longer = make_cycles(problem, cycles, self.start, made, self.record, self.origin, self.kind)
         return cast(Self, longer)
 
@@ -246,7 +240,7 @@ def make_cycles(
         )
         tracks = (backward, forward)
         path, special, zeros = join(start, tracks, origin), [], NOT_SEARCHED
-    path, special = cut(cycles, path, in_order(special))
+    path, special = cut(CycleWalk(cycles), start, path, in_order(special))
     found = in_order([*special, *_ends(path)])
     points, labels, places = list(path.points), [""] * len(path.points), []
     shift = 0

@@ -15,6 +15,8 @@ from phasekit.bifurcation.continuation.periodic.functionals import (
     OfOrbit,
     number_names,
 )
+from phasekit.bifurcation.continuation.periodic.on_curves import CYCLE
+from phasekit.bifurcation.special_points import looked_for
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.user_events import ending, named
 from phasekit.labels.arguments import bad
@@ -50,10 +52,11 @@ def orbit_stop_of(
     if stop is None:
         return events, ()
 
-    def made(name: str, given: Any) -> Functional:
+    def functional_of(name: str, given: Any) -> Functional:
         return Functional(name, _function(problem, given, "stop"))
 
-    return ending(stop, events, made, ("event", *(CRITICAL if critical else ())))
+    kinds = (*CRITICAL, *looked_for(CYCLE)) if critical else ()
+    return ending(stop, events, functional_of, ("event", *kinds))
 
 
 def _function(problem: Problem, given: Any, argument: str) -> Formula | OfOrbit:

@@ -10,9 +10,10 @@ import numpy as np
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import starts
+from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.ending import run
 from phasekit.bifurcation.continuation.periodic.extended import extended
+from phasekit.bifurcation.continuation.walk import run
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
 from phasekit.labelled.continuation.cycle_points import clock_code
@@ -43,7 +44,7 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
     if point.kind == "period_doubling":
         cycles, orbit, dx = starts.doubled(cycles, here.orbit, checked.W)
         start = first_point(cycles, starts.off(cycles, orbit, dx, size), f"beside {where}")
-        forward = run(cycles, start, "forward")[1]
+        forward = run(CycleWalk(cycles), start, "forward")[1]
         origin = Stop("period_doubling", where)
         return make_cycles(problem, cycles, start, (None, forward), point.branch.record, origin)
     dx, _ = starts.other_tangent(cycles, here.orbit, checked.W, (here.dx, here.dy))
@@ -54,7 +55,7 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
     dx, dy = one.x - two.x, one.y - two.y
     length = np.sqrt(cycles.inner(mesh, dx, dx, dy, dy))
     start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
-    tracks = run(cycles, start, options.directions)
+    tracks = run(CycleWalk(cycles), start, options.directions)
     return make_cycles(problem, cycles, start, tracks, point.branch.record)
 
 
@@ -91,7 +92,7 @@ def point_curve(
     )
     if start.dy[2] < 0.0:
         start = start.flipped()
-    tracks = run(made, start, options.directions)
+    tracks = run(CycleWalk(made), start, options.directions)
     return make_cycles(problem, made, start, tracks, point.branch.record, kind=point.kind)
 
 

@@ -13,8 +13,10 @@ from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
+from phasekit.bifurcation.continuation.periodic.fourier import coefficients
 from phasekit.bifurcation.continuation.periodic.point import Point, vertical
 from phasekit.labelled.continuation.branch_points import attrs_of
+from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -172,12 +174,12 @@ def _along(
 ) -> FloatArray:
     """A function of the state at all places of an orbit: at once, where that gives the same."""
 
-    def one(k: int) -> float:
+    def value_at(k: int) -> float:
         moment = {} if time is None else {time: float(at[k])}
         return float(function(x[k].copy(), **values, **moment))
 
     count = len(x)
-    some = {k: one(k) for k in (0, count // 2, count - 1)}
+    some = {k: value_at(k) for k in (0, count // 2, count - 1)}
     try:
         moment = {} if time is None else {time: at.copy()}
         whole = np.asarray(function(x.T.copy(), **values, **moment), dtype=float)
@@ -188,7 +190,26 @@ def _along(
     )
     if alike and count > len(x[0]):
         return whole
-    return np.array([some[k] if k in some else one(k) for k in range(count)])
+    return np.array([some[k] if k in some else value_at(k) for k in range(count)])
+
+
+def _harmonic(
+    problem: Problem, cycles: Cycles, points: Sequence[Point], name: str, function: Fourier
+) -> dict[str, Any]:
+    """Amplitude and phase of a harmonic of the orbits."""
+    found = np.empty(len(points), complex)
+    for i, p in enumerate(points):
+        values = parameters_at(problem, cycles, p.orbit)
+        at = collocation.times(p.orbit.mesh, cycles.m) * p.orbit.y[0]
+        series = _along(function, p.orbit.x, values, problem.time, at)
+        found[i] = coefficients(p.orbit.mesh, series, cycles.m, function.order)[-1]
+    about = f"harmonic {function.order} of {function.formula}"
+    return {
+        f"{name}_amplitude": ("point", np.abs(found), {"long_name": f"amplitude of the {about}"}),
+        f"{name}_phase": (
+            "point", np.angle(found), {"long_name": f"phase of the {about}", "units": "rad"}
+        ),
+    }  # fmt: skip
 
 
 def _recorded(
@@ -197,6 +218,9 @@ def _recorded(
     """Least, largest and mean value of each recorded quantity over the orbits."""
     data: dict[str, Any] = {}
     for name, function in record.items():
+        if isinstance(function, Fourier):
+            data |= _harmonic(problem, cycles, points, name, function)
+            continue
         found = np.empty((len(points), 3))
         for i, p in enumerate(points):
             values = parameters_at(problem, cycles, p.orbit)

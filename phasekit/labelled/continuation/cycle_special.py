@@ -16,7 +16,7 @@ from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameter
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfinished import announced
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
 
@@ -52,13 +52,13 @@ class CyclePoint(SpecialPoint[Of]):
 
     def switch(self, *, direction: int = 0, options: Any = None) -> Of:
         """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
-        with said(f"following periodic orbits along {self.branch.parameter}"):
+        with notice(f"following periodic orbits along {self.branch.parameter}"):
             found: Of = onward("orbit.switch")(self, direction, options)
         return announced(found)
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
         """The curve of such orbits in this branch's parameter and a second one."""
-        with said(f"following {self.kind} points along {parameter}"):
+        with notice(f"following {self.kind} points along {parameter}"):
             found: Of = onward("orbit.curve")(self, parameter, span, options)
         return announced(found)
 

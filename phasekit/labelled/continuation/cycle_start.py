@@ -12,14 +12,15 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import starts
+from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.ending import run
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.points.hopf_families import (
     Family,
     critical_pairs,
     families,
 )
+from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch
@@ -88,7 +89,7 @@ def from_hopf(
     )
     start = first_point(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
     message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
-    tracks = (None, run(cycles, start, "forward")[1])
+    tracks = (None, run(CycleWalk(cycles), start, "forward")[1])
     return make_cycles(problem, cycles, start, tracks, {}, Stop("hopf", message))
 
 
@@ -150,7 +151,9 @@ def continue_orbit(
         start = start.flipped()
     cycles = cycles.replace(events=asked, ends=ends)
     try_events(cycles, start.orbit)
-    return make_cycles(problem, cycles, start, run(cycles, start, options.directions), record)
+    return make_cycles(
+        problem, cycles, start, run(CycleWalk(cycles), start, options.directions), record
+    )
 
 
 def _family(

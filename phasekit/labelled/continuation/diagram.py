@@ -92,7 +92,7 @@ def diagram(
     failures: list[ConvergenceError] = []
     try:
         for start, guess in _starts(problem, parameter, x0, (low, high), given):
-            if branches and _known(branches, start, guess, parameter):
+            if branches and _is_on_branches(branches, start, guess, parameter):
                 continue
             try:
                 branch = continuation(
@@ -180,7 +180,7 @@ def _repeats(branches: list[Branch], fresh: Branch) -> bool:
     return any(lies_on(*path_of(branch), u) for branch in branches)
 
 
-def _known(branches: list[Branch], start: Problem, guess: Any, parameter: str) -> bool:
+def _is_on_branches(branches: list[Branch], start: Problem, guess: Any, parameter: str) -> bool:
     curve, _ = branches[0].known()
     row = np.zeros(curve.size)
     row[curve.n] = 1.0

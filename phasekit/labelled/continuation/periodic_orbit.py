@@ -27,8 +27,9 @@ from phasekit.labelled.continuation.orbit_guess import (
 )
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, number, reals
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.problem_parts import refuse_aperiodic
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -105,6 +106,7 @@ def periodic_orbit(
     7.62987448
     """
     problem = as_problem(problem, moving=True)
+    refuse_aperiodic(problem)
     if problem.map:
         raise bad(
             "problem", problem, "a flow x' = f(x)",
@@ -156,12 +158,12 @@ def periodic_orbit(
     x = x.reshape(n)
     run = _Simulation(problem, units_of(problem, x))
     if period is not None:
-        with said("looking for a periodic orbit"):
+        with notice("looking for a periodic orbit"):
             start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
             turns = _turns(problem, run, start, period, value, options)
             where = f"from x0 = {x.tolist()} with period {period:.6g}"
             return _found(problem, turns, options, where)
-    with said("looking for a periodic orbit"):
+    with notice("looking for a periodic orbit"):
         return _searched(problem, x, settle, run, value, options)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
+from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.kernels.defining import (
     BRANCH,
     EVENT,
@@ -19,8 +20,8 @@ from phasekit.bifurcation.continuation.kernels.defining import (
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Sample, join
 from phasekit.bifurcation.continuation.specials import find
-from phasekit.bifurcation.continuation.start import run
 from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
+from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, make_branch
@@ -123,7 +124,7 @@ def point_curve(
             f"moves; {why}"
         )
     made, start = begun
-    backward, forward = run(made, start, options.directions)
+    backward, forward = run(CurveWalk(made), start, options.directions)
     return make_branch(problem, made, start, backward, forward, {})
 
 
@@ -163,7 +164,7 @@ def doubled(point: SpecialPoint[Branch], *, options: ContinuationOptions | None 
     tangent = np.append(point.special.extra, 0.0)
     tangent = tangent / curve.length(tangent)
     start = Sample(point.special.u, tangent, curve.at(point.special.u)[1])
-    _, forward = run(curve, start, "forward")
+    _, forward = run(CurveWalk(curve), start, "forward")
     assert forward is not None
     curve, forward = _to_other_end(curve, problem, start, forward)
     return make_branch(twice, curve, start, None, forward, point.branch.record)
@@ -232,5 +233,5 @@ def switch(
     options = curve.options if options is None else check_options(options)
     curve = curve.replace(options=options)
     start = Sample(point.special.u, others[direction], curve.at(point.special.u)[1])
-    backward, forward = run(curve, start, options.directions)
+    backward, forward = run(CurveWalk(curve), start, options.directions)
     return make_branch(problem, curve, start, backward, forward, point.branch.record)

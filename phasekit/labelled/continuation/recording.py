@@ -13,6 +13,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.columns import columns
+from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labels.arguments import bad, unknown
 from phasekit.systems.problem import Problem
 
@@ -48,7 +49,10 @@ def check_record(problem: Problem, record: Any) -> Mapping[str, Any]:
                 raise bad("record", name, "names that are identifiers and not taken")
             if not callable(function):
                 raise bad(f"record[{name!r}]", function, "a function q(x, **parameters)")
-        return dict(record)
+        return {
+            name: one.within(problem, f"record[{name!r}]") if isinstance(one, Fourier) else one
+            for name, one in record.items()
+        }
     if not isinstance(record, Sequence):
         raise bad("record", record, "a mapping from names to functions, or names of quantities")
     if problem.system is None:
@@ -69,6 +73,8 @@ def recorded(
     """The recorded quantities as variables on the dim ``point``."""
     made: dict[str, Any] = {}
     for name, function in record.items():
+        if isinstance(function, Fourier):
+            raise bad(f"record[{name!r}]", function, "nothing of periodic orbits on equilibria")
         if function is None:
             made[name] = _quantity(problem, ds, free, name)
         else:
@@ -84,16 +90,16 @@ def _values(
     fixed = {key: value for key, value in problem.parameters.items() if key not in varying}
     count = x.shape[1]
 
-    def one(i: int) -> Any:
+    def value_at(i: int) -> Any:
         at = {key: float(values[i]) for key, values in varying.items()}
         return np.asarray(function(x[:, i].copy(), **fixed, **at), dtype=float)
 
     failed: list[Exception] = []
 
-    def known(i: int) -> Any:
+    def value_or_nothing(i: int) -> Any:
         """The value at a point; None where the function raises."""
         try:
-            return one(i)
+            return value_at(i)
         except TypeError as error:
             raise ParameterError(
                 f"record[{name!r}]: cannot be called as q(x, **parameters): {error}"
@@ -104,20 +110,21 @@ def _values(
 
     values = None
     with np.errstate(all="ignore"):
-        found = known(0)
+        found = value_or_nothing(0)
         try:  # all points at once, if that gives the same
             whole = np.asarray(function(x.copy(), **fixed, **varying), dtype=float)
             whole = np.moveaxis(whole, -1, 0) if whole.ndim > 1 else whole
             checked = found is not None and whole.shape == (count, *found.shape)
             checked = checked and all(
-                np.array_equal(whole[i], one(i), equal_nan=True) for i in {0, count // 2, count - 1}
+                np.array_equal(whole[i], value_at(i), equal_nan=True)
+                for i in {0, count // 2, count - 1}
             )
             values = whole if checked and count > 3 else None
         except Exception:  # noqa: BLE001 - a function of single points; it is called point by point
             values = None
         if values is None:
             failed.clear()
-            rows = [known(i) for i in range(count)]
+            rows = [value_or_nothing(i) for i in range(count)]
             shape = next((row.shape for row in rows if row is not None), ())
             values = np.array([np.full(shape, np.nan) if row is None else row for row in rows])
     if failed:

@@ -17,7 +17,7 @@ from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.equality import same_fields
-from phasekit.numerics.waits import said
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -193,7 +193,7 @@ class SpecialPoint(Generic[Of]):
         >>> sides = [point.switch(direction=i) for i in range(3)]
         """
         if self.kind == "hopf":
-            with said(f"following periodic orbits along {self.branch.parameter}"):
+            with notice(f"following periodic orbits along {self.branch.parameter}"):
                 found: Of = onward("point.orbits")(self, options, direction)
         elif self.kind == "period_doubling":
             found = onward("point.double")(self, options=options)
@@ -239,7 +239,7 @@ class SpecialPoint(Generic[Of]):
         >>> bool(abs(curve.points.mu + curve.points.l / 2 - 1 / 8).max() < 1e-14)
         True
         """
-        with said(f"following {self.kind} points along {parameter}"):
+        with notice(f"following {self.kind} points along {parameter}"):
             found: Of = onward("point.curve")(self, parameter, span, options=options)
         return announced(found)
 

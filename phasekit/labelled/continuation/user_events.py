@@ -10,7 +10,8 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.bifurcation.continuation.functions import Code, Event, Formula
-from phasekit.bifurcation.special_points import KINDS
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.laws.formulas import NAME, symbols_of, take_formula, write_formula
@@ -76,19 +77,19 @@ def stop_of(
     """All events, those with which a branch ends as well, and the names at which it ends."""
     if stop is None:
         return events, ()
-    kinds = (*BOTH, *(MAP if problem.map else FLOW))
+    kinds = (*BOTH, *(MAP if problem.map else FLOW), *looked_for(EQUILIBRIUM))
 
-    def made(name: str, given: Any) -> Event:
+    def event_of(name: str, given: Any) -> Event:
         return _event(problem, name, given, "stop", x)
 
-    return ending(stop, events, made, kinds, detect)
+    return ending(stop, events, event_of, kinds, detect)
 
 
 def ending(
-    stop: Any, events: tuple[Any, ...], made: Callable[[str, Any], Any], kinds: Sequence[str],
+    stop: Any, events: tuple[Any, ...], make: Callable[[str, Any], Any], kinds: Sequence[str],
     detect: Sequence[str] | None = None,
 ) -> tuple[tuple[Any, ...], tuple[str, ...]]:  # fmt: skip
-    """All events, those that are ``made`` of functions as well, and the names at which it ends.
+    """All events, also those that it is to `make` of functions, and the names at which it ends.
 
     ``kinds`` of special points are there to end at, where ``detect`` looks for them.
     """
@@ -113,7 +114,7 @@ def ending(
             taken = [event.name for event in events]
             while name in taken:
                 name += "_"
-            events = (*events, made(name, one))
+            events = (*events, make(name, one))
             names += [name] * count  # the last of so many ends it
             continue
         if not isinstance(one, str):

@@ -9,33 +9,35 @@ motion, of as many components.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy.integrate import DOP853
 
+from phasekit.motion.kernels import coefficients
 from phasekit.numerics.compile import Array, inline, routine
+from phasekit.numerics.elementary import hypot
 from phasekit.numerics.lanes import LANES, invoke
 
 STAGES = 12
 ROWS = 16
-C, C_MORE, D = DOP853.C.copy(), DOP853.C_EXTRA.copy(), np.ascontiguousarray(DOP853.D)
+C, C_MORE = np.array(coefficients.TIMES), np.array(coefficients.TIMES_MORE)
 #: Rows that are summed at a time.
 TOGETHER = 4
 
 
-def packed(*sums: Array) -> tuple[Array, npt.NDArray[np.int64]]:
-    """Weights of sums without their zeros, and the rows they belong to, filled up with zeros."""
-    most = -(-max(np.count_nonzero(one) for one in sums) // TOGETHER) * TOGETHER
+def packed(sums: Sequence[dict[int, float]]) -> tuple[Array, npt.NDArray[np.int64]]:
+    """Weights of sums and the rows they belong to, filled up with zeros."""
+    most = -(-max(map(len, sums)) // TOGETHER) * TOGETHER
     weights, places = np.zeros((len(sums), most)), np.zeros((len(sums), most), np.int64)
     for row, one in enumerate(sums):
-        used = np.flatnonzero(one)
-        weights[row, : used.size], places[row, : used.size] = one[used], used
+        weights[row, : len(one)], places[row, : len(one)] = list(one.values()), list(one)
     return weights, places
 
 
+D = np.array([[one.get(place, 0.0) for place in range(ROWS)] for one in coefficients.DENSE])
 #: Sums for the stages 1 to 11, for the end, for the stages 13 to 15 and for both errors.
-WEIGHTS, PLACES = packed(*DOP853.A[1:], DOP853.B, *DOP853.A_EXTRA, DOP853.E3, DOP853.E5)
+WEIGHTS, PLACES = packed(coefficients.SUMS)
 _, MORE, THIRD, FIFTH = 11, 12, 15, 16
 
 #: Rows of limits: errors that are allowed, value from which on a coordinate is held as closely as
@@ -86,7 +88,7 @@ def rates(
     if table.shape[0] > 0:
         for lane in range(LANES):
             drive_at(table, z[lane], z, lane)
-    invoke(address, y, p, z, k)  # type: ignore[call-arg]
+    invoke(address, y, p, z, k)
 
 
 @routine
@@ -174,7 +176,7 @@ def errors(
                     scale = unit
             else:
                 other = m + LANES if c % 2 == 0 else m - LANES
-                scale = max(math.hypot(x[m], x[other]), math.hypot(y[m], y[other]))
+                scale = max(hypot(x[m], x[other]), hypot(y[m], y[other]))
             allowed = rtol * scale
             if c == 0:
                 allowed += least

@@ -262,7 +262,7 @@ def renew(
 
 @inline
 def _run(series: int, x: Array, p: Array, real: Array, limits: Array) -> None:
-    invoke(series, x, p, real, limits)  # type: ignore[call-arg]
+    invoke(series, x, p, real, limits)
 
 
 @routine

@@ -23,43 +23,69 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
-from phasekit.motion.lost import ARRIVED, IDLE, RUNNING
+from phasekit.motion.lost import ARRIVED, FAILED, IDLE, RUNNING
 from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 
-Codes = npt.NDArray[np.int16]
 Index = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 
 @inline
-def nearest_of(phi: float, dphi: float, points: Array, period: float, scale: float) -> int:
+def nearest_of(lane: int, x: Array, points: Array, turns: Array, units: Array) -> int:
     """Number of the attractor's point near which a state lies; -1: of none.
 
-    Rows of the points: coordinate, rate, radius, attractor. Rates are measured by `scale`.
+    Rows of the points: state, radius, attractor. Distances are measured by a unit of each state;
+    of angles `turns` are the periods, 0 of others.
     """
+    n = turns.size
     for row in range(points.shape[0]):
-        off = phi - points[row, 0]
-        if period > 0.0:
-            off -= period * np.rint(off / period)
-        speed = (dphi - points[row, 1]) / scale
-        if off * off + speed * speed <= points[row, 2] ** 2:
-            return int(points[row, 3])
+        room, total = points[row, n] ** 2, 0.0
+        for c in range(n):
+            off = x[c * LANES + lane] - points[row, c]
+            if turns[c] > 0.0:
+                off -= turns[c] * np.rint(off / turns[c])
+            total += (off / units[c]) ** 2
+        if total <= room:
+            return int(points[row, n + 1])
     return -1
 
 
 @inline
-def box_of(phi: float, dphi: float, period: float, box: Array, boxes: Codes) -> int:
-    """What is written in the box of a grid in which a state lies; -1 outside."""
-    if boxes.shape[0] == 0:
+def cell_of(
+    lane: int, x: Array, turns: Array, grid: Array, side: int, keys: Index, codes: Index
+) -> int:
+    """What is written in the cell of a grid in which a state lies; -1 outside, or for nothing.
+
+    Rows of the grid: its least state, and the edges of a cell, `side` along each axis. The cells
+    stand in a table: each at the place of its number modulo the size, or the next that was free.
+    """
+    if keys.size == 0:
         return -1
-    if period > 0.0:
-        phi -= period * math.floor((phi - box[0]) / period)
-    i = math.floor((phi - box[0]) / (box[1] - box[0]) * boxes.shape[0])
-    j = math.floor((dphi - box[2]) / (box[3] - box[2]) * boxes.shape[1])
-    if not (0 <= i < boxes.shape[0] and 0 <= j < boxes.shape[1]):
-        return -1
-    return int(boxes[int(i), int(j)])
+    key = 0
+    for c in range(turns.size):
+        off = x[c * LANES + lane] - grid[0, c]
+        if turns[c] > 0.0:
+            off -= turns[c] * math.floor(off / turns[c])
+        place = off / grid[1, c]
+        if not 0.0 <= place < side:
+            return -1
+        key = key * side + int(place)
+    at = key % keys.size
+    while keys[at] >= 0:
+        if keys[at] == key:
+            return int(codes[at])
+        at = (at + 1) % keys.size
+    return -1
+
+
+@inline
+def is_far(lane: int, x: Array, reach: Array) -> bool:
+    """Whether a state lies beyond where motions count as gone for good."""
+    for c in range(reach.shape[1]):
+        if not reach[0, c] <= x[c * LANES + lane] <= reach[1, c]:
+            return True
+    return False
 
 
 @inline
@@ -86,25 +112,28 @@ def band_of(phi: float, dphi: float, period: float, spans: Array, bands: Array) 
 
 
 @routine
-def grow(lane: int, scale: float, x: Array, sizes: Array) -> None:
+def grow(lane: int, units: Array, x: Array, sizes: Array) -> None:
     """Make the tangent vector one unit long, and count by how much errors have grown.
 
     Each leg adds an error of one unit. Rows of sizes: the error now, the greatest so far, and that
     when the motion came to the boxes in which it is.
     """
-    u, w = x[2 * LANES + lane], x[3 * LANES + lane]
-    size = math.hypot(u, w / scale)
+    n, size = units.size, 0.0
+    for c in range(n):
+        size += (x[(n + c) * LANES + lane] / units[c]) ** 2
+    size = math.sqrt(size)
     if size > 0.0:
-        x[2 * LANES + lane], x[3 * LANES + lane] = u / size, w / size
+        for c in range(n):
+            x[(n + c) * LANES + lane] /= size
     sizes[0, lane] = sizes[0, lane] * size + 1.0
     sizes[1, lane] = max(sizes[0, lane], sizes[1, lane])
 
 
 @routine
-def write(lane: int, x: Array, sizes: Array, out: Array) -> None:
+def write(lane: int, n: int, x: Array, sizes: Array, out: Array) -> None:
     """Write the state of a lane, and its tangent vector as long as the error now."""
     for c in range(out.size):
-        out[c] = x[c * LANES + lane] * (sizes[0, lane] if c > 1 else 1.0)
+        out[c] = x[c * LANES + lane] * (sizes[0, lane] if c >= n else 1.0)
 
 
 @routine
@@ -137,12 +166,15 @@ def strobe(
     kink: int,
     skip: int,
     many: int,
-    period: float,
-    scale: float,
+    turns: Array,
+    units: Array,
     points: Array,
-    box: Array,
-    boxes: Codes,
+    grid: Array,
+    side: int,
+    keys: Index,
+    codes: Index,
     visits: int,
+    reach: Array,
     enough: float,
     spans: Array,
     bands: Array,
@@ -165,10 +197,11 @@ def strobe(
 
     Where the law repeats itself after each leg (`again`), time begins anew. A motion ends early
     near a point of an attractor, in whose number `code` is then, within its borders, or after so
-    many visits in succession to boxes of the same attractor. `taken` is the number of legs. Where a
-    tangent vector moves along, as long as the error at first, `growth` is by how much it and an
-    error of every leg have grown at most before the motion came to where it ends. Where that is
-    `enough`, the motion ends as well, and its state is the first of `out`.
+    many visits in succession to cells of the same attractor; and it fails out of `reach`. `taken`
+    is the number of legs. Where a tangent vector moves along, as long as the error at first,
+    `growth` is by how much it and an error of every leg have grown at most before the motion came
+    to where it ends. Where that is `enough`, the motion ends as well, and its state is the first
+    of `out`.
     """
     size = states.shape[1] * LANES
     x, y, h = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -179,7 +212,8 @@ def strobe(
     counts = np.zeros((3, LANES), np.int64)
     done, last, same = counts[0], counts[1], counts[2]
     sizes = np.zeros((3, LANES))
-    measured = states.shape[1] > 2
+    n = turns.size
+    measured = states.shape[1] > n
     cell = first
     left = stop - first
     while left > 0:
@@ -192,23 +226,24 @@ def strobe(
             ended, grown = state != IDLE and state != ARRIVED, False
             if state == ARRIVED:
                 done[lane] += 1
-                phi, dphi = x[lane], x[LANES + lane]
                 if measured:
-                    grow(lane, scale, x, sizes)
+                    grow(lane, units, x, sizes)
                 if skip <= done[lane] < skip + out.shape[1]:
-                    write(lane, x, sizes, out[own, done[lane] - skip])
-                inside = box_of(phi, dphi, period, box, boxes)
-                code[own] = nearest_of(phi, dphi, points, period, scale)
-                if code[own] < 0:
-                    code[own] = band_of(phi, dphi, period, spans, bands)
+                    write(lane, n, x, sizes, out[own, done[lane] - skip])
+                inside = cell_of(lane, x, turns, grid, side, keys, codes)
+                code[own] = nearest_of(lane, x, points, turns, units)
+                if code[own] < 0 and spans.shape[0] > 0:
+                    code[own] = band_of(x[lane], x[LANES + lane], turns[0], spans, bands)
                 if stays(lane, inside, visits, last, same) and code[own] < 0:
                     code[own] = inside
                 if same[lane] == 1 or 0 <= code[own] != inside:
                     sizes[2, lane] = sizes[1, lane]
                 ended = code[own] >= 0 or done[lane] >= many
+                if not ended and is_far(lane, x, reach):
+                    state, ended = FAILED, True
                 grown = not ended and sizes[2, lane] > enough
                 if grown:
-                    write(lane, x, sizes, out[own, 0])
+                    write(lane, n, x, sizes, out[own, 0])
                 if not ended and not grown:
                     anew = again[own] or measured
                     resume(lane, done[lane], legs[own], again[own], anew, real, whole)
@@ -227,7 +262,7 @@ def strobe(
                 done[lane] = last[lane] = same[lane] = 0
                 sizes[0, lane], sizes[1, lane], sizes[2, lane] = 1.0, 0.0, 0.0
                 if measured:
-                    grow(lane, scale, x, sizes)
+                    grow(lane, units, x, sizes)
                 fresh = True
                 cell += 1
         if address is not None and fresh:

@@ -12,11 +12,10 @@ from __future__ import annotations
 import functools
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import llvmlite.binding as llvm
 import numpy as np
-import sympy as sp
 from llvmlite import ir
 
 from phasekit.motion.kernels.dop853 import (
@@ -44,8 +43,14 @@ from phasekit.motion.kernels.stepping import (
 )
 from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, RUNNING
 from phasekit.numerics.lanes import LANES, LaneWriter
+from phasekit.numerics.later import later
 from phasekit.numerics.machine_code import machine_code
 from phasekit.numerics.series import Series
+
+if TYPE_CHECKING:
+    import sympy as sp
+else:
+    sp = later("sympy")
 
 #: Steps after which it is foreseen that too many would be needed.
 TRIAL = 4096

@@ -55,6 +55,13 @@ class State(NamedTuple):
     """Angular velocity, 1/s."""
 
 
+class NumberedState(NamedTuple):
+    """States by action and angle, named as the quantities are."""
+
+    phi_of_angle: Array
+    dphi_of_angle: Array
+
+
 def orbits_with_angles(
     A: npt.ArrayLike,
     B: npt.ArrayLike,
@@ -237,9 +244,8 @@ def state_of_numbers(
     action: npt.ArrayLike,
     angle: npt.ArrayLike,
     family: npt.ArrayLike,
-) -> tuple[Array, Array]:
+) -> NumberedState:
     """`state_of` for families that are kept as floats; what is no code of one gives NaN."""
     known = [family.value for family in OrbitFamily if family > 0]
     codes = np.where(np.isin(family, known), family, OrbitFamily.NONE)
-    phi, dphi = state_of(A, B, C, action, angle, codes.astype(np.int8))
-    return phi, dphi
+    return NumberedState(*state_of(A, B, C, action, angle, codes.astype(np.int8)))

@@ -7,13 +7,14 @@ method on the exact motion: in the direction of the flow, which vanishes at no s
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.differences import Ground
+from phasekit.phase.numerical.families import codes_of
 from phasekit.phase.numerical.motion import MotionWithErrors, flow
 from phasekit.phase.numerical.orbits import Orbits, orbits
 
@@ -28,9 +29,10 @@ WORST = 1e-7
 
 
 class AnglesWithErrors(NamedTuple):
-    """Angle variables; families and twist are known in closed form alone."""
+    """Angle variables; twist is known in closed form alone."""
 
-    orbit_family: npt.NDArray[np.int8]
+    orbit_family: npt.NDArray[np.integer[Any]]
+    """Code of the family: the sum of 2^k over the numbers k of its centers, or of a rotation."""
     angle: Array
     twist: Array
     angle_error: Array
@@ -47,7 +49,8 @@ def angles(ground: Ground, x: Array, v: Array) -> AnglesWithErrors:
     if rows.size:
         few = Orbits._make(field[rows] for field in orbit)
         angle[rows], error[rows] = _angles(ground.take(rows), few, x[rows], v[rows])
-    return AnglesWithErrors(np.zeros(x.shape, np.int8), angle, np.full(x.shape, np.nan), error)
+    family = codes_of(ground, orbit, v)
+    return AnglesWithErrors(family, angle, np.full(x.shape, np.nan), error)
 
 
 def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, Array]:

@@ -25,6 +25,8 @@ Array = npt.NDArray[np.float64]
 _LEAST, _MOST = 64, 4096
 _NEWTON = 6
 _ROUNDING = np.finfo(float).eps
+#: Rounding of the series for the arc length and back, as part of half a turn.
+SERIES = 8.0 * float(_ROUNDING)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,12 +173,26 @@ class ArcLength:
         points = Equilibria._make((*rows, count, np.array([True]), gaps, none, unknown))
         return survey(Systems(self.formula(), (), 1), points)
 
+    def scale(self, x: npt.ArrayLike) -> Array:
+        """Arc length per coordinate: the root of the inertia."""
+        return np.asarray(np.sqrt(self.law.inertia(np.asarray(x, float))[0]))
+
+    def error(self, x: Array, error: Any) -> Array:
+        """An error of the arc length as one of the coordinate, which may be NaN."""
+        there = np.where(np.isfinite(x), x, 0.0)
+        rounding = SERIES * (0.5 * self.law.period + np.abs(there))
+        return np.asarray(error / self.scale(there) + rounding)
+
+    def by_coordinate(self, found: rounds.Orbits) -> rounds.Orbits:
+        """Orbits along the arc length in terms of the coordinate."""
+        low, high = self.place(found.phi_min), self.place(found.phi_max)
+        return found._replace(
+            phi_min=low, phi_max=high, amplitude=0.5 * (high - low),
+            phi_min_error=self.error(low, found.phi_min_error),
+            phi_max_error=self.error(high, found.phi_max_error),
+        )  # fmt: skip
+
     def orbit(self, ground: Ground, x: float, v: float) -> rounds.Orbits:
         """The orbit through a state (x, x')."""
-        speed = v * np.sqrt(self.law.inertia(x)[0])
-        found = rounds.orbits(ground, self.length([x]), np.array([speed]))
-        ends = (self.place(found.phi_min), self.place(found.phi_max))
-        found = found._replace(
-            phi_min=ends[0], phi_max=ends[1], amplitude=0.5 * (ends[1] - ends[0])
-        )
-        return rounds.Orbits._make(field[0] for field in found)
+        found = rounds.orbits(ground, self.length([x]), np.array([v * float(self.scale(x))]))
+        return rounds.Orbits._make(field[0] for field in self.by_coordinate(found))

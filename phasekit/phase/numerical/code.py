@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from phasekit.laws.formulas import is_name
-from phasekit.laws.nodes import wide
 
 #: Names that sympy gives to common parts, and dummies.
 _GIVEN = re.compile(r"_|x\d+$")
@@ -43,6 +42,8 @@ class Literals:
 
     def instead(self, e: Any) -> Any:
         """A formula with symbols for factors and terms that are such numbers."""
+        from phasekit.laws.nodes import wide
+
         own = e.is_Add or e.is_Mul
         parts = [
             self._symbol(part) if own and part.is_Rational and wide(part) else self.instead(part)

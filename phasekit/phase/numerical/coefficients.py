@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.numerics.intervals.bounds import Bounds
+from phasekit.numerics.intervals.program import NoRule
 from phasekit.phase.numerical.formula import Formula, shape_of
-from phasekit.phase.numerical.intervals import Bounds, NoRule
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]

@@ -6,6 +6,7 @@ small oscillations and separatrices are made of. There it is the integral of V''
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,7 @@ import numpy.typing as npt
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.equilibria import Equilibria, equilibria
 from phasekit.phase.numerical.formula import Shape
-from phasekit.phase.numerical.noise import noise, slope_noise
-from phasekit.phase.numerical.regions import smooth
+from phasekit.phase.numerical.formula_bounds import noise, slope_noise, smooth
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
@@ -65,6 +65,15 @@ class Ground:
         size = np.nanmax(np.abs(energy), axis=1, initial=0.0, where=there)[:, None]
         rise = energy[rows, column][:, None] - energy
         return np.where(np.abs(rise) <= 8.0 * np.finfo(float).eps * size, 0.0, rise)
+
+    def columns_of(self, numbers: Sequence[int]) -> list[Index]:
+        """Columns of equilibria by their numbers, -1 where there are fewer: all ways to see them.
+
+        Each has a row for each system, and a column for each number.
+        """
+        rows, width = self.points.phi.shape
+        found = np.array([k if k < width else -1 for k in numbers], np.intp)
+        return [np.broadcast_to(found, (rows, found.size))]
 
     def place_error(self, column: Index) -> Array:
         """How far rounding of V' may have moved one equilibrium of each system."""

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind
 from phasekit.numerics.contract import row_sums
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.noise import noise
+from phasekit.phase.numerical.formula_bounds import noise
 from phasekit.phase.numerical.turning_points import End, distances
 
 Array = npt.NDArray[np.float64]

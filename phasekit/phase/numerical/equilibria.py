@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind
-from phasekit.phase.numerical.extended import values
+from phasekit.phase.numerical.digits import doubled
 from phasekit.phase.numerical.formula import Shape
-from phasekit.phase.numerical.isolation import bracketed, isolate, slope_bounds
+from phasekit.phase.numerical.formula_bounds import slope_bounds
+from phasekit.phase.numerical.isolation import bracketed, isolate
 from phasekit.phase.numerical.partition import noise_at, partition
 from phasekit.phase.numerical.places import Places, located
 from phasekit.phase.numerical.series import (
@@ -311,10 +312,10 @@ def _sharp(systems: Systems, found: Equilibria, exact: dict[int, list[Fraction]]
     """Equilibria with all digits of V and V'' that the formula allows."""
     energy, curvature = found.energy.copy(), found.curvature.copy()
     cell, slot = np.nonzero(np.isfinite(found.phi))
-    fine = values(systems.take(cell), found.phi[cell, slot], 0, 2)
+    fine = doubled(systems.take(cell), found.phi[cell, slot], 0, 2)
     if fine is None and not exact:
         return found
-    for field, (value, rest) in zip((energy, curvature), fine or (), strict=False):
+    for field, (value, rest, _) in zip((energy, curvature), fine or (), strict=False):
         usable = np.isfinite(value) & np.isfinite(rest)
         field[cell[usable], slot[usable]] = value[usable]
     for row, coefficients in exact.items():

@@ -82,15 +82,18 @@ class Formula(Conservative):
         """Whether equilibria may be missed: those of polynomials and Fourier sums are not."""
         return self.shape is Shape.GENERAL
 
+    def expressions(self, *orders: int) -> tuple[list[Any], list[Any]]:
+        """V or derivatives of it, of the orders 0 to 2, and the symbols of (x, parameters)."""
+        from phasekit.laws.derivatives import derivative
+
+        x, *others = symbols_of((self.coordinate, *self.names)).values()
+        found = [derivative(self.expression, x, n) if n else self.expression for n in orders]
+        return found, [x, *others]
+
     @property
     def unbounded_function(self) -> str | None:
         """Name of a function in it of which no bounds are known, so that nothing is proved."""
-        from phasekit.phase.numerical.intervals import bounds_of_slopes
-
-        if self.shape is not Shape.GENERAL:
-            return None
-        found = bounds_of_slopes(self.expression, (self.coordinate, *self.names))
-        return found if isinstance(found, str) else None
+        return _unbounded_function(self) if self.shape is Shape.GENERAL else None
 
     def check_searchable(self) -> None:
         """Refuse to look for the equilibria of a function on the whole line."""
@@ -201,7 +204,8 @@ def _higher(formula: Formula, order: int) -> Callable[..., Array]:
     ParameterError
         If it holds a function that cannot be computed.
     """
-    from phasekit.laws.derivatives import DERIVED, derivative
+    from phasekit.laws.derivatives import derivative
+    from phasekit.laws.derived import DERIVED
     from phasekit.laws.nodes import foreign
 
     symbols = symbols_of((formula.coordinate, *formula.names))
@@ -217,11 +221,19 @@ def _higher(formula: Formula, order: int) -> Callable[..., Array]:
     return array_function(array_code(arguments, found, shared))
 
 
+@functools.lru_cache(maxsize=128)
+def _unbounded_function(formula: Formula) -> str | None:
+    from phasekit.numerics.intervals.bounds import missing_rule
+
+    return missing_rule(*formula.expressions(1, 2))
+
+
 def _derivatives(potential: Any, x: Any, symbols: Mapping[str, Any]) -> tuple[Any, Any]:
     """V' and V'', if they are functions that can be computed."""
     import sympy as sp
 
-    from phasekit.laws.derivatives import DERIVED, derivative
+    from phasekit.laws.derivatives import derivative
+    from phasekit.laws.derived import DERIVED
     from phasekit.laws.nodes import foreign
 
     try:

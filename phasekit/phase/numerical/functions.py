@@ -23,9 +23,10 @@ from phasekit.phase.numerical.angles import AnglesWithErrors
 from phasekit.phase.numerical.angles import angles as find_angles
 from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.differences import Ground, survey
+from phasekit.phase.numerical.digits import values
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
-from phasekit.phase.numerical.extended import values
+from phasekit.phase.numerical.families import StateWithErrors, states_of_action
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.orbits import Orbits
@@ -123,6 +124,13 @@ def angles(formula: Formula, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     ground, shape, (x, v) = _cells(formula, parameters, (phi, dphi))
     found = find_angles(ground, x, v)
     return AnglesWithErrors._make(array.reshape(shape) for array in found)
+
+
+def state_of(formula: Formula, *inputs: npt.ArrayLike) -> StateWithErrors:
+    """States by action, angle variable and code of the family, the last of the inputs."""
+    *parameters, action, angle, family = inputs
+    ground, shape, states = _cells(formula, parameters, (action, angle, family))
+    return StateWithErrors._make(x.reshape(shape) for x in states_of_action(ground, *states))
 
 
 def orbits_at_energy(formula: Formula, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
@@ -275,7 +283,7 @@ def energies(
         own = tuple(np.broadcast_to(np.asarray(p, float), phi.shape)[lost] for p in columns)
         fine = values(Systems(formula, own, lost[0].size), phi[lost], 0)
         if fine is not None:
-            high, low = fine[0]
+            high, low, _ = fine[0]
             total[lost] = np.where(np.isfinite(high) & np.isfinite(low), high, total[lost])
     return total
 

@@ -8,27 +8,26 @@ proved, and is reported as such.
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
-from phasekit.phase.numerical.formula import Formula
-from phasekit.phase.numerical.intervals import Bounds, bounds_of_slopes, point
+from phasekit.phase.numerical.formula_bounds import bounds_on
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-_FIRST = 64  # pieces with which a stretch is begun
-#: Pieces of one system that may wait at once.
-_WAITING = 1 << 15
+#: Pieces with which a stretch is begun, and of one system that may wait at once.
+_FIRST, _WAITING = 16, 1 << 15
 #: Pieces are halved down to this part of the stretch, or to two neighboring doubles.
 _FINEST = 2.0**-70
-_AT_ONCE = 64
+#: Systems that are looked at together.
+_AT_ONCE = 512
 _HALVE = np.int8(3)
 #: The widest stretch that stands for one merged equilibrium, as a part of the whole.
 _MERGED = 2.0**-6
@@ -50,25 +49,14 @@ class Isolated(NamedTuple):
     """For each row the stretches that could not be excluded and stand for no equilibrium."""
 
 
-def slope_bounds(formula: Formula) -> Bounds | None:
-    """Bounds of V' and V'' over boxes of (x, parameters); None where a function has no rule."""
-    found = bounds_of_slopes(formula.expression, (formula.coordinate, *formula.names))
-    return found if isinstance(found, Bounds) else None
-
-
 @dataclass
 class _Pieces:
-    """Pieces [low, high] of rows; `verdict` 1 and -1: V'' has that sign, 2 and -2: V' has.
-
-    `left` and `right` are the signs of V' at the ends, 0 where not known.
-    """
+    """Pieces [low, high] of rows; `verdict` 1 and -1: V'' has that sign, 2 and -2: V' has."""
 
     row: Index
     low: Array
     high: Array
     verdict: npt.NDArray[np.int8]
-    left: npt.NDArray[np.int8]
-    right: npt.NDArray[np.int8]
 
     def take(self, which: Index | Flags) -> _Pieces:
         return _Pieces(*(field[which] for field in vars(self).values()))
@@ -102,18 +90,28 @@ def isolate(systems: Systems) -> Isolated:
 
 
 def _isolate(systems: Systems) -> Isolated:
-    pieces = _divide(systems)
-    order = np.lexsort((pieces.low, pieces.row))
-    pieces = pieces.take(order)
-    firsts = np.searchsorted(pieces.row, np.arange(systems.size + 1))
+    runs = _joined(systems, _divide(systems))
+    start, stop = systems.formula.ends
+    firsts = np.searchsorted(runs.row, np.arange(systems.size + 1))
+    at_ends = _resting_ends(systems)
     rows: list[list[Found]] = []
     complete = np.ones(systems.size, dtype=bool)
     unproved: list[list[tuple[float, float]]] = []
     for i in range(systems.size):
-        own = pieces.take(np.arange(firsts[i], firsts[i + 1]))
-        found, gaps, sure = _read(systems.take(np.array([i])), own)
-        rows.append(found)
-        complete[i] = sure
+        own = [_Run(*values) for values in runs.of(slice(firsts[i], firsts[i + 1]))]
+        if any(run.verdict == 0 for run in own):
+            single = systems.take(np.array([i]))
+            for run in [run for run in own if run.verdict == 0]:
+                if run in own:
+                    _widen(single, own, own.index(run))
+        found, gaps = _read(own, stop - start)
+        outer = (own[0].verdict, own[-1].verdict) if own else ()
+        for at, sign, verdict in zip((start, stop), at_ends[i], outer, strict=False):
+            known = any(low <= at <= high for low, high, *_ in found)
+            if np.isfinite(sign) and verdict != 0 and not known:
+                found.append((at, at, at, float(sign)))
+        rows.append(sorted(found))
+        complete[i] = all(run.verdict != 0 for run in own)
         unproved.append(gaps)
     most = max(map(len, rows), default=0)
     table = np.full((4, systems.size, most), np.nan)
@@ -132,17 +130,6 @@ def _isolate(systems: Systems) -> Isolated:
 # ------------------------------------------------------------------------- pieces
 
 
-def bounds_on(
-    systems: Systems, row: Index, low: Array, high: Array
-) -> tuple[Array, Array, Array, Array, Flags]:
-    """Bounds of V' and V'' on pieces: low and high of each, and where they may be undefined."""
-    bounds = slope_bounds(systems.formula)
-    assert bounds is not None
-    beside = [point(p[row]) for p in systems.parameters]
-    (slope, bend), undefined = bounds((low, high), *beside)
-    return (*slope, *bend, undefined)
-
-
 def _divide(systems: Systems) -> _Pieces:
     """Pieces with verdicts, 0 where there is none down to rounding."""
     formula = systems.formula
@@ -154,7 +141,7 @@ def _divide(systems: Systems) -> _Pieces:
         edges += 0.2764 * span / _FIRST  # the cut lies at no point of symmetry
     low, high = np.tile(edges[:-1], valid.size), np.tile(edges[1:], valid.size)
     row = np.repeat(valid, _FIRST)
-    done = [_Pieces(row[:0], low[:0], high[:0], *(np.empty(0, np.int8) for _ in range(3)))]
+    done = [_Pieces(row[:0], low[:0], high[:0], np.empty(0, np.int8))]
     while row.size:
         if row.size > _WAITING and np.max(np.bincount(row)) > _WAITING:
             raise ConvergenceError(
@@ -184,50 +171,44 @@ def _judge(systems: Systems, row: Index, low: Array, high: Array) -> tuple[_Piec
     """Give pieces their verdicts, `_HALVE` among them; and where V is found not to be smooth."""
     formula = systems.formula
     start, stop = formula.ends
-    span, n = stop - start, row.size
-    middle = low + 0.5 * (high - low)
-    slope_low, slope_high, bend_low, bend_high, undefined = bounds_on(
-        systems,
-        np.tile(row, 4),
-        np.concatenate([low, middle, low, high]),
-        np.concatenate([high, middle, low, high]),
-    )
-    slope_low, slope_high, bend_low, bend_high = (
-        end.reshape(4, n) for end in (slope_low, slope_high, bend_low, bend_high)
-    )
-    nowhere = undefined[n : 2 * n]
-    undefined = undefined[:n]
+    span, middle = stop - start, low + 0.5 * (high - low)
+    slope_low, slope_high, bend_low, bend_high, undefined = bounds_on(systems, row, low, high)
+    wall = np.select([slope_low > 0.0, slope_high < 0.0], [2, -2], _HALVE)
+    verdict = np.select([wall != _HALVE, bend_low > 0.0, bend_high < 0.0], [wall, 1, -1], _HALVE)
+    verdict[undefined] = _HALVE
+    bad = np.zeros(row.size, dtype=bool)
+    few = np.flatnonzero(verdict == _HALVE)  # of which the middle is looked at
+    least, most, lower, upper, bad[few] = bounds_on(systems, row[few], middle[few], middle[few])
     with np.errstate(all="ignore"):
         # V'(middle) + V''(piece) (piece - middle), rounded outward.
-        half = np.nextafter(np.maximum(middle - low, high - middle), np.inf)
-        sway = np.maximum(np.abs(bend_low[0]), np.abs(bend_high[0])) * half * (1.0 + 1e-15)
-        least = np.fmax(slope_low[0], np.nextafter(slope_low[1] - sway, -np.inf))
-        most = np.fmin(slope_high[0], np.nextafter(slope_high[1] + sway, np.inf))
-    verdict = np.select(
-        [least > 0.0, most < 0.0, bend_low[0] > 0.0, bend_high[0] < 0.0], [2, -2, 1, -1], _HALVE
-    ).astype(np.int8)
-    wall = verdict
-    verdict = np.where(undefined, _HALVE, verdict)
+        half = np.nextafter(np.maximum(middle - low, high - middle)[few], np.inf)
+        sway = np.maximum(np.abs(bend_low), np.abs(bend_high))[few] * half * (1.0 + 1e-15)
+        above = np.nextafter(least - sway, -np.inf) > 0.0
+        below = np.nextafter(most + sway, np.inf) < 0.0
+    wall[few] = np.select([above, below], [2, -2], wall[few])
+    verdict[few] = np.where(undefined[few], _HALVE, wall[few])
     # Neither V' nor V'' is known at the middle or an end: shorter pieces would not tell.
-    blind = np.isfinite(slope_high[1:] - slope_low[1:]).all(axis=0) & ~undefined
-    for lower, upper in ((slope_low, slope_high), (bend_low, bend_high)):
-        blind &= np.all((lower[1:] <= 0.0) & (upper[1:] >= 0.0), axis=0)
+    blind = np.zeros(row.size, dtype=bool)
+    blind[few] = _unknown(least, most, lower, upper) & ~undefined[few]
+    blind &= (verdict == _HALVE) & (high - low <= _MERGED * span)
+    for end in (low, high):
+        few = np.flatnonzero(blind)
+        blind[few] = _unknown(*bounds_on(systems, row[few], end[few], end[few])[:4])
     finest = (high - low <= _FINEST * span) | (middle <= low) | (middle >= high)
-    open_ = verdict == _HALVE
-    verdict[open_ & (finest | (blind & (high - low <= _MERGED * span)))] = 0
+    verdict[(verdict == _HALVE) & (finest | blind)] = 0
     # At an end V may rise or fall beyond all bounds: a wall, which is no equilibrium.
     at_end = (low == start) | (high == stop)
-    walled = finest & undefined & at_end & (np.abs(wall) == 2) & (formula.period is None)
+    walled = finest & undefined & at_end & (wall != _HALVE) & (formula.period is None)
     verdict[walled] = wall[walled]
-    left, right = (
-        np.where(slope_low[k] > 0.0, 1, np.where(slope_high[k] < 0.0, -1, 0)).astype(np.int8)
-        for k in (2, 3)
-    )
-    left, right = (
-        np.where(np.abs(verdict) == 2, verdict // 2, sign).astype(np.int8) for sign in (left, right)
-    )
-    bad = (finest & undefined & ~walled) | nowhere
-    return _Pieces(row, low, high, verdict, left, right), bad
+    bad |= finest & undefined & ~walled
+    return _Pieces(row, low, high, verdict.astype(np.int8)), bad
+
+
+def _unknown(least: Array, most: Array, lower: Array, upper: Array) -> Flags:
+    """Whether bounds of V' are finite, and neither these nor those of V'' exclude 0."""
+    with np.errstate(all="ignore"):
+        finite = np.isfinite(most - least)
+    return finite & (least <= 0.0) & (most >= 0.0) & (lower <= 0.0) & (upper >= 0.0)
 
 
 # ------------------------------------------------------------------------- reading
@@ -244,39 +225,54 @@ class _Run:
     right: int
 
 
-def _runs(pieces: _Pieces) -> list[_Run]:
-    change = np.flatnonzero(np.diff(pieces.verdict)) + 1
-    first, last = [0, *change], [*(change - 1), pieces.low.size - 1]
-    runs = [
-        _Run(
-            float(pieces.low[a]),
-            float(pieces.high[b]),
-            int(pieces.verdict[a]),
-            int(pieces.left[a]),
-            int(pieces.right[b]),
-        )
-        for a, b in zip(first, last, strict=True)
-    ]
+class _Runs(NamedTuple):
+    """Fields of all runs, in the order of rows and from left to right."""
+
+    row: Index
+    low: Array
+    high: Array
+    verdict: npt.NDArray[np.int8]
+    left: npt.NDArray[np.int8]
+    right: npt.NDArray[np.int8]
+
+    def of(self, part: slice) -> Iterator[tuple[Any, ...]]:
+        """The runs of a row."""
+        return zip(*(field[part].tolist() for field in self[1:]), strict=True)
+
+
+def _joined(systems: Systems, pieces: _Pieces) -> _Runs:
+    """Neighboring pieces of one verdict as one."""
+    pieces = pieces.take(np.lexsort((pieces.low, pieces.row)))
+    row, verdict = pieces.row, pieces.verdict
+    fresh = (np.diff(row) != 0) | (np.diff(verdict) != 0)
+    first = np.flatnonzero(np.append(row.size > 0, fresh))
+    last = np.flatnonzero(np.append(fresh, row.size > 0))
+    row, verdict, low, high = row[first], verdict[first], pieces.low[first], pieces.high[last]
+    known = np.where(np.abs(verdict) == 2, verdict // 2, 0).astype(np.int8)
+    left, right = known.copy(), known.copy()
     # What is known on one side of a knot is known on the other.
-    for one, two in itertools.pairwise(runs):
-        one.right = two.left = one.right or two.left
-    return runs
+    same = np.flatnonzero(row[1:] == row[:-1])
+    left[same + 1] = np.where(known[same + 1] == 0, known[same], known[same + 1])
+    right[same] = np.where(known[same] == 0, known[same + 1], known[same])
+    for sign, place in ((left, low), (right, high)):
+        few = np.flatnonzero(sign == 0)
+        sign[few] = _signs(systems, row[few], place[few])
+    return _Runs(row, low, high, verdict, left, right)
 
 
-def _read(system: Systems, pieces: _Pieces) -> tuple[list[Found], list[tuple[float, float]], bool]:
-    """Equilibria of one system from its pieces, what was not excluded, whether all is proved."""
-    if not pieces.row.size:
-        return [], [], True
-    runs = _runs(pieces)
-    for run in [run for run in runs if run.verdict == 0]:
-        if run in runs:
-            _widen(system, runs, runs.index(run))
-    start, stop = runs[0].low, runs[-1].high
+def _signs(systems: Systems, row: Index, x: Array) -> npt.NDArray[np.int8]:
+    """Signs of V' at places, 0 where not known."""
+    low, high, *_ = bounds_on(systems, row, x, x)
+    return np.where(low > 0.0, 1, np.where(high < 0.0, -1, 0)).astype(np.int8)
+
+
+def _read(runs: list[_Run], span: float) -> tuple[list[Found], list[tuple[float, float]]]:
+    """Equilibria of one system from its runs, and what was not excluded."""
     found: list[Found] = []
     gaps: list[tuple[float, float]] = []
     for run in runs:
-        ends = run.left or run.low == start, run.right or run.high == stop
-        if run.verdict == 0 and all(ends) and run.high - run.low <= _MERGED * (stop - start):
+        ends = run.left or run is runs[0], run.right or run is runs[-1]
+        if run.verdict == 0 and all(ends) and run.high - run.low <= _MERGED * span:
             at = 0.5 * (run.low + run.high)
             if not run.left or not run.right:
                 at = run.high if run.left else run.low
@@ -287,14 +283,22 @@ def _read(system: Systems, pieces: _Pieces) -> tuple[list[Found], list[tuple[flo
             gaps.append((run.low, run.high))
         elif abs(run.verdict) == 1 and run.left * run.right < 0:
             found.append((run.low, run.high, np.nan, float(run.verdict)))
-    if system.formula.period is None:
-        for run, at in ((runs[0], start), (runs[-1], stop)):
-            if run.verdict != 0 and not any(low <= at <= high for low, high, *_ in found):
-                # The ends belong to the interval, and what lies within rounding of them.
-                slope, bend = (f(np.array([at]))[0] for f in (system.slope, system.bend))
-                if np.isfinite(bend) and abs(slope) <= abs(bend) * np.spacing(abs(at)):
-                    found.append((at, at, at, float(np.sign(bend))))
-    return sorted(found), gaps, all(run.verdict != 0 for run in runs)
+    return found, gaps
+
+
+def _resting_ends(systems: Systems) -> Array:
+    """Signs of V'' at the ends where V' vanishes within their rounding, else NaN.
+
+    The ends belong to an interval, and what lies within rounding of them.
+    """
+    if systems.formula.period is not None:
+        return np.full((systems.size, 2), np.nan)
+    ends = np.array(systems.formula.ends)
+    at = np.broadcast_to(ends, (systems.size, 2))
+    slope, bend = systems.slope(at), systems.bend(at)
+    with np.errstate(all="ignore"):
+        rests = np.isfinite(bend) & (np.abs(slope) <= np.abs(bend) * np.spacing(np.abs(ends)))
+    return np.where(rests, np.sign(bend), np.nan)
 
 
 def _widen(system: Systems, runs: list[_Run], k: int) -> None:
@@ -307,8 +311,7 @@ def _widen(system: Systems, runs: list[_Run], k: int) -> None:
             width = max(run.high - run.low, 4.0 * float(np.spacing(abs(at))))
             places: Array = at + step * width * 2.0 ** np.arange(64.0)
             places = np.append(places[np.abs(places - at) < abs(end - at)], end)
-            low, high, *_ = bounds_on(system, np.zeros(places.size, np.intp), places, places)
-            known = np.where(low > 0.0, 1, np.where(high < 0.0, -1, 0))
+            known = _signs(system, np.zeros(places.size, np.intp), places)
             first = int(np.argmax(known != 0)) if known.any() else places.size - 1
             place, value = float(places[first]), int(known[first])
             if side:

@@ -16,10 +16,9 @@ import numpy.typing as npt
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.collocation import follow
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.noise import bend_noise, noise
+from phasekit.phase.numerical.formula_bounds import bend_noise, noise, smooth
 from phasekit.phase.numerical.orbits import Orbits, States, orbits_of, resting_ends, states_of
 from phasekit.phase.numerical.quadrature import speeds
-from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.separatrices import Branch, branch_of
 from phasekit.phase.numerical.spread import spreading, widths
 from phasekit.phase.numerical.systems import Systems

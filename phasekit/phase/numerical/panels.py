@@ -18,8 +18,8 @@ import numpy.typing as npt
 
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.differences import Anchor, Ground
+from phasekit.phase.numerical.formula_bounds import smooth
 from phasekit.phase.numerical.quadrature import Pieces
-from phasekit.phase.numerical.regions import smooth
 from phasekit.phase.numerical.systems import Index
 
 Array = npt.NDArray[np.float64]

@@ -13,8 +13,8 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.phase.numerical.extended import extended, values
-from phasekit.phase.numerical.isolation import bounds_on, slope_bounds
+from phasekit.phase.numerical.digits import values
+from phasekit.phase.numerical.formula_bounds import bounds_on, slope_bounds
 from phasekit.phase.numerical.systems import Index, Systems
 
 Array = npt.NDArray[np.float64]
@@ -62,9 +62,9 @@ def located(places: Places) -> tuple[Array, Array]:
         ends = _bounds(places.systems, places.x)
         error = _errors(places, ends, _bounds)
         poor = np.flatnonzero((error > _POOR * np.spacing(np.abs(places.x))) & (places.sign != 0.0))
-        if not poor.size or extended(places.systems.formula, (1, 2)) is None:
-            return places.x, error
         few = places.take(poor)
+        if not poor.size or values(few.systems, few.x, 1, 2) is None:
+            return places.x, error
         fresh = few._replace(x=_newton(few.systems, few.x))
         found = _errors(fresh, _fine(fresh.systems, fresh.x), _fine)
         better = (found < error[poor]) & (np.abs(fresh.x - few.x) <= error[poor])
@@ -146,13 +146,13 @@ def _scattered(systems: Systems, x: Array) -> Ends:
 
 
 def _fine(systems: Systems, x: Array) -> Ends:
-    """Bounds in double-double arithmetic, where it has the digits."""
+    """Bounds with all digits, where there are more than doubles have."""
     ends, inner = _bounds(systems, x), values(systems, x, 1, 2)
     assert inner is not None
     found: list[Array] = []
-    for (value, rest), low, high in zip(inner, ends[::2], ends[1::2], strict=True):
+    for (value, rest, off), low, high in zip(inner, ends[::2], ends[1::2], strict=True):
         width = high - low
-        off = _FINER * width + _EPS * np.abs(value)
+        off = np.maximum(_FINER * width, off) + _EPS * np.abs(value)
         usable = (width > _TINY) & np.isfinite(off + rest)
         found += [np.where(usable, value - off, low), np.where(usable, value + off, high)]
     return found[0], found[1], found[2], found[3]
@@ -164,7 +164,7 @@ def _newton(systems: Systems, x: Array) -> Array:
     for _ in range(_STEPS):
         inner = values(systems.take(rows), x[rows], 1, 2)
         assert inner is not None
-        (slope, _), (bend, _) = inner
+        (slope, *_), (bend, *_) = inner
         step = slope / bend
         step = np.where(np.isfinite(step), step, 0.0)
         x[rows] -= step

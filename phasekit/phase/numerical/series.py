@@ -9,7 +9,6 @@ Where discs touch, a polynomial whose coefficients are rational is isolated in e
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Callable
 from fractions import Fraction
@@ -17,7 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from flint import fmpq_poly
 
+from phasekit.numerics.real_roots import nearest_roots, rational
 from phasekit.phase.numerical.coefficients import slope_coefficients, spreads
 from phasekit.phase.numerical.formula import Formula
 from phasekit.phase.numerical.systems import Systems
@@ -210,79 +211,16 @@ def exact_coefficients(formula: Formula, parameters: tuple[float, ...]) -> list[
 
 def exact_roots(coefficients: list[Fraction]) -> tuple[Array, Array]:
     """Real roots as the nearest doubles, and the signs of the derivative there, 0 if multiple."""
-    import sympy as sp
-
-    while coefficients and coefficients[-1] == 0:
-        coefficients = coefficients[:-1]
-    if len(coefficients) < 2:
+    polynomial = fmpq_poly([rational(c) for c in coefficients])
+    if polynomial.degree() < 1:
         return np.empty(0), np.empty(0)
-    common = math.lcm(*(c.denominator for c in coefficients))
-    x = sp.Symbol("x")
-    poly = sp.Poly([int(c * common) for c in reversed(coefficients)], x, domain="ZZ")
-    found: list[tuple[float, int]] = []
-    for factor, times in poly.sqf_list()[1]:
-        numbers = [int(c) for c in factor.all_coeffs()]
-        for (low, high), _ in factor.intervals():
-            found.append(
-                (_nearest(numbers, Fraction(low.p, low.q), Fraction(high.p, high.q)), times)
-            )
-    found.sort()
-    sign = 1.0 if coefficients[-1] > 0 else -1.0
+    found = nearest_roots(polynomial)
+    sign = 1.0 if polynomial.leading_coefficient() > 0 else -1.0
     signs = []
     for _, times in reversed(found):
         signs.append(sign if times == 1 else 0.0)
         sign = -sign if times % 2 else sign
     return np.array([at for at, _ in found]), np.array(signs[::-1])
-
-
-def _nearest(numbers: list[int], low: Fraction, high: Fraction) -> float:
-    """The double next to the one root between two fractions; highest coefficient first."""
-    if low == high:
-        return float(low)
-    sign_at = functools.partial(exact_sign, numbers)
-    behind = sign_at(high) or -sign_at(low)
-    a, b = float(low), float(high)
-    while True:
-        middle = _middle(a, b)
-        if not a < middle < b:
-            break
-        exact = Fraction(middle)
-        before = exact <= low or (exact < high and sign_at(exact) == -behind)
-        if low < exact < high and sign_at(exact) == 0:
-            return middle
-        a, b = (middle, b) if before else (a, middle)
-    halfway = (Fraction(a) + Fraction(b)) / 2
-    left = halfway <= low or (halfway < high and sign_at(halfway) == -behind)
-    return b if left else a
-
-
-def _middle(a: float, b: float) -> float:
-    """A double between two, half-way in the number of doubles where they differ in size."""
-    if a > 0.0 and b > 4.0 * a:
-        return math.sqrt(a) * math.sqrt(b)
-    if b < 0.0 and a < 4.0 * b:
-        return -math.sqrt(-a) * math.sqrt(-b)
-    if a == 0.0 and b > 1e-300:
-        return b * 1e-3
-    if b == 0.0 and a < -1e-300:
-        return a * 1e-3
-    return 0.5 * a + 0.5 * b
-
-
-def exact_sign(numbers: list[int], x: Fraction) -> int:
-    """Sign of a polynomial, highest coefficient first, at a fraction."""
-    value = exact_value(numbers, x)
-    return int(value > 0) - int(value < 0)
-
-
-def exact_value(numbers: list[Any], x: Fraction) -> Any:
-    """A polynomial, highest coefficient first, at p/q, times q^degree."""
-    p, q = x.numerator, x.denominator
-    value, scale = numbers[0], 1
-    for c in numbers[1:]:
-        scale *= q
-        value = value * p + c * scale
-    return value
 
 
 def exact_base(formula: Formula, parameters: tuple[float, ...]) -> Fraction:

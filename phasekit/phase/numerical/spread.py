@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from phasekit.numerics.contract import contract
 from phasekit.phase.numerical.collocation import STAGES, WEIGHTS, Carry
-from phasekit.phase.numerical.noise import slope_noise
+from phasekit.phase.numerical.formula_bounds import slope_noise
 from phasekit.phase.numerical.systems import Systems
 
 Array = npt.NDArray[np.float64]

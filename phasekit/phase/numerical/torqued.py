@@ -15,15 +15,24 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import OrbitKind
-from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.errors import OrbitFamily, OrbitKind
+from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical import orbits as rounds
 from phasekit.phase.numerical.angles import AnglesWithErrors
 from phasekit.phase.numerical.angles import angles as find_angles
+from phasekit.phase.numerical.constants import reduced
+from phasekit.phase.numerical.differences import Ground, survey
+from phasekit.phase.numerical.families import (
+    BACKWARD,
+    FORWARD,
+    StateWithErrors,
+    states_of_action,
+)
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.motion import separatrix_motion as follow
 from phasekit.phase.numerical.separatrices import branch_of
+from phasekit.phase.numerical.systems import Systems
 from phasekit.phase.numerical.turns import Turns, followed, torqued
 from phasekit.phase.numerical.unpushed import TRIGONOMETRIC, Named, Unpushed, merged, unpushed
 
@@ -32,6 +41,10 @@ Index = npt.NDArray[np.intp]
 
 Result = TypeVar("Result", bound=tuple[Any, ...])
 
+#: Families of librations by the labels of their centers.
+NUMBERS = {OrbitFamily.LOWER_WELL: 1, OrbitFamily.UPPER_WELL: 4, OrbitFamily.OUTER: 5}
+#: Those of rotations.
+ROTATIONS = {OrbitFamily.FORWARD: FORWARD, OrbitFamily.BACKWARD: BACKWARD}
 #: States at a time, for memory.
 CELLS = 4096
 #: Systems up to which their turns are kept for the next call.
@@ -86,7 +99,7 @@ class Cells:
     shape: tuple[int, ...]
 
     @classmethod
-    def of(cls, law: PerturbedConservative, inputs: Any, states: Any) -> Cells:
+    def of(cls, law: PerturbedLaw, inputs: Any, states: Any) -> Cells:
         """Lay out parameters and states that broadcast."""
         base, used, torque, own = _parts(law, inputs)
         columns = np.stack([np.broadcast_to(x, own).reshape(-1) for x in (*used, torque)]) + 0.0
@@ -152,9 +165,7 @@ def _kept(base: Unpushed, lined: bool, *parameters: bytes) -> Any:
     return base.turns(points, own, torque) if lined else points
 
 
-def _parts(
-    law: PerturbedConservative, inputs: Any
-) -> tuple[Unpushed, list[Any], Any, tuple[int, ...]]:
+def _parts(law: PerturbedLaw, inputs: Any) -> tuple[Unpushed, list[Any], Any, tuple[int, ...]]:
     """The potential, its parameters and the torque, and the shape of all parameters."""
     values = law.values(*inputs)
     base, used = unpushed(law.base, values)
@@ -165,7 +176,7 @@ def _parts(
 
 
 def _of_formula(function: Callable[..., Array], states: int) -> Callable[..., Array]:
-    def called(law: PerturbedConservative, *inputs: npt.ArrayLike) -> Array:
+    def called(law: PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
         base, used, torque, _ = _parts(law, inputs[:-states])
         found = function(torqued(base.formula), *used, torque, *inputs[-states:])
         return np.asarray(np.where(np.isnan(torque), np.nan, found))  # which is not in V''
@@ -183,19 +194,17 @@ phase_velocity = _of_formula(functions.phase_velocity, 2)
 # ------------------------------------------------------------------------- phase space
 
 
-def equilibria(law: PerturbedConservative, *parameters: npt.ArrayLike) -> Any:
+def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Any:
     """All equilibria under a constant torque."""
     return _equilibria(Cells.of(law, parameters, ()))
 
 
-def separatrices(law: PerturbedConservative, *parameters: npt.ArrayLike) -> TorquedSeparatrices:
+def separatrices(law: PerturbedLaw, *parameters: npt.ArrayLike) -> TorquedSeparatrices:
     """Separatrices under a constant torque, of the saddles of the turn of the states."""
     return _separatrices(Cells.of(law, parameters, ()))
 
 
-def phase_space(
-    law: PerturbedConservative, *parameters: npt.ArrayLike
-) -> tuple[Any, TorquedSeparatrices]:
+def phase_space(law: PerturbedLaw, *parameters: npt.ArrayLike) -> tuple[Any, TorquedSeparatrices]:
     """Equilibria and separatrices at once."""
     cells = Cells.of(law, parameters, ())
     return _equilibria(cells), _separatrices(cells)
@@ -222,6 +231,38 @@ def _separatrices(cells: Cells) -> TorquedSeparatrices:
     return cells.answered(parts, TorquedSeparatrices)
 
 
+def grounds(
+    law: PerturbedLaw, parameters: Any, most: int, *, lined: bool = False
+) -> list[tuple[Any, Index]]:
+    """Potentials of cells, so many at a time: on the line where a torque acts, or all if lined.
+
+    Those in closed form are left out where no torque acts.
+    """
+    cells = Cells.of(law, parameters, ())
+    found: list[tuple[Ground, Index]] = []
+    level = cells.level()
+    if level.size and not isinstance(cells.base, Named):
+        own = cells.at(level)
+        if lined:
+            still = np.zeros(level.size)
+            points = cells.base.points(own, still)
+            found.append((cells.base.turns(points, own, still), level))
+        else:
+            systems = Systems(reduced(cells.base.formula), tuple(own), level.size)
+            found.append((survey(systems), level))
+    found += cells.turns()
+    return [
+        (ground.take(np.arange(start, min(start + most, some.size))), some[start : start + most])
+        for ground, some in found
+        for start in range(0, some.size, most)
+    ]
+
+
+def code_of_numbers(family: int) -> int:
+    """The code of a named family as one of numbered centers, those of `Turns`."""
+    return {**NUMBERS, **ROTATIONS}.get(OrbitFamily(family), 0)
+
+
 def lines_of(*cells: Array) -> tuple[Any, Turns]:
     """Equilibria of coefficients (A, B, C) under a torque, the last, and what is on the line."""
     *own, torque = cells
@@ -233,7 +274,7 @@ def lines_of(*cells: Array) -> tuple[Any, Turns]:
 # ------------------------------------------------------------------------- orbits
 
 
-def orbits(law: PerturbedConservative, *inputs: npt.ArrayLike) -> TorquedOrbits:
+def orbits(law: PerturbedLaw, *inputs: npt.ArrayLike) -> TorquedOrbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
     cells = Cells.of(law, inputs[:-2], inputs[-2:])
     x, v = cells.states
@@ -248,7 +289,7 @@ def orbits(law: PerturbedConservative, *inputs: npt.ArrayLike) -> TorquedOrbits:
 
 
 def orbits_at_energy(
-    law: PerturbedConservative, *inputs: npt.ArrayLike, center: int | None = None
+    law: PerturbedLaw, *inputs: npt.ArrayLike, center: int | None = None
 ) -> TorquedOrbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
     cells = Cells.of(law, inputs[:-1], inputs[-1:])
@@ -264,7 +305,7 @@ def orbits_at_energy(
 
 
 def orbits_at_gap(
-    law: PerturbedConservative,
+    law: PerturbedLaw,
     *inputs: npt.ArrayLike,
     saddle: int | None = None,
     side: int = 1,
@@ -283,7 +324,7 @@ def orbits_at_gap(
     return _orbits(cells, "orbits_at_gap", start, saddle=saddle, side=side)
 
 
-def angles(law: PerturbedConservative, *inputs: npt.ArrayLike) -> AnglesWithErrors:
+def angles(law: PerturbedLaw, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     """Angle variables of states (phi, dphi), the last of the inputs; NaN where they run."""
     cells = Cells.of(law, inputs[:-2], inputs[-2:])
     x, v = cells.states
@@ -298,8 +339,24 @@ def angles(law: PerturbedConservative, *inputs: npt.ArrayLike) -> AnglesWithErro
     return found._replace(orbit_family=np.zeros(cells.shape, np.int8), twist=nothing)
 
 
+def state_of(law: PerturbedLaw, *inputs: npt.ArrayLike) -> StateWithErrors:
+    """States by action, angle variable and code of the family, the last of the inputs."""
+    cells = Cells.of(law, inputs[:-3], inputs[-3:])
+    flat = cells.level()
+    parts: list[tuple[Index, Any]] = []
+    if flat.size or not cells.number.size:
+        states = (x[flat] for x in cells.states)
+        parts.append((flat, cells.base.level("state_of", cells.at(flat), *states)))
+    for turns, some in cells.turns():
+        action, angle, family = (x[some] for x in cells.states)
+        if turns.named:
+            family = np.select([family == code for code in NUMBERS], list(NUMBERS.values()), 0.0)
+        parts.append((some, states_of_action(turns, action, angle, family)))
+    return cells.answered(parts, StateWithErrors)
+
+
 def separatrix_motion_with_errors(
-    law: PerturbedConservative, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
+    law: PerturbedLaw, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> MotionWithErrors:
     """Motion on the separatrix of a saddle at times, the last of the inputs.
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, OrbitKind
 from phasekit.phase.numerical.differences import Ground
-from phasekit.phase.numerical.noise import noise, slope_noise
+from phasekit.phase.numerical.formula_bounds import noise, slope_noise
 from phasekit.phase.numerical.turning_points import End
 
 Array = npt.NDArray[np.float64]
@@ -42,7 +42,7 @@ def turning_errors(
         For each side, at which orbits come to rest, and the column of the equilibrium.
     """
     x, points = states.x, ground.points
-    here = np.max(np.where(points.phi == x[:, None], _known(points), 0.0), 1, initial=0.0)
+    here = np.max(np.where(points.phi == x[:, None], _place_errors(points), 0.0), 1, initial=0.0)
     given = _EPS * (np.abs(x) + np.where(states.turns == 0.0, 0.0, np.abs(states.turns + x)))
     found = []
     for side, end, (rest, column) in zip((-1.0, 1.0), ends, rests, strict=True):
@@ -62,7 +62,7 @@ def turning_errors(
     return found[0], found[1]
 
 
-def _known(points: Any) -> Array:
+def _place_errors(points: Any) -> Array:
     """How far off equilibria are, as what is at rest in their place is: on its other side."""
     return np.asarray(np.where(points.kind == EquilibriumKind.CENTER, 2.0, 1.0) * points.phi_error)
 

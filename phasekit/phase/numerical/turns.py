@@ -10,6 +10,7 @@ there as well. On a line a torque is a part of the potential, and nothing is rep
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -143,6 +144,19 @@ class Turns(Ground):
         rise = self.rise[rows[:, None], label[:, None], self.label] + fall
         hidden = self.hidden[rows[:, None], label[:, None], self.label]
         return np.where(np.abs(rise) <= hidden, 0.0, rise)
+
+    def columns_of(self, numbers: Sequence[int]) -> list[Index]:
+        """Columns of equilibria by their labels: all in one turn, or the last ones one before."""
+        few = np.array(sorted(numbers), np.intp)
+        ways = range(len(few) if self.period is not None else 1)
+        place = np.arange(len(few))
+        return [self._columns(few, np.where(place >= len(few) - way, -1, 0)) for way in ways]
+
+    def _columns(self, label: Index, turn: Any) -> Index:
+        """Columns of labels in turns, one a label; -1 where there is none."""
+        same = (self.label[:, None, :] == label[:, None]) & (self.turn[:, None, :] == turn[:, None])
+        same &= self.points.kind[:, None, :] > 0
+        return np.where(same.any(axis=2), same.argmax(axis=2), -1)
 
     def place_error(self, column: Index) -> Array:
         """How far rounding of V' may have moved one equilibrium of each system."""

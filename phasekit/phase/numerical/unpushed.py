@@ -24,6 +24,7 @@ from phasekit.phase.numerical.angles import AnglesWithErrors
 from phasekit.phase.numerical.constants import constant, reduced
 from phasekit.phase.numerical.equilibria import Equilibria
 from phasekit.phase.numerical.equilibria import equilibria as find_equilibria
+from phasekit.phase.numerical.families import StateWithErrors
 from phasekit.phase.numerical.formula import Formula, Shape
 from phasekit.phase.numerical.motion import MotionWithErrors
 from phasekit.phase.numerical.orbits import Orbits
@@ -226,6 +227,11 @@ def _motion(A: Any, B: Any, C: Any, *inputs: Any) -> MotionWithErrors:
     return MotionWithErrors(*moved, *(np.where(np.isnan(x), np.nan, 0.0) for x in moved))
 
 
+def _states(A: Any, B: Any, C: Any, *inputs: Any) -> StateWithErrors:
+    found = action_angle.state_of_numbers(A, B, C, *inputs)
+    return StateWithErrors(*found, *(np.where(np.isnan(x), np.nan, 0.0) for x in found))
+
+
 #: Namesakes of the functions of a formula.
 CLOSED: Mapping[str, Callable[..., Any]] = {
     "separatrices": _separatrices,
@@ -234,4 +240,5 @@ CLOSED: Mapping[str, Callable[..., Any]] = {
     "orbits_at_energy": lambda *inputs: _with_errors(closed.orbits_at_energy(*inputs)),
     "orbits_at_gap": lambda *inputs: _with_errors(closed.orbits_at_gap(*inputs)),
     "separatrix_motion_with_errors": _motion,
+    "state_of": _states,
 }

@@ -1,157 +1,361 @@
-"""Phase portrait of a planar flow: field, nullclines, equilibria and manifolds of its saddles."""
+"""Phase portrait of a flow: field, nullclines, equilibria, manifolds of saddles, limit cycles.
+
+Of a planar flow all of it; of more states what projects to a plane of two of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
 from matplotlib.lines import Line2D
-from numpy.typing import ArrayLike
+from matplotlib.patches import Patch
 
-from phasekit.errors import FlowEquilibriumKind
-from phasekit.labelled.in_box import corners, equilibria_in_box
-from phasekit.labelled.manifolds import manifolds
+from phasekit.errors import AttractorKind, FlowEquilibriumKind
+from phasekit.labelled.basins import basins
+from phasekit.labelled.manifolds import manifolds_of
 from phasekit.labelled.motion import flow
 from phasekit.labelled.nullclines import nullclines
-from phasekit.labels.arguments import bad, number
-from phasekit.laws.equations import Equations
-from phasekit.laws.ladder import Map
+from phasekit.labelled.periodic_orbits import all_round, cycles_of
+from phasekit.labels.arguments import bad, flag, number, unknown
 from phasekit.motion.equation_rates import rates_on
+from phasekit.motion.limit_cycles import Cycle
+from phasekit.motion.paths import distances
 from phasekit.plot.parts import strokes, style
-from phasekit.plot.parts.units import coordinate_symbol
-from phasekit.systems.problem import as_problem
+from phasekit.plot.parts.circle import TURN, Circle
+from phasekit.plot.parts.units import Units, printed, state_symbols
+from phasekit.systems.problem import Problem
+from phasekit.systems.rests import Equilibria, corners, equilibria_of
+
+Array = npt.NDArray[np.float64]
 
 #: Arrows of the field along each axis.
 ARROWS = 19
 #: Time for which motions are drawn, in times that the field takes across the window.
 LONG = 60.0
+#: Length of manifolds, in widths of the window.
+LENGTH = 20.0
+#: Distance from a cycle, in widths, up to which a manifold that comes to it is drawn.
+BESIDE = 0.03
+#: States along each axis of the basins.
+CELLS = 120
 FIELD: style.Look = {"color": style.GRAY, "alpha": 0.55, "zorder": 0.5}
 NULLCLINES: tuple[style.Look, ...] = (
     {"color": style.GRAY, "linestyle": (0, (6, 2)), "linewidth": 1.2},
     {"color": style.GRAY, "linestyle": (0, (1.2, 1.4)), "linewidth": 1.4},
 )
+CYCLES: Mapping[bool, style.Look] = {
+    True: {"color": style.BLACK, "linestyle": "-", "linewidth": 2.4, "label": "limit cycle"},
+    False: {
+        "color": style.BLACK,
+        "linestyle": (0, (2.5, 1.2)),
+        "linewidth": 2.4,
+        "label": "unstable limit cycle",
+    },
+}
+#: Short names, for narrow legends.
+SHORT = {"limit cycle": "cycle", "unstable limit cycle": "unstable cycle"}
+#: Shades of basins, light enough for all that is drawn on them.
+SHADES = (style.SKY, style.ORANGE, style.GREEN, style.PURPLE, style.YELLOW, style.BLUE)
+
+
+@dataclass(frozen=True)
+class View:
+    """The plane of two states in which a flow is drawn.
+
+    Attributes
+    ----------
+    problem : Problem
+        The flow.
+    shown : tuple of int
+        Places of both states.
+    low, high : array
+        Corners of the window, of all states.
+    circles : tuple of Circle
+        Of both states, those that are angles all round.
+    """
+
+    axes: Axes
+    problem: Problem
+    shown: tuple[int, int]
+    low: Array
+    high: Array
+    circles: tuple[Circle, Circle]
+
+    @classmethod
+    def of(cls, axes: Axes, problem: Problem, window: Any, plane: Any) -> View:
+        """Check a window and a plane."""
+        low, high = corners(problem, window, "window")
+        names = problem.state
+        chosen = names[:2] if plane is None else tuple(plane)
+        if len(chosen) != 2 or chosen[0] == chosen[-1] or isinstance(plane, str):
+            raise bad("plane", plane, f"two of the states {', '.join(names)}")
+        for name in chosen:
+            if name not in names:
+                raise unknown("plane: state", name, names)
+        shown = names.index(chosen[0]), names.index(chosen[1])
+        turns = all_round(problem, low, high)
+        # A window that is a little more than a turn is cut in its middle.
+        first, second = (
+            Circle(float(0.5 * (low[i] + high[i] - turns[i])), float(turns[i]))
+            if turns[i] > 0.0 else Circle(float(low[i]), None)
+            for i in shown
+        )  # fmt: skip
+        return cls(axes, problem, shown, low, high, (first, second))
+
+    @property
+    def box(self) -> dict[str, tuple[float, float]]:
+        """The window by state."""
+        ends = zip(self.low.tolist(), self.high.tolist(), strict=True)
+        return dict(zip(self.problem.state, ends, strict=True))
+
+    def seen(self, states: Array) -> tuple[Array, Array]:
+        """A curve of states, of shape (points, states), where it is seen: round both circles."""
+        x, y = (states[:, i] for i in self.shown)
+        beyond = np.zeros(len(x), bool)
+        for values, i, circle in zip((x, y), self.shown, self.circles, strict=True):
+            if circle.period is None:  # what is far outside is not drawn at all
+                width = self.high[i] - self.low[i]
+                beyond |= (values < self.low[i] - width) | (values > self.high[i] + width)
+        x, y = np.where(beyond, np.nan, x), np.where(beyond, np.nan, y)
+        if not np.isfinite(x).any():
+            return x, y
+        x, y = self.circles[0].unrolled(x, y)
+        y, x = self.circles[1].unrolled(y, x)
+        return x, y
+
+    def points(self, states: Array) -> tuple[Array, Array]:
+        """Points where they are seen, those on a cut at both of its sides."""
+        x, y = self.circles[0].points(states[:, self.shown[0]], states[:, self.shown[1]])
+        y, x = self.circles[1].points(y, x)
+        return x, y
+
+    def name_axes(self) -> None:
+        """Limits, ticks and names of both axes."""
+        symbols, _ = state_symbols(self.problem.state)
+        for which, i, circle in zip("xy", self.shown, self.circles, strict=True):
+            name = self.problem.state[i]
+            unit = self.problem.unit_of(name) or "1"
+            text = f"${symbols[i]}$" + (f" ({printed(unit)})" if unit not in ("", "1") else "")
+            if circle.period is not None and abs(circle.period - TURN) < 1e-12:
+                style.circle_axis(self.axes, which, Units.of("rad", None, {}), circle, name)  # type: ignore[arg-type]
+            else:
+                self.axes.set(**{f"{which}lim": (self.low[i], self.high[i])})
+            self.axes.set(**{f"{which}label": text})
 
 
 def flow_portrait(
-    system: Any,
-    law: Equations,
-    *,
-    window: Any,
-    orbits: ArrayLike | None,
-    duration: float | None,
-    legend: bool,
-    ax: Axes | None,
-) -> Axes:
-    """Draw a planar flow in a window; see `phase_portrait`."""
-    if isinstance(law, Map) or law.time is not None or len(law.states) != 2:
-        hint = "draw pk.flow(...) with pk.plot.time_history"
-        if law.time is not None:
-            hint = "draw pk.plot.poincare_section of motions once a period"
-        raise bad("system", system, "a flow of two states without forcing", hint)
-    problem = as_problem(system)
-    low, high = corners(problem, window)
-    box = dict(zip(law.states, zip(low.tolist(), high.tolist(), strict=True), strict=True))
-    values = {name: float(problem.parameters[name]) for name in law.names}
-    starts = [] if orbits is None else strokes.starts_of_pairs(orbits)
-    rests = equilibria_in_box(problem, box)
+    problem: Problem, *, window: Any, plane: Any, orbits: Any, duration: float | None,
+    cycles: bool | None, shade: bool, legend: bool, ax: Axes | None,
+) -> Axes:  # fmt: skip
+    """Draw a flow in a window; see `phase_portrait`."""
+    flag("basins", shade)
+    if cycles is not None:
+        flag("cycles", cycles)
+    planar = len(problem.state) == 2
+    for name, value in {"basins": shade, "cycles": bool(cycles)}.items():
+        if value and not planar:
+            raise bad(name, True, "False, for a flow of more than two states")
+    starts = _starts(problem, orbits)
     axes = style.axes_for(ax, legend=legend)
-    _field(axes, law, values, low, high)
-    symbols = [coordinate_symbol(name) for name in law.states]
-    handles = _nullclines(axes, problem, box, law, symbols)
-    handles += _manifolds(axes, problem, box, law, rests)
-    handles += _motions(axes, problem, law, values, starts, duration, (low, high))
-    handles += _points(axes, rests)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    texts = []
-    for name, symbol in zip(law.states, symbols, strict=True):
-        unit = law.units.get(name, "1")
-        texts.append(f"${symbol}$" + (f" ({unit})" if unit not in ("", "1") else ""))
-    axes.set_xlabel(texts[0])
-    axes.set_ylabel(texts[1])
+    view = View.of(axes, problem, window, plane)
+    rests = equilibria_of(problem, view.low, view.high)
+    handles: list[Artist] = []
+    found: list[Cycle] | None = [] if planar else None
+    if planar:
+        if shade:
+            handles += _basins(view)
+        _field(view)
+        handles += _nullclines(view)
+        if cycles or (cycles is None and problem.kind != "python"):
+            found = cycles_of(problem, view.low, view.high, rests.x).cycles
+    handles += _manifolds(view, rests, found)
+    handles += _cycles(view, found or [])
+    handles += _motions(view, starts, duration)
+    handles += _points(view, rests)
+    view.name_axes()
     if legend:
-        style.legend_below(axes, handles, style.MANIFOLDS)
+        style.legend_below(axes, handles, {**style.MANIFOLDS, **SHORT})
     return axes
 
 
-def _field(axes: Axes, law: Equations, values: Any, low: Any, high: Any) -> None:
+def _starts(problem: Problem, orbits: Any) -> list[Array]:
+    """States at which motions start, each of one number a state."""
+    if orbits is None:
+        return []
+    names = problem.state
+    wants = f"states ({', '.join(names)}), one or a list of them"
+    if isinstance(orbits, Mapping):
+        orbits = [orbits]
+    if isinstance(orbits, Sequence) and orbits and isinstance(orbits[0], Mapping):
+        for one in orbits:
+            if set(one) != set(names):
+                raise bad("orbits", one, wants)
+        orbits = [[one[name] for name in names] for one in orbits]
+    array = strokes.finite(orbits, "orbits", "the units of the states")
+    if not array.size:
+        return []
+    array = np.atleast_2d(array)
+    if array.ndim != 2 or array.shape[1] != len(names):
+        raise bad("orbits", orbits, wants)
+    return list(array)
+
+
+def _field(view: View) -> None:
     """Arrows of one length: where the flow goes, as it is seen."""
+    law: Any = view.problem.law
+    values = {name: float(view.problem.parameters[name]) for name in law.names}
+    low, width = view.low, view.high - view.low
     parts = (np.arange(ARROWS) + 0.5) / ARROWS
-    x, y = np.meshgrid(*(a + parts * (b - a) for a, b in zip(low, high, strict=True)))
-    rates = rates_on(law, values, np.stack([x.ravel(), y.ravel()], axis=-1)) / (high - low)
+    x, y = np.meshgrid(*(a + parts * b for a, b in zip(low, width, strict=True)))
+    rates = rates_on(law, values, np.stack([x.ravel(), y.ravel()], axis=-1)) / width
     with np.errstate(all="ignore"):
         rates /= np.linalg.norm(rates, axis=1)[:, None]
-    axes.quiver(
-        x, y, *rates.T, angles="uv", pivot="mid", scale=1.7 * ARROWS, width=0.0028,
-        headwidth=4, **FIELD,
+    first, second = view.shown
+    at = (x, y)
+    view.axes.quiver(
+        at[first], at[second], rates[:, first], rates[:, second], angles="uv", pivot="mid",
+        scale=1.7 * ARROWS, width=0.0028, headwidth=4, **FIELD,
     )  # fmt: skip
 
 
-def _nullclines(
-    axes: Axes, problem: Any, box: Any, law: Equations, symbols: list[str]
-) -> list[Artist]:
-    found, handles = nullclines(problem, box), list[Artist]()
-    for name, symbol, look in zip(law.states, symbols, NULLCLINES, strict=True):
+def _nullclines(view: View) -> list[Artist]:
+    found, handles = nullclines(view.problem, view.box), list[Artist]()
+    names = view.problem.state
+    _, rates = state_symbols(names)
+    for name, rate, look in zip(names, rates, NULLCLINES, strict=True):
         own = found.isel(curve=np.flatnonzero(found.nullcline_of.values == name))
         for row in range(own.sizes["curve"]):
-            across, up = (own[f"nullcline_{state}"].values[row] for state in law.states)
-            axes.plot(across, up, zorder=1, **look)
+            across, up = (own[f"nullcline_{names[i]}"].values[row] for i in view.shown)
+            view.axes.plot(across, up, zorder=1, **look)
         if own.sizes["curve"]:
-            name = symbol if symbol[1:].isalpha() else f"{{{symbol}}}"
-            handles.append(Line2D([], [], label=rf"$\dot {name} = 0$", **look))
+            handles.append(Line2D([], [], label=f"${rate} = 0$", **look))
     return handles
 
 
-def _manifolds(axes: Axes, problem: Any, box: Any, law: Equations, rests: Any) -> list[Artist]:
-    if not np.any(rests.kind.values == FlowEquilibriumKind.SADDLE):
-        return []
-    found, handles = manifolds(problem, window=box), list[Artist]()
-    for stable, look, text in (
-        (True, style.STABLE, "stable manifold"), (False, style.UNSTABLE, "unstable manifold"),
+def _manifolds(view: View, rests: Equilibria, cycles: list[Cycle] | None) -> list[Artist]:
+    problem = view.problem
+    found = manifolds_of(
+        problem, view.low, view.high, rests, range(len(rests.x)), LENGTH, cycles=cycles or []
+    )
+    handles = list[Artist]()
+    for sense, look, text in (
+        (-1.0, style.STABLE, "stable manifold"), (1.0, style.UNSTABLE, "unstable manifold"),
     ):  # fmt: skip
-        own = found.isel(manifold=np.flatnonzero(found.manifold_stable.values == stable))
-        for row in range(own.sizes["manifold"]):
-            axes.plot(*(own[f"manifold_{s}"].values[row] for s in law.states), zorder=3, **look)
-        if own.sizes["manifold"]:
+        own = [
+            one.x if goal.cycle < 0 else _until_beside(view, one.x, (cycles or [])[goal.cycle])
+            for begin, one, goal in zip(*found, strict=True)
+            if begin.sense == sense
+        ]
+        for one in own:
+            view.axes.plot(*view.seen(one), zorder=3, **look)
+        if own:
             handles.append(Line2D([], [], label=text, **look))
     return handles
 
 
-def _motions(
-    axes: Axes, problem: Any, law: Equations, values: Any, starts: list[strokes.State],
-    duration: float | None, window: Any,
-) -> list[Artist]:  # fmt: skip
+def _until_beside(view: View, states: Array, cycle: Cycle) -> Array:
+    """A curve up to where it is next to the cycle to which it comes."""
+    turns = np.array([circle.period or 0.0 for circle in view.circles])
+    widths = np.where(turns > 0.0, turns, view.high - view.low)
+    away = distances(states, cycle.state, widths, turns)
+    return states[: int(np.argmax(away < BESIDE)) + 1] if np.any(away < BESIDE) else states
+
+
+def _cycles(view: View, cycles: Sequence[Cycle]) -> list[Artist]:
+    handles = list[Artist]()
+    for stable in (True, False):
+        own = [one for one in cycles if (one.growth < 0.0) == stable]
+        look = style.inked(CYCLES[stable])
+        for one in own:
+            view.axes.plot(*view.seen(one.state), zorder=2.8, **{**look, "label": "_"})
+        if own:
+            handles.append(Line2D([], [], **look))
+    return handles
+
+
+def _motions(view: View, starts: Sequence[Array], duration: float | None) -> list[Artist]:
     """Motions from given states, with their starts."""
+    if duration is not None and not (duration := number("duration", duration, "a time > 0")) > 0.0:
+        raise bad("duration", duration, "a time > 0")
     if not starts:
         return []
-    low, high = window
     if duration is None:
-        inside = low + (high - low) * np.random.default_rng(0).random((400, 2))
-        speed = np.linalg.norm(rates_on(law, values, inside) / (high - low), axis=1)
-        typical = float(np.nanmedian(speed))
-        duration = LONG / typical if typical > 0.0 else 1.0
-    elif not (duration := number("duration", duration, "a time > 0")) > 0.0:
-        raise bad("duration", duration, "a time > 0")
+        duration = LONG * _crossing_time(view)
     times, handles = np.linspace(0.0, duration, 6_001), list[Artist]()
     for k, start in enumerate(starts):
-        ds = flow(problem, list(start), times)
+        ds = flow(view.problem, list(start), times)
+        states = np.stack([ds[f"motion_{name}"].values for name in view.problem.state], axis=-1)
         look = strokes.orbit_look(k)
-        axes.plot(*(ds[f"motion_{name}"].values for name in law.states), zorder=2.5, **look)
+        view.axes.plot(*view.seen(states), zorder=2.5, **look)
         look = {**look, **strokes.START}
-        axes.plot([start[0]], [start[1]], zorder=6, **{**look, "linestyle": "none"})
-        text = f"from ({start[0]:.4g}, {start[1]:.4g})".replace("-", "\N{MINUS SIGN}")
+        at = view.points(start[None])
+        view.axes.plot(*at, zorder=6, **{**look, "linestyle": "none"})
+        text = f"from ({', '.join(f'{x:.4g}' for x in start)})".replace("-", "\N{MINUS SIGN}")
         handles.append(Line2D([], [], label=text, **look))
     return handles
 
 
-def _points(axes: Axes, rests: Any) -> list[Artist]:
+def _crossing_time(view: View) -> float:
+    """A time that the flow takes across the window."""
+    law: Any = view.problem.law
+    values = {name: float(view.problem.parameters[name]) for name in law.names}
+    width = view.high - view.low
+    inside = view.low + width * np.random.default_rng(0).random((400, len(width)))
+    speed = np.linalg.norm(rates_on(law, values, inside) / width, axis=1)
+    typical = float(np.nanmedian(speed))
+    return 1.0 / typical if typical > 0.0 else 1.0
+
+
+def _basins(view: View) -> list[Artist]:
+    """Shades of the basins of attractors, in the order in which they are found."""
+    names = view.problem.state
+    cells = {
+        name: low + (np.arange(CELLS) + 0.5) / CELLS * (high - low)
+        for name, low, high in zip(names, view.low, view.high, strict=True)
+    }
+    found = basins(view.problem, cells)
+    first, second = (names[i] for i in view.shown)
+    codes = found.basin.transpose(f"state_{second}", f"state_{first}")
+    handles: list[Artist] = []
+    for code in np.unique(codes.values[codes.values >= 0]):
+        color = SHADES[int(code) % len(SHADES)]
+        text = f"basin of {_attractor(view, found, int(code))}"
+        handles.append(Patch(facecolor=color, alpha=0.25, label=text))
+        here = np.where(codes.values == code, 1.0, np.nan)
+        view.axes.pcolormesh(
+            cells[first], cells[second], here, color=color, alpha=0.25, zorder=0, shading="nearest",
+            cmap=ListedColormap([color]), linewidth=0, rasterized=True,
+        )  # fmt: skip
+    return handles
+
+
+def _attractor(view: View, found: Any, code: int) -> str:
+    """What the legend calls an attractor: a rest by its place."""
+    own = found.isel(attractor=code)
+    kind = AttractorKind(int(own.attractor_kind)).name.lower()
+    if AttractorKind(int(own.attractor_kind)) is not AttractorKind.EQUILIBRIUM:
+        return f"a {kind}"
+    place = np.array([own[f"attractor_{name}"].values.ravel()[0] for name in view.problem.state])
+    small = np.abs(place) < 1e-9 * (view.high - view.low)
+    text = ", ".join(f"{x:.3g}" for x in np.where(small, 0.0, place))
+    return f"({text})".replace("-", "\N{MINUS SIGN}")
+
+
+def _points(view: View, rests: Equilibria) -> list[Artist]:
     handles: list[Artist] = []
     for kind in FlowEquilibriumKind:
         if (look := style.FLOW_POINTS.get(kind)) is None:
             continue
-        own = rests.x.values[rests.kind.values == kind]
+        own = rests.x[rests.kind == kind]
         if len(own):
-            handles += axes.plot(*own.T, zorder=5, clip_on=False, linestyle="none", **look)
+            handles += view.axes.plot(
+                *view.points(own), zorder=5, clip_on=False, linestyle="none", **look
+            )
     return handles

@@ -130,6 +130,20 @@ MERGED: Look = {"color": PURPLE, "linestyle": (0, (1, 1)), "linewidth": 2.4, "la
 
 # Curves in a plane of two parameters, by kind and the sign of A.
 LOCI: Mapping[tuple[str, int], Look] = {
+    ("fold", 0): {"color": BLUE, "linestyle": "-", "linewidth": 2.0, "label": "fold"},
+    ("pitchfork", 0): {"color": BLUE, "linestyle": "-", "linewidth": 3.0, "label": "pitchfork"},
+    ("transcritical", 0): {
+        "color": VERMILLION,
+        "linestyle": (0, (4, 1)),
+        "linewidth": 3.0,
+        "label": "transcritical",
+    },
+    ("window_exit", 0): {
+        "color": BLACK,
+        "linestyle": (0, (1, 1.5)),
+        "linewidth": 1.2,
+        "label": "leaves the interval",
+    },
     ("fold", 1): {"color": BLUE, "linestyle": "-", "linewidth": 2.0, "label": "fold, $A > 0$"},
     ("fold", -1): {
         "color": VERMILLION,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -61,7 +61,7 @@ class Units:
             return cls(angles)
         if not isinstance(units, Mapping):
             raise bad("units", units, "a mapping from names to units, such as {'beta': 'deg'}")
-        known = {**_known(), **(own or {})}
+        known = {**_unit_names(), **(own or {})}
         for name, unit in units.items():
             if not isinstance(name, str) or name not in known:
                 raise unknown("name in units", name, known)
@@ -136,7 +136,29 @@ def coordinate_symbol(name: str) -> str:
     return str(sp.latex(sp.Symbol(name)))
 
 
-def _known() -> dict[str, str]:
+def dotted(symbol: str, dots: str = "dot") -> str:
+    r"""A rate of a coordinate for print, without the dollars.
+
+    >>> print(dotted("x"), dotted(r"\varphi", "ddot"), dotted("x_{1}"))
+    \dot x \ddot\varphi \dot{x_{1}}
+    """
+    if symbol[:1] == "\\" and symbol[1:].isalpha():
+        return f"\\{dots}{symbol}"
+    return f"\\{dots} {symbol}" if len(symbol) == 1 else f"\\{dots}{{{symbol}}}"
+
+
+def state_symbols(names: Sequence[str]) -> tuple[list[str], list[str]]:
+    """States, and their rates, for print: dx is the rate of x, if that is a state."""
+    states, rates = [], []
+    for name in names:
+        own = name[1:] if name[:1] == "d" and name[1:] in names else ""
+        symbol = coordinate_symbol(own or name)
+        states.append(dotted(symbol) if own else symbol)
+        rates.append(dotted(symbol, "ddot" if own else "dot"))
+    return states, rates
+
+
+def _unit_names() -> dict[str, str]:
     """Return the names that quantities, parameters and states have anywhere, with their units."""
     parameters = {p.name: p.units for model in models().values() for p in model.declared}
     states = {name: units for name, (units, _) in STATES.items()}

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 
 from phasekit.numerics.differences import bend, jet, spare_size
 from phasekit.numerics.native import call
-
-carray: Any = numba.carray  # type: ignore[attr-defined]
+from phasekit.numerics.pointers import carray
 
 #: Places of whole numbers: the code of one step, how it comes, states, unknowns, times that it is
 #: applied, parameters, whether the identity is taken off, and the places of free parameters.

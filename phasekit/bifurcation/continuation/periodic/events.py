@@ -48,7 +48,7 @@ from phasekit.bifurcation.continuation.periodic.normal_forms import (
     at_torus,
     known,
 )
-from phasekit.bifurcation.continuation.periodic.on_curves import SAME, CurveTest, tests_of
+from phasekit.bifurcation.continuation.periodic.on_curves import SAME, OrbitTest, looked_for_on
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of, still, vertical
 from phasekit.bifurcation.continuation.periodic.starts import null_vector, other_tangent
 from phasekit.bifurcation.continuation.periodic.together import together
@@ -75,12 +75,12 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
     said = []
     for k, test in enumerate(_looked_for(cycles)):
         column = np.array([row[k] for row in values])
-        if isinstance(test, CurveTest) and test.vanishes(cycles, path.points, column):
+        if isinstance(test, OrbitTest) and test.vanishes(cycles, path.points, column):
             said.append(zero_along(test.coefficient, test.kind))
             for row in values:
                 row[k] = math.nan
     for test, value in zip(_looked_for(cycles), values[0], strict=True):
-        if isinstance(test, CurveTest) and test.blurred and value == 0.0:  # what the curve ends for
+        if isinstance(test, OrbitTest) and test.blurred and value == 0.0:  # what the curve ends for
             p = float(path.points[0].orbit.y[1])
             found.append(Found(test.kind, path.points[0], 0, (p, p), "converged", "", {}))
     for i, (a, b) in enumerate(zip(path.points[:-1], path.points[1:], strict=True)):
@@ -106,12 +106,12 @@ def _values(cycles: Cycles, point: Point) -> list[float]:
 
 def _value(event: Any, cycles: Cycles, point: Point) -> float:
     """The number whose zero is an event, or a special point of a curve."""
-    return float(event.value(cycles, point if isinstance(event, CurveTest) else point.orbit))
+    return float(event.value(cycles, point if isinstance(event, OrbitTest) else point.orbit))
 
 
 def _looked_for(cycles: Cycles) -> tuple[Any, ...]:
     """Events, and special points of curves in two parameters, which are found alike."""
-    return (*cycles.events, *tests_of(cycles))
+    return (*cycles.events, *looked_for_on(cycles))
 
 
 def _events(
@@ -122,7 +122,7 @@ def _events(
     for event, before, after in zip(_looked_for(cycles), left, right, strict=True):
         if not (before < 0.0 <= after or before > 0.0 >= after):
             continue
-        if isinstance(event, CurveTest) and not (
+        if isinstance(event, OrbitTest) and not (
             event.signed(cycles, a) or event.signed(cycles, b)
         ):
             continue  # a coefficient that is zero all along
@@ -131,7 +131,7 @@ def _events(
             return _value(event, cycles, point)
 
         point = b if after == 0.0 else root(Stretch(cycles, a, b), value)
-        if isinstance(event, CurveTest) and point is not None:
+        if isinstance(event, OrbitTest) and point is not None:
             if abs(value(point, False)) > JUMP * max(abs(before), abs(after)):
                 continue  # a coefficient that changes its sign without a zero
         p = sorted((float(a.orbit.y[1]), float(b.orbit.y[1])))
@@ -139,7 +139,7 @@ def _events(
         if point is None:
             point, status = b, "guess"
             message = "Newton's method did not converge between the points"
-        elif point is not b and isinstance(event, CurveTest) and event.blurred:
+        elif point is not b and isinstance(event, OrbitTest) and event.blurred:
             status = "guess"
             message = f"the equations are singular there: found to {2 * SAME:g} rad of the pair"
         found.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -57,6 +57,20 @@ class Path:
     stops: tuple[Stop, Stop]
     #: The special points at which it was told to end.
     ends: tuple[Found | None, Found | None] = (None, None)
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the family ends on its start."""
+        return self.stops[1].reason == "closed"
+
+    def part(self, first: int, last: int, ends: tuple[Found | None, Found | None]) -> Path:
+        """Points of it, between the special points at which it ends."""
+        return replace(self, points=self.points[first:last], start=self.start - first, ends=ends)
 
 
 def join(start: Point, tracks: Tracks, first: Stop) -> Path:

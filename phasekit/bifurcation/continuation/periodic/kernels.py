@@ -112,7 +112,9 @@ def condense(
                 if not np.isfinite(total):
                     return 0.0, np.inf, 0.0, np.nan
                 divergence += h * weights[i] * y[0] * jet_[at, base + c]
-        found = eliminate(M, size, size, size, width) * side**n
+        found = eliminate(M, size, size, size, width)
+        for _ in range(n):
+            found *= side
         if found == 0.0:
             return 0.0, np.inf, 0.0, np.nan
         sign *= found

@@ -90,17 +90,21 @@ def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Arr
 
 
 @kernel
-def iterate(G: Array) -> tuple[Array, Array, Array, Array]:
+def iterate(G: Array, Q: Array, R: Array, log: Array, turn: Array, cut: Array) -> None:
     """Orthogonal iteration until blocks of unlike multipliers part: where they do, ``cut`` is 1.
 
-    Returns R, log and turn as `triangular` leaves them, and cut; log is NaN if G is not finite.
+    Leaves R, log and turn as `triangular` does; log is NaN if G is not finite.
     """
     n = G.shape[1]
-    Q, R, log, turn = np.eye(n), np.empty((n, n)), np.full(n, np.nan), np.empty((n, n))
-    cut = np.ones(n)
-    for one in G.flat:
-        if not np.isfinite(one):
-            return R, log, turn, cut
+    for i in range(n):
+        log[i], cut[i] = np.nan, 1.0
+        for k in range(n):
+            Q[i, k] = 1.0 if i == k else 0.0
+    for j in range(G.shape[0]):
+        for i in range(n):
+            for k in range(n):
+                if not np.isfinite(G[j, i, k]):
+                    return
     for _ in range(PASSES // 2):
         triangular(G, 2, Q, R, log, turn)
         settled, finite = True, np.isfinite(log[n - 1])
@@ -115,7 +119,6 @@ def iterate(G: Array) -> tuple[Array, Array, Array, Array]:
             finite = finite and np.isfinite(log[i])
         if settled or not finite:
             break
-    return R, log, turn, cut
 
 
 def multipliers(G: Array) -> tuple[Complex, float]:
@@ -125,7 +128,10 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     holds multipliers of like size: so small ones are as accurate, relative to themselves, as
     large ones.
     """
-    R, log, turn, cut = iterate(np.ascontiguousarray(G))
+    n = G.shape[-1]
+    Q, R, turn = np.empty((3, n, n))
+    log, cut = np.empty((2, n))
+    iterate(np.ascontiguousarray(G), Q, R, log, turn, cut)
     values, logs, first = [], 0.0, 0
     for last, parted in enumerate(cut.tolist(), 1):
         if not parted:

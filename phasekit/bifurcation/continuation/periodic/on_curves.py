@@ -1,4 +1,4 @@
-"""Special points on curves of folds, period doublings and tori of cycles in two parameters.
+"""Special points on families of cycles, and on curves of their folds, doublings and tori.
 
 A cusp is where the quadratic coefficient of the fold vanishes; where it is infinite, a second
 multiplier besides that of the fold is 1. A torus has a strong resonance where its multipliers meet
@@ -33,6 +33,7 @@ from phasekit.bifurcation.continuation.periodic.normal_forms import (
     at_torus,
 )
 from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.bifurcation.special_points import functions_along, look_for
 
 Array = npt.NDArray[np.float64]
 Sized = tuple[float, float]
@@ -40,15 +41,28 @@ Sized = tuple[float, float]
 RESONANT = 0.05  # distance of half the angle from resonances 1 and 2 below which d says nothing
 NOTHING = 1e-9  # size of a function of the multipliers that is rounding
 LARGE = 1e-2  # part of its terms from which on a coefficient is not zero by their errors
+CYCLE = "cycle"  # families themselves
 SAME = 2e-5  # half the angle within which multipliers meet, at ends of curves
 
 
 @dataclass(frozen=True)
-class CurveTest:
-    """A kind of point on curves of a kind, and the number of an orbit that vanishes there."""
+class OrbitTest:
+    """A kind of point along cycles or a curve, and the number of an orbit that vanishes there.
+
+    Attributes
+    ----------
+    kind : str
+        A kind of the registry of special points.
+    along : str
+        "cycle", or "fold_of_cycles", "period_doubling" or "torus", which are curves.
+    function : callable
+        The number of a family and a point of it.
+    name : str
+        What it is called in messages besides its kind.
+    """
 
     kind: str
-    of: str
+    along: str
     function: Callable[..., Any]
     name: str = ""
     #: Whether the equations are singular there, so that it is known to `SAME` alone.
@@ -61,19 +75,18 @@ class CurveTest:
 
     def value(self, cycles: Cycles, point: Point) -> float:
         """The number of an orbit with its critical function."""
-        assert isinstance(cycles, Extended)
         return float(self.function(cycles, point)[0] if self.bent else self.function(cycles, point))
 
     def signed(self, cycles: Cycles, point: Point) -> bool:
         """Whether the number has a sign, and is not zero but for its error."""
         if not self.bent:
             return abs(self.value(cycles, point)) >= NOTHING
-        assert isinstance(cycles, Extended)
         value, size = self.function(cycles, point)
         # Derivatives have errors, and the orbit has, along which terms cancel.
         error = max(point.mesh_error, NOTHING) * size
         if abs(value) <= error or abs(value) > LARGE * size:
             return bool(abs(value) > error)
+        assert isinstance(cycles, Extended)
         count = 2 if cycles.jets.jets.exact else VARIANTS
         variants = (float(self.function(cycles, point, k)[0]) for k in range(1, count))
         return bool(abs(value) > error + max(abs(one - value) for one in variants))
@@ -177,28 +190,29 @@ def _of(test: Callable[[Point, bool], float]) -> Callable[[Extended, Point], flo
 _A, _C, _D = "the coefficient a", "the coefficient c", "the coefficient d"
 _PAIR = "the distance of the pair of multipliers from that angle"
 _OTHER = "the distance of another multiplier from 1 or -1"
-TESTS = (
-    CurveTest("cusp", FOLD, _bend, bent=True, coefficient=_A),
-    CurveTest("resonance_1", FOLD, _meet, bent=True),
-    CurveTest("fold_flip", FOLD, _of(doubling_test), coefficient=_OTHER),
-    CurveTest("generalized_flip", DOUBLING, _doubled, bent=True, coefficient=_C),
-    CurveTest("fold_flip", DOUBLING, _of(determinant), coefficient=_OTHER),
-    CurveTest("resonance_2", DOUBLING, _of(second_doubling), coefficient=_OTHER),
-    CurveTest(
+for _test in (
+    OrbitTest("cusp", FOLD, _bend, bent=True, coefficient=_A),
+    OrbitTest("resonance_1", FOLD, _meet, bent=True),
+    OrbitTest("fold_flip", FOLD, _of(doubling_test), coefficient=_OTHER),
+    OrbitTest("generalized_flip", DOUBLING, _doubled, bent=True, coefficient=_C),
+    OrbitTest("fold_flip", DOUBLING, _of(determinant), coefficient=_OTHER),
+    OrbitTest("resonance_2", DOUBLING, _of(second_doubling), coefficient=_OTHER),
+    OrbitTest(
         "resonance_1", TORUS, lambda cycles, p: _zero(math.sin(0.5 * _angle(cycles, p))),
         blurred=True, coefficient=_PAIR,
     ),
-    CurveTest(
+    OrbitTest(
         "resonance_2", TORUS, lambda cycles, p: _zero(math.cos(0.5 * _angle(cycles, p))),
         blurred=True, coefficient=_PAIR,
     ),
-    CurveTest("resonance_3", TORUS, _at(1.0 / 3.0), coefficient=_PAIR),
-    CurveTest("resonance_4", TORUS, _at(0.25), coefficient=_PAIR),
-    CurveTest("chenciner", TORUS, _torus, bent=True, coefficient=_D),
-)  # fmt: skip
+    OrbitTest("resonance_3", TORUS, _at(1.0 / 3.0), coefficient=_PAIR),
+    OrbitTest("resonance_4", TORUS, _at(0.25), coefficient=_PAIR),
+    OrbitTest("chenciner", TORUS, _torus, bent=True, coefficient=_D),
+):  # fmt: skip
+    look_for(_test)
 
 
-def tests_of(cycles: Cycles) -> tuple[CurveTest, ...]:
-    """What is looked for along a curve."""
-    kind = cycles.kind if isinstance(cycles, Extended) else ""
-    return tuple(test for test in TESTS if test.of == kind)
+def looked_for_on(cycles: Cycles) -> tuple[OrbitTest, ...]:
+    """What is looked for along a family or a curve."""
+    kind = cycles.kind if isinstance(cycles, Extended) else CYCLE
+    return tuple(functions_along(kind))

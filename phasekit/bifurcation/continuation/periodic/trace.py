@@ -30,11 +30,27 @@ class Track:
     state: State
     stop: Stop
 
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.points)
 
-def begin(cycles: Cycles, start: Point, forward: bool) -> State:
-    """The state of a trace that begins at a point."""
-    side = 1.0 if forward else -1.0
-    return State(start.orbit, side * start.dx, side * start.dy, cycles.options.initial_step, 0.0, 0)
+    def first(self, count: int, stop: Stop) -> Track:
+        """Its first points, for what it ends there."""
+        return replace(self, points=self.points[:count], stop=stop)
+
+    def joined(self, more: Track) -> Track:
+        """It and what follows."""
+        return Track((*self.points, *more.points), more.state, more.stop)
+
+    def at(self, state: State) -> Track:
+        """The same with another state to go on from."""
+        return replace(self, state=state)
+
+
+def begin(cycles: Cycles, start: Point) -> State:
+    """The state of a trace that begins at a point, in the direction of its tangent."""
+    return State(start.orbit, start.dx, start.dy, cycles.options.initial_step, 0.0, 0)
 
 
 def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:

@@ -1,4 +1,4 @@
-"""Test functions along curves in two parameters: what a special point on them is known by."""
+"""Test functions along branches and curves: what a special point on them is known by."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class CurveTest:
-    """A function along curves of a kind, and the kind of special point that its zeros are.
+    """A function along equilibria or curves of a kind, and the special points its zeros are.
 
     Attributes
     ----------
     kind : str
         A kind of the registry of special points.
-    curve : int
-        FOLD, HOPF or BRANCH; of maps FLIP or TORUS.
+    along : int
+        EQUILIBRIUM, FOLD, HOPF, BRANCH or EVENT; of maps FLIP or TORUS, too.
     values : callable
         Its values at points (rows of unknowns, with the derivatives of f at each).
     states : int
@@ -37,7 +37,7 @@ class CurveTest:
     """
 
     kind: str
-    curve: int
+    along: int
     values: Callable[[Curve, Array, Array], Array]
     states: int = 1
     holds: Callable[[Curve, Sample], bool] = lambda curve, s: True

@@ -1,9 +1,9 @@
-"""All test functions along curves in two parameters; one's own are added."""
+"""All test functions along branches of equilibria and curves in two parameters."""
 
 from __future__ import annotations
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.kernels.defining import EVENT
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVENT
 from phasekit.bifurcation.continuation.points import (
     bogdanov_takens,
     cusp,
@@ -14,41 +14,22 @@ from phasekit.bifurcation.continuation.points import (
     zero_hopf,
 )
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
-from phasekit.bifurcation.special_points import KINDS
+from phasekit.bifurcation.special_points import KINDS, functions_along, look_for
 
-TESTS: list[CurveTest] = [
+for _test in (
     *cusp.TESTS, *bogdanov_takens.TESTS, *generalized_hopf.TESTS, *zero_hopf.TESTS,
     *hopf_hopf.TESTS, *of_maps.TESTS, *on_events.TESTS,
-]  # fmt: skip
+):  # fmt: skip
+    look_for(_test)
 
 
-def add(test: CurveTest) -> CurveTest:
-    """Look for the zeros of one more function along curves.
-
-    Raises
-    ------
-    ValueError
-        If its kind is not registered.
-
-    Examples
-    --------
-    >>> add(CurveTest("swallowtail", 1, lambda curve, u, slopes: u[:, 0]))
-    Traceback (most recent call last):
-    ValueError: no special point is a 'swallowtail'
-    """
-    if test.kind not in KINDS:
-        raise ValueError(f"no special point is a {test.kind!r}")
-    TESTS.append(test)
-    return test
-
-
-def tests_of(curve: Curve) -> list[CurveTest]:
+def looked_for_on(curve: Curve) -> list[CurveTest]:
     """Those of a curve."""
+    asked = (None, *curve.detect)
     return [
         test
-        for test in TESTS
-        if test.curve == curve.kind
-        and curve.n >= test.states
+        for test in functions_along(curve.kind)
+        if curve.n >= test.states
         and curve.discrete in test.of
-        and (curve.kind != EVENT or KINDS[test.kind].detected in (None, *curve.detect))
+        and (curve.kind not in (EQUILIBRIUM, EVENT) or KINDS[test.kind].detected in asked)
     ]

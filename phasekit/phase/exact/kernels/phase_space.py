@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.numerics.compile import Array, Outputs, compose, kernel
+from phasekit.numerics.compile import Array, Outputs, compose, vector_kernel
 from phasekit.phase.exact.kernels import equilibria as eq
 from phasekit.phase.exact.kernels import separatrices as sx
 
@@ -105,7 +105,7 @@ def enclose(n: int, m: int, w: Array) -> None:
             sx.leave_out(j, i, w)
 
 
-@kernel
+@vector_kernel
 def equilibria(
     a: Array, b: Array, c: Array, exact: Array, start: int, stop: int, points: Outputs
 ) -> None:
@@ -122,7 +122,7 @@ def equilibria(
             eq.write(i, first + order[i], w, points)
 
 
-@kernel
+@vector_kernel
 def phase_space(
     a: Array,
     b: Array,

@@ -1,0 +1,278 @@
+"""Continuation itself, whatever is followed: both ways from a start, on from an end, to a stop.
+
+A walker follows one kind of solution: equilibria and the points of curves (`curve_walk`), periodic
+orbits (`periodic.cycle_walk`). It says how a step is made, what is passed and where it ends; how
+far to go, where to stop and how to go on is said here, once.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, Protocol, Self, TypeVar
+
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.stops import (
+    NOT_BEGUN,
+    SEARCHED,
+    UNFINISHED,
+    Stop,
+    wished,
+)
+from phasekit.bifurcation.special_points import KINDS
+
+
+class Track(Protocol):
+    """Points in one direction from a start, and the state to go on from."""
+
+    @property
+    def count(self) -> int:
+        """How many points."""
+
+    @property
+    def state(self) -> Any:
+        """What it takes to go on as if it had never stopped."""
+
+    @property
+    def stop(self) -> Stop:
+        """Why it ends."""
+
+    def first(self, count: int, stop: Stop) -> Self:
+        """Its first points, for what it ends there."""
+
+    def joined(self, more: Self) -> Self:
+        """It and what follows."""
+
+    def at(self, state: Any) -> Self:
+        """The same with another state to go on from."""
+
+
+class Seen(Protocol):
+    """A special point on a path."""
+
+    @property
+    def index(self) -> int:
+        """The point of the path before it."""
+
+    @property
+    def kind(self) -> str:
+        """Of the registry of special points."""
+
+    @property
+    def name(self) -> str:
+        """Of an event, else empty."""
+
+
+class Path(Protocol):
+    """Points from the backward to the forward end."""
+
+    @property
+    def count(self) -> int:
+        """How many points."""
+
+    @property
+    def start(self) -> int:
+        """Which of them is the start."""
+
+    @property
+    def stops(self) -> tuple[Stop, Stop]:
+        """Why it ends on both sides."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether it ends on its start."""
+
+    def part(self, first: int, last: int, ends: tuple[Any, Any]) -> Self:
+        """Points of it, between the special points at which it ends."""
+
+
+class Walker(Protocol):
+    """What can be followed: the protocol between one kind of solution and the walk."""
+
+    @property
+    def options(self) -> ContinuationOptions:
+        """How far and how finely."""
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Kinds, labels and names of special points at which it ends."""
+
+    @property
+    def chunk(self) -> int:
+        """Points after which such ends are looked for first; then after twice as many each time."""
+
+    @property
+    def looks_back(self) -> bool:
+        """Whether what is found between two points goes with those before them, too."""
+
+    def hindered(self, start: Any) -> Stop | None:
+        """Why there is nothing to follow at all."""
+
+    def turned(self, start: Any) -> Any:
+        """The start in the other direction."""
+
+    def begin(self, start: Any) -> Any:
+        """The state of a walk that begins at a point, in the direction of its tangent."""
+
+    def follow(self, state: Any, points: int, start: Any) -> Any:
+        """At most so many points from a state: a track."""
+
+    def passed(self, start: Any, track: Any, since: int) -> Sequence[Seen]:
+        """Special points of a track from one of its points on, in order."""
+
+    def is_start(self, seen: Any, start: Any) -> bool:
+        """Whether a special point is the start itself."""
+
+    def within(self, state: Any) -> bool:
+        """Whether a state stands inside its bounds."""
+
+    def words(self, seen: Any) -> str:
+        """Where a special point is."""
+
+
+Tracks = tuple[Any, Any]
+P = TypeVar("P", bound=Path)
+
+
+def run(walker: Walker, start: Any, directions: str) -> Tracks:
+    """Follow from a start, backward and forward; None where it was not asked for."""
+    points = walker.options.max_points
+    why = walker.hindered(start)
+    if why is not None:
+        still = walker.follow(walker.begin(start), 0, start).first(0, why)
+        return None if directions == "forward" else still, (
+            None if directions == "backward" else still
+        )
+    backward = forward = None
+    if directions != "backward":
+        forward = _followed(walker, start, walker.begin(start), points)
+    closed = forward is not None and forward.stop.reason == "closed"
+    if directions != "forward" and not closed:
+        start = walker.turned(start)
+        state = walker.begin(start)
+        if forward is not None and forward.stop.reason == "interrupted":
+            return _not_begun(walker, start, state), forward
+        backward = _followed(walker, start, state, points)
+    return backward, forward
+
+
+def goes_on(walker: Walker, track: Track | None) -> bool:
+    """Whether a track can be longer: it was cut, or a bound is no longer where it met it."""
+    if track is None:
+        return False
+    if track.stop.reason == "bound":
+        return walker.within(track.state)
+    return track.stop.reason in UNFINISHED or wished(track.stop, walker.ends)
+
+
+def go_on(walker: Walker, start: Any, tracks: Tracks, points: int) -> Tracks:
+    """More points of tracks that can be longer, exactly as if they had never stopped."""
+    backward, forward = (
+        _longer(walker, begin, track, points) if goes_on(walker, track) else track
+        for begin, track in zip((walker.turned(start), start), tracks, strict=True)
+    )
+    if forward is not None and forward.stop.reason == "closed":
+        backward = None
+    return backward, forward
+
+
+def _longer(walker: Walker, start: Any, track: Any, points: int) -> Any:
+    if wished(track.stop, walker.ends) and track.count:
+        # The state behind the last point, which is followed again.
+        track = track.at(walker.follow(walker.begin(start), track.count, start).state)
+    return _followed(walker, start, track.state, points, track)
+
+
+def _not_begun(walker: Walker, start: Any, state: Any) -> Any:
+    """A track without points, to go on from."""
+    return walker.follow(state, 0, start).first(0, NOT_BEGUN)
+
+
+def _followed(walker: Walker, start: Any, state: Any, points: int, track: Any = None) -> Any:
+    """Follow from a state for so many points, or to where it is to end."""
+    known = since = 0 if track is None else track.count
+    passed: Counter[str] = Counter()
+    chunk = walker.chunk if walker.ends else points
+    while True:
+        more = walker.follow(state, min(chunk, points), start)
+        whole = more if track is None else track.joined(more)
+        try:
+            end = _end_of(walker, start, whole, since, passed) if walker.ends else None
+        except KeyboardInterrupt:
+            track = _not_begun(walker, start, state) if track is None else track
+            return track.first(track.count, SEARCHED)
+        if end is not None:
+            return whole.first(*end)
+        track, state = whole, whole.state
+        points -= more.count
+        if more.stop.reason != "max_points" or points <= 0:
+            return track
+        chunk *= 2
+        if walker.looks_back:
+            since, passed = known, Counter()
+        else:
+            since = track.count
+
+
+def _end_of(
+    walker: Walker, start: Any, track: Track, since: int, passed: Counter[str]
+) -> tuple[int, Stop] | None:
+    """How many points there are up to that at which a track is to end, and why.
+
+    Where it ended before, it goes on: what it passed there counts no more.
+    """
+    for one in walker.passed(start, track, since):
+        name = _ending(walker, one, start)
+        if name is None:
+            continue
+        passed[name] += 1
+        if passed[name] >= walker.ends.count(name):
+            what = f"the event {one.name!r}" if one.name else one.kind.replace("_", " ")
+            why = f"stop = {name!r}: {what} at {walker.words(one)}"
+            return one.index + 1, Stop(name, why)
+    return None
+
+
+def _names(seen: Seen) -> set[str]:
+    """What a special point goes by."""
+    return {seen.kind, KINDS[seen.kind].label, seen.name} - {""}
+
+
+def _ending(walker: Walker, seen: Seen, start: Any) -> str | None:
+    """The name by which a special point ends the walk, if it does."""
+    name = next((name for name in walker.ends if name in _names(seen)), None)
+    return None if name is None or walker.is_start(seen, start) else name
+
+
+def cut(walker: Walker, start: Any, path: P, found: list[Any]) -> tuple[P, list[Any]]:
+    """A path that ends on the special points at which it is to end, and what is left on it."""
+    first, last = 0, path.count
+    ends: list[Any] = [None, None]
+    for side, stop in enumerate(path.stops):
+        there = [
+            one
+            for one in found
+            if (one.index >= path.start) == bool(side)
+            and stop.reason in _names(one)
+            and not walker.is_start(one, start)
+        ]
+        if stop.reason not in walker.ends or not there or path.closed:
+            continue
+        # Where it ended before, it went on; it ends at the first of those that its wish is for.
+        own = [one for one in there if (one.index >= path.count - 2 if side else one.index <= 0)]
+        one = (own or there)[side - 1]
+        ends[side] = one
+        place = next(k for k, other in enumerate(found) if other is one)
+        if side:
+            last, found = one.index + 1, found[: place + 1]
+        else:
+            first, found = one.index + 1, found[place:]
+    if ends == [None, None]:
+        return path, found
+    moved = [replace(one, index=one.index - first) for one in found]
+    kept = [
+        None if end is None else next(m for m, one in zip(moved, found, strict=True) if one is end)
+        for end in ends
+    ]
+    return path.part(first, max(last, first + 1), (kept[0], kept[1])), moved

@@ -1,0 +1,197 @@
+"""One attractor of a flow or map that is followed while parameters change slowly, labelled."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.labelled.flows import refuse_force, states_of
+from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
+from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.laws.equations import Equations
+from phasekit.motion.flow import RTOL
+from phasekit.motion.pace import units_of
+from phasekit.motion.slow_path import Kept, SlowPath, growth
+from phasekit.numerics.waits import notice
+from phasekit.systems.system import System, single
+from phasekit.table.attractors import rows_of
+
+
+def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) -> xr.Dataset:
+    """Follow an attractor along a path of parameters; see `phasekit.quasi_static`.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable, or the motion from the start comes to no attractor.
+    """
+    refuse_force(system)
+    steps = _steps(law, path)
+    first = system.replace(**{name: float(array[0]) for name, array in steps.items()})
+    _, parameters = single(first)
+    count = len(next(iter(steps.values())))
+    start = _start(law, x0)
+    places = np.arange(count)
+
+    def at(place: float) -> dict[str, FloatArray]:
+        return {
+            name: np.asarray(np.interp(place, places, steps[name]) if name in steps else value)
+            for name, value in parameters.items()
+        }
+
+    widths = np.array([np.ptp(law.window.get(name, (0.0, 0.0))) for name in law.states])
+    units = units_of(law, at(0.0), start[None], widths)
+    units = np.where(widths > 0.0, units, np.maximum(units, np.abs(start)))
+    track = SlowPath(law, at, units, RTOL)
+    with notice(f"following an attractor along {count:,} steps"):
+        kept = track.settled(start[None], 0.0)
+        if kept is None:
+            why = "runs to infinity" if track.escaped else "comes to no attractor that is found"
+            raise bad(
+                "x0", start.tolist(), "a state in a basin at the first step", f"its motion {why}"
+            )
+        found = track.follow(kept, count)
+        ds = _dataset(first, law, steps, track, found)
+    there = sum(one is not None for one in found)
+    if there < count:
+        why = "runs to infinity" if track.escaped else "comes to nothing that is found"
+        warnings.warn(
+            f"path: the attractor is lost before step {there}, and the motion from it {why}; from "
+            "there on results are NaN",
+            RuntimeWarning,
+            stacklevel=4,
+        )
+    return ds
+
+
+def _start(law: Equations, x0: Any) -> FloatArray:
+    if x0 is None:
+        missing = [name for name in law.states if name not in law.window]
+        if missing:
+            raise bad("x0", None, f"a state, or a window of {', '.join(missing)}")
+        return np.array([0.5 * sum(law.window[name]) for name in law.states])
+    given = states_of(law, x0, {}).items()
+    return np.array([number(f"x0[{name!r}]", value) for name, (_, value) in given])
+
+
+def _steps(law: Equations, path: Mapping[str, Any]) -> dict[str, FloatArray]:
+    """The parameters of a path as arrays of one length."""
+    wants = "a 1-D array of finite values"
+    kept: dict[str, FloatArray] = {}
+    for name, value in path.items():
+        if name not in law.names:
+            raise unknown("path: parameter", name, law.names)
+        array = np.asarray(numeric(name, value, None, wants), float)
+        if array.ndim > 1 or not np.isfinite(array).all():
+            raise bad(name, value, wants)
+        kept[name] = array
+    sizes = {name: array.size for name, array in kept.items() if array.ndim}
+    if len(set(sizes.values())) != 1:
+        got = ", ".join(f"{n} values of {name}" for name, n in sizes.items()) or "numbers alone"
+        raise bad("path", got, "1-D arrays of one length")
+    (size,) = set(sizes.values())
+    return {name: np.array(np.broadcast_to(array, size)) for name, array in kept.items()}
+
+
+def _dataset(
+    system: System, law: Equations, steps: Mapping[str, FloatArray], track: SlowPath,
+    found: list[Kept | None],
+) -> xr.Dataset:  # fmt: skip
+    rows, count = rows_of(law), len(found)
+    low, high = np.full((2, count, len(law.states)), np.nan)
+    kind, period, recovery = (
+        np.full(count, -1, np.int8),
+        np.full(count, np.nan),
+        np.full(count, np.nan),
+    )
+    for k, one in enumerate(found):
+        if one is None:
+            continue
+        low[k], high[k] = _extremes(track.way(one, float(k)))
+        kind[k], period[k] = one.kind, one.period
+        if one.values.size:
+            time = 1.0 if one.is_rest_of_flow else one.period
+            time *= track.leg(float(k)) if track.strobed and law.time is not None else 1.0
+            recovery[k] = -growth(one) / time
+    jumped = np.zeros(count, bool)
+    jumped[[min(int(np.ceil(loss.place)), count - 1) for loss in track.losses]] = True
+    on = ("step",)
+    data: dict[str, xr.Variable] = {}
+    for i, name in enumerate(law.states):
+        for word, values in (("least", low), ("greatest", high)):
+            attrs = {
+                "long_name": f"{word} {name} along the attractor",
+                "units": law.units.get(name, "1"),
+            }
+            end = "min" if word == "least" else "max"
+            data[f"{name}_{end}"] = variable(on, values[:, i], attrs)
+    data["attractor_kind"] = variable(on, kind, rows["attractor_kind"].attrs)
+    data["attractor_period"] = variable(on, period, rows["attractor_period"].attrs)
+    words = "rate at which disturbances decay; it vanishes where the attractor is lost"
+    data["recovery_rate"] = variable(on, recovery, {"long_name": words, "units": "1"})
+    about = "whether the attractor was lost since the step before"
+    data["jumped"] = variable(on, jumped, {"long_name": about})
+    data |= _losses(system, law, steps, track)
+    coords = {"step": variable(on, np.arange(count), {"long_name": "step along the path"})}
+    for name, value in system.parameters.items():
+        own = on if name in steps else ()
+        coords[name] = variable(own, steps.get(name, value), input_attrs(system, name))
+    return xr.Dataset(data, coords, dataset_attrs(system))
+
+
+def _losses(
+    system: System, law: Equations, steps: Mapping[str, FloatArray], track: SlowPath
+) -> dict[str, xr.Variable]:
+    """Where the attractor was lost, and what came after."""
+    losses, n = track.losses, len(law.states)
+    nothing = np.full(n, np.nan)
+    columns: dict[str, tuple[Any, dict[str, str]]] = {
+        "jump_step": (
+            np.array([int(np.ceil(one.place)) for one in losses], int),
+            {"long_name": "first step after it"},
+        ),
+        "jump_kind": (
+            np.array([one.why for one in losses], LABEL_DTYPE),
+            {"long_name": "how the attractor is lost"},
+        ),
+        "jump_soft": (
+            np.array([one.soft for one in losses], bool),
+            {"long_name": "whether what comes after grows out of what was before"},
+        ),
+    }
+    for name in steps:
+        own = {**input_attrs(system, name)}
+        own["long_name"] = f"{own.get('long_name', name)} where the attractor is lost"
+        places = np.array([float(track.at(one.place)[name]) for one in losses])
+        columns[f"jump_{name}"] = places, own
+    for i, name in enumerate(law.states):
+        units = {"units": law.units.get(name, "1")}
+        before = np.array([one.before.points[-1, i] for one in losses])
+        after = np.array(
+            [(nothing if one.after is None else one.after.points[0])[i] for one in losses]
+        )
+        columns[f"jump_from_{name}"] = before, {"long_name": f"{name} before the jump", **units}
+        columns[f"jump_to_{name}"] = after, {"long_name": f"{name} after the jump", **units}
+    return {name: variable(("jump",), values, attrs) for name, (values, attrs) in columns.items()}
+
+
+def _extremes(way: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least and greatest states along a closed way, between its points by parabolas."""
+    if len(way) < 8:
+        return way.min(axis=0), way.max(axis=0)
+    found = []
+    for sense in (-1.0, 1.0):
+        values = sense * way
+        top = values.argmax(axis=0)
+        columns = np.arange(way.shape[1])
+        a, b, c = (values[(top + k) % len(way), columns] for k in (-1, 0, 1))
+        bend = a - 2.0 * b + c
+        with np.errstate(all="ignore"):
+            more = np.where(bend < 0.0, -((c - a) ** 2) / (8.0 * bend), 0.0)
+        found.append(sense * (b + np.minimum(more, np.abs(bend))))
+    return found[0], found[1]

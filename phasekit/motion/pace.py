@@ -1,0 +1,158 @@
+"""How fast a flow goes: by which its states are measured, and times between looks at motions."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
+from phasekit.motion import flows
+from phasekit.motion.equation_rates import rates_on, slopes_at
+from phasekit.motion.strobe import common_period, strobe
+
+Array = npt.NDArray[np.float64]
+
+#: Part of a quarter of a turn in which a motion hardly turns.
+FINE = 0.25
+#: Part of the fastest turn that a leg lasts, and part of the box that motions go in one at least.
+QUARTER, WAY = 0.25, 0.05
+#: Legs at most in which the part of the box is gone.
+LONGER = 100.0
+#: States at which rates are asked for, and legs for which motions from them are followed.
+SOME, FIRST = 32, 20
+#: Part of the greatest speed that counts as rest.
+SLOW = 1e-3
+#: How often as fast as all else what decays is where a flow is stiff, part of the states at which
+#: it must be, and rates that are rounding.
+SPLIT, MOSTLY, ROUNDED = 1e3, 0.9, 1e-13
+#: Part of a leg between looks at a stiff motion that may come back.
+SHARE = 1e-4
+
+
+def few(array: Array, number: int) -> Array:
+    """So many rows, evenly among all."""
+    which = np.linspace(0, len(array) - 1, min(len(array), number)).round().astype(int)
+    return np.asarray(array[which])
+
+
+class Pace(NamedTuple):
+    """Times of a flow."""
+
+    leg: float
+    """Between looks: a quarter of the fastest turn, or in which motions go a part of the box."""
+    fine: float
+    """Between which a motion hardly turns."""
+    stiff: bool = False
+    """Whether motions creep behind states that decay much faster."""
+
+
+def pace_of(law: Equations, values: Mapping[str, Any], states: Array, units: Array) -> Pace:
+    """How fast motions from some states go.
+
+    Parameters
+    ----------
+    states : array, shape (n, states)
+        Where motions start.
+    units : array
+        By which the states are measured.
+    """
+    starts = few(states, SOME)
+    one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+    fast, speed = _stiffness(law, one, starts, units), _speeds(law, one, starts, units)
+    leg = 2.0 * np.pi * QUARTER / fast if fast > 0.0 else 1.0
+    if not fast > 0.0 and speed.size:
+        leg = WAY / float(np.median(speed))
+    times = np.broadcast_to(leg * np.arange(1.0, FIRST + 1.0), (len(starts), FIRST))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)
+        if law.kind == "python":
+            found, _ = flows.one_by_one(
+                law, values, few(starts, 4), times[:4], None, {"rtol": 1e-6, "atol": 1e-8}
+            )
+        else:
+            found, _ = flows.motions(law, values, starts, times, 1e-8, 1e-10)
+    seen = found.reshape(-1, len(units))
+    seen = few(seen[np.isfinite(seen).all(axis=1)], 2 * SOME)
+    if not len(seen):
+        return Pace(leg, leg * FINE)
+    fast, speed = _stiffness(law, one, seen, units), _speeds(law, one, seen, units)
+    if fast > 0.0:
+        leg = 2.0 * np.pi * QUARTER / fast
+    fine, slow = leg * FINE, _slow(law, one, seen)
+    if slow > 0.0:
+        leg *= fast / slow
+        fine = max(fine, SHARE * leg)
+    moving = speed[speed > SLOW * speed.max()] if speed.size else speed
+    if moving.size:
+        leg = max(leg, min(WAY / float(np.median(moving)), LONGER * leg))
+    return Pace(leg, fine, slow > 0.0)
+
+
+def _slow(law: Equations, one: Mapping[str, float], x: Array) -> float:
+    """Median of the rates that are left where others decay much faster; 0 of a law without such."""
+    slopes = [slopes_at(law, one, state) for state in x]
+    found = [_split(np.linalg.eigvals(jac)) for jac in slopes if np.isfinite(jac).all()]
+    split = [rate for rate in found if rate > 0.0]
+    return float(np.median(split)) if len(split) >= MOSTLY * len(x) else 0.0
+
+
+def _split(eigenvalues: npt.NDArray[Any]) -> float:
+    """Greatest rate but for those that decay much faster than it; 0 where none do."""
+    order = np.argsort(-np.abs(eigenvalues))
+    sizes, decays = np.abs(eigenvalues[order]), -eigenvalues[order].real
+    for i in range(1, len(sizes)):
+        if decays[i - 1] < 0.5 * sizes[i - 1] or sizes[i] < ROUNDED * sizes[0]:
+            break
+        if sizes[i - 1] > SPLIT * sizes[i]:
+            return float(sizes[i])
+    return 0.0
+
+
+def _stiffness(law: Equations, one: Mapping[str, float], x: Array, units: Array) -> float:
+    """Median of the size of derivatives at states; 0 where there are none."""
+    slopes = np.array([slopes_at(law, one, state) for state in x]) * units / units[:, None]
+    sizes = np.linalg.norm(slopes, axis=(1, 2))
+    sizes = sizes[np.isfinite(sizes)]
+    return float(np.median(sizes)) if sizes.size else 0.0
+
+
+def _speeds(law: Equations, one: Mapping[str, float], x: Array, units: Array) -> Array:
+    """Speeds at states where there is motion."""
+    found = np.asarray(np.linalg.norm(rates_on(law, one, x) / units, axis=1))
+    return np.asarray(found[np.isfinite(found) & (found > 0.0)])
+
+
+def units_of(law: Equations, values: Mapping[str, Any], states: Array, widths: Array) -> Array:
+    """By what states are measured: widths, of angles a radian, or what motions come to.
+
+    Parameters
+    ----------
+    states : array, shape (n, states)
+        Where motions start.
+    widths : array
+        Widths of their ranges; 0 where unknown.
+    """
+    units = np.array(widths, float)
+    unknown = ~(units > 0.0)
+    for i, name in enumerate(law.states):
+        if name in law.periods:
+            units[i], unknown[i] = law.periods[name] / (2.0 * np.pi), False
+    if not unknown.any():
+        return units
+    starts = few(states, SOME)
+    rough = np.maximum(np.abs(starts).max(axis=0), 1.0)
+    period = common_period(law, values)
+    leg = 1.0 if period is None else float(period) / 8.0
+    if period is None and not isinstance(law, Map):
+        leg = pace_of(law, values, starts, np.where(unknown, rough, units)).leg
+    seen = strobe(law, values, starts, leg, 65).states.reshape(-1, units.size)
+    seen = seen[np.isfinite(seen).all(axis=1) & (np.abs(seen) < 1e6 * rough).all(axis=1)]
+    if not len(seen):
+        return np.where(unknown, rough, units)
+    ranges = np.maximum(np.ptp(seen, axis=0), 1e-3 * np.abs(seen).max(axis=0))
+    return np.where(unknown, np.where(ranges > 0.0, ranges, rough), units)

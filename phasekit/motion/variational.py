@@ -1,0 +1,141 @@
+"""Where one motion comes to after a time, and the derivative of that by the state at the start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import ConvergenceError
+from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Map
+from phasekit.laws.perturbed import PerturbedConservative
+from phasekit.motion import flow, flows
+from phasekit.motion.equation_rates import pointwise, slopes_at
+from phasekit.motion.method import turns_of
+from phasekit.motion.steps import InitialValue, steps
+
+Array = npt.NDArray[np.float64]
+
+RTOL, ATOL = 1e-12, 1e-13
+#: Steps of Newton's method, and the last, in units of the states.
+NEWTON, LAST = 12, 1e-12
+#: A step that rounding alone may make where a multiplier is near 1: it shrinks no more.
+ROUNDED, SHRINKS = 1e-8, 0.3
+#: Times the reach at which Newton's method is given up.
+ASTRAY = 4.0
+#: Steps of a Python function's motion.
+MOST = 100_000
+
+
+def carried(
+    law: PerturbedConservative | Equations, values: Mapping[str, Array], state: Array, time: float
+) -> tuple[Array, Array]:
+    """State after a time, or so many steps of a map, and its derivative; NaN where there is none.
+
+    Parameters
+    ----------
+    law, values
+        The law, and single values of its parameters.
+    state : array, shape (n,)
+        State at t = 0.
+    """
+    n = len(state)
+    if isinstance(law, Equations) and law.kind == "python":
+        one = {name: float(np.reshape(x, ())) for name, x in values.items()}
+        kind = _iterated if isinstance(law, Map) else _integrated
+        found = kind(law, one, state, time)
+    else:
+        start, times = np.concatenate([state, np.eye(n).ravel()])[None], np.array([[time]])
+        # So few motions do not pay for the machine code of series.
+        if isinstance(law, Equations):
+            cell = law, values, start, times, RTOL, ATOL
+            found = flows.motions(*cell, method="dop853", tangents=n)[0][0, 0]
+        else:
+            cells = law, values, start, times, RTOL, ATOL
+            found = flow.motions(*cells, tangents=n, series=False).states[0, 0]
+    return found[:n], found[n:].reshape(n, n).T
+
+
+class Return(NamedTuple):
+    """A state to which a motion returns after a time."""
+
+    x: Array
+    slope: Array
+    """Derivative of the state after it."""
+    turned: Array
+    """What angles have grown by."""
+
+
+def returned(
+    law: PerturbedConservative | Equations,
+    values: Mapping[str, Array],
+    state: Array,
+    time: float,
+    units: Array,
+    reach: float,
+) -> Return | None:
+    """The state near another to which a motion returns; None where Newton's method finds none.
+
+    Parameters
+    ----------
+    law, values, state, time
+        As of `carried`.
+    units : array
+        By which states are measured.
+    reach : float
+        Greatest distance from the state.
+    """
+    x, turns = state, turns_of(law)
+    whole, before = np.where(turns > 0.0, turns, 1.0), np.inf
+    for _ in range(NEWTON):
+        image, slope = carried(law, values, x, time)
+        off = image - x
+        turned = np.where(turns > 0.0, turns * np.round(off / whole), 0.0)
+        try:
+            step = np.linalg.solve(np.eye(len(x)) - slope, off - turned)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.isfinite(step).all():
+            return None
+        x, size = x + step, float(np.linalg.norm(step / units))
+        gone = x - state
+        gone = gone - np.where(turns > 0.0, turns * np.round(gone / whole), 0.0)
+        away = float(np.linalg.norm(gone / units))
+        if size < LAST or is_rounding(size, before):
+            return Return(x, slope, turned) if away <= reach else None
+        if away > ASTRAY * reach:
+            return None
+        before = size
+    return None
+
+
+def is_rounding(size: float, before: float) -> bool:
+    """Whether a step of Newton's method, after another, is no more than rounding."""
+    return ROUNDED > size > SHRINKS * before
+
+
+def _iterated(law: Equations, values: Mapping[str, float], x: Array, count: float) -> Array:
+    f, slope = pointwise(law, values), np.eye(len(x))
+    for i in range(int(count)):
+        slope, x = slopes_at(law, values, x, float(i)) @ slope, f(float(i), x)
+    return np.concatenate([x, slope.T.ravel()])
+
+
+def _integrated(law: Equations, values: Mapping[str, float], x: Array, time: float) -> Array:
+    n, f = len(x), pointwise(law, values)
+
+    def rates(t: float, y: Array) -> Array:
+        moved = slopes_at(law, values, y[:n], t) @ y[n:].reshape(n, n).T
+        return np.concatenate([f(t, y[:n]), moved.T.ravel()])
+
+    found: Any = np.concatenate([x, np.eye(n).ravel()])
+    problem = InitialValue(rates, list(found), rtol=RTOL, atol=ATOL, unit=np.inf, most=MOST)
+    try:
+        for step in steps(problem, time):
+            found = step.after
+    except (ConvergenceError, ValueError):
+        return np.full(n + n * n, np.nan)
+    return np.asarray(found)

@@ -1,0 +1,48 @@
+"""The way along a cycle, and how far states are from it."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+class Way:
+    """Many points along a cycle, between which chords are as good as the way."""
+
+    def __init__(self, points: Array, turns: Array, units: Array) -> None:
+        from scipy.spatial import cKDTree
+
+        self.turns, self.units, self.low = turns / units, units, points.min(axis=0)
+        self.points = self._inside(points)
+        ahead = np.roll(self.points, -1, axis=0) - self.points
+        self.along = self._nearest_turn(ahead)
+        self.length = np.maximum((self.along**2).sum(axis=1), 1e-300)
+        self.tree = cKDTree(self.points, boxsize=self.turns)
+
+    def distance(self, states: Array) -> Array:
+        """Distances of states from the chords next to the nearest point; infinite of NaN."""
+        at = self._inside(states)
+        good = np.isfinite(at).all(axis=1)
+        found = np.full(len(at), np.inf)
+        _, near = self.tree.query(at[good])
+        best = found[good]
+        for i in (near, near - 1):
+            off = self._nearest_turn(at[good] - self.points[i])
+            part = np.clip((off * self.along[i]).sum(axis=1) / self.length[i], 0.0, 1.0)
+            across = np.linalg.norm(off - part[:, None] * self.along[i], axis=1)
+            best = np.minimum(best, across)
+        found[good] = best
+        return found
+
+    def _inside(self, states: Array) -> Array:
+        """States in units, angles within the first turn."""
+        off = (states - self.low) / self.units
+        turned = off - self.turns * np.floor(off / np.where(self.turns > 0.0, self.turns, 1.0))
+        turned = np.where(turned < self.turns, turned, 0.0)
+        return np.asarray(np.where(self.turns > 0.0, turned, off))
+
+    def _nearest_turn(self, off: Array) -> Array:
+        whole = np.where(self.turns > 0.0, self.turns, 1.0)
+        return np.asarray(off - np.where(self.turns > 0.0, self.turns * np.round(off / whole), 0.0))

@@ -1,0 +1,1 @@
+"""Interval arithmetic: what is proved of formulas over whole boxes."""

@@ -1,0 +1,200 @@
+"""Branches between their points, proved: one curve of zeros in a tube about each chord.
+
+F maps N unknowns to N - 1 equations; its zeros near a regular point are a curve. About the chord
+from one point of it to the next, u = c + s d + T w, the columns of T across. With Y close to the
+inverse of F'(c) T and J the derivatives over the whole tube, the operator
+
+    K(W) = -Y F(c) - Y J d s + (I - Y J T) W
+
+holds all zeros w of each s with |w| <= W: where it lies inside W there is exactly one for each s,
+so one smooth curve through the tube: [MooreKearfottCloud2009] 8.2, with s as a parameter. Two
+tubes hold one curve if the zero of the first next to their common point lies in the second, where a
+zero is alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.numerics.intervals.krawczyk import UNIT, inverses
+from phasekit.numerics.intervals.zeros import System
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+#: How much further than its chord a tube goes at either end, in parts of the chord.
+BEYOND = 1e-3
+#: How often a tube is widened until it holds its image, and once it does, by how much.
+TRIES, WIDER = 12, 4.0
+
+
+class Tubes(NamedTuple):
+    """Tubes about the chords of some points, the next after each."""
+
+    middle: Array
+    """c, of shape (chords, N)."""
+    chord: Array
+    """d, of shape (chords, N)."""
+    across: Array
+    """T, of shape (chords, N, N - 1)."""
+    radius: Array
+    """How far the curve may be from the chord across, of shape (chords, N - 1)."""
+    alone: Array
+    """How far across there is no other zero."""
+    proved: Flags
+    """Whether each tube holds one curve."""
+    joined: Flags
+    """Whether it is the same in each tube and the next, of shape (chords - 1,)."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether one curve passes all tubes."""
+        return bool(self.proved.all() and self.joined.all())
+
+    def holds(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """The first tube in which a zero at each point is on the curve; -1 where there is none."""
+        u = np.asarray(points, dtype=float)[:, None] - self.middle
+        size = np.sum(self.chord * self.chord, axis=1)
+        s = np.abs(np.sum(u * self.chord, axis=2) / size)
+        w = np.abs(np.einsum("pki,kij->pkj", u, self.across))
+        inside = (s <= 0.5) & np.all(w <= self.alone, axis=2) & self.proved
+        return np.where(inside.any(axis=1), np.argmax(inside, axis=1), -1)
+
+
+def tubes(system: System, points: npt.ArrayLike) -> Tubes:
+    """Prove that a curve of zeros passes near some points, one after the other.
+
+    Parameters
+    ----------
+    system : System
+        N - 1 formulas of N unknowns; its parameters may be intervals.
+    points : array_like, shape (points, N)
+        In order along the curve, as a continuation by pseudo-arclength finds them.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> x, mu = sp.symbols("x mu", real=True)
+    >>> turn = np.linspace(-1.0, 1.0, 21)
+    >>> found = tubes(System([mu - x**2], [x, mu], {}), np.stack([turn, turn**2], axis=1))
+    >>> found.complete, bool(found.radius.max() < 0.01)
+    (True, True)
+    """
+    u = np.asarray(points, dtype=float)
+    chord, middle = np.diff(u, axis=0), 0.5 * (u[:-1] + u[1:])
+    across = _complements(chord)
+    slopes, undefined = system(middle, middle)[1:]
+    inverse, usable = inverses((0.5 * (slopes[0] + slopes[1])) @ across)
+    usable &= ~undefined
+    operator = _Operator(system, chord, across, inverse, usable)
+    # Where the curve is at the end of a chord is found by itself: that is known far better.
+    nowhere = np.zeros(len(chord))
+    tip, held = _held(operator.about(u[1:], nowhere), 0.0, _floors(u[1:], chord))
+    beyond, beside = _passed(chord, across, tip)
+    whole = operator.about(middle, 0.5 + beyond)
+    radius, proved = _held(whole, tip, _floors(middle, chord))
+    proved &= held
+    alone = radius.copy()
+    for _ in range(TRIES):
+        wider = alone * WIDER
+        holds = np.all(whole(wider) < wider, axis=1) & proved
+        alone = np.where(holds[:, None], wider, alone)
+        if not holds.any():
+            break
+    joined = np.all(beside <= alone[1:], axis=1) & proved[:-1] & proved[1:]
+    return Tubes(middle, chord, across, radius, alone, proved, joined)
+
+
+class _Operator(NamedTuple):
+    """The operator K of tubes."""
+
+    system: System
+    chord: Array
+    across: Array
+    inverse: Array
+    usable: Flags
+
+    def about(self, base: Array, parts: Array) -> Callable[[Array], Array]:
+        """How far K(W) reaches, about points and so far along the chords, in parts of these."""
+        system, chord, across, inverse, _ = self
+        # A sum of N products is off by N rounded units at most, of the products' sizes.
+        rounding = UNIT * (2 * system.n + 8)
+        size, reach = np.abs(inverse), parts[:, None] * (1.0 + 1e-15)
+        with np.errstate(all="ignore"):
+            (least, most), _, outside = system(base, base)
+            blur = 0.5 * (most - least) + rounding * np.maximum(np.abs(least), np.abs(most))
+            value = np.abs(np.einsum("kij,kj->ki", inverse, 0.5 * (least + most)))
+            value += np.einsum("kij,kj->ki", size, blur)
+
+        def image(w: Array) -> Array:
+            with np.errstate(all="ignore"):
+                half = np.abs(chord) * reach + np.einsum("kij,kj->ki", np.abs(across), w)
+                half = half * (1.0 + rounding) + 4.0 * UNIT * np.abs(base)
+                _, (low, high), away = system(base - half, base + half)
+                center = 0.5 * (low + high)
+                wide = 0.5 * (high - low) + 2.0 * rounding * np.abs(center)
+                inner = np.einsum("kij,kj->ki", center, chord)
+                along = np.abs(np.einsum("kij,kj->ki", inverse, inner))
+                spread = np.einsum("kij,kj->ki", wide, np.abs(chord))
+                along += np.einsum("kij,kj->ki", size, spread + rounding * np.abs(inner))
+                off = np.abs(np.eye(system.m) - inverse @ (center @ across))
+                off += size @ (wide @ np.abs(across)) + rounding * np.eye(system.m)
+                found = value + reach * along + np.einsum("kij,kj->ki", off, w)
+                found *= 1.0 + 4.0 * rounding
+            found[away | outside | ~self.usable] = np.inf
+            return np.asarray(np.where(np.isfinite(found), found, np.inf))
+
+        return image
+
+
+def _floors(base: Array, chord: Array) -> Array:
+    """What rounding leaves of radii."""
+    floor = 8.0 * UNIT * np.linalg.norm(np.abs(base) + np.abs(chord), axis=1)
+    return np.repeat(floor[:, None], base.shape[1] - 1, axis=1)
+
+
+def _held(
+    image: Callable[[Array], Array], least: Array | float, floor: Array
+) -> tuple[Array, Flags]:
+    """Radii that hold their images, and whether these were found."""
+    radius, proved = np.maximum(least, 0.0 * floor), np.zeros(len(floor), dtype=bool)
+    for _ in range(TRIES):
+        found = image(radius)
+        proved = np.all(found < radius, axis=1)
+        finite = np.isfinite(found).all(axis=1)
+        if (proved | ~finite).all():
+            break
+        grows = (finite & ~proved)[:, None]
+        radius = np.where(grows, np.maximum(radius, 1.2 * found + floor), radius)
+    return radius, proved
+
+
+def _complements(chord: Array) -> Array:
+    """Orthonormal columns across directions."""
+    n = chord.shape[1]
+    matrices = np.broadcast_to(np.eye(n), (len(chord), n, n)).copy()
+    matrices[:, :, 0] = chord
+    # The largest entry of a direction is left out of the unit vectors beside it.
+    largest = np.argmax(np.abs(chord), axis=1)
+    for k in range(n - 1):
+        column = np.where(k >= largest, k + 1, k)
+        matrices[:, :, k + 1] = np.eye(n)[column]
+    return np.asarray(np.linalg.qr(matrices)[0][:, :, 1:])
+
+
+def _passed(chord: Array, across: Array, tip: Array) -> tuple[Array, Array]:
+    """How far beyond its chord each tube must go, in parts of it, to take over the curve.
+
+    And how far from the next chord the curve is where that begins.
+    """
+    size = np.linalg.norm(chord, axis=1)
+    along = np.einsum("ki,kij->kj", chord[1:] / size[1:, None], across[:-1])
+    turned = np.einsum("kij,kil->kjl", across[1:], across[:-1])
+    room = 1.0 + 1e-12
+    needed = np.einsum("kj,kj->k", np.abs(along), tip[:-1]) * room / size[1:]
+    beside = np.einsum("kjl,kl->kj", np.abs(turned), tip[:-1]) * room
+    return np.maximum(BEYOND, np.append(0.0, needed)), beside

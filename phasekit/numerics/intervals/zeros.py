@@ -1,0 +1,305 @@
+"""All zeros of formulas in a box, proved: interval arithmetic excludes what holds none.
+
+A box is dropped where a component of f cannot vanish in it; on the others Krawczyk's operator
+decides (`.krawczyk`). What is undecided is bisected, all boxes of a generation at once. Parameters
+may be intervals: then what is proved holds for each of their values. Boxes about the zeros of their
+middles are inflated until they hold one zero for all of them, and what lies elsewhere is excluded.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from copy import copy
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.numerics.intervals.bounds import Bounds, Interval
+from phasekit.numerics.intervals.krawczyk import UNIT, Image, inverses, krawczyk
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+Boxes = tuple[Array, Array]
+
+#: Boxes of a generation beyond which the search stops, and says so.
+MOST_BOXES = 1 << 16
+#: Relative width at which a box that nothing decides is given up: a multiple zero, or a pole.
+NARROW = 1e-9
+#: The same where parameters are intervals, which blur zeros anyway.
+COARSE = 2.0**-14
+#: A box is tested a little larger than it is, so that zeros on its faces lie inside.
+INFLATED = 0.05
+
+
+class Zeros(NamedTuple):
+    """Zeros, one a row, with boxes that hold them; and the boxes of which nothing is known."""
+
+    zeros: Array
+    """Of interval parameters those of their middles."""
+    boxes: Boxes
+    """Corners; for each value of the parameters there is exactly one zero in each."""
+    undecided: Boxes
+    visited: int
+    """Number of boxes that were looked at."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether these are all, and each is one."""
+        return not len(self.undecided[0])
+
+
+class _Known(NamedTuple):
+    """Where there is one zero: a box that holds it, and a larger one in which it is alone."""
+
+    least: Boxes
+    most: Boxes
+
+
+class System:
+    """Bounds of f and its derivatives over boxes of the states.
+
+    Parameters
+    ----------
+    f, states : sequence of sympy expressions and symbols
+    values : mapping of symbol to float or (float, float)
+        Parameters, or intervals of them.
+
+    Raises
+    ------
+    NoRule
+        If f holds a function of which no bounds are known.
+    """
+
+    def __init__(self, f: Sequence[Any], states: Sequence[Any], values: Mapping[Any, Any]) -> None:
+        self.m, self.n = len(f), len(states)
+        self._bounds = _bounds(tuple(f), tuple(states), tuple(values))
+        ends = [np.broadcast_to(np.asarray(v, dtype=float), 2) for v in values.values()]
+        self.parameters: list[Interval] = [(float(a), float(b)) for a, b in ends]
+        self.exact = all(a == b for a, b in self.parameters)
+
+    def at_middle(self) -> System:
+        """The same for the middles of the parameters."""
+        found = copy(self)
+        found.exact = True
+        found.parameters = [(0.5 * (a + b), 0.5 * (a + b)) for a, b in self.parameters]
+        return found
+
+    def __call__(self, low: Array, high: Array) -> tuple[Boxes, Boxes, Flags]:
+        """Bounds of f, of its derivatives, and where either may be undefined."""
+        columns = [(low[:, i], high[:, i]) for i in range(self.n)]
+        found, undefined = self._bounds(*columns, *self.parameters)
+        lows, highs = (np.stack([one[i] for one in found], axis=1) for i in (0, 1))
+        shape = (-1, self.m, self.n)
+        f = lows[:, : self.m], highs[:, : self.m]
+        return f, (lows[:, self.m :].reshape(shape), highs[:, self.m :].reshape(shape)), undefined
+
+
+@functools.lru_cache(maxsize=64)
+def _bounds(f: tuple[Any, ...], states: tuple[Any, ...], parameters: tuple[Any, ...]) -> Bounds:
+    slopes = [row.diff(x) for row in f for x in states]
+    return Bounds([*f, *slopes], [*states, *parameters])
+
+
+def zeros_in_box(
+    f: Sequence[Any],
+    states: Sequence[Any],
+    values: Mapping[Any, Any],
+    low: npt.ArrayLike,
+    high: npt.ArrayLike,
+) -> Zeros:
+    """Return all zeros of f in a closed box.
+
+    Parameters
+    ----------
+    f, states : sequence of sympy expressions and symbols
+    values : mapping of symbol to float or (float, float)
+        Parameters, or intervals of them: then each box holds one zero for each of their values, and
+        there are no others, if nothing is undecided.
+    low, high : array_like, shape (n,)
+        Corners of the box.
+
+    Raises
+    ------
+    NoRule
+        If f holds a function of which no bounds are known.
+
+    Examples
+    --------
+    >>> import sympy as sp
+    >>> x, y, r = sp.symbols("x y r")
+    >>> found = zeros_in_box([x**2 + y**2 - r, x - y], [x, y], {r: 1.0}, [-2, -2], [2, 2])
+    >>> found.zeros.round(12).tolist(), found.complete
+    ([[-0.707106781187, -0.707106781187], [0.707106781187, 0.707106781187]], True)
+    >>> found = zeros_in_box([x**2 + y**2 - r, x - y], [x, y], {r: (0.9, 1.1)}, [-2, -2], [2, 2])
+    >>> [end.round(2).tolist() for end in found.boxes], found.complete
+    ([[[-0.74, -0.74], [0.67, 0.67]], [[-0.67, -0.67], [0.74, 0.74]]], True)
+    """
+    system = System(f, states, values)
+    whole = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
+    if system.exact:
+        return _search(system, whole, [])
+    middle = _search(system.at_middle(), whole, [])
+    known = [box for x in middle.zeros for box in _inflated(system, x, whole[1] - whole[0])]
+    found = _search(system, whole, known)
+    return found._replace(visited=middle.visited + found.visited)
+
+
+def _search(system: System, whole: Boxes, known: list[_Known]) -> Zeros:
+    """All zeros in a box, some of which are the only ones in boxes of their own."""
+    width = whole[1] - whole[0]
+    # Nothing is cut that is only a few doubles wide.
+    part = NARROW if system.exact else COARSE
+    narrowest = np.maximum(part * width, 8.0 * UNIT * np.max(np.abs(whole), axis=0))
+    lows, highs = whole[0][None, :], whole[1][None, :]
+    sure = [(0.5 * (a + b), a, b) for (a, b), _ in known]
+    lost: list[Boxes] = []
+    visited = 0
+    while len(lows):
+        if len(lows) > MOST_BOXES:
+            lost.append((lows, highs))
+            break
+        visited += len(lows)
+        for _, (a, b) in known:
+            out = np.any((lows < a) | (highs > b), axis=1)
+            lows, highs = lows[out], highs[out]
+        one, centers, lows, highs = _judge(system, lows, highs, width)
+        sure += zip(centers[one], lows[one], highs[one], strict=True)
+        narrow = np.all(highs - lows <= narrowest, axis=1) & ~one
+        if narrow.any():
+            lost.append((lows[narrow], highs[narrow]))
+        lows, highs = _halved(lows[~one & ~narrow], highs[~one & ~narrow], width)
+    zeros, boxes = _once(system, sure, whole, lost)
+    empty = np.empty((0, system.n))
+    rest = [np.concatenate([part[i] for part in lost]) if lost else empty for i in (0, 1)]
+    return Zeros(zeros, boxes, (rest[0], rest[1]), visited)
+
+
+def _inflated(system: System, x: Array, width: Array) -> list[_Known]:
+    """Boxes about a zero of middle parameters that hold one zero for all of them, if there are."""
+    low, high = x[None], x[None]
+    least: Boxes | None = None
+    most, grown = (low, high), 1.0
+    for _ in range(80):
+        image, defined = _image(system, low, high, 0.5 * (low + high))
+        usable = bool((image.usable & defined).all()) and not np.any(high - low > 2.0 * width)
+        if usable and np.all((image.low > low) & (image.high < high)):
+            least, most = least or (low[0], high[0]), (low, high)
+        elif least is None and usable:
+            most = np.minimum(low, image.low), np.maximum(high, image.high)
+        elif least is None or grown < 1.0:
+            break
+        else:  # too much
+            grown = 0.1
+        more = width * (grown * np.max((most[1] - most[0]) / width) + 1e-15)
+        low, high = most[0] - more, most[1] + more
+    return [] if least is None else [_Known(least, (most[0][0], most[1][0]))]
+
+
+def _judge(
+    system: System, low: Array, high: Array, width: Array
+) -> tuple[Flags, Array, Array, Array]:
+    """Boxes that may hold a zero, contracted; which hold exactly one, and about where."""
+    f, _, undefined = system(low, high)
+    possible = np.all((f[0] <= 0.0) & (f[1] >= 0.0), axis=1) | undefined
+    low, high, undefined = low[possible], high[possible], undefined[possible]
+    around = INFLATED * (high - low) + 1e-15 * width
+    wide_low, wide_high = low - around, high + around
+    image, defined = _image(system, wide_low, wide_high, 0.5 * (low + high))
+    usable = image.usable & defined & ~undefined
+    one = usable & np.all((image.low > wide_low) & (image.high < wide_high), axis=1)
+    apart = usable & np.any((image.low > high) | (image.high < low), axis=1)
+    tight = (usable & ~one)[:, None]
+    new_low = np.where(tight, np.maximum(low, image.low), low)
+    new_high = np.where(tight, np.minimum(high, image.high), high)
+    new_low = np.where(one[:, None], wide_low, new_low)[~apart]
+    new_high = np.where(one[:, None], wide_high, new_high)[~apart]
+    return one[~apart], image.middle[~apart], new_low, new_high
+
+
+def _image(system: System, low: Array, high: Array, middle: Array) -> tuple[Image, Flags]:
+    """Krawczyk's images of boxes, and where f is defined on them."""
+    at, _, away = system(middle, middle)
+    _, slopes, beyond = system(low, high)
+    reach = np.maximum(high - middle, middle - low)
+    return krawczyk(middle, reach, at, slopes), ~(away | beyond)
+
+
+def _halved(low: Array, high: Array, width: Array) -> Boxes:
+    """Boxes cut across their longest side, in units of the whole box."""
+    if not len(low):
+        return low, high
+    side = np.argmax((high - low) / width, axis=1)
+    rows = np.arange(len(low))
+    cut = 0.5 * (low[rows, side] + high[rows, side])
+    left, right = high.copy(), low.copy()
+    left[rows, side] = right[rows, side] = cut
+    return np.concatenate([low, right]), np.concatenate([left, high])
+
+
+def _once(
+    system: System, sure: list[tuple[Array, Array, Array]], whole: Boxes, lost: list[Boxes]
+) -> tuple[Array, Boxes]:
+    """Each zero once, to rounding, and inside the whole box."""
+    empty = np.empty((0, system.n))
+    if not sure:
+        return empty, (empty, empty)
+    start, low, high = (np.array(part) for part in zip(*sure, strict=True))
+    x = _refined(system.at_middle(), start, low, high)
+    a, b = _contracted(system, low, high)
+    slack = 4e-16 * np.maximum(np.abs(whole[0]), np.abs(whole[1]))
+    # A box in which a zero is the only one tells whether another's is the same: of interval
+    # parameters for one value of them, and so for all.
+    inside = np.all((x[:, None] >= low) & (x[:, None] <= high), axis=2)
+    inside |= inside.T
+    kept: list[int] = []
+    for k in range(len(x)):
+        if not inside[k, kept].any():
+            kept.append(k)
+    rows = []
+    for k in kept:
+        if system.exact:
+            if np.all((x[k] >= whole[0] - slack) & (x[k] <= whole[1] + slack)):
+                rows.append((np.clip(x[k], *whole), np.minimum(a[k], x[k]), np.maximum(b[k], x[k])))
+        elif np.all((a[k] >= whole[0]) & (b[k] <= whole[1])):
+            rows.append((x[k], a[k], b[k]))
+        elif np.all((b[k] >= whole[0]) & (a[k] <= whole[1])):  # for some values it is outside
+            lost.append((a[k][None], b[k][None]))
+    rows.sort(key=lambda row: tuple(row[0]))
+    x, a, b = np.array(rows).reshape(-1, 3, system.n).transpose(1, 0, 2)
+    return x, (a, b)
+
+
+def _contracted(system: System, low: Array, high: Array) -> Boxes:
+    """Boxes that hold one zero each as narrow as steps make them."""
+    low, high = low.copy(), high.copy()
+    rows = np.arange(len(low))
+    for _ in range(100):
+        a, b = low[rows], high[rows]
+        image, defined = _image(system, a, b, 0.5 * (a + b))
+        usable = (image.usable & defined)[:, None]
+        low[rows] = np.where(usable, np.maximum(a, image.low), a)
+        high[rows] = np.where(usable, np.minimum(b, image.high), b)
+        rows = rows[np.any(high[rows] - low[rows] < 0.99 * (b - a), axis=1)]
+        if not rows.size:
+            break
+    return low, high
+
+
+def _refined(system: System, x: Array, low: Array, high: Array) -> Array:
+    """Newton's method inside boxes in which a zero is the only one."""
+    best, least = x.copy(), np.full(len(x), np.inf)
+    rows, x = np.arange(len(x)), x.copy()
+    for _ in range(60):
+        f, slopes, _ = system(x, x)
+        inverse, _ = inverses(0.5 * (slopes[0] + slopes[1]))
+        step = np.einsum("kij,kj->ki", inverse, 0.5 * (f[0] + f[1]))
+        size = np.max(np.abs(step) / (high - low)[rows], axis=1)
+        closer = size < least[rows]
+        rows, x, step = rows[closer], x[closer], step[closer]
+        best[rows], least[rows] = x, size[closer]
+        if not rows.size:
+            break
+        x = np.clip(x - step, low[rows], high[rows])
+    return best

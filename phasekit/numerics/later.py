@@ -1,0 +1,34 @@
+"""Modules that are imported when something of theirs is first used.
+
+SymPy, SciPy's integrators and FLINT take longer to import than most first answers take to compute,
+and most of those need none of them.
+"""
+
+from __future__ import annotations
+
+import importlib
+from types import ModuleType
+from typing import Any
+
+
+class _Later(ModuleType):
+    """Stands for a module until it is used, and hands its names on."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") and name != "__version__":  # asked for by machines
+            raise AttributeError(name)
+        value = getattr(importlib.import_module(self.__name__), name)
+        self.__dict__[name] = value  # later uses find it without coming here
+        return value
+
+
+def later(name: str) -> Any:
+    """Return what stands for a module, whose import waits for the first use.
+
+    Examples
+    --------
+    >>> fractions = later("fractions")
+    >>> fractions.Fraction(1, 2)
+    Fraction(1, 2)
+    """
+    return _Later(name)

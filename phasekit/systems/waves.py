@@ -1,0 +1,70 @@
+"""The period of formulas in time, where time enters through sines and cosines alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from fractions import Fraction
+from typing import Any
+
+#: Largest whole numbers whose ratio two frequencies may have.
+MOST = 64
+
+
+def period_in_time(formulas: Iterable[Any], t: Any) -> Any:
+    """The common period of formulas in a symbol; None where none is found.
+
+    Parameters
+    ----------
+    formulas : iterable of sympy.Expr
+        Formulas.
+    t : sympy.Symbol
+        The time.
+
+    Examples
+    --------
+    >>> import sympy
+    >>> t, w = sympy.symbols("t w", real=True)
+    >>> period_in_time([sympy.sin(w * t), sympy.cos(3 * w * t / 2) ** 2], t)
+    2*pi/w
+    >>> period_in_time([sympy.exp(-t)], t)
+    """
+    import sympy as sp
+
+    rates: list[Any] = []
+    queue = [one for one in formulas if t in one.free_symbols]
+    while queue:
+        node = queue.pop()
+        if node == t:
+            return None
+        even = node.is_Pow and node.exp.is_Integer and node.exp % 2 == 0
+        wave = node.base if even else node
+        if wave.func in (sp.sin, sp.cos):
+            rate = wave.args[0].diff(t) * (2 if even else 1)
+            if t not in rate.free_symbols and rate != 0:
+                rates.append(rate)
+                continue
+        queue += [part for part in node.args if t in part.free_symbols]
+    if not rates:
+        return None
+    ratios = [_ratio(rate / rates[0]) for rate in rates]
+    if any(ratio is None for ratio in ratios):
+        return None
+    known = [abs(ratio) for ratio in ratios if ratio is not None]
+    below = math.lcm(*(ratio.denominator for ratio in known))
+    greatest = Fraction(math.gcd(*(int(ratio * below) for ratio in known)), below)
+    slowest = rates[0] * sp.Rational(greatest.numerator, greatest.denominator)
+    if slowest.is_number and slowest < 0 or slowest.could_extract_minus_sign():
+        slowest = -slowest
+    return 2 * sp.pi / slowest
+
+
+def _ratio(ratio: Any) -> Fraction | None:
+    """A ratio of frequencies as a fraction of small numbers."""
+    ratio = ratio.cancel() if not ratio.is_number else ratio
+    if not ratio.is_number:
+        return None
+    value = float(ratio)
+    near = Fraction(value).limit_denominator(MOST)
+    is_near = near != 0 and abs(float(near) / value - 1.0) < 1e-12
+    return near if is_near and near.numerator <= MOST else None

@@ -1,0 +1,80 @@
+"""All zeros of formulas in a box, for numbers and for intervals of parameters."""
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from phasekit.numerics.intervals.zeros import zeros_in_box
+
+x, y, z, mu, nu = sp.symbols("x y z mu nu", real=True)
+LORENZ = [10 * (y - x), x * (mu - z) - y, x * y - sp.Rational(8, 3) * z]
+
+#: Boxes that the search by arrays of NumPy visited, before it was compiled.
+VISITED = [
+    ([x**4 / 4 - 2 * x**2 + x / 7], [x], {}, 53),
+    ([sp.sin(3 * x) - x / 5 + sp.exp(-(x**2))], [x], {}, 49),
+    ([x**2 + y**2 - 4, x * y - 1], [x, y], {}, 71),
+    ([x * (1 - x - 2 * y / (x + 5)), y * (sp.tanh(x) - sp.Rational(1, 2)) - y**3], [x, y], {}, 113),
+    (LORENZ, [x, y, z], {mu: 28.0}, 241),
+    ([x - sp.sin(y), y - sp.cos(z), z - x * y], [x, y, z], {}, 75),
+]
+
+
+@pytest.mark.parametrize(("f", "states", "values", "most"), VISITED)
+def test_no_more_boxes_are_visited_than_before(f, states, values, most):
+    reach = 50.0 if f is LORENZ else 4.1
+    found = zeros_in_box(f, states, values, [-reach] * len(states), [reach + 0.3] * len(states))
+    assert found.visited <= most
+    for row in found.zeros:
+        at = {**values, **dict(zip(states, map(sp.Float, row), strict=True))}
+        assert all(abs(g.subs(at)) < 1e-12 for g in f)
+
+
+def test_zeros_of_all_values_of_parameters_lie_in_their_boxes():
+    """They are sqrt(nu) and mu/sqrt(nu), with both signs."""
+    f = [x**2 - nu, x * y - mu]
+    found = zeros_in_box(f, [x, y], {mu: (0.9, 1.1), nu: (1.9, 2.2)}, [-5, -5], [5, 5])
+    assert found.complete
+    assert len(found.zeros) == 2
+    for m in (0.9, 1.0, 1.1):
+        for n in (1.9, 2.05, 2.2):
+            for (low, high), sign in zip(zip(*found.boxes, strict=True), (-1.0, 1.0), strict=True):
+                root = sign * np.array([np.sqrt(n), m / np.sqrt(n)])
+                assert np.all((root > low - 1e-15) & (root < high + 1e-15))
+    np.testing.assert_allclose(found.zeros[1], [np.sqrt(2.05), 1.0 / np.sqrt(2.05)], rtol=1e-15)
+
+
+def test_a_fold_among_the_values_leaves_its_place_open():
+    found = zeros_in_box([x**2 - mu], [x], {mu: (-0.01, 0.04)}, [-2.0], [2.0])
+    assert not found.complete
+    assert not len(found.zeros)
+    low, high = found.undecided
+    assert low.min() <= -0.2
+    assert 0.2 <= high.max() < 0.25
+    apart = zeros_in_box([x**2 - mu], [x], {mu: (0.016, 0.03)}, [-2.0], [2.0])
+    assert apart.complete
+    assert len(apart.zeros) == 2
+
+
+def test_a_zero_that_leaves_the_box_is_not_counted_for_all_values():
+    f = [x - mu, y]
+    found = zeros_in_box(f, [x, y], {mu: (0.9, 1.1)}, [-1.0, -1.0], [1.0, 1.0])
+    assert not found.complete
+    assert not len(found.zeros)
+    assert found.undecided[1].max() >= 1.1
+    outside = zeros_in_box(f, [x, y], {mu: (1.2, 1.3)}, [-1.0, -1.0], [1.0, 1.0])
+    assert outside.complete
+    assert not len(outside.zeros)
+
+
+def test_pitchfork_values_beside_the_point():
+    """One zero below it, three above, and nothing said where it is among the values."""
+    f, box = [mu * x - x**3], ([-3.0], [3.0])
+    counts = [
+        (len(found.zeros), found.complete)
+        for found in (
+            zeros_in_box(f, [x], {mu: values}, *box)
+            for values in ((-2.0, -0.1), (0.38, 0.42), (-0.1, 0.1))
+        )
+    ]
+    assert counts == [(1, True), (3, True), (0, False)]
