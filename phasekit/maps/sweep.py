@@ -167,7 +167,7 @@ def sweep(
 
 def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
     """Say in how many systems that state their rates or step there may be more equilibria."""
-    if "complete" not in ds or equations_of(system) is None:
+    if equations_of(system) is None or "complete" not in ds:
         return
     open_ = ~ds["complete"]
     if "n_equilibria" in ds:  # cells that are not valid were not searched
