@@ -271,7 +271,8 @@ def _basins_of(
     coords = {
         f"state_{name}": variable(
             (f"state_{name}",), axis,
-            {"long_name": f"{name} at the start", "units": law.units.get(name, "1")},
+            {"long_name": f"{name} at the start", "units": law.units.get(name, "1")}
+            | ({"period": law.periods[name]} if name in law.periods else {}),
         )
         for name, axis in starts.axes.items()
     }  # fmt: skip

@@ -50,6 +50,42 @@ def test_basins_show_shares_and_odds(ax):
         pk.plot.basins(ds.drop_vars("basin"))
 
 
+def test_basins_of_equations_show_their_plane(ax):
+    flow = pk.Problem(
+        {"x": "x - x^3", "y": "-y", "z": "-2*z"}, window={n: (-1.5, 1.5) for n in "xyz"}
+    ).described({"y": {"units": "m"}})
+    axis = np.linspace(-1.5, 1.5, 6)
+    ds = pk.basins(flow, {"x": axis, "y": axis[:5], "z": axis[:4]})
+    pk.plot.basins(ds, x="y", z=0.5, ax=ax)  # the nearest is 0.3
+    shown = ax.collections[0].get_array().reshape(6, 5)
+    assert np.array_equal(shown, ds.basin.values[:, :, 3])
+    assert (ax.get_xlabel(), ax.get_ylabel(), ax.get_title()) == ("$y$ (m)", "$x$", "z = 0.3")
+    texts = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert texts[0].startswith("at (0, −1): 0.500")
+    with pytest.raises(pk.ParameterError, match="states x, y, z, wants two.*z=0.0"):
+        pk.plot.basins(ds)
+    with pytest.raises(pk.ParameterError, match="state of the grid 'w' is unknown"):
+        pk.plot.basins(ds, w=0.0)
+    with pytest.raises(pk.ParameterError, match="angles"):
+        pk.plot.basins(ds, z=0.0, angles="deg")
+
+
+def test_cycles_are_closed_lines_wherever_an_angle_is_seen(ax):
+    # r' = r (1 - r^2) in the angle and the rate of a circle of radius 1 about (0, 0).
+    turning = pk.Problem(
+        {"q": "1 + 0.2*sin(q)", "r": "r*(1 - r^2)"}, periods={"q": 2 * np.pi}, window={"r": (0, 2)}
+    )
+    ds = pk.basins(turning, {"q": np.linspace(0.0, 12.0, 13), "r": np.linspace(0.1, 2.0, 9)})
+    pk.plot.basins(ds, ax=ax)
+    (line,) = ax.get_lines()
+    q, r = line.get_data()
+    seen = np.isfinite(q) & (q >= 0.0) & (q <= 12.0)
+    np.testing.assert_allclose(r[seen], 1.0, atol=1e-8)
+    assert np.ptp(q[seen]) > 11.5
+    period = 2 * np.pi / np.sqrt(1.0 - 0.04)
+    assert f"cycle of period {period:.4g}" in ax.get_legend().get_texts()[0].get_text()
+
+
 def test_a_section_shows_its_states(ax):
     system = pk.Perturbed(EIGHT, damping=0.1, forcing=pk.Harmonic(0.6, 1.0))
     ds = pk.stroboscopic(system, [0.1, 0.4], 0.0, n=30, skip=5)

@@ -91,6 +91,15 @@ def fates(kind):
     if kind == "well":
         driven = pk.Perturbed(DOUBLE_WELL, damping=0.25, forcing=pk.Harmonic(0.1, 1.0))
         return pk.basins(driven, phi=np.linspace(-2.0, 2.0, 25), dphi=np.linspace(-2.0, 2.0, 25))
+    if kind == "cycles":  # one of two cycles about a rest, and what runs away
+        rate = "(x^2 + y^2 - 1)*(4 - x^2 - y^2)/4"
+        flow = pk.Problem({"x": f"{rate}*x - y", "y": f"{rate}*y + x"})
+        axis = np.linspace(-3.0, 3.0, 21)
+        return pk.basins(flow, {"x": axis, "y": axis})
+    if kind == "space":
+        flow = pk.Problem({"x": "x - x^3", "y": "-y", "z": "-2*z"})
+        axis = np.linspace(-1.5, 1.5, 6)
+        return pk.basins(flow, {"x": axis, "y": axis, "z": axis})
     ends = {"damped": 3.0, "two turns": 6.5}[kind]
     phi, dphi = np.linspace(-ends, ends, 41), np.linspace(-1.5, 1.5, 31)
     return pk.basins(DAMPED, phi=phi, dphi=dphi)
@@ -144,6 +153,8 @@ CASES = {
         "odds": lambda: P.basins(fates("damped"), capture=pk.capture(DAMPED)),
         "degrees": lambda: P.basins(fates("two turns"), units={"phi": "deg", "dphi": "rpm"}),
         "line": lambda: P.basins(fates("well")),
+        "cycles": lambda: P.basins(fates("cycles")),
+        "slice": lambda: P.basins(fates("space"), z=0.5),
     },
     "damped_portrait": {
         "eight": lambda: P.damped_portrait(DAMPED, orbits=[(1.0, 0.5), (-1.5, 0.2)]),

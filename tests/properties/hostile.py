@@ -456,7 +456,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "CycleBranch.save": {"path": lambda: "branch.zarr"},
     "CycleBranch.extend": {"points": lambda: 1},
     "CycleBranch.orbit": {"i": lambda: -1},
-    "plot.basins": {"dataset": shares},
+    "plot.basins": {"dataset": shares, "x": lambda: "phi", "y": lambda: "dphi"},
     "plot.poincare_section": {"dataset": section},
     "plot.run_up": {"dataset": started},
     "plot.damped_portrait": {"perturbed": damped},
