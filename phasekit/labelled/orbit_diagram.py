@@ -1,24 +1,36 @@
-"""Orbit diagrams: where maps and forced flows end up, value by value of a parameter."""
+"""Orbit diagrams: what motions do in the end, value by value of a parameter."""
 
 from __future__ import annotations
 
 import warnings
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.labelled.crossings import section_of
 from phasekit.labelled.flows import states_of
 from phasekit.labels.arguments import bad, call_checked, flag, number, numeric, unknown, whole
 from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations, equations_of
 from phasekit.laws.ladder import Map
 from phasekit.motion import flows
+from phasekit.motion.crossings import NEVER
 from phasekit.motion.flow import ATOL, RTOL
+from phasekit.motion.pace import pace_of, units_of
+from phasekit.motion.samples import maxima, samples
+from phasekit.motion.strobe import common_period
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import as_problem
 from phasekit.systems.system import as_system
+
+Array = npt.NDArray[np.float64]
+
+#: Part of the window by which a motion that rests is displaced before the next value.
+NUDGE = 1e-7
+SECTION, MAXIMA = "section", "maxima"
 
 
 @call_checked
@@ -28,26 +40,32 @@ def orbit_diagram(
     values: Any,
     x0: Any = None,
     *,
+    of: Any = "section",
     n: int = 200,
     skip: int = 1000,
     from_last: bool = True,
 ) -> xr.Dataset:
-    """States of a map, or of a forced flow once a period, after transients: for many values.
+    """What motions do after transients, for many values of a parameter.
 
     Parameters
     ----------
-    system : Problem, or system that states rates or a step
-        A map, or a flow with a period; one system.
+    system : Problem, Perturbed, or system that states rates or a step
+        A map or a flow; one system.
     parameter : str
         The parameter that changes.
     values : 1-D array_like
         Its values, in the order in which they are taken: up, down, or both.
     x0 : mapping or sequence, optional
         State at the first value; by default the middle of the window.
+    of : {"section", "maxima"} or a section
+        What is kept: of a map each iterate, of a forced flow its state once a period
+        (``"section"``); of a flow each maximum of each state along the motion (``"maxima"``); or
+        the states at which it crosses a section upwards, given as for `poincare_section`:
+        ``"z = r - 1"``, ``("y", 0.0)``, ``"x + 2*y - 1"``.
     n : int, default 200
         States to keep at each value.
     skip : int, default 1000
-        Iterations, or periods, before them.
+        Iterations, periods, maxima or crossings before them.
     from_last : bool, default True
         Whether each value begins where the one before it ended, so that a branch is followed and
         hysteresis shows; else all begin at `x0`.
@@ -56,17 +74,21 @@ def orbit_diagram(
     -------
     xarray.Dataset
         ``sample_`` and the name of each state on (parameter, ``sample``). NaN where a motion left
-        for infinity, which a RuntimeWarning says; the next value then begins at `x0` again.
+        for infinity, or was not seen so often in its section, which a RuntimeWarning says; after
+        infinity the next value begins at `x0` again. A motion that comes to rest has its state as
+        maxima; a state that has an eighth of the maxima of another, or none, has NaN for the rest.
 
     Raises
     ------
     ParameterError
-        If the system is neither, or an argument is unusable.
+        If an argument is unusable, or the system does not fit what is to be kept.
 
     Notes
     -----
     The bifurcation diagram of [GuckenheimerHolmes1983] section 6.3 shows attractors; it does not
-    find unstable orbits, which `continuation` follows.
+    find unstable orbits, which `continuation` follows. A motion rests where no state goes further
+    than 1e-8 of its size in a quarter of the fastest turn; before the next value it is displaced
+    by 1e-7, so that it leaves a rest which has lost its stability.
 
     Examples
     --------
@@ -76,13 +98,18 @@ def orbit_diagram(
     >>> ds = pk.orbit_diagram(logistic, "r", [2.8, 3.2, 3.5], n=64)
     >>> [len(np.unique(row.round(9))) for row in ds.sample_x.values]
     [1, 2, 4]
+    >>> cycle = pk.Problem({"x": "m*x - y - x*(x^2 + y^2)", "y": "x + m*y - y*(x^2 + y^2)"},
+    ...                    parameters={"m": 0.0}, window={"x": (-2, 2), "y": (-2, 2)})
+    >>> ds = pk.orbit_diagram(cycle, "m", [-0.5, 0.25, 1.0], of="maxima", n=3, skip=40)
+    >>> ds.sample_x[:, 0].values.round(6).tolist()
+    [0.0, 0.5, 1.0]
     """
     found = as_system(system)
     found = found if found.standing.traits is None else as_problem(found)
     law = equations_of(found)
-    if law is None or not (isinstance(law, Map) or law.period is not None):
-        hint = "for other flows use pk.poincare_section, or follow equilibria by pk.diagram"
-        raise bad("system", found, "a map, or a flow with a period", hint)
+    if law is None:
+        raise bad("system", found, "a map, or a flow with states of its own, or a Perturbed one")
+    kept = _kept(law, of)
     problem = as_problem(found)
     if not isinstance(parameter, str) or parameter not in law.names:
         raise unknown("parameter of the problem", parameter, law.names)
@@ -90,31 +117,25 @@ def orbit_diagram(
     if not np.isfinite(array).all():
         raise bad("values", values, "finite numbers")
     n = whole("n", n, "a number of states >= 1")
-    skip = whole("skip", skip, "a number of iterations or periods >= 0", 0)
+    skip = whole("skip", skip, "a number of states before them >= 0", 0)
     flag("from_last", from_last)
     start = _start(law, x0)
     fixed = {name: float(problem.parameters[name]) for name in law.names}
     with notice(f"following {array.size:,} values of {parameter}"):
-        samples = _samples(law, fixed, parameter, array, start, n, skip, from_last)
-    lost = int(np.isnan(samples).any(axis=(1, 2)).sum())
-    if lost:
-        warnings.warn(
-            f"orbit_diagram: at {lost} of {array.size} values motions run to infinity",
-            RuntimeWarning,
-            stacklevel=2,
-        )
+        followed = Followed(law, kept, fixed, parameter, n, skip)
+        seen = _samples(followed, array, start, from_last=from_last)
+    _tell(seen, array.size)
     data = {
         f"sample_{name}": variable(
-            (parameter, "sample"), samples[..., i],
-            {"long_name": f"{name} after transients", "units": law.units.get(name, "1")},
+            (parameter, "sample"), seen.states[..., i],
+            {"long_name": kept.words(name), "units": law.units.get(name, "1")},
         )
         for i, name in enumerate(law.states)
     }  # fmt: skip
-    what = "iteration" if isinstance(law, Map) else "period"
     coords = {
         parameter: variable((parameter,), array, input_attrs(found, parameter)),
         "sample": variable(
-            ("sample",), np.arange(skip, skip + n), {"long_name": f"number of the {what}"}
+            ("sample",), np.arange(skip, skip + n), {"long_name": f"number of the {kept.each}"}
         ),
         **{
             name: variable((), value, input_attrs(found, name))
@@ -123,6 +144,49 @@ def orbit_diagram(
         },
     }
     return xr.Dataset(data, coords, dataset_attrs(found))
+
+
+class Kept(NamedTuple):
+    """What is kept of motions."""
+
+    each: str
+    watched: tuple[Any, ...] = ()
+    picks: tuple[int, ...] = ()
+    equation: str = ""
+
+    def words(self, name: str) -> str:
+        """What the samples of a state are."""
+        if self.each == "maximum":
+            return f"maxima of {name}"
+        return f"{name} where {self.equation}" if self.equation else f"{name} after transients"
+
+
+def _kept(law: Equations, of: Any) -> Kept:
+    """What is to be kept of motions.
+
+    Raises
+    ------
+    ParameterError
+        If the law has none of it.
+    """
+    plain = isinstance(of, str) and of in (SECTION, MAXIMA)
+    if isinstance(law, Map):
+        if not plain or of != SECTION:
+            raise bad("of", of, "'section' for a map, of which each iterate is kept")
+        return Kept("iteration")
+    if plain and of == SECTION:
+        if law.period is None:
+            hint = "of a flow without forcing there are 'maxima', or a section such as 'x = 0'"
+            raise bad("of", of, "another kind for a flow that is not forced", hint)
+        return Kept("period")
+    if plain:
+        if law.kind != "symbolic":
+            hint = "of a function use a section, such as 'x = 0'"
+            raise bad("of", of, "'section' or a formula for a law that is no formula", hint)
+        return Kept("maximum", tuple(maxima(law)), tuple(range(len(law.states))))
+    watched, equation = section_of(law, of, 1, 0)
+    first = next(i for i, one in enumerate(watched) if one.sense != NEVER)
+    return Kept("crossing", tuple(watched), (first,) * len(law.states), equation)
 
 
 def _start(law: Equations, x0: Any) -> Any:
@@ -135,31 +199,87 @@ def _start(law: Equations, x0: Any) -> Any:
     return np.array([number("x0", value) for value in given])
 
 
-def _samples(
-    law: Equations, fixed: dict[str, float], parameter: str, values: Any, start: Any,
-    n: int, skip: int, from_last: bool,
-) -> Any:  # fmt: skip
-    """States of shape (values, samples, states)."""
+class Seen(NamedTuple):
+    """What was seen at values."""
+
+    states: Array
+    """Of shape (values, samples, states)."""
+    ends: Array
+    """Last states."""
+    resting: npt.NDArray[np.bool_]
+
+
+class Followed(NamedTuple):
+    """How motions are followed."""
+
+    law: Equations
+    kept: Kept
+    fixed: dict[str, float]
+    parameter: str
+    n: int
+    skip: int
+
+    def at(self, values: Array, x: Array) -> Seen:
+        """What is seen at values, from a state of each."""
+        law, n, skip, count = self.law, self.n, self.skip, len(values)
+        own = {name: np.full(count, value) for name, value in self.fixed.items()}
+        own[self.parameter] = values
+        calm = np.zeros(count, bool)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # how many are lost is said once
+            if self.kept.watched:
+                first = {name: value[0] for name, value in own.items()}
+                widths = np.array([np.ptp(law.window.get(name, (0.0, 0.0))) for name in law.states])
+                units = units_of(law, first, x, widths)
+                period = common_period(law, first)
+                leg = pace_of(law, first, x, units).leg if period is None else float(period)
+                found = samples(
+                    law, own, x, self.kept.watched, self.kept.picks, n=n, skip=skip, leg=leg,
+                    units=units,
+                )  # fmt: skip
+                states = found.states
+                if self.kept.each == "maximum":
+                    still = found.resting
+                    states[still] = found.ends[still][:, None, :]
+                return Seen(states, found.ends, found.resting)
+            if isinstance(law, Map):
+                times = np.broadcast_to(np.arange(skip, skip + n) * float(law.times), (count, n))
+                states = flows.iterates(law, own, x, times)[0]
+            else:
+                given = [own[name] for name in law.names]
+                parts = flows.sections(
+                    law, *given, *x.T, n=n, skip=skip, period=None, rtol=RTOL, atol=ATOL
+                )
+                states = np.stack([parts[f"section_{name}"] for name in law.states], axis=-1)
+        return Seen(states, states[:, -1], calm)
+
+
+def _samples(followed: Followed, values: Array, start: Array, *, from_last: bool) -> Seen:
     if not from_last:
-        return _of(law, fixed, parameter, values, np.tile(start, (len(values), 1)), n, skip)
-    found, x = np.empty((len(values), n, len(start))), start
+        return followed.at(values, np.tile(start, (len(values), 1)))
+    law, rows, x = followed.law, list[Seen](), start
+    widths = np.array([np.ptp(law.window.get(name, (0.0, 0.0))) for name in law.states])
     for k in range(len(values)):
-        found[k] = _of(law, fixed, parameter, values[k : k + 1], x[None], n, skip)[0]
-        x = found[k, -1] if np.isfinite(found[k, -1]).all() else start
+        one = followed.at(values[k : k + 1], x[None])
+        rows.append(one)
+        x = one.ends[0] if np.isfinite(one.ends[0]).all() else start
+        if one.resting[0]:
+            x = x + NUDGE * np.where(widths > 0.0, widths, np.maximum(np.abs(x), 1.0))
         stage(f"{k + 1:,} of {len(values):,} values")
-    return found
+    return Seen(*(np.concatenate(parts) for parts in zip(*rows, strict=True)))
 
 
-def _of(
-    law: Equations, fixed: dict[str, float], parameter: str, values: Any, x: Any, n: int, skip: int
-) -> Any:
-    count = len(values)
-    own = {name: np.full(count, value) for name, value in fixed.items()} | {parameter: values}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # how many are lost is said once
-        if isinstance(law, Map):
-            times = np.broadcast_to(np.arange(skip, skip + n) * float(law.times), (count, n))
-            return flows.iterates(law, own, x, times)[0]
-        given = [own[name] for name in law.names]
-        parts = flows.sections(law, *given, *x.T, n=n, skip=skip, period=None, rtol=RTOL, atol=ATOL)
-    return np.stack([parts[f"section_{name}"] for name in law.states], axis=-1)
+def _tell(seen: Seen, count: int) -> None:
+    """Say how many motions are not seen to their end."""
+    lost = ~np.isfinite(seen.ends).all(axis=1)
+    rest = seen.resting & np.isnan(seen.states).any(axis=(1, 2))
+    few = ~lost & ~rest & np.any(np.all(np.isnan(seen.states), axis=2), axis=1)
+    for which, what in (
+        (lost, "motions run to infinity"), (rest, "motions come to rest beside the section"),
+        (few, "motions were not seen so often"),
+    ):  # fmt: skip
+        if which.any():
+            warnings.warn(
+                f"orbit_diagram: at {which.sum()} of {count} values {what}", RuntimeWarning,
+                stacklevel=4,
+            )  # fmt: skip

@@ -161,8 +161,8 @@ def pointwise(law: Equations, values: Mapping[str, float]) -> Callable[[float, A
     return rates
 
 
-def rates_on(law: Equations, values: Mapping[str, float], x: Array) -> Array:
-    """The rates at many states, the rows of x, at time 0."""
+def rates_on(law: Equations, values: Mapping[str, Any], x: Array) -> Array:
+    """The rates at many states, the rows of x, at time 0; of formulas, one value each, too."""
     if law.kind == "python":
         f = _called(law, values)
         return np.array([f(0.0, row) for row in x]).reshape(x.shape)

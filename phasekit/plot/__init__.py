@@ -21,8 +21,10 @@ if _TYPE_CHECKING:
     from phasekit.plot.force_polygon import force_polygon as force_polygon
     from phasekit.plot.hodograph import hodograph as hodograph
     from phasekit.plot.hysteresis_loop import hysteresis_loop as hysteresis_loop
+    from phasekit.plot.lyapunov_map import lyapunov_map as lyapunov_map
     from phasekit.plot.multipliers import multipliers as multipliers
     from phasekit.plot.nullclines import nullclines as nullclines
+    from phasekit.plot.orbit_diagram import orbit_diagram as orbit_diagram
     from phasekit.plot.parameter_map import parameter_map as parameter_map
     from phasekit.plot.periods import frequency_action as frequency_action
     from phasekit.plot.periods import period_energy as period_energy
@@ -50,8 +52,10 @@ __all__ = [
     "frequency_action",
     "hodograph",
     "hysteresis_loop",
+    "lyapunov_map",
     "multipliers",
     "nullclines",
+    "orbit_diagram",
     "parameter_map",
     "period_energy",
     "phase_portrait",

@@ -99,9 +99,9 @@ def parameter_map(
     ds = labels.dataset(dataset, "dataset", ())
     if not isinstance(variable, str) or variable not in ds.data_vars:
         raise unknown("variable", variable, map(str, ds.data_vars))
-    chosen, shown = Units.of_dataset(_select(ds, variable, sel), angles, units)
+    chosen, shown = Units.of_dataset(selected_in(ds, variable, sel), angles, units)
     field = chosen[variable]
-    across, up = _axes_of(field, x, y)
+    across, up = axes_of(field, x, y)
     field = field.transpose(up.dims[0], across.dims[0])
     axes = style.axes_for(ax, legend=legend)
 
@@ -116,7 +116,7 @@ def parameter_map(
     return axes
 
 
-def _select(ds: xr.Dataset, variable: str, sel: Mapping[str, Any]) -> xr.Dataset:
+def selected_in(ds: xr.Dataset, variable: str, sel: Mapping[str, Any]) -> xr.Dataset:
     """Select along the dims that `sel` names; by nearest value where these are numbers."""
     for name, value in sel.items():
         if name not in ds[variable].dims:
@@ -144,9 +144,8 @@ def _named(values: xr.DataArray, sel: Mapping[str, Any]) -> str:
     return ", ".join(filter(None, [before, *(name.replace("_", " ") for name in names)]))
 
 
-def _axes_of(
-    field: xr.DataArray, x: str | None, y: str | None
-) -> tuple[xr.DataArray, xr.DataArray]:
+def axes_of(field: xr.DataArray, x: str | None, y: str | None) -> tuple[xr.DataArray, xr.DataArray]:
+    """Return what stands on both axes of a map."""
     dims = labels.swept(field)
     if len(dims) != 2:
         what = f"the dims {', '.join(dims)}" if dims else "no dims"

@@ -69,10 +69,78 @@ def test_what_runs_away_is_announced_and_begins_anew():
         (lambda: pk.orbit_diagram(LOGISTIC, "r", [3.0], n=0), "n: got 0"),
         (lambda: pk.orbit_diagram(LOGISTIC, "r", [3.0], [0.1, 0.2]), "x0"),
         (lambda: pk.orbit_diagram(pk.Problem("x", "x", map=True), "r", [3.0]), "'r' is unknown"),
-        (lambda: pk.orbit_diagram(pk.Problem("-a*x", "x", {"a": 1.0}), "a", [3.0]), "a map, or"),
+        (
+            lambda: pk.orbit_diagram(pk.Problem("-a*x", "x", {"a": 1.0}), "a", [3.0]),
+            "of: got .section",
+        ),
         (lambda: pk.orbit_diagram(pk.Pendulum(length=1.0), "g", [3.0]), "a map, or a flow"),
     ],
 )
 def test_what_is_wrong_is_said(call, message):
     with pytest.raises(pk.ParameterError, match=message):
         call()
+
+
+HOPF = pk.Problem(
+    {"x": "m*x - 2*y - x*(x^2 + y^2)", "y": "2*x + m*y - y*(x^2 + y^2)"}, parameters={"m": 0.0},
+    window={"x": (-2, 2), "y": (-2, 2)},
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("from_last", [True, False])
+def test_maxima_are_radii_of_circles_and_rests_before(from_last):
+    m = np.array([-0.5, -0.1, 0.25, 1.0, 0.25, -0.1])
+    ds = pk.orbit_diagram(HOPF, "m", m, [0.3, 0.1], of="maxima", n=3, skip=80, from_last=from_last)
+    radius = np.sqrt(np.maximum(m, 0.0))
+    for name in ("x", "y"):
+        np.testing.assert_allclose(ds[f"sample_{name}"], np.tile(radius[:, None], 3), atol=1e-7)
+    assert ds.sample_x.attrs["long_name"] == "maxima of x"
+
+
+def test_a_section_of_a_flow_is_crossed_upwards():
+    m = np.array([0.25, 1.0])
+    ds = pk.orbit_diagram(HOPF, "m", m, [0.3, 0.1], of="y = m/4", n=2, skip=60)
+    np.testing.assert_allclose(ds.sample_y, np.tile(m[:, None] / 4, 2), atol=1e-12)
+    np.testing.assert_allclose(ds.sample_x[:, 0], np.sqrt(m - m**2 / 16), rtol=1e-8)
+    assert "y - " in ds.sample_x.attrs["long_name"] or "m/4" in ds.sample_x.attrs["long_name"]
+    with pytest.warns(RuntimeWarning, match="at 1 of 2 values motions come to rest beside"):
+        ds = pk.orbit_diagram(HOPF, "m", [-0.5, 0.25], [0.3, 0.1], of=("y", 0.1), n=2, skip=10)
+    assert np.isnan(ds.sample_x[0]).all()
+
+
+def test_maxima_of_a_driven_oscillator_are_those_of_its_response():
+    linear = pk.Problem(
+        {"x": "v", "v": "-x - d*v + cos(w*t)"}, parameters={"d": 0.5, "w": 1.0}, time="t",
+        period="2*pi/w",
+    )  # fmt: skip
+    w = np.array([0.5, 2.0])
+    ds = pk.orbit_diagram(linear, "w", w, [0.0, 0.0], of="maxima", n=2, skip=40)
+    size = np.abs(1.0 / (1.0 - w**2 + 0.5j * w))
+    np.testing.assert_allclose(ds.sample_x, np.tile(size[:, None], 2), rtol=1e-7)
+    np.testing.assert_allclose(ds.sample_v, np.tile((w * size)[:, None], 2), rtol=1e-7)
+
+
+def test_an_angle_is_seen_each_turn_and_has_no_maxima():
+    turning = pk.Problem({"q": "s + sin(q)/2", "r": "1 - r"}, parameters={"s": 1.0},
+                         periods={"q": 2 * np.pi})  # fmt: skip
+    with pytest.warns(RuntimeWarning, match="motions were not seen so often"):
+        ds = pk.orbit_diagram(turning, "s", [1.0], [0.0, 0.2], of="maxima", n=2, skip=3)
+    assert np.isnan(ds.sample_q).all()
+    ds = pk.orbit_diagram(turning, "s", [1.0, 2.0], [0.0, 0.2], of=("q", 1.0), n=2, skip=3)
+    np.testing.assert_allclose(np.mod(ds.sample_q, 2 * np.pi), 1.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("system", "of", "message"),
+    [
+        (LOGISTIC, "maxima", "of: got 'maxima', wants 'section' for a map"),
+        (HOPF, "section", "of: got 'section'.*'maxima', or a section"),
+        (HOPF, "z = 0", "of|section"),
+        (HOPF, 3.0, "section: got 3.0"),
+        (pk.Problem(lambda x, m: [m * x[0]], ("x",), {"m": -1.0}), "maxima", "no formula"),
+    ],
+)
+def test_what_is_kept_has_to_fit_the_system(system, of, message):
+    parameter = next(iter(system.parameters))
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.orbit_diagram(system, parameter, [1.0], of=of)

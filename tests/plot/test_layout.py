@@ -105,6 +105,27 @@ def fates(kind):
     return pk.basins(DAMPED, phi=phi, dphi=dphi)
 
 
+LOGISTIC = pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True, window={"x": (0, 1)})
+HENON = pk.Problem(
+    {"x": "1 - a*x^2 + y", "y": "b*x"}, parameters={"a": 1.4, "b": 0.3}, map=True,
+    window={"x": (-2, 2), "y": (-2, 2)},
+)  # fmt: skip
+
+
+@functools.cache
+def samples():
+    r = np.linspace(2.8, 3.9, 60)
+    return pk.orbit_diagram(LOGISTIC, "r", np.concatenate([r, r[::-1]]), n=32, skip=200)
+
+
+@functools.cache
+def exponents():
+    a, b = np.linspace(0.9, 1.5, 13), np.linspace(0.0, 0.4, 9)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "lyapunov_exponent: ")  # some run to infinity
+        return pk.sweep(HENON, a=a, b=b, of="lyapunov", x=0.1, y=0.1, n=300)
+
+
 @functools.cache
 def section(kind):
     base = {"well": DOUBLE_WELL, "eight": pk.Coefficients(1.0, 0.35, 0.12)}[kind]
@@ -258,6 +279,16 @@ CASES = {
     "waterfall": {
         "swings": lambda: P.waterfall(pk.spectrum(pendulums()), "amplitude_dphi"),
         "low": lambda: P.waterfall(pk.spectrum(pendulums()), highest=20.0, log=False),
+    },
+    "orbit_diagram": {
+        "both ways": lambda: P.orbit_diagram(samples()),
+        "one way": lambda: P.orbit_diagram(samples().isel(r=slice(60)), "x"),
+        "all NaN": lambda: P.orbit_diagram(without_values(samples())),
+    },
+    "lyapunov_map": {
+        "largest": lambda: P.lyapunov_map(exponents()),
+        "last": lambda: P.lyapunov_map(exponents(), 2, x="b"),
+        "all NaN": lambda: P.lyapunov_map(without_values(exponents())),
     },
     "nullclines": {"neuron": lambda: P.nullclines(neuron())},
     "time_history": {

@@ -84,6 +84,22 @@ STILL, EVEN = DISK.replace(omega1=0.0), np.linspace(0.0, 2.0, 41)
 
 
 @functools.cache
+def the_samples():
+    logistic = pk.Problem("r*x*(1 - x/K)", "x", {"r": 3.0, "K": 1.0}, map=True).described(
+        {"x": {"units": "m"}, "r": {"units": "s"}}
+    )
+    return pk.orbit_diagram(logistic, "r", [2.0, 3.2, 3.5, 3.2], 0.3, n=8)
+
+
+@functools.cache
+def the_exponents():
+    logistic = pk.Problem("r*x*(1 - x/K)", "x", {"r": 3.0, "K": 1.0}, map=True).described(
+        {"K": {"units": "m"}, "r": {"units": "s"}}
+    )
+    return pk.sweep(logistic, r=[2.0, 3.2, 3.9], K=[1.0, 2.0], of="lyapunov", x=0.3, n=400)
+
+
+@functools.cache
 def the_speeding():
     return pk.run_up(STILL, omega1=lambda t: 5.0 * t, phi0=0.1, dphi0=0.0, t=EVEN)
 
@@ -177,6 +193,18 @@ CASES = {
         {"phi": "deg", "omega1": "rpm"},
         (RPM, DEG),
         ("(rpm)", "(°)"),
+    ),
+    "orbit_diagram": (
+        lambda **o: P.orbit_diagram(the_samples(), **o),
+        {"x": "mm", "r": "ms"},
+        (1e3, 1e3),
+        ("(ms)", "(mm)"),
+    ),
+    "lyapunov_map": (
+        lambda **o: P.lyapunov_map(the_exponents(), **o),
+        {"r": "ms", "K": "mm"},
+        (1e3, 1e3),
+        ("(ms)", "(mm)"),
     ),
     "multipliers": (  # pure numbers
         lambda **o: P.multipliers(the_cycles(), **o),

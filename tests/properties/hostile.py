@@ -247,6 +247,18 @@ def shares() -> xr.Dataset:
 
 
 @functools.cache
+def samples() -> xr.Dataset:
+    steps = pk.Problem("r*x*(1 - x)", "x", {"r": 3.0}, map=True)
+    return pk.orbit_diagram(steps, "r", [2.5, 3.2], 0.3, n=2)
+
+
+@functools.cache
+def exponents() -> xr.Dataset:
+    steps = pk.Problem("r*x*(1 - x/K)", "x", {"r": 3.0, "K": 1.0}, map=True)
+    return pk.sweep(steps, r=[2.5, 3.2], K=[1.0, 2.0], of="lyapunov", x=0.3, n=50)
+
+
+@functools.cache
 def damped() -> Any:
     return pk.Perturbed(pk.Coefficients(2.0, 1.0, 0.3), damping=0.5)
 
@@ -457,6 +469,8 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "CycleBranch.extend": {"points": lambda: 1},
     "CycleBranch.orbit": {"i": lambda: -1},
     "plot.basins": {"dataset": shares, "x": lambda: "phi", "y": lambda: "dphi"},
+    "plot.orbit_diagram": {"dataset": samples},
+    "plot.lyapunov_map": {"dataset": exponents},
     "plot.poincare_section": {"dataset": section},
     "plot.run_up": {"dataset": started},
     "plot.damped_portrait": {"perturbed": damped},
