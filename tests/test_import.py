@@ -53,6 +53,29 @@ def test_first_result_does_not_load_dask():
     assert not {"matplotlib", "zarr", "tqdm"} & set(loaded_after(code))
 
 
+def test_dask_is_loaded_when_there_are_arrays_of_it():
+    """xarray asks of all arrays whether they are dask's: after phasekit, without loading dask."""
+    code = """
+import sys
+import numpy as np, phasekit as pk, xarray as xr
+disk = pk.GyroRotorDisk(beta=0.3, e=0.0115, a=0.02, r=0.21, omega1=2.5)
+ds = pk.sweep(disk, beta=np.linspace(0.1, 1.4, 6))
+pk.plot.parameter_map(pk.sweep(disk, beta=np.linspace(0.1, 1, 4), a=[0.01, 0.02]), "topology")
+assert ds.n_equilibria.chunks is None
+assert ds.isel(beta=slice(2)).n_equilibria.astype(float).mean().item() > 1
+assert "dask.array" not in sys.modules
+lazy = ds.chunk(beta=3).n_equilibria
+assert lazy.chunks == ((3, 3),) and "dask.array" in sys.modules
+assert (lazy.mean() == ds.n_equilibria.mean()).compute().item()
+assert xr.DataArray(lazy.data).chunks == ((3, 3),)
+from xarray.namedarray import pycompat
+import dask, dask.array
+assert pycompat.array_type("dask") == (dask.array.Array,)
+assert str(pycompat.mod_version("dask")) == dask.__version__.split("+")[0]
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 @pytest.mark.parametrize("name", sorted(set(pk.__all__) - {"plot"}))
 def test_every_public_name_is_there(name):
     assert getattr(pk, name) is getattr(pk, name)

@@ -21,6 +21,7 @@ HIDDEN = {
     "xarray.core.indexing.IndexingSupport",
     "xarray.core.indexing.LazilyIndexedArray",
     "xarray.core.indexing.explicit_indexing_adapter",
+    "xarray.namedarray.pycompat._cached_duck_array_modules",
     "zarr.core.sync.sync",
 }
 OURS = {"phasekit", "__future__"}

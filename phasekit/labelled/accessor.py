@@ -17,12 +17,16 @@ from phasekit.labelled.map_plots import MapPlots as MapPlots
 from phasekit.labelled.tables import table_of
 from phasekit.labels.arguments import NumberLike, bad, state_arguments
 from phasekit.labels.conversion import in_si, in_units
+from phasekit.labels.dask_later import load_dask_later
 from phasekit.systems.identity import MODEL, model_name
 from phasekit.systems.registry import model_named
 from phasekit.systems.system import System
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+load_dask_later()
 
 
 @xr.register_dataset_accessor("phasekit")  # type: ignore[no-untyped-call]

@@ -61,8 +61,6 @@ def kind_of(
 
     The error is that of the derivatives, relative to their norm.
     """
-    from scipy.linalg import eig
-
     if conservative and len(slopes) == 1:  # the force alone: x'' = f
         root = np.sqrt(complex(slopes[0, 0]))
         kind = FlowEquilibriumKind.SADDLE if root.real > 0.0 else FlowEquilibriumKind.CENTER
@@ -75,11 +73,12 @@ def kind_of(
     if not np.isfinite(slopes).all():
         nothing = np.full(len(slopes), np.nan + 0j)
         return nothing, 0, FlowEquilibriumKind.NOT_COMPUTED
-    found, left, right = eig(slopes, left=True, right=True)
+    found, right = np.linalg.eig(slopes)
+    found = found.astype(complex)
     size = max(float(np.linalg.norm(slopes)), float(discrete))
     with np.errstate(all="ignore"):
         # How much an eigenvalue moves with the derivatives; of a double one by the root of that.
-        bend = np.abs(np.einsum("ij,ij->j", left.conj(), right))
+        bend = _angles(right)
         doubt = np.minimum(error * size / bend, np.sqrt(error) * size)
     growth = np.abs(found) - 1.0 if discrete else found.real
     unstable = growth > doubt
@@ -99,6 +98,14 @@ def kind_of(
     else:
         kind = kinds.STABLE_FOCUS if turns else kinds.STABLE_NODE
     return found, number, kind
+
+
+def _angles(right: npt.NDArray[Any]) -> Array:
+    """The cosines between the left and the right eigenvectors, which have the length 1."""
+    try:
+        return np.asarray(1.0 / np.linalg.norm(np.linalg.inv(right), axis=1))
+    except np.linalg.LinAlgError:  # there are too few eigenvectors
+        return np.zeros(len(right))
 
 
 def corners(problem: Problem, box: Any, argument: str = "box") -> tuple[Array, Array]:
