@@ -100,6 +100,7 @@ if TYPE_CHECKING:
     from phasekit.systems.analogues import ParticleOnCircle as ParticleOnCircle
     from phasekit.systems.analogues import Pendulum as Pendulum
     from phasekit.systems.analogues import StonerWohlfarth as StonerWohlfarth
+    from phasekit.systems.boundary_problem import BoundaryProblem as BoundaryProblem
     from phasekit.systems.disk import GyroRotorDisk as GyroRotorDisk
     from phasekit.systems.field_analogues import JosephsonJunction as JosephsonJunction
     from phasekit.systems.field_analogues import SpinOrbit as SpinOrbit
@@ -186,6 +187,7 @@ _MODULES = {
     "phasekit.labelled.phase_space": ("equilibria", "separatrices"),
     "phasekit.labelled.quasi_static": ("quasi_static",),
     "phasekit.systems.potential": ("Potential",),
+    "phasekit.systems.boundary_problem": ("BoundaryProblem",),
     "phasekit.systems.problem": ("Problem",),
     "phasekit.table.quantities": ("quantities",),
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),

@@ -53,6 +53,8 @@ _UNSTABLE_CYCLE: style.Look = {
     "linewidth": 3.0,
     "label": "unstable cycle",
 }
+#: Kinds of branches whose states have a range at each point.
+_RANGES = ("cycle", "boundary")
 #: What is said of a state of periodic orbits, and short names for narrow legends.
 _EXTREMES = ", max and min"
 _SHORT = {
@@ -85,6 +87,7 @@ _CURVES: dict[str, style.Look] = {
         "label": "period doubling",
     },
     "torus": {"color": style.SKY, "linestyle": "-", "linewidth": 2.0, "label": "torus"},
+    "boundary": {"color": style.BLUE, "linestyle": "-", "linewidth": 1.8, "label": "solution"},
     "branch_point": {
         "color": style.PURPLE,
         "linestyle": (0, (7, 2, 1.5, 2)),
@@ -161,7 +164,8 @@ def branch(
         raise bad("sel", sel, "a mapping from dims to labels, such as {'unknown': 'x'}")
     x = first.free[0] if x is None else x
     if y is None:
-        y = first.free[1] if len(first.free) > 1 else first.problem_state[0]
+        plane = len(first.free) > 1 and first.kind not in _RANGES
+        y = first.free[1] if plane else first.problem_state[0]
     several, columns = _columns(several, x, y, sel)
     held = {str(c.name): str(c.attrs.get("units", "")) for c in columns[0]}
     shown = Units.of(angles, units, held)
@@ -175,7 +179,7 @@ def branch(
             if circle is not None:
                 up, across = circle.unrolled(up, across)
             text = str(look["label"])
-            if one.kind == "cycle" and y in one.problem_state:
+            if one.kind in _RANGES and y in one.problem_state:
                 text += _EXTREMES
             elif mixed and one.kind == "equilibrium" and text in ("stable", "unstable"):
                 text += " equilibrium"
@@ -239,7 +243,7 @@ def _columns(
     """What to draw of which branch: of the states of periodic orbits the largest and the least."""
     branches, columns = [], []
     for one in several:
-        cycle = one.kind == "cycle" and y in one.problem_state
+        cycle = one.kind in _RANGES and y in one.problem_state
         for name in (f"{y}_max", f"{y}_min") if cycle else (y,):
             branches.append(one)
             column = _column(one, "y", name, sel)

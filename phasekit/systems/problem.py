@@ -138,6 +138,8 @@ class Problem(ProblemSources, System):
         "period", "periods", "start", "state", "system", "time", "times", "window", "words",
     )  # fmt: skip
 
+    #: Whether there are conditions at both ends of a stretch of time.
+    bounded: ClassVar[bool] = False
     rung: ClassVar[Any] = OfInstance(lambda problem: Map if problem.map else Flow, Flow)
     declared: ClassVar[Any] = OfInstance(declared_of, ())
 
@@ -378,7 +380,9 @@ class Problem(ProblemSources, System):
                 raise unknown("parameter of the problem", name, values)
             values[name] = arrays_of("parameters", {name: value})[name]
         copy = object.__new__(type(self))
-        for slot in self.__slots__:
+        for slot in (
+            slot for kind in type(self).__mro__ for slot in getattr(kind, "__slots__", ())
+        ):
             copy._set(slot, getattr(self, slot))
         copy._set("_values", values)
         if self.system is not None:

@@ -205,6 +205,11 @@ def map_() -> Any:
     return pk.Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
 
 
+def bounded() -> pk.BoundaryProblem:
+    law = {"u": "v", "v": "-r*exp(u)"}
+    return pk.BoundaryProblem(law, ["u(0)", "u(1)"], parameters={"r": 0.5})
+
+
 def problem() -> Any:
     return pk.Problem("r + x**2 - 0.1*x**4", ("x",), {"r": -0.5})
 
@@ -479,6 +484,12 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Potential": {"parameters": dict},
     "Term": {"force": lambda: "-0.1*dphi", "parameters": dict},
     "Problem.from_potential": {"parameters": dict},
+    "BoundaryProblem": {
+        "f": lambda: ["v", "-r*exp(u)"], "conditions": lambda: ["u(0)", "u(1)"],
+        "parameters": lambda: {"r": 0.5}, "state": lambda: ("u", "v"),
+    },
+    "BoundaryProblem.derivatives": {"x": lambda: [0.1, 0.0]},
+    "BoundaryProblem.described": {"words": lambda: {"u": {"long_name": "place", "units": "m"}}},
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
     "Problem.iterated": {"times": lambda: 2},
@@ -523,6 +534,7 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "StonerWohlfarth": lambda: pk.StonerWohlfarth(K=1.0, h_x=0.2, h_y=0.1),
     "Potential": well,
     "Problem": problem,
+    "BoundaryProblem": bounded,
     "RigidBody": lambda: GOOD["body"](),
     "CoupledRotation": machine,
     "CoupledRotationState": lambda: machine().at(omega1=1.0, phi2=0.3),

@@ -96,7 +96,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         else:
             given = stored.problem()
         functions = stored.functions(record or {})
-        of_cycles = ("cycle", "fold_of_cycles", "period_doubling", "torus")
+        of_cycles = ("cycle", "boundary", "fold_of_cycles", "period_doubling", "torus")
         if stored.spec["kind"] in of_cycles and not given.map:
             return made_again(stored, given, functions, events)
         curve = stored.curve(given).replace(**stored.asked(given, events))

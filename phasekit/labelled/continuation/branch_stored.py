@@ -28,6 +28,7 @@ from phasekit.labelled.continuation.branch import KINDS, NUMBERS
 from phasekit.labelled.continuation.user_events import events_of
 from phasekit.labels.arguments import bad
 from phasekit.maps.stored_arrays import reason
+from phasekit.systems.boundary_problem import BoundaryProblem
 from phasekit.systems.identity import SCHEMA, SCHEMA_VERSION
 from phasekit.systems.problem import Problem
 from phasekit.systems.registry import model_named
@@ -82,7 +83,8 @@ class Stored:
             if name:
                 model = model_named("problem", name)
                 return Problem.from_system(model(**self.made_of["system_parameters"]))
-            problem = Problem.from_specification(self.made_of)
+            kind = BoundaryProblem if "conditions" in self.made_of else Problem
+            problem = kind.from_specification(self.made_of)
         if problem is None:
             raise ParameterError(
                 "problem: the branch is one of Python or compiled code, which is not saved; "

@@ -46,7 +46,7 @@ def continuation(
     stop: Any = None,
     options: ContinuationOptions | None = None,
 ) -> Branch:
-    """Follow equilibria, fixed points of a map or periodic orbits along a parameter.
+    """Follow equilibria, fixed points of a map, periodic orbits or solutions along a parameter.
 
     Parameters
     ----------
@@ -55,13 +55,17 @@ def continuation(
         with scalar parameters is ``phi' = -V'(phi)`` on the circle; with an orbit, and a
         `FreeGyroRotor` always, it has the states phi and dphi.
     parameter : str
-        The parameter that varies. It starts at the problem's own value.
+        The parameter that varies. It starts at the problem's own value. Of a `BoundaryProblem` that
+        frees several a sequence of names: the first one that the branch is followed along, and
+        those that follow from it.
     x0 : array_like or str, optional
         The state to start from, which is corrected to an equilibrium first; default the problem's
         own `start`, else zeros. Fixed
         points of a map of angles are those of f itself, without whole turns added. Of a
         system also one of its labels: lower_center (the default), lower_saddle, upper_center,
-        upper_saddle, or, where equilibria are numbered, "0" (the default), "1", ...
+        upper_saddle, or, where equilibria are numbered, "0" (the default), "1", ... Of a
+        `BoundaryProblem` a guess of a solution: a constant one, samples even in time of shape
+        (samples, states), a function of the time s in [0, 1], or what ``branch.orbit(i)`` returns.
     span : (float, float)
         Lowest and highest value of the parameter; it holds the problem's own.
     orbit : xarray.Dataset, optional
@@ -125,6 +129,16 @@ def continuation(
     """
     given, problem = problem, as_problem(problem, moving=orbit is not None)
     options = check_options(options)
+    if problem.bounded:
+        from phasekit.labelled.continuation.bounded_start import continue_solution
+
+        for name, value in (("orbit", orbit), ("fix", fix)):
+            if value is not None:
+                raise bad(name, value, "None of a BoundaryProblem", "x0= takes a solution")
+        with notice(f"following solutions along {parameter}"):
+            return announced(continue_solution(
+                problem, parameter, x0, span, _record(problem, record), options, events, stop
+            ))  # fmt: skip
     if orbit is not None:
         from phasekit.labelled.continuation.cycle_start import continue_orbit
 

@@ -139,9 +139,10 @@ class CycleBranch(Branch):
             As `Branch.to_dataset`, with ``special_period``.
         """
         ds = super().to_dataset()
-        ds["special_period"] = (
-            "special_point", np.array([s["period"] for s in self.special_points]),
-        )  # fmt: skip
+        if self.curve.closes:
+            ds["special_period"] = (
+                "special_point", np.array([s["period"] for s in self.special_points]),
+            )  # fmt: skip
         return ds
 
     def _bounded(self) -> list[str]:
@@ -203,14 +204,18 @@ class CycleBranch(Branch):
 
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""
-        u = {name: self._points[name].values for name in (*self.free, "period")}
+        names = (*self.free, "period") if self.curve.closes else self.free
+        u = {name: self._points[name].values for name in names}
         ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        of = "periodic orbits" if self.kind == "cycle" else f"{self.kind} points"
+        whole = {"cycle": "periodic orbits", "boundary": "solutions"}
+        of = whole.get(self.kind, f"{self.kind} points")
         lines = [f"<Branch of {of}: {len(self.path)} points, {ranges}"]
         shown = [s for s in self.special_points if s.kind != "end"]
         lines += [f"  {special!r}" for special in shown[:20]]
         lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []
-        unknown = int(np.sum(self._points["n_unstable"].values < 0))
+        unknown = 0
+        if self.curve.closes:
+            unknown = int(np.sum(self._points["n_unstable"].values < 0))
         if unknown:
             lines.append(f"  multipliers fail their checks at {unknown} points: no detection there")
         lines += [

@@ -56,6 +56,8 @@ def orbit_stop_of(
         return Functional(name, _function(problem, given, "stop"))
 
     kinds = (*CRITICAL, *looked_for(CYCLE)) if critical else ()
+    if problem.bounded:
+        kinds = ("fold", "branch_point")
     return ending(stop, events, functional_of, ("event", *kinds))
 
 

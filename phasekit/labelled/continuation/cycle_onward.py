@@ -27,8 +27,8 @@ CURVES = ("fold_of_cycles", "period_doubling", "torus")
 
 def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
     """The other branch at a period doubling or a branch point of cycles."""
-    if point.kind not in ("period_doubling", "cycle_branch_point"):
-        raise bad("point", point.kind, "a period doubling or a branch point of cycles")
+    if point.kind not in ("period_doubling", "cycle_branch_point", "branch_point"):
+        raise bad("point", point.kind, "a period doubling or a branch point")
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
     cycles, problem = point.branch.known()
@@ -56,7 +56,7 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
     length = np.sqrt(cycles.inner(mesh, dx, dx, dy, dy))
     start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
     tracks = run(CycleWalk(cycles), start, options.directions)
-    return make_cycles(problem, cycles, start, tracks, point.branch.record)
+    return make_cycles(problem, cycles, start, tracks, point.branch.record, kind=point.branch.kind)
 
 
 def point_curve(

@@ -57,15 +57,21 @@ def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> 
     orbit, m = point.orbit, cycles.m
     low, high = collocation.extremes(orbit.x, m)
     middle = collocation.mean(orbit.mesh, orbit.x, m)
-    found: dict[str, Any] = {"period": float(orbit.y[0])}
+    found: dict[str, Any] = {"period": float(orbit.y[0])} if cycles.closes else {}
     for i, name in enumerate(problem.state):
         found[f"{name}_min"], found[f"{name}_max"] = float(low[i]), float(high[i])
         found[f"{name}_mean"] = float(middle[i])
-    found["n_unstable"] = critical_count(point, cycles.forced, label, vertical(cycles, point))
-    for name in _CHECKS:
+    if cycles.closes:
+        found["n_unstable"] = critical_count(point, cycles.forced, label, vertical(cycles, point))
+    for name in _checks(cycles):
         found[name] = float(getattr(point, name))
     found["n_intervals"] = orbit.intervals
     return found
+
+
+def _checks(cycles: Cycles) -> tuple[str, ...]:
+    """Checks of the points: those of multipliers only where there are some."""
+    return tuple(_CHECKS) if cycles.closes else ("mesh_error", "residual")
 
 
 def winding(cycles: Cycles) -> list[int]:
@@ -101,11 +107,39 @@ def points_of(
         for what in ("min", "max", "mean") if words else ():
             long_name = f"{_WHICH[what]} {words['long_name']}"
             data[f"{name}_{what}"] = (*data[f"{name}_{what}"], {**words, "long_name": long_name})
-    for name, text in _CHECKS.items():
-        data[name] = (*data[name], {"long_name": text})
+    for name in _checks(cycles):
+        data[name] = (*data[name], {"long_name": _CHECKS[name]})
+    data["n_intervals"] = (*data["n_intervals"], {"long_name": "mesh intervals"})
+    if cycles.closes:
+        _of_cycles(problem, cycles, points, data)
+    data["arclength"] = (dim, np.array([p.arclength for p in points]))
+    data["special"] = (dim, np.array(labels, dtype=np.dtypes.StringDType()))
+    data["step"] = (dim, np.array([p.step for p in points]))
+    data["newton_steps"] = (dim, np.array([p.newton_steps for p in points], dtype=np.int64))
+    coords: dict[str, Any] = {
+        k: ((), v, attrs_of(problem, k)) for k, v in problem.parameters.items() if k not in free
+    }
+    if len(winding(cycles)) > 1:
+        coords["angle"] = np.array(list(problem.periods), dtype=np.dtypes.StringDType())
+    if record:
+        data.update(_recorded(problem, cycles, points, record))
+    values = data.pop("multiplier", None)
+    ds = xr.Dataset(data, coords)
+    if values is not None:
+        ds["multiplier"] = values
+    for array in ds.variables.values():
+        if isinstance(array.data, np.ndarray):
+            array.data.flags.writeable = False
+    return ds
+
+
+def _of_cycles(
+    problem: Problem, cycles: Cycles, points: Sequence[Point], data: dict[str, Any]
+) -> None:
+    """Columns of periodic orbits alone."""
+    dim = "point"
     period = {"long_name": "period of the orbit", **({"units": "s"} if problem.words else {})}
     data["period"] = (*data["period"], period)
-    data["n_intervals"] = (*data["n_intervals"], {"long_name": "mesh intervals"})
     data["n_unstable"] = (
         *data["n_unstable"],
         {"long_name": "number of multipliers outside the unit circle; -1: not known"},
@@ -120,24 +154,6 @@ def points_of(
         (dim, "multiplier"), np.array([p.multipliers for p in points]),
         {"long_name": "Floquet multipliers, the largest first"},
     )  # fmt: skip
-    data["arclength"] = (dim, np.array([p.arclength for p in points]))
-    data["special"] = (dim, np.array(labels, dtype=np.dtypes.StringDType()))
-    data["step"] = (dim, np.array([p.step for p in points]))
-    data["newton_steps"] = (dim, np.array([p.newton_steps for p in points], dtype=np.int64))
-    coords: dict[str, Any] = {
-        k: ((), v, attrs_of(problem, k)) for k, v in problem.parameters.items() if k not in free
-    }
-    if len(turns) > 1:
-        coords["angle"] = np.array(list(problem.periods), dtype=np.dtypes.StringDType())
-    if record:
-        data.update(_recorded(problem, cycles, points, record))
-    values = data.pop("multiplier")
-    ds = xr.Dataset(data, coords)
-    ds["multiplier"] = values
-    for array in ds.variables.values():
-        if isinstance(array.data, np.ndarray):
-            array.data.flags.writeable = False
-    return ds
 
 
 def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> xr.Dataset:
@@ -149,15 +165,16 @@ def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "
         for i, name in enumerate(problem.state)
     }
     data.update(summary(problem, cycles, point, label))
-    data["multiplier"] = ("multiplier", point.multipliers.copy())
-    turns = winding(cycles)
-    data["winding"] = sum(turns) if len(turns) <= 1 else ("angle", np.array(turns))
+    if cycles.closes:
+        turns = winding(cycles)
+        data["winding"] = sum(turns) if len(turns) <= 1 else ("angle", np.array(turns))
     held = parameters_at(problem, cycles, orbit)
     coords: dict[str, Any] = {k: ((), v, attrs_of(problem, k)) for k, v in held.items()}
     if problem.words:
         coords["time"] = ("time", at, {"long_name": "time", "units": "s"})
     ds = xr.Dataset(data, {"time": at, **coords})
-    ds = ds.drop_vars("multiplier").assign({"multiplier": ("multiplier", point.multipliers.copy())})
+    if cycles.closes:
+        ds = ds.assign({"multiplier": ("multiplier", point.multipliers.copy())})
     return ds
 
 

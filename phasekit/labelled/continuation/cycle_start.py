@@ -137,7 +137,7 @@ def continue_orbit(
         parameter = UNFOLDING if fix is None else beside_unfolding(problem, parameter)
     free = _free(problem, parameter, fix)
     family = parameter == UNFOLDING
-    spans = [(-np.inf, np.inf)] if family else _spans(problem, free, span)
+    spans = [(-np.inf, np.inf)] if family else spans_of(problem, free, span)
     value = problem.parameters[free[0]]
     given = given_orbit(problem, orbit, value, options.degree)
     if fix is not None and free[1] == UNFOLDING:
@@ -241,8 +241,8 @@ def _free(problem: Problem, parameter: Any, fix: Any) -> list[str]:
     return names
 
 
-def _spans(problem: Problem, free: list[str], span: Any) -> list[tuple[float, float]]:
-    """The span of each free parameter; that of a second one is as wide as the first by default."""
+def spans_of(problem: Problem, free: list[str], span: Any) -> list[tuple[float, float]]:
+    """The span of each free parameter; of others than the first ten times as wide by default."""
     pairs = span if np.ndim(span) == 2 else [span]
     spans = [check_span(one) for one in pairs]
     for name, (low, high) in zip(free, spans, strict=False):
@@ -251,10 +251,11 @@ def _spans(problem: Problem, free: list[str], span: Any) -> list[tuple[float, fl
             raise bad(
                 "span", (low, high), f"a span that holds the problem's own {name} = {value:.9g}"
             )
-    if len(spans) < len(free) and free[1] == UNFOLDING:
-        spans.append((-np.inf, np.inf))  # it stays zero: steps are not measured by it
-    if len(spans) < len(free):
-        value = problem.parameters[free[1]]
+    for name in free[len(spans) :]:
+        if name == UNFOLDING:
+            spans.append((-np.inf, np.inf))  # it stays zero: steps are not measured by it
+            continue
+        value = problem.parameters[name]
         reach = 10.0 * max(abs(value), spans[0][1] - spans[0][0])
         spans.append((value - reach, value + reach))
     return spans

@@ -17,11 +17,13 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic.bounded import Bounded
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.family import Tracks
 from phasekit.bifurcation.continuation.periodic.point import Point, State
 from phasekit.bifurcation.continuation.periodic.trace import Track
+from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
@@ -52,10 +54,11 @@ def save(branch: CycleBranch, path: str | PathLike[str], overwrite: bool) -> Non
     flag("overwrite", overwrite)
     target = WholeTarget(target_of(path), overwrite=overwrite)
     ds = branch.to_dataset()
-    values = ds["multiplier"].values
-    ds = ds.drop_vars("multiplier")
-    for part, array in (("real", values.real), ("imag", values.imag)):
-        ds[f"multiplier_{part}"] = (("point", "number"), array)
+    if "multiplier" in ds:
+        values = ds["multiplier"].values
+        ds = ds.drop_vars("multiplier")
+        for part, array in (("real", values.real), ("imag", values.imag)):
+            ds[f"multiplier_{part}"] = (("point", "number"), array)
     raw: dict[str, FloatArray] = {f"cycles_{name}": getattr(cycles, name) for name in _ARRAYS}
     raw.update(_packed("start", [branch.start]))
     for side, track in zip(_SIDES, branch.tracks, strict=True):
@@ -116,10 +119,11 @@ def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
     options["bounds"] = {k: tuple(v) for k, v in options["bounds"].items()}
     names, free = list(problem.parameters), list(stored.spec["free"])
     active = tuple(names.index(name) for name in free)
-    if not 1 <= len(set(active)) == len(active) <= 2:
-        raise ValueError(f"free: got {free}, wants one or two different parameters")
+    most = getattr(problem, "freed", 2)
+    if not 1 <= len(set(active)) == len(active) <= most:
+        raise ValueError(f"free: got {free}, wants 1 to {most} different parameters")
     forced = problem.time is not None
-    parts = {"cycle": 1, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}[kind]
+    parts = {"cycle": 1, "boundary": 1, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}[kind]
     n, k = parts * len(problem.state), len(active)
     k += kind == "torus" or (kind == "fold_of_cycles" and not forced)
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
@@ -134,6 +138,8 @@ def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
     if not ((arrays["scale"] > 0.0).all() and (arrays["width"] > 0.0).all()):
         raise ValueError("raw_cycles_scale, raw_cycles_width: want numbers > 0")
     form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
+    if problem.bounded:
+        form = functools.partial(Bounded, conditions=conditions_of(problem))
     made: Cycles = form(
         problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced,
         clock=clock_code(problem, active),
@@ -145,7 +151,7 @@ def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
 def _packed(name: str, points: Sequence[Point]) -> dict[str, FloatArray]:
     """Points as flat arrays."""
     n = points[0].orbit.x.shape[1] if points else 0
-    own = len(points[0].multipliers) if points else 0
+    own = len(points[0].multipliers) if points else 0  # none of solutions that need not close
     q = len(points[0].dy) if points else 0
     table = [[float(getattr(p, one)) for one in _NUMBERS] for p in points]
     values = np.array([p.multipliers for p in points]).reshape(len(points), own)
@@ -200,9 +206,9 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
     mesh = stored.array(f"{name}_mesh", (int(np.sum(intervals + 1)),))
     x, dx = (stored.array(f"{name}_{one}", (places, width)) for one in ("x", "dx"))
     y, dy = (stored.array(f"{name}_{one}", (total, columns)) for one in ("y", "dy"))
+    own = cycles.own if total and cycles.closes else 0
     real, imag = (
-        stored.array(f"{name}_{one}", (total, cycles.own if total else 0), finite=False)
-        for one in ("real", "imag")
+        stored.array(f"{name}_{one}", (total, own), finite=False) for one in ("real", "imag")
     )
     points, at, node = [], 0, 0
     for i, count in enumerate(intervals):
@@ -210,7 +216,7 @@ def _unpacked(stored: Stored, name: str, cycles: Cycles) -> list[Point]:
         at, node = here.stop, nodes.stop
         numbers: dict[str, Any] = dict(zip(_NUMBERS, table[i].tolist(), strict=True))
         numbers["newton_steps"] = int(numbers["newton_steps"])
-        values = np.empty(cycles.own, dtype=complex)
+        values = np.empty(own, dtype=complex)
         values.real, values.imag = real[i], imag[i]
         points.append(
             Point(

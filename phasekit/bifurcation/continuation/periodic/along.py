@@ -225,7 +225,10 @@ def place(
 def highest(
     mesh: Array, x: Array, coefficients: Array, scale: Array, closure: Array, out: Array
 ) -> None:
-    """Size of the derivative of order m + 1 on each interval (see `collocation.highest`)."""
+    """Size of the derivative of order m + 1 on each interval (see `collocation.highest`).
+
+    A state with closure 0 does not come back: its first and last intervals have one neighbour.
+    """
     m, n, count = coefficients.size - 1, x.shape[1], mesh.size - 1
     constant = np.zeros((count, n))
     jump = np.zeros((count, n))
@@ -240,11 +243,15 @@ def highest(
         for c in range(n):
             value = constant[before, c] * (closure[c] if j == 0 else 1.0)
             jump[j, c] = abs(constant[j, c] - value) / gap / scale[c]
+    for c in range(n):
+        if closure[c] == 0.0 and count > 1:
+            jump[0, c] = jump[1, c]
     for j in range(count):
         after = j + 1 if j < count - 1 else 0
         out[j] = 0.0
         for c in range(n):
-            out[j] = max(out[j], 0.5 * (jump[j, c] + jump[after, c]))
+            there = after if after > 0 or closure[c] != 0.0 else j
+            out[j] = max(out[j], 0.5 * (jump[j, c] + jump[there, c]))
 
 
 @kernel

@@ -12,12 +12,15 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.periodic.criteria import determinant, fold_test
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
+from phasekit.bifurcation.continuation.periodic.starts import other_tangent, resolved, singularity
 
 Array = npt.NDArray[np.float64]
 Value = Callable[[Any, bool], float]
 
 SPLIT = 1e-2  # part of a step between the zeros into which rounding parts a double one
 STILL = 1e-11  # part of a stretch, as far as orbits are known, within which roots settle
+FINER = 1.1  # times the points of a mesh that does not resolve what goes off
+ZOOMS, ZOOM = 3, 0.06  # windows in which it is looked for, and half of one beside the last
 NODES = 9  # points of the family through which a branch point is interpolated
 
 
@@ -28,12 +31,14 @@ class Stretch:
     cycles: Cycles
     a: Point | State
     b: Point
+    mesh: Array | None = None
 
     def __post_init__(self) -> None:
         """Bring both ends to one mesh."""
         mesh = self.b.orbit.mesh
         if self.a.orbit.intervals > self.b.orbit.intervals:
             mesh = self.a.orbit.mesh
+        mesh = mesh if self.mesh is None else self.mesh
         a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
         b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
         rows, rows_y, target = self.cycles.rows(a, dx, self.a.dy)
@@ -120,17 +125,26 @@ def branching(stretch: Stretch, test: Value) -> Point | None:
     The family is smooth through it, so its points at a distance say where it is to rounding.
     """
     cycles = stretch.cycles
-    nodes = 0.5 * stretch.length * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
-    points = [stretch.at(float(s)) for s in nodes]
-    made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
-    if len(made) < NODES - 2:
-        return None
-    at = np.array([s for s, _ in made]) / stretch.length
-    s = _crossing(at, *(
-        np.array([value(p, cycles.forced) for _, p in made]) for value in (determinant, fold_test)
-    ))  # fmt: skip
-    if s is None:
-        return None
+
+    def singular(point: Point, forced: bool) -> float:
+        return determinant(point, forced) if cycles.closes else singularity(cycles, point)
+
+    low, high = 0.0, stretch.length
+    for _ in range(1 if cycles.closes else ZOOMS):  # determinants are smooth, borders not
+        nodes = 0.5 * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
+        points = [stretch.at(float(low + s * (high - low))) for s in nodes]
+        made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
+        if len(made) < NODES - 2:
+            return None
+        at = np.array([s for s, _ in made])
+        s = _crossing(at, *(
+            np.array([value(p, cycles.forced) for _, p in made]) for value in (singular, fold_test)
+        ))  # fmt: skip
+        if s is None:
+            return None
+        width, middle = high - low, low + s * (high - low)
+        low = max(0.0, middle - ZOOM * width)
+        high = min(stretch.length, middle + ZOOM * width)
     weights = np.array(
         [np.prod((s - np.delete(at, k)) / (at[k] - np.delete(at, k))) for k in range(len(at))]
     )
@@ -144,7 +158,12 @@ def branching(stretch: Stretch, test: Value) -> Point | None:
         np.asarray(sum(w * p.orbit.y for w, (_, p) in zip(weights, made, strict=True))),
     )
     checked = cycles.looked_at(orbit, *mixed)
-    return point_of(cycles, checked, stretch.a.arclength + s * stretch.length, s * stretch.length)
+    if not cycles.closes:
+        null, _ = other_tangent(cycles, orbit, checked.W, (checked.dx, checked.dy))
+        finer = resolved(cycles, orbit.mesh, null)
+        if finer is not None and len(finer) > FINER * len(orbit.mesh):
+            return branching(Stretch(cycles, stretch.a, stretch.b, finer), test)
+    return point_of(cycles, checked, stretch.a.arclength + middle, middle)
 
 
 def _crossing(at: Array, determinants: Array, rates: Array) -> float | None:

@@ -12,7 +12,7 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Path
 from phasekit.bifurcation.continuation.periodic.point import Point, State
-from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow
+from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow, where
 
 START = 1e-6  # arclength within which a point is the start itself
 
@@ -71,9 +71,7 @@ class CycleWalk:
     def words(self, seen: Found) -> str:
         """Where a special point is."""
         cycles = self.cycles
-        names = ["period", *(cycles.field.parameters[i] for i in cycles.active)]
-        values = zip(names, seen.point.orbit.y.tolist(), strict=False)
-        return ", ".join(f"{name} = {value:.9g}" for name, value in values)
+        return where(cycles, seen.point.orbit)
 
 
 def in_order(found: list[Found]) -> list[Found]:

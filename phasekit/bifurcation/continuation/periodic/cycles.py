@@ -146,6 +146,21 @@ class Cycles:
         return 1 + len(self.active)
 
     @property
+    def bordering(self) -> int:
+        """Number of bordering rows."""
+        return self.q
+
+    @property
+    def closes(self) -> bool:
+        """Whether orbits come back: else as many rows as states say what holds at their ends."""
+        return self.bordering == self.q
+
+    @property
+    def critical(self) -> bool:
+        """Whether folds and branch points are looked for."""
+        return len(self.active) == 1
+
+    @property
     def moving(self) -> int:
         """Number of states with a part in tangents; those behind follow from them."""
         return self.n
@@ -240,6 +255,10 @@ class Cycles:
         rows_y[-1, 1:] = dy[1:] / self.width**2
         return rows, rows_y, at + rows_y @ orbit.y
 
+    def at(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Any:
+        """The bordering rows beside an orbit, if they are not the same everywhere; else None."""
+        return None
+
     def correct(
         self,
         guess: Orbit,
@@ -265,14 +284,18 @@ class Cycles:
         values, size, step = np.empty((0, 0)), np.inf, 0
         if not jets.given:
             values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
+        one = jets.given or not self.closes  # step at a time
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, local.sizes)
+            rows, rows_y, target = self.at(Orbit(mesh, x, y), rows, rows_y, target) or (
+                rows, rows_y, target,
+            )  # fmt: skip
             end, steps, side, residual, trace, size, length = newton.newton(
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, local.scale,
                 local.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
-                dx, dy, values, local.tolerance, 1 if jets.given else most, damped, size,
+                dx, dy, values, local.tolerance, 1 if one else most, damped, size,
             )  # fmt: skip
             step += steps
             if steps:  # else the last ones stand

@@ -32,7 +32,12 @@ def end_of(
     """The last point and the reason, if the family ends between two points."""
     sizes = (cycles.amplitudes(made.orbit) / cycles.scale)[: cycles.own].tolist()
     small = sum(sizes) < 4.0 * made.step * len(sizes)
-    if small and not cycles.forced and _through_hopf(cycles, before.orbit, made.orbit):
+    if (
+        small
+        and cycles.closes
+        and not cycles.forced
+        and _through_hopf(cycles, before.orbit, made.orbit)
+    ):
         return _at_hopf(cycles, before, made)
     if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit):
         name = cycles.field.parameters[cycles.active[0]]
@@ -75,6 +80,8 @@ def when_stuck(cycles: Cycles, state: State, start: Point, stuck: Stop) -> Stop:
 
     Folds meet Hopf points of equilibria where the multiplier no longer tells small orbits apart.
     """
+    if not cycles.closes:
+        return stuck
     if len(cycles.active) < 2 or cycles.forced:
         return homoclinic.when_stuck(cycles, state, start, stuck)
     own, scale = slice(cycles.own), cycles.scale[: cycles.own]

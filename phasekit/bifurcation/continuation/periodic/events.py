@@ -69,7 +69,7 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
     And, in words, what is zero all along it, whose zeros are no points.
     """
     found: list[Found] = []
-    critical = len(cycles.active) == 1
+    critical = bool(tests_of(cycles))
     signs = [_signs(cycles, point) if critical else None for point in path.points]
     values = [_values(cycles, point) for point in path.points]
     said = []
@@ -87,7 +87,8 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
         here: list[Found] = []
         if signs[i] is not None and signs[i + 1] is not None and signs[i] != signs[i + 1]:
             here = _between(cycles, a, b, DEPTH)
-            here += together(Stretch(cycles, a, b), here)
+            if cycles.closes:
+                here += together(Stretch(cycles, a, b), here)
         if values[i]:
             # A special point between them parts the stretch: at a fold a parameter turns back.
             inside = [one.point for one in here if one.status == "converged"]
@@ -152,16 +153,23 @@ def _signs(cycles: Cycles, point: Point) -> tuple[Any, ...] | None:
     """The signs of all test functions and the number of unstable multipliers; None: not known."""
     if point.sign == 0.0 or not point.trusted:  # a branch point that the path begins at
         return None
-    tests = [test.value(point, cycles.forced) >= 0.0 for test in TESTS]
-    return (*tests, unstable(point.multipliers, cycles.forced))
+    tests = [test.value(point, cycles.forced) >= 0.0 for test in tests_of(cycles)]
+    return (*tests, unstable(point.multipliers, cycles.forced) if cycles.closes else 0)
 
 
 def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     """The special points between two points of a family."""
     forced = cycles.forced
     changed = [
-        test for test in TESTS if (test.value(a, forced) >= 0.0) != (test.value(b, forced) >= 0.0)
+        test
+        for test in tests_of(cycles)
+        if (test.value(a, forced) >= 0.0) != (test.value(b, forced) >= 0.0)
     ]
+    if not cycles.closes:
+        if blurred(cycles, a, b):  # the parameter stands still but for rounding
+            changed = [test for test in changed if test.kind != FOLD_OF_OPEN]
+        made = (refined(Stretch(cycles, a, b), test) for test in changed)
+        return [one for one in made if one is not None]
     if (vertical(cycles, a) and vertical(cycles, b)) or still(cycles, a, b):
         # Conservative: a second multiplier is always 1, and the parameter never moves.
         changed = [test for test in changed if test is DOUBLING]
@@ -341,3 +349,22 @@ BRANCHING = CycleTest(
     root=branching,
 )  # fmt: skip
 TESTS = (FOLD, DOUBLING, TORUS, BRANCHING)
+
+
+def _no_form(cycles: Cycles, point: Point) -> Form:
+    return {}, ""
+
+
+FOLD_OF_OPEN = "fold"
+#: Of solutions that need not close, which have no multipliers.
+OPEN = (
+    CycleTest(FOLD_OF_OPEN, fold_test, _no_form),
+    CycleTest("branch_point", lambda point, forced: point.sign, _no_form, root=branching),
+)
+
+
+def tests_of(cycles: Cycles) -> tuple[CycleTest, ...]:
+    """The kinds of special points that are looked for by multipliers and tangents."""
+    if not cycles.closes:
+        return OPEN if cycles.critical else ()
+    return TESTS if len(cycles.active) == 1 else ()

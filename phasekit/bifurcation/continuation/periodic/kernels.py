@@ -3,8 +3,9 @@
 The unknowns are the values x at all places of the mesh and y = (T, free parameters). The places
 inside an interval are eliminated first (condensation): x_jk = W_jk x_j + V_jk y + v_jk. What is
 left, x_(j+1) = G_j x_j + ..., is a chain that is closed by x_N = sigma x_0 + gap and bordered by
-one row for each of y. It is eliminated with pivoting over two blocks at a time: a recursion
-forwards would be single shooting, which overflows where orbits are unstable.
+one row for each of y; or that is not closed, with as many rows more as there are states. It is
+eliminated with pivoting over two blocks at a time: a recursion forwards would be single shooting,
+which overflows where orbits are unstable.
 """
 
 from __future__ import annotations
@@ -136,21 +137,22 @@ def solve(
     Parameters
     ----------
     rows, rows_y, right
-        The bordering rows, shape (y, places, n) and (y, y), and their right sides.
+        The bordering rows, shape (rows, places, n) and (rows, y), and their right sides: as many as
+        y, or n more where they close the chain.
     gap, sigma
-        x_N = sigma x_0 + gap closes the chain, sigma a sign for each state.
+        x_N = sigma x_0 + gap closes the chain, sigma a sign for each state, if no rows do.
     dx, dy
         The solution, shape (2, places, n) and (2, y): that of the right sides given, and the one
         of a 1 in the last row alone.
     """
-    count, n, q = W.shape[0], sigma.size, right.size
+    count, n, q, border = W.shape[0], sigma.size, dy.shape[1], right.size
     # Columns: x_j, x_0, x_(j+1), y, right side. Rows: what is known of x_j and x_0, at first that
     # both are one; the next interval; the border.
-    block = np.zeros((2 * n + q, 3 * n + q + 1))
+    block = np.zeros((2 * n + border, 3 * n + q + 1))
     store = np.empty((count, n, block.shape[1]))
     for c in range(n):
         block[c, c], block[c, n + c] = 1.0, -1.0
-    for r in range(q):
+    for r in range(border):
         for c in range(n):
             block[2 * n + r, c] = rows[r, 0, c]
         for k in range(q):
@@ -159,25 +161,30 @@ def solve(
     sign = 1.0
     for j in range(count):
         append(W, rows, j, m, n, block)
-        found = eliminate(block, 2 * n, 2 * n + q, n, block.shape[1])
+        found = eliminate(block, 2 * n, 2 * n + border, n, block.shape[1])
         if found == 0.0:
             return 0.0
         sign *= found
         step_on(block, n, store[j])
-    D = np.zeros((n + q, n + q + 2))
+    end = n + border
+    D = np.zeros((end, end + 2))
     sign *= close(block, gap, sigma, D)
     if sign != 0.0:
+        last = np.empty(n)
         for which in range(2):
-            carry_back(
-                store, W, D[:, n + q + which], gap, sigma, m, which == 0, dx[which], dy[which]
-            )
+            for c in range(n):
+                if border > q:
+                    last[c] = D[n + c, end + which]
+                else:
+                    last[c] = sigma[c] * D[c, end + which] + (1.0 if which == 0 else 0.0) * gap[c]
+            carry_back(store, W, D[:, end + which], last, m, which == 0, dx[which], dy[which])
     return sign
 
 
 @inline
 def append(W: Array, rows: Array, j: int, m: int, n: int, block: Array) -> None:
     """Write an interval into the block: its equation, and the border's part of its places."""
-    top, y, q = (m - 1) * n, 3 * n, rows.shape[0]
+    top, y, q = (m - 1) * n, 3 * n, block.shape[1] - 3 * n - 1
     for i in range(n):
         for k in range(n):
             block[n + i, k] = -W[j, top + i, k]
@@ -186,7 +193,7 @@ def append(W: Array, rows: Array, j: int, m: int, n: int, block: Array) -> None:
         for k in range(q):
             block[n + i, y + k] = -W[j, top + i, n + k]
         block[n + i, y + q] = W[j, top + i, n + q]
-    for r in range(q):
+    for r in range(rows.shape[0]):
         row = 2 * n + r
         for c in range(n):
             block[row, 2 * n + c] = rows[r, (j + 1) * m, c]
@@ -222,19 +229,27 @@ def step_on(block: Array, n: int, store: Array) -> None:
 def close(block: Array, gap: Array, sigma: Array, D: Array) -> float:
     """Solve for x_0 and y with x_N = sigma x_0 + gap; the sign of the determinant, or 0.
 
-    The last columns of D become the solution, and that of a 1 in the last row alone.
+    With rows that close the chain for x_0, x_N and y. The last columns of D become the solution,
+    and that of a 1 in the last row alone.
     """
     n, end = gap.size, D.shape[0]
+    open_ = end > block.shape[1] - 1 - 2 * n
     for i in range(end):
         row = i if i < n else n + i
         total = block[row, block.shape[1] - 1]
         size = 0.0
         for k in range(n):
-            D[i, k] = sigma[k] * block[row, k] + block[row, n + k]
-            total -= block[row, k] * gap[k]
+            if open_:
+                D[i, k] = block[row, n + k]
+                D[i, n + k] = block[row, k]
+                size = max(size, abs(D[i, n + k]))
+            else:
+                D[i, k] = sigma[k] * block[row, k] + block[row, n + k]
+                total -= block[row, k] * gap[k]
             size = max(size, abs(D[i, k]))
-        for k in range(n, end):
-            D[i, k] = block[row, 2 * n + k]
+        before = n if open_ else 2 * n  # columns of x_(j+1), which is no unknown any more
+        for k in range(2 * n if open_ else n, end):
+            D[i, k] = block[row, before + k]
             size = max(size, abs(D[i, k]))
         D[i, end] = total
         D[i, end + 1] = 1.0 if i == end - 1 else 0.0
@@ -250,17 +265,16 @@ def close(block: Array, gap: Array, sigma: Array, D: Array) -> float:
 
 @inline
 def carry_back(
-    store: Array, W: Array, ends: Array, gap: Array, sigma: Array, m: int, whole: bool,
-    dx: Array, dy: Array,
+    store: Array, W: Array, ends: Array, last: Array, m: int, whole: bool, dx: Array, dy: Array
 ) -> None:  # fmt: skip
-    """Fill dx and dy from x_0 and y at the ends; without right sides but the last unless whole."""
-    count, n, q = W.shape[0], gap.size, dy.size
+    """Fill dx and dy from x_0, x_N and y; without right sides but the last unless whole."""
+    count, n, q = W.shape[0], last.size, dy.size
     constant = 1.0 if whole else 0.0
     for k in range(q):
-        dy[k] = ends[n + k]
+        dy[k] = ends[ends.size - q + k]
     for c in range(n):
         dx[0, c] = ends[c]
-        dx[count * m, c] = sigma[c] * ends[c] + constant * gap[c]
+        dx[count * m, c] = last[c]
     for j in range(count - 1, 0, -1):
         for i in range(n - 1, -1, -1):
             total = constant * store[j, i, 3 * n + q]

@@ -75,19 +75,19 @@ def newton(
     """
     m, n, q = nodes.size, x.shape[1], y.size
     places = x.shape[0]
-    right, gap = np.zeros(q), np.zeros(n)
+    right, gap = np.zeros(target.size), np.zeros(n)
     border = rows_y.copy()
     w = np.zeros(2 * q + 2)
     sign, residual, divergence, size = 0.0, np.inf, np.nan, before
     whole = before < np.inf and not damped
     for step in range(1, iterations + 1):
-        for r in range(q):
+        for r in range(target.size):
             right[r] = target[r]
             for k in range(q):
                 right[r] -= rows_y[r, k] * y[k]
         for i in range(places):
             for c in range(n):
-                for r in range(q):
+                for r in range(target.size):
                     right[r] -= rows[r, i, c] * x[i, c]
         if forced:
             own = active.size - 1

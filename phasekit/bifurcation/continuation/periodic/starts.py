@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.periodic import collocation, kernels
-from phasekit.bifurcation.continuation.periodic.adapt import LEAST, count_for, fitted
+from phasekit.bifurcation.continuation.periodic.adapt import LEAST, SPARE, count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, Extended
 from phasekit.bifurcation.continuation.periodic.linear import Linear, wave
@@ -198,11 +199,35 @@ def null_vector(cycles: Cycles, orbit: Orbit, W: Array, sigma: float) -> Array:
     return _null_vector(cycles, orbit, W, sigma, None)[0]
 
 
+def resolved(cycles: Cycles, mesh: Array, direction: Array) -> Array | None:
+    """The parts of a mesh that resolve a direction of another family, too; None if it does."""
+    orbit = Orbit(mesh, direction, np.ones(cycles.q))
+    error = cycles.mesh_error(orbit)
+    if error <= cycles.options.mesh_tolerance or cycles.options.intervals is not None:
+        return None
+    parts = math.ceil((error / (SPARE * cycles.options.mesh_tolerance)) ** (1.0 / (cycles.m + 1)))
+    count = (len(mesh) - 1) * parts
+    if count > cycles.options.max_intervals:
+        return None
+    return np.asarray(np.interp(np.arange(count + 1) / parts, np.arange(len(mesh)), mesh))
+
+
+def singularity(cycles: Cycles, point: Point) -> float:
+    """A smooth number of a point whose zeros are where its equations are singular.
+
+    That is the factor of the column by which they are bordered ([Govaerts2000] chapter 3), with the
+    sign of their determinant.
+    """
+    W = cycles.looked_at(point.orbit, point.dx, point.dy).W
+    factor = _null_vector(cycles, point.orbit, W, 1.0, (point.dx, point.dy))[2]
+    return math.copysign(factor, point.sign)
+
+
 def other_tangent(
     cycles: Cycles, orbit: Orbit, W: Array, tangent: tuple[Array, Array]
 ) -> tuple[Array, Array]:
     """Where two families cross, the solution of their equations orthogonal to a tangent of one."""
-    return _null_vector(cycles, orbit, W, 1.0, tangent)
+    return _null_vector(cycles, orbit, W, 1.0, tangent)[:2]
 
 
 def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution | None:
@@ -211,15 +236,15 @@ def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution
     The equations are singular along the other one: that part stays, and an arbitrary column takes
     up what is left of them then.
     """
-    n, q = cycles.n, cycles.q
+    n, q, more = cycles.n, cycles.q, cycles.bordering
     found = cycles.looked_at(orbit, *own)
     ex, ey = other_tangent(cycles, orbit, found.W, own)
     column = np.random.default_rng(7).standard_normal(found.W.shape[:2]) / orbit.intervals
-    rows, rows_y = np.zeros((q + 1, *orbit.x.shape)), np.zeros((q + 1, q + 1))
-    target = np.zeros(q + 1)
-    rows[:q], rows_y[:q, :q], target[:q] = cycles.rows(orbit, *own)
+    rows, rows_y = np.zeros((more + 1, *orbit.x.shape)), np.zeros((more + 1, q + 1))
+    target = np.zeros(more + 1)
+    rows[:more], rows_y[:more, :q], target[:more] = cycles.rows(orbit, *own)
     others, others_y, at = cycles.rows(orbit, ex, ey)
-    rows[q], rows_y[q, :q], target[q] = others[-1], others_y[-1], at[-1]
+    rows[-1], rows_y[-1, :q], target[-1] = others[-1], others_y[-1], at[-1]
     dx, dy = np.empty((2, *orbit.x.shape)), np.empty((2, q + 1))
     for _ in range(CLOSER):
         x, y = orbit.x, orbit.y
@@ -239,21 +264,23 @@ def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution
 
 def _null_vector(
     cycles: Cycles, orbit: Orbit, W: Array, sigma: float, tangent: tuple[Array, Array] | None
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, float]:
     """A solution of singular equations with states of length 1; with a tangent, of its equations.
 
-    They are bordered by an arbitrary column and row; the column's factor vanishes.
+    They are bordered by an arbitrary column and row; the column's factor, the last of what is
+    returned, vanishes.
     """
     count, size, n = W.shape[0], W.shape[1], cycles.n
     q = 0 if tangent is None else cycles.q
+    more = 0 if tangent is None else cycles.bordering
     random = np.random.default_rng(7)
     V = np.zeros((count, size, n + q + 2))
     V[:, :, : n + q] = W[:, :, : n + q]
     V[:, :, n + q] = random.standard_normal((count, size)) / count
-    rows = np.zeros((q + 1, *orbit.x.shape))
-    rows_y = np.zeros((q + 1, q + 1))
+    rows = np.zeros((more + 1, *orbit.x.shape))
+    rows_y = np.zeros((more + 1, q + 1))
     if tangent is not None:
-        rows[:q], rows_y[:q, :q], _ = cycles.rows(orbit, *tangent)
+        rows[:more], rows_y[:more, :q], _ = cycles.rows(orbit, *tangent)
         if cycles.forced:
             rows_y[0, 0], rows_y[0, 1:q] = 1.0, -cycles.own_period(orbit.y)[1]
     row = random.standard_normal(orbit.x.shape)
@@ -268,8 +295,8 @@ def _null_vector(
             else row / len(row)
         )
         kernels.solve(
-            V, rows, rows_y, np.zeros(q + 1), np.zeros(n), np.full(n, sigma), cycles.m, dx, dy
+            V, rows, rows_y, np.zeros(more + 1), np.zeros(n), np.full(n, sigma), cycles.m, dx, dy
         )
         length = np.sqrt(cycles.inner(orbit.mesh, dx[1], dx[1], nothing, nothing))
         v = dx[1] / length
-    return np.asarray(v), dy[1, :q] / length
+    return np.asarray(v), dy[1, :q] / length, float(dy[1, q] / length)

@@ -67,7 +67,7 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
             assert isinstance(state_or_stop, State)
             end = ends.end_of(cycles, state, made, start)
         except KeyboardInterrupt:
-            why = f"it was interrupted behind {_where(cycles, state.orbit)}"
+            why = f"it was interrupted behind {where(cycles, state.orbit)}"
             return Track(tuple(found), state, Stop("interrupted", why))
         if end is not None:
             last, stop = end
@@ -77,7 +77,7 @@ def follow(cycles: Cycles, state: State, points: int, start: Point) -> Track:
         found.append(made)
         state = state_or_stop
         stage(f"{len(found):,} points")
-    why = f"max_points = {points} were computed, the last at {_where(cycles, state.orbit)}"
+    why = f"max_points = {points} were computed, the last at {where(cycles, state.orbit)}"
     return Track(tuple(found), state, Stop("max_points", why))
 
 
@@ -111,9 +111,9 @@ def advance(cycles: Cycles, state: State) -> tuple[Point | None, State | Stop]:
             (state.orbit, state.dx, state.dy),
         )  # fmt: skip
         return point, _meshed(cycles, after)
-    where = _where(cycles, state.orbit)
+    there = where(cycles, state.orbit)
     return None, Stop(
-        "stuck", f"no step longer than min_step = {o.min_step:g} succeeded at {where}: {reason}"
+        "stuck", f"no step longer than min_step = {o.min_step:g} succeeded at {there}: {reason}"
     )
 
 
@@ -141,11 +141,12 @@ def _unscaled(cycles: Cycles, local: Cycles, found: Solution) -> tuple[Solution,
     return made, length
 
 
-def _where(cycles: Cycles, orbit: Orbit) -> str:
-    """The period and the free parameters, in words."""
+def where(cycles: Cycles, orbit: Orbit) -> str:
+    """The period, if it is one, and the free parameters, in words."""
     names = ["period", *(cycles.field.parameters[i] for i in cycles.active)]
     # On curves of folds and tori kappa or omega follows.
-    return ", ".join(f"{n} = {v:.9g}" for n, v in zip(names, orbit.y.tolist(), strict=False))
+    values = list(zip(names, orbit.y.tolist(), strict=False))[0 if cycles.closes else 1 :]
+    return ", ".join(f"{name} = {value:.9g}" for name, value in values)
 
 
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:

@@ -1,0 +1,146 @@
+"""Where branches of solutions with conditions at both ends begin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic import collocation, starts
+from phasekit.bifurcation.continuation.periodic.bounded import Bounded, Condition
+from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
+from phasekit.bifurcation.continuation.periodic.cycles import Orbit
+from phasekit.bifurcation.continuation.walk import run
+from phasekit.errors import ConvergenceError
+from phasekit.labelled.continuation.checks import check_parameter
+from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
+from phasekit.labelled.continuation.cycle_start import spans_of
+from phasekit.labelled.continuation.orbit_guess import first_point, scale_of
+from phasekit.labels.arguments import bad, reals
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+FIRST = 20  # intervals of a first mesh
+
+
+def bounded_of(
+    problem: Problem, free: Sequence[str], spans: Sequence[tuple[float, float]],
+    scale: FloatArray, options: ContinuationOptions, conditions: tuple[Condition, ...],
+    **more: Any,
+) -> Bounded:  # fmt: skip
+    """Solutions of a problem over some of its parameters."""
+    names = list(problem.parameters)
+    low, high = np.array(spans, dtype=float).T
+    scale = np.array(
+        [options.scales.get(s, one) for s, one in zip(problem.state, scale, strict=True)]
+    )
+    return Bounded(
+        problem.field, np.array(list(problem.parameters.values()), dtype=float),
+        tuple(names.index(name) for name in free), False, 0, 1, np.zeros(len(scale)), scale,
+        high - low, low, high, np.zeros(len(scale)), options, conditions=conditions, **more,
+    )  # fmt: skip
+
+
+def conditions_of(problem: Any) -> tuple[Condition, ...]:
+    """What a problem says of its solutions."""
+    return tuple(one for one in (problem.ends, problem.means) if one.count)
+
+
+def continue_solution(
+    problem: Any,
+    parameter: str | Sequence[str],
+    guess: Any,
+    span: Any,
+    record: Mapping[str, Callable[..., Any]],
+    options: ContinuationOptions,
+    events: Any = None,
+    stop: Any = None,
+) -> CycleBranch:
+    """Follow the solutions of a boundary value problem from one near a guess."""
+    free = _free(problem, parameter)
+    asked = orbit_events_of(problem, events)
+    asked, ends = orbit_stop_of(problem, stop, asked, critical=True)
+    spans = spans_of(problem, free, span)
+    values = [problem.parameters[name] for name in free]
+    orbit = guess_of(problem, guess, values, options)
+    scale = scale_of(orbit.x, np.ones(len(problem.state)))
+    made = bounded_of(problem, free, spans, scale, options, conditions_of(problem))
+    found = starts.settled(made, orbit, held=1)
+    if not found.converged:
+        raise ConvergenceError(
+            f"no solution was found from the guess at {free[0]} = {values[0]:.9g}: "
+            f"{found.message}; x0= takes another one"
+        )
+    scale = scale_of(found.orbit.x, np.ones(len(scale)))
+    made = bounded_of(problem, free, spans, scale, options, conditions_of(problem))
+    found = starts.settled(made, found.orbit, held=1)
+    start = first_point(made, found, f"from the guess at {free[0]} = {values[0]:.9g}")
+    if start.dy[1] < 0.0:
+        start = start.flipped()
+    family = made.replace(events=asked, ends=ends)
+    try_events(family, start.orbit)
+    tracks = run(CycleWalk(family), start, options.directions)
+    return make_cycles(problem, family, start, tracks, record, kind=made.kind)
+
+
+def _free(problem: Any, parameter: Any) -> list[str]:
+    given = [parameter] if isinstance(parameter, str) else parameter
+    if not isinstance(given, (list, tuple)):
+        raise bad("parameter", parameter, "a name, or names")
+    names = [check_parameter(problem, name) for name in given]
+    if len(set(names)) != len(names) or len(names) != problem.freed:
+        one = "one name" if problem.freed == 1 else f"{problem.freed} different names"
+        raise bad(
+            "parameter", parameter, one,
+            f"{problem.ends.count + problem.means.count} conditions and integrals on "
+            f"{len(problem.state)} states free {problem.freed}",
+        )  # fmt: skip
+    return names
+
+
+def guess_of(problem: Problem, x0: Any, values: Sequence[float], options: Any) -> Orbit:
+    """A solution to begin with: one state, samples even in time, a function of s, or a Dataset."""
+    n = len(problem.state)
+    names = ", ".join(problem.state)
+    wants = f"{n} numbers ({names}), samples of shape (samples, {n}), or a function of s in [0, 1]"
+    mesh = np.linspace(0.0, 1.0, (options.intervals or FIRST) + 1)
+    if x0 is None:
+        x0 = [problem.start.get(name, 0.0) for name in problem.state]
+    if isinstance(x0, xr.Dataset):
+        missing = [name for name in problem.state if name not in x0]
+        if missing or "time" not in x0.coords:
+            raise bad("x0", list(map(str, x0.data_vars)), f"the states {names} on 'time'")
+        time = np.asarray(x0["time"].values, dtype=float)
+        s = (time - time[0]) / (time[-1] - time[0])
+        x = np.stack([np.asarray(x0[name].values, float) for name in problem.state], axis=1)
+        rows = np.linspace(0.0, len(s) - 1.0, len(mesh))
+        mesh = np.interp(rows, np.arange(len(s)), s)
+    elif callable(x0):
+        s = collocation.times(mesh, options.degree)
+        given = [np.ravel(x0(float(one))) for one in s]
+        x = np.atleast_2d(reals("x0", np.array(given), wants))
+    else:
+        if isinstance(x0, Mapping):
+            missing = [name for name in problem.state if name not in x0]
+            if missing or len(x0) != n:
+                raise bad("x0", list(x0), f"a value for each of {names}")
+            x0 = [x0[name] for name in problem.state]
+        x = np.atleast_1d(reals("x0", x0, wants))
+        x = x[None] if x.ndim == 1 else x
+        s = np.linspace(0.0, 1.0, len(x))
+    if x.ndim != 2 or x.shape[1] != n or not np.isfinite(x).all():
+        raise bad("x0", x0, wants)
+    places = collocation.times(mesh, options.degree)
+    if len(x) > 3:
+        from scipy.interpolate import CubicSpline
+
+        at = CubicSpline(s, x)(places)
+    else:
+        at = np.stack([np.interp(places, s, column) for column in x.T], axis=1)
+    return Orbit(mesh, np.ascontiguousarray(at), np.array([1.0, *values]))
