@@ -54,7 +54,7 @@ def test_first_result_does_not_load_dask():
 
 
 def test_dask_is_loaded_when_there_are_arrays_of_it():
-    """xarray asks of all arrays whether they are dask's: after phasekit, without loading dask."""
+    """Of all arrays xarray asks whether they are dask's: after phasekit, without loading dask."""
     code = """
 import sys
 import numpy as np, phasekit as pk, xarray as xr
