@@ -139,20 +139,19 @@ def every_branch_is_checked():
     """Hold each branch of equilibria that a test computes against what holds of all of them."""
     from witnesses import branch_invariants
 
-    from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
-    from phasekit.labelled.continuation import branch
+    from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 
-    find = branch.find
+    search = CurveWalk.search
 
-    def checked(curve, path):
-        found = find(curve, path)
-        if curve.kind == EQUILIBRIUM and set(curve.options.detect) == {
-            "fold", "branch_point", "hopf",
-        }:  # fmt: skip
-            placed = [one for one in found.placed if one.special.kind != "event"]
-            branch_invariants.check(curve, path, placed, found.eigenvalues, curve.conservative)
-        return found
+    def checked(walker, path):
+        found, placed, messages = search(walker, path)
+        detect = set(walker.options.detect)
+        if walker.kind == "equilibrium" and detect == {"fold", "branch_point", "hopf"}:
+            curve = walker.curve
+            special = [one for one in placed if one.special.kind != "event"]
+            branch_invariants.check(curve, path, special, found.eigenvalues, curve.conservative)
+        return found, placed, messages
 
-    branch.find = checked
+    CurveWalk.search = checked
     yield
-    branch.find = find
+    CurveWalk.search = search

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -11,15 +11,31 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.acceptance import on_bound
 from phasekit.bifurcation.continuation.conserved import deficient, not_isolated
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.gaps import narrow
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BRANCH,
+    EQUILIBRIUM,
+    EVENT,
+    FLIP,
+    FOLD,
+    HOPF,
+    TORUS,
+)
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.path import Sample, join
+from phasekit.bifurcation.continuation.path import Path, Sample, join
 from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.specials import find
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
 from phasekit.bifurcation.continuation.stops import place_of
+from phasekit.bifurcation.continuation.walk import Tracks
 
 Array = npt.NDArray[np.float64]
 
+#: What curves are curves of, by their defining systems.
+KINDS = {
+    EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point",
+    FLIP: "period_doubling", TORUS: "torus", EVENT: "event",
+}  # fmt: skip
 START = 1e-6  # distance on scaled axes within which a point is the start itself
 
 
@@ -30,6 +46,21 @@ class CurveWalk:
     curve: Curve
     chunk: ClassVar[int] = 32
     looks_back: ClassVar[bool] = True
+
+    def over(self, **changes: Any) -> CurveWalk:
+        """The same with changes of the curve, such as wider bounds."""
+        return CurveWalk(self.curve.replace(**changes))
+
+    @property
+    def kind(self) -> str:
+        """What it is a curve of."""
+        return KINDS[self.curve.kind]
+
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of what its bounds are bounds of."""
+        field = self.curve.field
+        return (*field.states, *(field.parameters[i] for i in self.curve.active))
 
     @property
     def options(self) -> ContinuationOptions:
@@ -80,6 +111,50 @@ class CurveWalk:
 
     def words(self, seen: Placed) -> str:
         """Where a special point is."""
+        names = self.bounded[:4]
+        return ", ".join(f"{name} = {seen.special.u[i]:.9g}" for i, name in enumerate(names))
+
+    def joined(self, start: Sample, tracks: Tracks, origin: Stop) -> Path:
+        """One path of two tracks."""
+        return join(self.curve, start, *tracks)
+
+    def search(self, path: Path) -> tuple[Path, list[Placed], tuple[str, ...]]:
+        """The path with its eigenvalues, its special points, and what is not certain."""
+        return _with_eigenvalues(path, find(self.curve, path), narrow(self.curve, path))
+
+    def unsearched(self, path: Path) -> tuple[Path, list[Placed], tuple[str, ...]]:
+        """The same where there was no time to look for them."""
+        return _with_eigenvalues(path, not_searched(path, self.curve.n), ())
+
+    def notes(self, path: Path) -> tuple[str, ...]:
+        """Nothing else."""
+        return ()
+
+    def at_ends(self, path: Path) -> list[Placed]:
+        """The two ends of a path as special points."""
         curve = self.curve
-        names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
-        return ", ".join(f"{name} = {seen.special.u[i]:.9g}" for i, name in enumerate(names[:4]))
+        found = []
+        last = path.count - 1
+        for i, along, stop in ((0, -np.inf, path.stops[0]), (last, np.inf, path.stops[1])):
+            there = path.ends[0 if along < 0.0 else 1]
+            u = path.u[i, : curve.m] if there is None else there.special.u
+            at = float(u[curve.n])
+            residual = float(np.max(np.abs(curve.at(u)[0])))
+            special = Special(
+                "end", u, (at, at), residual, "converged", stop.message, tangent=path.tangent[i]
+            )
+            found.append(Placed(i, along, special))
+        return found
+
+    def in_order(self, found: list[Placed]) -> list[Placed]:
+        """Special points as they come along the path."""
+        return sorted(found, key=lambda one: (one.index, one.along))
+
+
+def _with_eigenvalues(
+    path: Path, found: Specials, gaps: tuple[str, ...]
+) -> tuple[Path, list[Placed], tuple[str, ...]]:
+    """A path that knows its eigenvalues, its special points, and what is not certain of it."""
+    placed, eigenvalues, doubts = found
+    path = replace(path, eigenvalues=eigenvalues)
+    return path, placed, (*path.messages, *doubts, *gaps)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Protocol, Self, TypeVar
+from typing import Any, NamedTuple, Protocol, Self, TypeVar
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.stops import (
@@ -91,6 +91,21 @@ class Walker(Protocol):
     """What can be followed: the protocol between one kind of solution and the walk."""
 
     @property
+    def curve(self) -> Any:
+        """The equations of what is followed, over its free parameters."""
+
+    def over(self, **changes: Any) -> Self:
+        """The same with changes of the equations, such as wider bounds."""
+
+    @property
+    def kind(self) -> str:
+        """What it is a curve of."""
+
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of what its bounds are bounds of."""
+
+    @property
     def options(self) -> ContinuationOptions:
         """How far and how finely."""
 
@@ -130,9 +145,55 @@ class Walker(Protocol):
     def words(self, seen: Any) -> str:
         """Where a special point is."""
 
+    def joined(self, start: Any, tracks: Tracks, origin: Stop) -> Any:
+        """One path of two tracks; without a first one, the origin says why it begins there."""
+
+    def search(self, path: Any) -> tuple[Any, list[Any], tuple[str, ...]]:
+        """The path, its special points in order, and what is to be said of it."""
+
+    def unsearched(self, path: Any) -> tuple[Any, list[Any], tuple[str, ...]]:
+        """The same of a path on which there was no time to look for any."""
+
+    def notes(self, path: Any) -> tuple[str, ...]:
+        """What else holds all along a path that ends where it is to end."""
+
+    def at_ends(self, path: Any) -> list[Any]:
+        """The two ends of a path as special points."""
+
+    def in_order(self, found: list[Any]) -> list[Any]:
+        """Special points as they come along the path."""
+
 
 Tracks = tuple[Any, Any]
 P = TypeVar("P", bound=Path)
+
+
+class Found(NamedTuple):
+    """A path with its special points in order, ends among them, and what is to be said of it."""
+
+    path: Any
+    specials: list[Any]
+    messages: tuple[str, ...]
+
+
+def search(
+    walker: Walker, start: Any, tracks: Tracks, origin: Stop, *, interrupted: bool = False
+) -> Found:
+    """The path of two tracks from a start, and the special points on it."""
+    path = walker.joined(start, tracks, origin)
+    path, seen, messages = walker.unsearched(path) if interrupted else walker.search(path)
+    path, seen = cut(walker, start, path, seen)
+    if not path.closed:
+        seen = walker.in_order([*seen, *walker.at_ends(path)])
+    return Found(path, seen, (*messages, *walker.notes(path)))
+
+
+def halted(tracks: Tracks) -> Tracks:
+    """Tracks whose special points were not looked for, since the user interrupted it."""
+    backward, forward = (
+        None if track is None else replace(track, stop=SEARCHED) for track in tracks
+    )
+    return backward, forward
 
 
 def run(walker: Walker, start: Any, directions: str) -> Tracks:

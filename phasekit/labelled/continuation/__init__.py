@@ -6,10 +6,7 @@ lead(
     {
         "branch.save": "phasekit.labelled.continuation.branch_store:save",
         "branch.load": "phasekit.labelled.continuation.branch_store:load",
-        "cycles.save": "phasekit.labelled.continuation.cycle_store:save",
-        "point.switch": "phasekit.labelled.continuation.point_curves:switch",
-        "point.double": "phasekit.labelled.continuation.point_curves:doubled",
-        "point.orbits": "phasekit.labelled.continuation.cycle_start:from_hopf",
+        "point.switch": "phasekit.labelled.continuation.point_curves:leave",
         "point.curve": "phasekit.labelled.continuation.point_curves:point_curve",
         "orbit.switch": "phasekit.labelled.continuation.cycle_onward:switched",
         "orbit.curve": "phasekit.labelled.continuation.cycle_onward:point_curve",

@@ -17,7 +17,7 @@ from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.checks import check_parameter
-from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
 from phasekit.labelled.continuation.cycle_start import spans_of
 from phasekit.labelled.continuation.orbit_guess import first_point, scale_of
@@ -85,8 +85,9 @@ def continue_solution(
         start = start.flipped()
     family = made.replace(events=asked, ends=ends)
     try_events(family, start.orbit)
-    tracks = run(CycleWalk(family), start, options.directions)
-    return make_cycles(problem, family, start, tracks, record, kind=made.kind)
+    walker = CycleWalk(family)
+    tracks = run(walker, start, options.directions)
+    return CycleBranch.of_tracks(problem, walker, start, tracks, record)
 
 
 def _free(problem: Any, parameter: Any) -> list[str]:

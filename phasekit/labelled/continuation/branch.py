@@ -4,40 +4,32 @@ from __future__ import annotations
 
 import difflib
 import functools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+import html
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, fields
 from os import PathLike
 from types import MappingProxyType
-from typing import Any, Self, cast
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import numpy.typing as npt
 import xarray as xr
 
-from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.curve_walk import CurveWalk
-from phasekit.bifurcation.continuation.gaps import narrow
-from phasekit.bifurcation.continuation.kernels.defining import (
-    BRANCH,
-    EQUILIBRIUM,
-    EVENT,
-    FLIP,
-    FOLD,
-    HOPF,
-    TORUS,
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.walk import (
+    Found,
+    Tracks,
+    Walker,
+    go_on,
+    goes_on,
+    halted,
+    search,
 )
-from phasekit.bifurcation.continuation.path import Path, Sample, join
-from phasekit.bifurcation.continuation.placed import Placed
-from phasekit.bifurcation.continuation.points.special import Special
-from phasekit.bifurcation.continuation.specials import Specials, find, not_searched
-from phasekit.bifurcation.continuation.stops import SEARCHED
-from phasekit.bifurcation.continuation.walk import Walker, cut, go_on, goes_on
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.branch_points import Table, points_of
+from phasekit.labelled.continuation.branch_points import points_of
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
-from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
+from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, unknown, whole
@@ -45,14 +37,16 @@ from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
-FloatArray = npt.NDArray[np.float64]
-Record = Mapping[str, Any]
+if TYPE_CHECKING:
+    import pandas as pd
 
-KINDS = {
-    EQUILIBRIUM: "equilibrium", FOLD: "fold", HOPF: "hopf", BRANCH: "branch_point",
-    FLIP: "period_doubling", TORUS: "torus", EVENT: "event",
-}  # fmt: skip
-NUMBERS = {name: number for number, name in KINDS.items()}
+Record = Mapping[str, Any]
+#: A special point of a path, its place among the points, and the eigenvalues there.
+Place = tuple[Any, int, Any]
+
+NO_START = Stop("start", "the start; this direction was not requested")
+#: Special points that a branch shows at most.
+SHOWN = 20
 
 
 #: Usual words for kinds of special points, beside their names and labels.
@@ -110,7 +104,7 @@ class Branch:
         Why the curve ends, at its first and at its last point: ``reason`` (bound, closed,
         max_points, stuck, not_finite, start, or what it was to ``stop`` at) and ``message``.
     messages : tuple of str
-        What is not certain about the curve as a whole; empty where nothing is in doubt.
+        What holds of the curve as a whole, such as that something is not certain; else empty.
     kind : str
         equilibrium, fold, hopf, branch_point or event; of maps period_doubling or torus, too.
     parameter : str
@@ -151,22 +145,85 @@ class Branch:
     """
 
     problem: Problem
-    free: tuple[str, ...]
-    problem_state: tuple[str, ...]
-    curve: Curve
-    start: Sample
-    tracks: tuple[Track | None, Track | None]
-    _table: Table
-    special_points: tuple[SpecialPoint[Branch], ...]
-    stops: tuple[Stop, Stop]
-    kind: str
+    walker: Walker
+    start: Any
+    tracks: Tracks
+    origin: Stop
     record: Record
-    messages: tuple[str, ...] = ()
+    stops: tuple[Stop, Stop]
+    messages: tuple[str, ...]
+    _table: Callable[[], xr.Dataset]
+    _places: tuple[Place, ...]
+
+    @classmethod
+    def of_tracks(
+        cls, problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
+        origin: Stop = NO_START,
+    ) -> Self:  # fmt: skip
+        """A branch of what was followed: special points are looked for, quantities recorded."""
+        try:
+            found = search(walker, start, tracks, origin)
+            return cls._of(problem, walker, start, tracks, record, origin, found)
+        except KeyboardInterrupt:  # what was followed is kept
+            tracks = halted(tracks)
+            found = search(walker, start, tracks, origin, interrupted=True)
+            return cls._of(problem, walker, start, tracks, record, origin, found)
+
+    @classmethod
+    def _of(
+        cls, problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
+        origin: Stop, found: Found,
+    ) -> Self:  # fmt: skip
+        table, places = cls._tabulated(problem, walker, found, record)
+        branch = cls(
+            problem, walker, start, tracks, origin, MappingProxyType(dict(record)),
+            found.path.stops, found.messages, table, tuple(places),
+        )  # fmt: skip
+        if record:  # functions of the user are called now
+            _ = branch._points
+        return branch
+
+    @staticmethod
+    def _tabulated(
+        problem: Problem, walker: Any, found: Found, record: Record
+    ) -> tuple[Callable[[], xr.Dataset], list[Place]]:
+        """What makes the points, and where special points stand among them."""
+        return points_of(problem, walker.curve, found, record)
+
+    @functools.cached_property
+    def special_points(self) -> tuple[SpecialPoint[Self], ...]:
+        """In order along the curve."""
+        return tuple(self._special_point(*place) for place in self._places)
+
+    def _special_point(self, found: Any, index: int, eigenvalues: Any) -> SpecialPoint[Self]:
+        return SpecialPoint.placed(self.problem, self.curve, found, eigenvalues, index, self)
 
     @functools.cached_property
     def _points(self) -> xr.Dataset:
         """The points, made when they are first asked for."""
         return self._table()
+
+    @property
+    def curve(self) -> Any:
+        """The equations of what was followed."""
+        return self.walker.curve
+
+    @property
+    def kind(self) -> str:
+        """What it is a curve of."""
+        return self.walker.kind
+
+    @functools.cached_property
+    def free(self) -> tuple[str, ...]:
+        """The free parameters."""
+        names = self.curve.field.parameters
+        return tuple(names[i] for i in self.curve.active)
+
+    @property
+    def problem_state(self) -> tuple[str, ...]:
+        """The states."""
+        states: tuple[str, ...] = self.curve.field.states
+        return states
 
     @property
     def points(self) -> xr.Dataset:
@@ -219,6 +276,36 @@ class Branch:
         )
         return ds
 
+    def table(self) -> pd.DataFrame:
+        """The special points, a row each, for reading.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Label and kind, free parameters and states by name, ``residual``, ``status``, and the
+            name of an event or what is said of the point.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + x - x**3", state="x", parameters={"mu": -1.0})
+        >>> branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1))
+        >>> branch.table()[["kind", "mu"]].round(4).values.tolist()
+        [['end', -1.0], ['fold', 0.3849], ['fold', -0.3849], ['end', 1.0]]
+        """
+        import pandas as pd
+
+        specials = self.special_points
+        columns: dict[str, Any] = {
+            "label": [s.label for s in specials], "kind": [s.kind for s in specials]
+        }  # fmt: skip
+        for name in (*self.free, *self._numbers, *self.problem_state):
+            columns[name] = [s[name] for s in specials]
+        columns["residual"] = [s.residual for s in specials]
+        columns["status"] = [s.status for s in specials]
+        columns["message"] = ["; ".join(filter(None, (s.name, s.message))) for s in specials]
+        return pd.DataFrame(columns)
+
     def special(self, label: str) -> tuple[SpecialPoint[Branch], ...]:
         """Special points of one kind (fold, ...), label (LP, BP, ...) or named event.
 
@@ -237,7 +324,7 @@ class Branch:
         ParameterError
             If there is no such label, kind or event.
         """
-        events = [event.name for event in getattr(self.curve, "events", ())]
+        events = [event.name for event in self.curve.events]
         _check_kind(label, events)
         return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
 
@@ -300,26 +387,26 @@ class Branch:
         >>> round(float(longer.extend(span=(-1, 2)).points.mu.max()), 9)
         2.0
         """
-        curve, _ = self.known()
-        most = curve.options.max_points if points is None else points
+        most = self.walker.options.max_points if points is None else points
         count = whole("points", most, "a whole number >= 1")
-        wider = self._wider(span, bounds)
-        widened = self._walker(**wider)
-        if not any(goes_on(widened, track) for track in self.tracks):
+        walker = self.walker.over(**self._wider(span, bounds))
+        if not any(goes_on(walker, track) for track in self.tracks):
             reasons = "; ".join(stop.message for stop in self.stops)
             raise ParameterError(
                 f"extend: the branch ended for other reasons than max_points: {reasons}; where it "
                 "met a bound, give a wider span= or bounds="
             )
         with notice(f"extending the branch along {self.parameter}"):
-            return announced(self._longer(count, wider))
+            tracks = go_on(walker, self.start, self.tracks, count)
+            return announced(self.of_tracks(
+                self.problem, walker, self.start, tracks, self.record, self.origin
+            ))  # fmt: skip
 
     def _wider(
         self, span: Sequence[float] | None, bounds: Mapping[str, Sequence[float]] | None
     ) -> dict[str, Any]:
         """Bounds of the curve that are replaced, checked."""
-        curve, _ = self.known()
-        names = self._bounded()
+        curve, names = self.curve, self.walker.bounded
         asked = dict(check_bounds(bounds))
         if span is not None:
             if len(self.free) != 1:
@@ -343,30 +430,12 @@ class Branch:
             low[i], high[i] = first, last
         return {"low": low, "high": high}
 
-    def _bounded(self) -> list[str]:
-        """What the bounds of the curve are bounds of."""
-        return [*self.curve.field.states, *self.free]
-
-    def _walker(self, **changes: Any) -> Walker:
-        """How it is followed, with changes of what defines it."""
-        return CurveWalk(self.curve.replace(**changes))
-
-    def _longer(self, count: int, bounds: Mapping[str, Any]) -> Self:
-        curve, problem = self.known()
-        curve = curve.replace(**bounds)
-        backward, forward = go_on(CurveWalk(curve), self.start, self.tracks, count)
-        made = make_branch(problem, curve, self.start, backward, forward, self.record)
-        return cast(Self, made)
-
-    def _discrete(self) -> bool:
-        return self.problem.map
-
-    def known(self) -> tuple[Curve, Problem]:
+    def known(self) -> tuple[Any, Problem]:
         """The curve and the problem.
 
         Returns
         -------
-        tuple of (Curve, Problem)
+        tuple of (curve, Problem)
         """
         return self.curve, self.problem
 
@@ -422,9 +491,17 @@ class Branch:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made again of what was traced, as when a branch is loaded."""
-        curve, problem = self.known()
-        kept = {f.name: getattr(curve, f.name) for f in fields(curve) if f.name != "field"}
-        return _again, (problem, kept, self.start, self.tracks, dict(self.record))
+        curve = self.curve
+        kept = {f.name: getattr(curve, f.name) for f in fields(curve) if f.name not in NOT_COMPARED}
+        return _again, (
+            type(self), type(self.walker), type(curve), self.problem, kept, self.start,
+            self.tracks, dict(self.record), self.origin,
+        )  # fmt: skip
+
+    @staticmethod
+    def _code(problem: Problem, curve: Mapping[str, Any]) -> dict[str, Any]:
+        """Machine code of a curve, which is not kept."""
+        return {"field": problem.field}
 
     def __eq__(self, other: object) -> bool:
         """Whether it is the same curve of an equal problem, traced and recorded alike."""
@@ -437,105 +514,56 @@ class Branch:
         """Hash of what is followed, and how far."""
         return hash((type(self).__name__, self.kind, self.free, self._points.sizes["point"]))
 
-    def __repr__(self) -> str:
-        """Write what it is, its range, its special points and why it ends."""
-        u = {name: self._points[name].values for name in self.free}
-        ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
-        of = {"equilibrium": "fixed points" if self._discrete() else "equilibria"}.get(
-            self.kind, f"{self.kind} points"
-        )
+    #: Numbers of a point, beside its free parameters, that it is shown with.
+    @property
+    def _numbers(self) -> tuple[str, ...]:
+        return ()
+
+    @property
+    def _followed(self) -> str:
+        """What its points are, in words."""
         held = getattr(self.curve, "held", None)
-        of = of if held is None else f"points of the event {held.name!r}"
-        lines = [f"<Branch of {of}: {self._points.sizes['point']} points, {ranges}"]
-        shown = [s for s in self.special_points if s.kind != "end"]
-        lines += [f"  {special!r}" for special in shown[:20]]
-        lines += [f"  ... {len(shown) - 20} more"] if len(shown) > 20 else []
+        if held is not None:
+            return f"points of the event {held.name!r}"
+        words = {"equilibrium": "fixed points" if self.problem.map else "equilibria",
+                 "cycle": "periodic orbits", "boundary": "solutions"}  # fmt: skip
+        return words.get(self.kind, f"{self.kind} points")
+
+    def _head(self) -> str:
+        u = {name: self._points[name].values for name in (*self.free, *self._numbers)}
+        ranges = ", ".join(f"{n} from {v.min():.6g} to {v.max():.6g}" for n, v in u.items())
+        return f"Branch of {self._followed}: {self._points.sizes['point']} points, {ranges}"
+
+    def _notes(self) -> list[str]:
+        """What is to be said of it: why it ends, and what is not certain."""
         if self.closed:
-            lines.append(f"  closed: {self.stops[1].message}")
+            ends = [f"closed: {self.stops[1].message}"]
         else:
-            lines += [
-                f"  {name}: {stop.message}"
+            ends = [
+                f"{name}: {stop.reason}, {stop.message}"
                 for name, stop in zip(("first", "last"), self.stops, strict=True)
             ]
-        lines += [f"  not certain: {message}" for message in self.messages]
-        return "\n".join(lines) + ">"
+        return [*ends, *self.messages]
 
+    def __repr__(self) -> str:
+        """Write what it is, its range, its special points and why it ends."""
+        points = [repr(s) for s in self.special_points if s.kind != "end"]
+        more = [f"... {len(points) - SHOWN} more"] if len(points) > SHOWN else []
+        lines = [f"<{self._head()}", *points[:SHOWN], *more, *self._notes()]
+        return "\n  ".join(lines) + ">"
 
-def make_branch(
-    problem: Problem,
-    curve: Curve,
-    start: Sample,
-    backward: Track | None,
-    forward: Track | None,
-    record: Record,
-) -> Branch:
-    """A branch of what was traced: special points are looked for, quantities recorded."""
-    try:
-        path = join(curve, start, backward, forward)
-        found, gaps = find(curve, path), narrow(curve, path)
-        return _branch_of(problem, curve, start, (backward, forward), path, found, gaps, record)
-    except KeyboardInterrupt:  # what was followed is kept
-        backward, forward = (
-            None if track is None else replace(track, stop=SEARCHED)
-            for track in (backward, forward)
-        )
-        path = join(curve, start, backward, forward)
-        found, gaps = not_searched(path, curve.n), ()
-        return _branch_of(problem, curve, start, (backward, forward), path, found, gaps, record)
-
-
-def _branch_of(
-    problem: Problem,
-    curve: Curve,
-    start: Sample,
-    tracks: tuple[Track | None, Track | None],
-    path: Path,
-    found: Specials,
-    gaps: tuple[str, ...],
-    record: Record,
-) -> Branch:
-    """A branch of a path and the special points that were found on it."""
-    found_at, eigenvalues, doubts = found
-    path = replace(path, eigenvalues=eigenvalues)
-    path, placed = cut(CurveWalk(curve), start, path, found_at)
-    names = tuple(curve.field.parameters[i] for i in curve.active)
-    specials = [*placed, *_ends(curve, path)]
-    specials.sort(key=lambda one: (one.index, one.along))
-    table, places, values = points_of(problem, curve, path, specials, record)
-    branch = Branch(
-        problem, names, curve.field.states, curve, start, tracks, table, (),
-        path.stops, KINDS[curve.kind], MappingProxyType(dict(record)),
-        (*path.messages, *doubts, *gaps),
-    )  # fmt: skip
-    made = tuple(
-        special_point(problem, curve, one.special, own, place, branch)
-        for one, own, place in zip(specials, values, places, strict=True)
-    )
-    object.__setattr__(branch, "special_points", made)
-    return branch
+    def _repr_html_(self) -> str:
+        """Write the same for a notebook, special points in a table."""
+        points = self.table()
+        points = points[points.kind != "end"]
+        rows = points.to_html(index=False, border=0, max_rows=SHOWN) if len(points) else ""
+        notes = "".join(f"<div>{html.escape(note)}</div>" for note in self._notes())
+        return f"<div><b>{html.escape(self._head())}</b>{rows}{notes}</div>"
 
 
 def _again(
-    problem: Problem,
-    curve: Mapping[str, Any],
-    start: Sample,
-    tracks: tuple[Track | None, Track | None],
-    record: Record,
-) -> Branch:
-    return make_branch(problem, Curve(problem.field, **curve), start, *tracks, record)
-
-
-def _ends(curve: Curve, path: Path) -> list[Placed]:
-    if path.closed:
-        return []
-    found = []
-    for i, along, stop in ((0, -np.inf, path.stops[0]), (path.count - 1, np.inf, path.stops[1])):
-        there = path.ends[0 if along < 0.0 else 1]
-        u = path.u[i, : curve.m] if there is None else there.special.u
-        at = float(u[curve.n])
-        residual = float(np.max(np.abs(curve.at(u)[0])))
-        special = Special(
-            "end", u, (at, at), residual, "converged", stop.message, tangent=path.tangent[i]
-        )
-        found.append(Placed(i, along, special))
-    return found
+    form: type[Branch], walker: Any, curve: Any, problem: Problem, kept: Mapping[str, Any],
+    start: Any, tracks: Tracks, record: Record, origin: Stop,
+) -> Branch:  # fmt: skip
+    followed = walker(curve(**form._code(problem, kept), **kept))
+    return form.of_tracks(problem, followed, start, tracks, record, origin)

@@ -21,6 +21,7 @@ from phasekit.bifurcation.continuation.spectrum import (
     eigenvalues_of,
     unstable_of,
 )
+from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
 from phasekit.systems.problem import Problem
@@ -36,17 +37,15 @@ def wrap(value: FloatArray, period: float) -> FloatArray:
 
 
 def points_of(
-    problem: Problem,
-    curve: Curve,
-    path: Path,
-    specials: list[Placed],
-    record: Record,
-) -> tuple[Table, list[int], npt.NDArray[np.complex128]]:
-    """The points of a path with its special points, the places of these, and their eigenvalues.
+    problem: Problem, curve: Curve, found: Found, record: Record
+) -> tuple[Table, list[tuple[Placed, int, npt.NDArray[np.complex128]]]]:
+    """The points of a path with its special points, and the places and eigenvalues of these.
 
     The points are made when they are called for: labels take longer than a short curve.
     """
     n, m = curve.n, curve.m
+    path: Path = found.path
+    specials: list[Placed] = found.specials
     inner = [one for one in specials if one.special.kind != "end"]
     where = np.array([one.index + 1 for one in inner], dtype=np.int64)
     total = path.count + len(inner)
@@ -102,15 +101,7 @@ def points_of(
     table = functools.partial(
         _dataset, problem, curve, u, t, info, values, label, record, kappa, residual, one_of_many
     )
-    return made_with(table, record), places, there
-
-
-def made_with(table: Table, record: Record) -> Table:
-    """The table of points, to be made later; at once where functions of the user are recorded."""
-    if not record:
-        return table
-    made = table()
-    return lambda: made
+    return table, list(zip(specials, places, there, strict=True))
 
 
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:

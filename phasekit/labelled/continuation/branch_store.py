@@ -9,13 +9,12 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.continuation.branch import Branch, make_branch
-from phasekit.labelled.continuation.branch_stored import ARRAYS, Stored, damaged
-from phasekit.labelled.continuation.cycle_store import made_again
+from phasekit.labelled.continuation import curve_store
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
 from phasekit.maps.netcdf import open_netcdf
@@ -23,35 +22,29 @@ from phasekit.maps.replacing import put_back
 from phasekit.maps.stored_arrays import reason
 from phasekit.maps.whole import WholeTarget, target_of
 from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
-from phasekit.systems.problem import as_problem
+from phasekit.systems.problem import Problem, as_problem
 
 _NAME = "Branch"
+#: What branches of orbits are of, and those of fixed points of maps may be as well.
+_OF_ORBITS = ("cycle", "boundary", "fold_of_cycles", "period_doubling", "torus")
 
 
 def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
     """Write a branch: its points as a Dataset, and what it takes to go on."""
-    curve, problem = branch.known()
     flag("overwrite", overwrite)
     target = WholeTarget(target_of(path), overwrite=overwrite)
     ds = branch.to_dataset()
-    for name, array in {
-        **{f"curve_{name}": getattr(curve, name) for name in ARRAYS},
-        "curve_aux": np.zeros(0) if curve.aux is None else curve.aux,
-        "start_u": branch.start.u,
-        "start_tangent": branch.start.tangent,
-        "start_slopes": branch.start.slopes,
-    }.items():
+    for name, values in list(ds.data_vars.items()):
+        if values.dtype.kind == "c":
+            ds = ds.drop_vars(str(name))
+            for part, numbers in (("real", values.real), ("imag", values.imag)):
+                ds[f"{name}_{part}"] = ((*values.dims[:-1], "number"), numbers.values)
+    form = _form(branch.kind, branch.problem)
+    for name, array in form.arrays_of(branch).items():
         ds[f"raw_{name}"] = (tuple(f"raw_{name}_{k}" for k in range(array.ndim)), array)
-    for name, track in zip(("backward", "forward"), branch.tracks, strict=True):
-        if track is not None:
-            ds[f"raw_{name}"] = ((f"raw_{name}_point", f"raw_{name}_column"), track.record)
-            if track.slopes.shape[1]:
-                ds[f"raw_{name}_slopes"] = (
-                    (f"raw_{name}_point", f"raw_{name}_slope"), track.slopes,
-                )  # fmt: skip
-            ds[f"raw_{name}_state"] = ((f"raw_{name}_entry",), track.state)
+    curve = branch.curve
     spec = {
-        "problem": problem.specification(),
+        "problem": branch.problem.specification(),
         "free": list(branch.free),
         "kind": branch.kind,
         "options": curve.options.as_dict(),
@@ -60,18 +53,28 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
             for track in branch.tracks
         ],
         "record": {name: function is None for name, function in branch.record.items()},
+        **form.words_of(branch),
     }
     if curve.events:
-        spec |= {"events": written(curve.events), "ends": list(curve.ends)}
-        spec["conditions"] = [event.name for event in curve.events if event.condition]
-    elif curve.ends:
+        spec["events"] = written(curve.events)
+    if curve.ends or curve.events:
         spec["ends"] = list(curve.ends)
-    if curve.held is not None:
-        spec["held"] = written([curve.held])
     ds.attrs = {
         MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
     }  # fmt: skip
     target.write(ds)
+
+
+def _form(kind: str, problem: Problem) -> Any:
+    """The module that knows the arrays of such branches."""
+    if (
+        kind in ("cycle", "boundary", "fold_of_cycles", "period_doubling", "torus")
+        and not problem.map
+    ):
+        from phasekit.labelled.continuation import cycle_store
+
+        return cycle_store
+    return curve_store
 
 
 def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = None) -> Branch:
@@ -96,15 +99,12 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
         else:
             given = stored.problem()
         functions = stored.functions(record or {})
-        of_cycles = ("cycle", "boundary", "fold_of_cycles", "period_doubling", "torus")
-        if stored.spec["kind"] in of_cycles and not given.map:
-            return made_again(stored, given, functions, events)
-        curve = stored.curve(given).replace(**stored.asked(given, events))
-        start, tracks = stored.traces(curve)
-    if problem is not None or any(functions.values()) or events:
-        return make_branch(given, curve, start, *tracks, functions)  # what f raises is the user's
-    with damaged(str(place), "its points"):
-        return make_branch(given, curve, start, *tracks, functions)
+        form, walker, *followed = _form(stored.kind, given).read(stored, given, events)
+    of_user = problem is not None or any(functions.values()) or events
+    with contextlib.nullcontext() if of_user else damaged(str(place), "its points"):
+        start, tracks, origin = followed
+        branch: Branch = form.of_tracks(given, walker, start, tracks, functions, origin)
+    return branch
 
 
 def _place(path: Any) -> Path:

@@ -8,24 +8,18 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
-from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVENT, HOPF, TORUS
-from phasekit.bifurcation.continuation.kernels.state import NUMBERS as STATE_NUMBERS
-from phasekit.bifurcation.continuation.kernels.state import VECTORS
+from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.path import Sample
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ParameterError, StoreError
-from phasekit.labelled.continuation.branch import KINDS, NUMBERS
-from phasekit.labelled.continuation.user_events import events_of
+from phasekit.labelled.continuation.user_events import REASONS
 from phasekit.labels.arguments import bad
 from phasekit.maps.stored_arrays import reason
 from phasekit.systems.boundary_problem import BoundaryProblem
@@ -35,9 +29,6 @@ from phasekit.systems.registry import model_named
 
 Array = npt.NDArray[np.float64]
 
-#: Arrays of a curve, by name.
-ARRAYS = ("par", "scale", "period", "low", "high")
-_REASONS = ("bound", "closed", "max_points", "interrupted", "stuck", "not_finite", "start")
 #: Bytes of an array that any file may hold, and how many times smaller it may be stored.
 _SMALL, _RATIO = 1 << 26, 1000
 
@@ -75,6 +66,7 @@ class Stored:
         with damaged(name, "the attribute 'branch'"):
             self.spec = _mapping("branch", json.loads(ds.attrs["branch"]))
             self.made_of = _mapping("problem", self.spec["problem"])
+            self.kind = self.spec["kind"]
 
     def problem(self) -> Problem:
         """The problem, if it is one of formulas or of a system."""
@@ -112,21 +104,6 @@ class Stored:
             )
         return {name: None if by_name else given[name] for name, by_name in kept.items()}
 
-    def asked(self, problem: Problem, given: Mapping[str, Any] | None) -> dict[str, Any]:
-        """The events of the branch and where it ends, with functions that are given again."""
-        events = self.events(problem, given, events_of)
-        with damaged(self.name, "its events"):
-            ends = tuple(str(name) for name in self.spec.get("ends", ()))
-            conditions = list(self.spec.get("conditions", ()))
-        events = tuple(replace(one, condition=one.name in conditions) for one in events)
-        held = None
-        if self.spec["kind"] == KINDS[EVENT]:
-            found = self.events(problem, given, events_of, "held")
-            with damaged(self.name, "its event"):
-                (held,) = found
-        return {"events": events, "ends": ends, "conservative": problem.conservative,
-                "discrete": problem.map, "held": held}  # fmt: skip
-
     def events(
         self, problem: Problem, given: Mapping[str, Any] | None, take: Callable[..., Any],
         which: str = "events",
@@ -152,75 +129,39 @@ class Stored:
         functions = {one.name: one for one in take(problem, code)}
         return tuple((formulas | functions)[name] for name in kept)
 
-    def curve(self, problem: Problem) -> Curve:
-        """The curve that was traced."""
-        with damaged(self.name, "its curve"):
-            options = dict(_mapping("options", self.spec["options"]))
-            options["detect"] = tuple(options["detect"])
-            options["bounds"] = {k: tuple(v) for k, v in options["bounds"].items()}
-            kind = NUMBERS[self.spec["kind"]]
-            names, free = list(problem.parameters), list(self.spec["free"])
-            active = tuple(names.index(name) for name in free)
-            count = 1 if kind == EQUILIBRIUM else 2
-            if len(set(active)) != count or len(active) != count:
-                raise ValueError(f"free: got {free}, wants {count} different parameters")
-            empty = np.zeros(0)
-            made = Curve(
-                problem.field, kind, empty, active, empty, empty, empty, empty,
-                ContinuationOptions(**options),
-            )  # fmt: skip
-            shapes = {name: (made.size,) for name in ARRAYS} | {"par": (len(names),)}
-            arrays = {
-                name: self.array(f"curve_{name}", shape, finite=name not in ("low", "high"))
-                for name, shape in shapes.items()
-            }
-            if not (arrays["scale"] > 0.0).all() or not (arrays["period"] >= 0.0).all():
-                raise ValueError("raw_curve_scale, raw_curve_period: want numbers > 0, and >= 0")
-            aux = self.array("curve_aux", (made.n if kind in (HOPF, TORUS) else 0,))
-            return made.replace(**arrays, aux=aux if aux.size else None)
+    def ends(self) -> tuple[str, ...]:
+        """At what the branch was told to end."""
+        return tuple(str(name) for name in self.spec.get("ends", ()))
 
-    def traces(self, curve: Curve) -> tuple[Sample, tuple[Track | None, Track | None]]:
-        """The start, and the tracks in both directions."""
-        size, n, m = curve.size, curve.n, curve.m
-        with damaged(self.name, "its points"):
-            u, tangent = self.array("start_u", (size,)), self.array("start_tangent", (size,))
-            start = Sample(u, tangent, self.array("start_slopes", (n, m), finite=False))
-            backward, forward = (
-                self._track(name, stop, curve)
-                for name, stop in zip(("backward", "forward"), self.spec["stops"], strict=True)
-            )
-        return start, (backward, forward)
+    def options(self) -> ContinuationOptions:
+        """The options of the branch."""
+        options = dict(_mapping("options", self.spec["options"]))
+        options["detect"] = tuple(options["detect"])
+        options["bounds"] = {k: tuple(v) for k, v in options["bounds"].items()}
+        return ContinuationOptions(**options)
 
-    def _track(self, name: str, stop: Any, curve: Curve) -> Track | None:
-        if stop is None:
-            return None
-        size = curve.size
-        columns = 2 * size + trace.RECORDED
-        state = VECTORS * size + curve.n
-        reason, message = stop
-        ends = (*_REASONS, *(str(name) for name in self.spec.get("ends", ())))
+    def active(self, problem: Problem, counts: Sequence[int]) -> tuple[int, ...]:
+        """Places of the free parameters, of which there may be so many."""
+        names, free = list(problem.parameters), list(self.spec["free"])
+        active = tuple(names.index(name) for name in free)
+        if len(set(active)) != len(active) or len(active) not in counts:
+            wanted = " or ".join(str(count) for count in counts)
+            raise ValueError(f"free: got {free}, wants {wanted} different parameters")
+        return active
+
+    def tracks(self, read: Callable[[str, Stop], Any]) -> tuple[Any, Any]:
+        """The tracks in both directions, by what reads one of a name that ends so."""
+        backward, forward = (
+            None if stop is None else read(name, self._stop(*stop))
+            for name, stop in zip(("backward", "forward"), self.spec["stops"], strict=True)
+        )
+        return backward, forward
+
+    def _stop(self, reason: Any, message: Any) -> Stop:
+        ends = (*REASONS, *KINDS, *self.ends())
         if reason not in ends or not isinstance(message, str):
-            raise ValueError(f"stops: got {reason!r:.80}, wants one of {', '.join(_REASONS)}")
-        # Where f ends, derivatives and the state that is left need not be finite.
-        record, slopes = self._points(name, curve, columns)
-        left = self.array(f"{name}_state", (state + STATE_NUMBERS,), finite=False)
-        if not np.isfinite(record[:, : 2 * size]).all():
-            raise ValueError(f"raw_{name}: got points that are not finite")
-        return Track(record, slopes, left, Stop(reason, message))
-
-    def _points(self, name: str, curve: Curve, columns: int) -> tuple[Array, Array]:
-        """Points and, of few states, the derivatives of f at each."""
-        matrix = curve.n * curve.m
-        if self.ds.variables[f"raw_{name}"].shape[-1:] != (columns,):
-            # Earlier versions kept the derivatives between tangents and step data.
-            record = self.array(name, (None, columns + matrix), finite=False)
-            here = slice(2 * curve.size, 2 * curve.size + matrix)
-            slopes = record[:, here] if curve.keeps else record[:, :0]
-            return np.delete(record, here, axis=1), slopes
-        record = self.array(name, (None, columns), finite=False)
-        if not curve.keeps:
-            return record, record[:, :0]
-        return record, self.array(f"{name}_slopes", (len(record), matrix), finite=False)
+            raise ValueError(f"stops: got {reason!r:.80}, wants one of {', '.join(REASONS)}")
+        return Stop(reason, message)
 
     def array(self, name: str, shape: tuple[int | None, ...], *, finite: bool = True) -> Array:
         """Read an array of doubles of a shape, in which None is any length."""

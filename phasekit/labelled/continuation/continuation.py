@@ -17,7 +17,7 @@ from phasekit.bifurcation.continuation.scales import guessed, scaled
 from phasekit.bifurcation.continuation.start import settle, tangent_of
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.unfinished import announced
@@ -179,8 +179,9 @@ def continuation(
     curve = scaled(curve, u, given)
     start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
     with notice(f"following equilibria along {parameter}"):
-        backward, forward = run(CurveWalk(curve), start, options.directions)
-        branch = make_branch(problem, curve, start, backward, forward, _record(problem, record))
+        walker = CurveWalk(curve)
+        tracks = run(walker, start, options.directions)
+        branch = Branch.of_tracks(problem, walker, start, tracks, _record(problem, record))
     return announced(branch)
 
 

@@ -15,11 +15,12 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.extended import extended
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
-from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.orbit_guess import first_point
 from phasekit.labels.arguments import bad
+from phasekit.numerics.waits import notice
 
 #: Special points that have curves in two parameters.
 CURVES = ("fold_of_cycles", "period_doubling", "torus")
@@ -27,6 +28,11 @@ CURVES = ("fold_of_cycles", "period_doubling", "torus")
 
 def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
     """The other branch at a period doubling or a branch point of cycles."""
+    with notice(f"following periodic orbits along {point.branch.parameter}"):
+        return _switched(point, direction, options)
+
+
+def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
     if point.kind not in ("period_doubling", "cycle_branch_point", "branch_point"):
         raise bad("point", point.kind, "a period doubling or a branch point")
     if point.status != "converged":
@@ -44,9 +50,10 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
     if point.kind == "period_doubling":
         cycles, orbit, dx = starts.doubled(cycles, here.orbit, checked.W)
         start = first_point(cycles, starts.off(cycles, orbit, dx, size), f"beside {where}")
-        forward = run(CycleWalk(cycles), start, "forward")[1]
+        walker = CycleWalk(cycles)
+        tracks = (None, run(walker, start, "forward")[1])
         origin = Stop("period_doubling", where)
-        return make_cycles(problem, cycles, start, (None, forward), point.branch.record, origin)
+        return CycleBranch.of_tracks(problem, walker, start, tracks, point.branch.record, origin)
     dx, _ = starts.other_tangent(cycles, here.orbit, checked.W, (here.dx, here.dy))
     sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
     one, two = (first_point(cycles, side, f"beside {where}").orbit for side in sides)
@@ -55,8 +62,9 @@ def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> Cy
     dx, dy = one.x - two.x, one.y - two.y
     length = np.sqrt(cycles.inner(mesh, dx, dx, dy, dy))
     start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
-    tracks = run(CycleWalk(cycles), start, options.directions)
-    return make_cycles(problem, cycles, start, tracks, point.branch.record, kind=point.branch.kind)
+    walker = CycleWalk(cycles)
+    tracks = run(walker, start, options.directions)
+    return CycleBranch.of_tracks(problem, walker, start, tracks, point.branch.record)
 
 
 def point_curve(
@@ -92,8 +100,9 @@ def point_curve(
     )
     if start.dy[2] < 0.0:
         start = start.flipped()
-    tracks = run(CycleWalk(made), start, options.directions)
-    return make_cycles(problem, made, start, tracks, point.branch.record, kind=point.kind)
+    walker = CycleWalk(made)
+    tracks = run(walker, start, options.directions)
+    return CycleBranch.of_tracks(problem, walker, start, tracks, point.branch.record)
 
 
 def _options(cycles: Cycles, options: Any) -> ContinuationOptions:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.fourier import coefficients
 from phasekit.bifurcation.continuation.periodic.point import Point, vertical
+from phasekit.bifurcation.continuation.walk import Found
+from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.systems.problem import Problem
@@ -80,14 +83,50 @@ def winding(cycles: Cycles) -> list[int]:
     return [int(k) for k in np.round(cycles.turns[angles] / cycles.period[angles])]
 
 
+@dataclass(frozen=True, eq=False)
+class Orbits:
+    """The orbits of a branch, special points in their places; called, their table."""
+
+    problem: Problem
+    cycles: Cycles
+    points: tuple[Point, ...]
+    labels: tuple[str, ...]
+    record: Mapping[str, Any]
+
+    def __call__(self) -> xr.Dataset:
+        """The points of the branch."""
+        return _dataset(self.problem, self.cycles, self.points, self.labels, self.record)
+
+
 def points_of(
+    problem: Problem, cycles: Cycles, found: Found, record: Mapping[str, Any]
+) -> tuple[Orbits, list[tuple[Any, int, Any]]]:
+    """The orbits of a path with its special points, and the places and multipliers of these."""
+    points, labels = list(found.path.points), [""] * found.path.count
+    places: list[int] = []
+    for seen in found.specials:
+        place = seen.index + 1 + len(points) - found.path.count
+        if seen.kind != "end":
+            points.insert(place, seen.point)
+            labels.insert(place, KINDS[seen.kind].label)
+        places.append(max(place, 0))
+    places = [min(place, len(points) - 1) for place in places]
+    for seen, place in zip(found.specials, places, strict=True):
+        if not labels[place]:
+            labels[place] = KINDS[seen.kind].label
+    orbits = Orbits(problem, cycles, tuple(points), tuple(labels), record)
+    marked = zip(found.specials, places, strict=True)
+    return orbits, [(seen, place, seen.point.multipliers) for seen, place in marked]
+
+
+def _dataset(
     problem: Problem,
     cycles: Cycles,
     points: Sequence[Point],
     labels: Sequence[str],
     record: Mapping[str, Any],
 ) -> xr.Dataset:
-    """The points of a branch, special points in their places."""
+    """The points of a branch as a Dataset."""
     dim = "point"
     # On a curve of special points one multiplier at least is critical everywhere.
     on_curve = "curve" if isinstance(cycles, Extended) else ""

@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import xarray as xr
 
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.family import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
-from phasekit.labelled.continuation.onward import Of, onward
-from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labelled.continuation.unfinished import announced
-from phasekit.numerics.waits import notice
+from phasekit.labelled.continuation.onward import Of
+from phasekit.labelled.continuation.special_point import SpecialPoint, fixed
 from phasekit.systems.problem import Problem
 
 
@@ -28,7 +23,20 @@ class CyclePoint(SpecialPoint[Of]):
     coefficient of the map over one period.
     """
 
-    special: Found  # type: ignore[assignment]
+    way: ClassVar[str] = "orbit"
+
+    @classmethod
+    def placed(
+        cls, problem: Problem, curve: Any, found: Any, eigenvalues: Any, index: int, branch: Of
+    ) -> Self:
+        """A special point of a branch of periodic orbits."""
+        point = found.point
+        return cls(
+            found.kind, fixed(point.orbit.x[0]),
+            MappingProxyType(parameters_at(problem, curve, point.orbit)), found.interval,
+            point.residual, found.status, found.message,
+            MappingProxyType(dict(found.normal_form)), fixed(eigenvalues), index, found, branch,
+        )  # fmt: skip
 
     @property
     def corank(self) -> int:
@@ -49,29 +57,3 @@ class CyclePoint(SpecialPoint[Of]):
     def __getitem__(self, name: str) -> float:
         """A state, a parameter or the period by name."""
         return self.period if name == "period" else super().__getitem__(name)
-
-    def switch(self, *, direction: int = 0, options: Any = None) -> Of:
-        """The other branch: of doubled orbits at PD, through the same orbit at BPC."""
-        with notice(f"following periodic orbits along {self.branch.parameter}"):
-            found: Of = onward("orbit.switch")(self, direction, options)
-        return announced(found)
-
-    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
-        """The curve of such orbits in this branch's parameter and a second one."""
-        with notice(f"following {self.kind} points along {parameter}"):
-            found: Of = onward("orbit.curve")(self, parameter, span, options)
-        return announced(found)
-
-
-def cycle_point(
-    problem: Problem, cycles: Cycles, found: Found, index: int, branch: Of
-) -> CyclePoint[Of]:
-    """A special point of a branch of periodic orbits."""
-    point = found.point
-    x, multipliers = point.orbit.x[0].copy(), point.multipliers.copy()
-    x.flags.writeable = multipliers.flags.writeable = False
-    return CyclePoint(
-        found.kind, x, MappingProxyType(parameters_at(problem, cycles, point.orbit)),
-        found.interval, point.residual, found.status, found.message,
-        MappingProxyType(dict(found.normal_form)), multipliers, index, found, branch,
-    )  # fmt: skip

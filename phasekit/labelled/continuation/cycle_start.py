@@ -25,7 +25,7 @@ from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
-from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
 from phasekit.labelled.continuation.orbit_guess import (
     Given,
@@ -89,8 +89,9 @@ def from_hopf(
     )
     start = first_point(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
     message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
-    tracks = (None, run(CycleWalk(cycles), start, "forward")[1])
-    return make_cycles(problem, cycles, start, tracks, {}, Stop("hopf", message))
+    walker = CycleWalk(cycles)
+    tracks = (None, run(walker, start, "forward")[1])
+    return CycleBranch.of_tracks(problem, walker, start, tracks, {}, Stop("hopf", message))
 
 
 def _families(point: SpecialPoint[Branch]) -> tuple[list[Family], list[str]]:
@@ -151,9 +152,9 @@ def continue_orbit(
         start = start.flipped()
     cycles = cycles.replace(events=asked, ends=ends)
     try_events(cycles, start.orbit)
-    return make_cycles(
-        problem, cycles, start, run(CycleWalk(cycles), start, options.directions), record
-    )
+    walker = CycleWalk(cycles)
+    tracks = run(walker, start, options.directions)
+    return CycleBranch.of_tracks(problem, walker, start, tracks, record)
 
 
 def _family(

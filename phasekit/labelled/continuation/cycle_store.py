@@ -1,4 +1,4 @@
-"""Branches of periodic orbits on disk: everything that they hold, to the last bit.
+"""The arrays of a stored branch of periodic orbits, and the family made of them.
 
 The orbits of a track have meshes of their own, so they stand one after another in flat arrays,
 with the number of mesh intervals of each beside them.
@@ -7,17 +7,15 @@ with the number of mesh intervals of each beside them.
 from __future__ import annotations
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
-from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic.bounded import Bounded
+from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.family import Tracks
@@ -25,18 +23,13 @@ from phasekit.bifurcation.continuation.periodic.point import Point, State
 from phasekit.bifurcation.continuation.periodic.trace import Track
 from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
-from phasekit.labelled.continuation.cycle_branch import CycleBranch, make_cycles
+from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
 from phasekit.labelled.continuation.cycle_points import clock_code
-from phasekit.labelled.continuation.user_events import written
-from phasekit.labels.arguments import flag
-from phasekit.maps.whole import WholeTarget, target_of
-from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 
-_NAME = "Branch"
 #: Arrays of a family, by name.
 _ARRAYS = ("par", "turns", "scale", "width", "low", "high", "period")
 #: Numbers of a point, in their columns.
@@ -45,89 +38,54 @@ _NUMBERS = (
     "mesh_error",
 )  # fmt: skip
 _FINITE = ("par", "turns", "scale", "period")
-_SIDES = ("backward", "forward")
 
 
-def save(branch: CycleBranch, path: str | PathLike[str], overwrite: bool) -> None:
-    """Write a branch: its points as a Dataset, and what it takes to go on."""
-    cycles, problem = branch.known()
-    flag("overwrite", overwrite)
-    target = WholeTarget(target_of(path), overwrite=overwrite)
-    ds = branch.to_dataset()
-    if "multiplier" in ds:
-        values = ds["multiplier"].values
-        ds = ds.drop_vars("multiplier")
-        for part, array in (("real", values.real), ("imag", values.imag)):
-            ds[f"multiplier_{part}"] = (("point", "number"), array)
-    raw: dict[str, FloatArray] = {f"cycles_{name}": getattr(cycles, name) for name in _ARRAYS}
-    raw.update(_packed("start", [branch.start]))
-    for side, track in zip(_SIDES, branch.tracks, strict=True):
-        if track is not None:
-            raw.update(_packed(side, track.points))
-            raw.update(_packed_state(f"{side}_state", track.state))
-    for name, array in raw.items():
-        ds[f"raw_{name}"] = (tuple(f"raw_{name}_{k}" for k in range(array.ndim)), array)
-    spec = {
-        "problem": problem.specification(),
-        "free": list(branch.free),
-        "kind": branch.kind,
-        "options": cycles.options.as_dict(),
-        "multiple": cycles.multiple,
-        "origin": [branch.origin.reason, branch.origin.message],
-        "stops": [
-            None if track is None else [track.stop.reason, track.stop.message]
-            for track in branch.tracks
-        ],
-        "record": {name: function is None for name, function in branch.record.items()},
+def arrays_of(branch: CycleBranch) -> dict[str, FloatArray]:
+    """What it takes to make the branch again, as arrays."""
+    arrays: dict[str, FloatArray] = {
+        f"cycles_{name}": getattr(branch.curve, name) for name in _ARRAYS
     }
-    if cycles.events:
-        spec["events"] = written(cycles.events)
-    if cycles.ends:
-        spec["ends"] = list(cycles.ends)
-    ds.attrs = {
-        MODEL: _NAME, SCHEMA: SCHEMA_VERSION, **versions(), "branch": json.dumps(spec),
-    }  # fmt: skip
-    target.write(ds)
+    arrays.update(_packed("start", [branch.start]))
+    for side, track in zip(("backward", "forward"), branch.tracks, strict=True):
+        if track is not None:
+            arrays.update(_packed(side, track.points))
+            arrays.update(_packed_state(f"{side}_state", track.state))
+    return arrays
 
 
-def made_again(
-    stored: Stored, problem: Problem, functions: Mapping[str, Any], events: Any = None
-) -> CycleBranch:
-    """The branch of periodic orbits that a file holds."""
-    kind = stored.spec["kind"]
+def words_of(branch: CycleBranch) -> dict[str, Any]:
+    """And what is no array."""
+    origin = branch.origin
+    return {"multiple": branch.curve.multiple, "origin": [origin.reason, origin.message]}
+
+
+def read(
+    stored: Stored, problem: Problem, events: Mapping[str, Any] | None
+) -> tuple[type[CycleBranch], CycleWalk, Point, Tracks, Stop]:
+    """The class of a stored branch, what was followed, its start, its tracks and its origin."""
     asked = stored.events(problem, events, orbit_events_of)
     with damaged(stored.name, "its periodic orbits"):
-        ends = tuple(str(name) for name in stored.spec.get("ends", ()))
-        cycles = _cycles(stored, problem, kind).replace(events=asked, ends=ends)
-        (start,) = _unpacked(stored, "start", cycles)
-        tracks: list[Track | None] = []
-        for side, stop in zip(_SIDES, stored.spec["stops"], strict=True):
-            if stop is None:
-                tracks.append(None)
-                continue
+        cycles = _cycles(stored, problem).replace(events=asked, ends=stored.ends())
+
+        def track_of(side: str, stop: Stop) -> Track:
             points = _unpacked(stored, side, cycles)
-            state = _unpacked_state(stored, f"{side}_state", cycles)
-            tracks.append(Track(tuple(points), state, Stop(str(stop[0]), str(stop[1]))))
-        both: Tracks = (tracks[0], tracks[1])
+            return Track(tuple(points), _unpacked_state(stored, f"{side}_state", cycles), stop)
+
+        (start,) = _unpacked(stored, "start", cycles)
+        tracks = stored.tracks(track_of)
         origin = Stop(*map(str, stored.spec["origin"]))
-    return make_cycles(problem, cycles, start, both, functions, origin, kind)
+    return CycleBranch, CycleWalk(cycles), start, tracks, origin
 
 
-def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
-    options = dict(stored.spec["options"])
-    options["detect"] = tuple(options["detect"])
-    options["bounds"] = {k: tuple(v) for k, v in options["bounds"].items()}
-    names, free = list(problem.parameters), list(stored.spec["free"])
-    active = tuple(names.index(name) for name in free)
-    most = getattr(problem, "freed", 2)
-    if not 1 <= len(set(active)) == len(active) <= most:
-        raise ValueError(f"free: got {free}, wants 1 to {most} different parameters")
+def _cycles(stored: Stored, problem: Problem) -> Cycles:
+    kind, active = stored.kind, stored.active(problem, range(1, getattr(problem, "freed", 2) + 1))
     forced = problem.time is not None
     parts = {"cycle": 1, "boundary": 1, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}[kind]
     n, k = parts * len(problem.state), len(active)
     k += kind == "torus" or (kind == "fold_of_cycles" and not forced)
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
-    shapes.update({name: (k,) for name in ("width", "low", "high")}, par=(len(names) + forced,))
+    shapes.update({name: (k,) for name in ("width", "low", "high")})
+    shapes["par"] = (len(problem.parameters) + forced,)
     arrays: dict[str, Any] = {
         name: stored.array(f"cycles_{name}", shapes[name], finite=name in _FINITE)
         for name in _ARRAYS
@@ -142,8 +100,7 @@ def _cycles(stored: Stored, problem: Problem, kind: str) -> Cycles:
         form = functools.partial(Bounded, conditions=conditions_of(problem))
     made: Cycles = form(
         problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced,
-        clock=clock_code(problem, active),
-        multiple=multiple, options=ContinuationOptions(**options), **arrays,
+        clock=clock_code(problem, active), multiple=multiple, options=stored.options(), **arrays,
     )  # fmt: skip
     return made
 

@@ -24,11 +24,12 @@ from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
-from phasekit.labelled.continuation.branch import Branch, make_branch
+from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
 #: Defining systems of curves, by what special points say of theirs.
@@ -42,7 +43,6 @@ def point_curve(
     point: SpecialPoint[Branch],
     parameter: str,
     span: Sequence[float],
-    *,
     options: ContinuationOptions | None = None,
 ) -> Branch:
     """The curve of points of one kind through one, in two parameters.
@@ -124,8 +124,8 @@ def point_curve(
             f"moves; {why}"
         )
     made, start = begun
-    backward, forward = run(CurveWalk(made), start, options.directions)
-    return make_branch(problem, made, start, backward, forward, {})
+    walker = CurveWalk(made)
+    return Branch.of_tracks(problem, walker, start, run(walker, start, options.directions), {})
 
 
 def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:
@@ -145,7 +145,7 @@ def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:
     }
 
 
-def doubled(point: SpecialPoint[Branch], *, options: ContinuationOptions | None = None) -> Branch:
+def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) -> Branch:
     """The orbit of period 2 that begins at a period doubling of a map, followed to one side.
 
     The other side is the same orbit from its other point.
@@ -167,7 +167,8 @@ def doubled(point: SpecialPoint[Branch], *, options: ContinuationOptions | None 
     _, forward = run(CurveWalk(curve), start, "forward")
     assert forward is not None
     curve, forward = _to_other_end(curve, problem, start, forward)
-    return make_branch(twice, curve, start, None, forward, point.branch.record)
+    walker = CurveWalk(curve)
+    return Branch.of_tracks(twice, walker, start, (None, forward), point.branch.record)
 
 
 def _to_other_end(
@@ -202,8 +203,22 @@ def _free(curve: Curve) -> str:
     return curve.field.parameters[curve.active[0]]
 
 
+def leave(
+    point: SpecialPoint[Branch], direction: int, options: ContinuationOptions | None
+) -> Branch:
+    """What begins at a point: its other branch, a doubled orbit of a map, periodic orbits."""
+    if point.kind == "period_doubling":
+        return doubled(point, options)
+    if point.kind != "hopf":
+        return switch(point, direction, options)
+    from phasekit.labelled.continuation.cycle_start import from_hopf
+
+    with notice(f"following periodic orbits along {point.branch.parameter}"):
+        return from_hopf(point, options, direction)
+
+
 def switch(
-    point: SpecialPoint[Branch], *, direction: int = 0, options: ContinuationOptions | None = None
+    point: SpecialPoint[Branch], direction: int = 0, options: ContinuationOptions | None = None
 ) -> Branch:
     """Another branch through a branch point, followed to both sides.
 
@@ -233,5 +248,6 @@ def switch(
     options = curve.options if options is None else check_options(options)
     curve = curve.replace(options=options)
     start = Sample(point.special.u, others[direction], curve.at(point.special.u)[1])
-    backward, forward = run(CurveWalk(curve), start, options.directions)
-    return make_branch(problem, curve, start, backward, forward, point.branch.record)
+    walker = CurveWalk(curve)
+    tracks = run(walker, start, options.directions)
+    return Branch.of_tracks(problem, walker, start, tracks, point.branch.record)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Generic
+from typing import Any, ClassVar, Generic, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.onward import Of, onward
@@ -21,6 +21,7 @@ from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
 
 #: Fields that follow from others: machine code from the problem, a point's branch from its branch.
 NOT_COMPARED = ("field", "clock", "branch")
@@ -109,15 +110,40 @@ class SpecialPoint(Generic[Of]):
     status: str
     message: str
     normal_form: Mapping[str, float]
-    eigenvalues: npt.NDArray[np.complex128]
+    eigenvalues: Complex
     index: int
-    special: Special
+    special: Any
     branch: Of
+
+    #: What leads on from it (`lead`).
+    way: ClassVar[str] = "point"
+
+    @classmethod
+    def placed(
+        cls, problem: Problem, curve: Curve, found: Placed, eigenvalues: Complex, index: int,
+        branch: Of,
+    ) -> Self:  # fmt: skip
+        """A special point of a branch, angles wrapped."""
+        n, special = curve.n, found.special
+        parameters = dict(problem.parameters)
+        for i, name in enumerate(branch.free):
+            parameters[name] = float(special.u[n + i])
+        x = special.u[:n].copy()
+        for j in range(n):
+            if curve.period[j] > 0.0:
+                x[j] = wrap(x[j], float(curve.period[j]))
+        return cls(
+            special.kind, fixed(x), MappingProxyType(parameters), special.interval,
+            special.residual, special.status, special.message,
+            MappingProxyType(dict(special.normal_form)), fixed(eigenvalues), index, special,
+            branch,
+        )  # fmt: skip
 
     @property
     def corank(self) -> int:
         """Dimension of the null space of f_x."""
-        return self.special.corank
+        corank: int = self.special.corank
+        return corank
 
     @property
     def directions(self) -> FloatArray:
@@ -133,7 +159,8 @@ class SpecialPoint(Generic[Of]):
     @property
     def name(self) -> str:
         """The name of an event; else empty."""
-        return getattr(self.special, "name", "")
+        name: str = self.special.name
+        return name
 
     def __getitem__(self, name: str) -> float:
         """A state or parameter by name."""
@@ -192,13 +219,7 @@ class SpecialPoint(Generic[Of]):
         ('cycle', 6.28)
         >>> sides = [point.switch(direction=i) for i in range(3)]
         """
-        if self.kind == "hopf":
-            with notice(f"following periodic orbits along {self.branch.parameter}"):
-                found: Of = onward("point.orbits")(self, options, direction)
-        elif self.kind == "period_doubling":
-            found = onward("point.double")(self, options=options)
-        else:
-            found = onward("point.switch")(self, direction=direction, options=options)
+        found: Of = onward(f"{self.way}.switch")(self, direction, options)
         return announced(found)
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
@@ -240,7 +261,7 @@ class SpecialPoint(Generic[Of]):
         True
         """
         with notice(f"following {self.kind} points along {parameter}"):
-            found: Of = onward("point.curve")(self, parameter, span, options=options)
+            found: Of = onward(f"{self.way}.curve")(self, parameter, span, options)
         return announced(found)
 
     def __eq__(self, other: object) -> bool:
@@ -273,28 +294,13 @@ class SpecialPoint(Generic[Of]):
         return f"<{text}{'; ' if notes else ''}{', '.join(notes)}>"
 
 
+def fixed(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """A copy that cannot be written to."""
+    array = array.copy()
+    array.flags.writeable = False
+    return array
+
+
 def _point_of(branch: Of, place: int) -> SpecialPoint[Of]:
     point: SpecialPoint[Of] = branch.special_points[place]
     return point
-
-
-def special_point(
-    problem: Problem, curve: Curve, special: Special, eigenvalues: npt.NDArray[np.complex128],
-    index: int, branch: Of,
-) -> SpecialPoint[Of]:  # fmt: skip
-    """A special point of a branch, angles wrapped."""
-    n = curve.n
-    parameters = dict(problem.parameters)
-    for i, name in enumerate(branch.free):
-        parameters[name] = float(special.u[n + i])
-    x = special.u[:n].copy()
-    for j in range(n):
-        if curve.period[j] > 0.0:
-            x[j] = wrap(x[j], float(curve.period[j]))
-    eigenvalues = eigenvalues.copy()
-    x.flags.writeable = eigenvalues.flags.writeable = False
-    return SpecialPoint(
-        special.kind, x, MappingProxyType(parameters), special.interval, special.residual,
-        special.status, special.message, MappingProxyType(dict(special.normal_form)),
-        eigenvalues, index, special, branch,
-    )  # fmt: skip
