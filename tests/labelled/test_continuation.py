@@ -20,6 +20,7 @@ from phasekit.systems.problem import Problem
 
 matplotlib.use("Agg")
 
+BRUSSELATOR = Problem(["1 - (b + 1)*x + x**2*y", "b*x - x**2*y"], ("x", "y"), {"b": 1.5})
 CUSP = Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 1.0})
 FOLD = 2.0 / (3.0 * math.sqrt(3.0))
 REACTION = Problem(
@@ -525,6 +526,48 @@ def test_conservative_problems_have_centers_and_saddles():
 
 
 # ------------------------------------------------------------------------------ results
+
+
+def names_of(branch):
+    """Everything that a branch shows, and all that it holds."""
+    return [*(name for name in dir(branch) if not name.startswith("__")), "note"]
+
+
+@pytest.mark.parametrize("of_cycles", [False, True], ids=["equilibria", "cycles"])
+def test_a_branch_is_frozen(of_cycles):
+    branch = continuation(CUSP, "mu", x0=[-1.3], span=(-1.0, 1.0), events={"half": "x - 1/2"})
+    if of_cycles:
+        rest = continuation(BRUSSELATOR, "b", x0=[1.0, 1.5], span=(1.5, 2.2))
+        branch = rest.special("H")[0].switch()
+    assert "special_points" not in vars(branch)  # made when they are asked for, and kept
+    assert branch.special_points is branch.special_points
+    for thing in (branch, branch.special_points[0]):
+        for name in names_of(thing):
+            with pytest.raises(AttributeError):
+                setattr(thing, name, None)
+    for point in branch.special_points:
+        for array in (point.x, point.eigenvalues):
+            with pytest.raises(ValueError, match="read-only"):
+                array[...] = 0.0
+        with pytest.raises(TypeError):
+            point.parameters["mu"] = 0.0
+    with pytest.raises(TypeError):
+        branch.record["square"] = None
+
+
+def test_a_branch_is_read_in_a_notebook_as_in_text():
+    branch = continuation(CUSP, "mu", x0=[-1.3], span=(-1.0, 1.0), events={"<half>": "x - 1/2"})
+    table = branch.table()
+    assert table.kind.tolist() == [point.kind for point in branch.special_points]
+    for point, row in zip(branch.special_points, table.itertuples(), strict=True):
+        assert (row.mu, row.x, row.residual) == (point["mu"], point["x"], point.residual)
+        assert (row.label, row.status) == (point.label, point.status)
+    page = branch._repr_html_()
+    assert f"{branch.points.sizes['point']} points" in page
+    assert page.count("<tr") == 1 + len(branch.special("fold")) + len(branch.special("<half>"))
+    assert "&lt;half&gt;" in page
+    assert "<half>" not in page
+    assert "mu met its lower bound -1" in page
 
 
 def test_points_are_labelled_when_asked_for():

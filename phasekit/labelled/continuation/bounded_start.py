@@ -16,6 +16,7 @@ from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ConvergenceError
+from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_parameter
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
@@ -87,7 +88,7 @@ def continue_solution(
     try_events(family, start.orbit)
     walker = CycleWalk(family)
     tracks = run(walker, start, options.directions)
-    return CycleBranch.of_tracks(problem, walker, start, tracks, record)
+    return branch_of(CycleBranch, problem, walker, start, tracks, record)
 
 
 def _free(problem: Any, parameter: Any) -> list[str]:

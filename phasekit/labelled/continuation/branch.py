@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from os import PathLike
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -29,7 +29,7 @@ from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch_points import points_of
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
-from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint
+from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, unknown, whole
@@ -43,6 +43,7 @@ if TYPE_CHECKING:
 Record = Mapping[str, Any]
 #: A special point of a path, its place among the points, and the eigenvalues there.
 Place = tuple[Any, int, Any]
+B = TypeVar("B", bound="Branch")
 
 NO_START = Stop("start", "the start; this direction was not requested")
 #: Special points that a branch shows at most.
@@ -155,34 +156,6 @@ class Branch:
     _table: Callable[[], xr.Dataset]
     _places: tuple[Place, ...]
 
-    @classmethod
-    def of_tracks(
-        cls, problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
-        origin: Stop = NO_START,
-    ) -> Self:  # fmt: skip
-        """A branch of what was followed: special points are looked for, quantities recorded."""
-        try:
-            found = search(walker, start, tracks, origin)
-            return cls._of(problem, walker, start, tracks, record, origin, found)
-        except KeyboardInterrupt:  # what was followed is kept
-            tracks = halted(tracks)
-            found = search(walker, start, tracks, origin, interrupted=True)
-            return cls._of(problem, walker, start, tracks, record, origin, found)
-
-    @classmethod
-    def _of(
-        cls, problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
-        origin: Stop, found: Found,
-    ) -> Self:  # fmt: skip
-        table, places = cls._tabulated(problem, walker, found, record)
-        branch = cls(
-            problem, walker, start, tracks, origin, MappingProxyType(dict(record)),
-            found.path.stops, found.messages, table, tuple(places),
-        )  # fmt: skip
-        if record:  # functions of the user are called now
-            _ = branch._points
-        return branch
-
     @staticmethod
     def _tabulated(
         problem: Problem, walker: Any, found: Found, record: Record
@@ -196,7 +169,7 @@ class Branch:
         return tuple(self._special_point(*place) for place in self._places)
 
     def _special_point(self, found: Any, index: int, eigenvalues: Any) -> SpecialPoint[Self]:
-        return SpecialPoint.placed(self.problem, self.curve, found, eigenvalues, index, self)
+        return special_point(self.problem, self.curve, found, eigenvalues, index, self)
 
     @functools.cached_property
     def _points(self) -> xr.Dataset:
@@ -398,8 +371,8 @@ class Branch:
             )
         with notice(f"extending the branch along {self.parameter}"):
             tracks = go_on(walker, self.start, self.tracks, count)
-            return announced(self.of_tracks(
-                self.problem, walker, self.start, tracks, self.record, self.origin
+            return announced(branch_of(
+                type(self), self.problem, walker, self.start, tracks, self.record, self.origin,
             ))  # fmt: skip
 
     def _wider(
@@ -561,9 +534,37 @@ class Branch:
         return f"<div><b>{html.escape(self._head())}</b>{rows}{notes}</div>"
 
 
+def branch_of(
+    form: type[B], problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
+    origin: Stop = NO_START,
+) -> B:  # fmt: skip
+    """A branch of what was followed: special points are looked for, quantities recorded."""
+    try:
+        found = search(walker, start, tracks, origin)
+        return _branch(form, problem, walker, start, tracks, record, origin, found)
+    except KeyboardInterrupt:  # what was followed is kept
+        tracks = halted(tracks)
+        found = search(walker, start, tracks, origin, interrupted=True)
+        return _branch(form, problem, walker, start, tracks, record, origin, found)
+
+
+def _branch(
+    form: type[B], problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
+    origin: Stop, found: Found,
+) -> B:  # fmt: skip
+    table, places = form._tabulated(problem, walker, found, record)
+    branch = form(
+        problem, walker, start, tracks, origin, MappingProxyType(dict(record)),
+        found.path.stops, found.messages, table, tuple(places),
+    )  # fmt: skip
+    if record:  # functions of the user are called now
+        _ = branch._points
+    return branch
+
+
 def _again(
     form: type[Branch], walker: Any, curve: Any, problem: Problem, kept: Mapping[str, Any],
     start: Any, tracks: Tracks, record: Record, origin: Stop,
 ) -> Branch:  # fmt: skip
     followed = walker(curve(**form._code(problem, kept), **kept))
-    return form.of_tracks(problem, followed, start, tracks, record, origin)
+    return branch_of(form, problem, followed, start, tracks, record, origin)

@@ -13,7 +13,7 @@ import xarray as xr
 
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labelled.continuation import curve_store
-from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.user_events import written
 from phasekit.labels.arguments import bad, flag
@@ -103,7 +103,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
     of_user = problem is not None or any(functions.values()) or events
     with contextlib.nullcontext() if of_user else damaged(str(place), "its points"):
         start, tracks, origin = followed
-        branch: Branch = form.of_tracks(given, walker, start, tracks, functions, origin)
+        branch: Branch = branch_of(form, given, walker, start, tracks, functions, origin)
     return branch
 
 

@@ -17,7 +17,7 @@ from phasekit.bifurcation.continuation.scales import guessed, scaled
 from phasekit.bifurcation.continuation.start import settle, tangent_of
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.unfinished import announced
@@ -181,7 +181,7 @@ def continuation(
     with notice(f"following equilibria along {parameter}"):
         walker = CurveWalk(curve)
         tracks = run(walker, start, options.directions)
-        branch = Branch.of_tracks(problem, walker, start, tracks, _record(problem, record))
+        branch = branch_of(Branch, problem, walker, start, tracks, _record(problem, record))
     return announced(branch)
 
 

@@ -20,7 +20,7 @@ from phasekit.labelled.continuation.cycle_points import (
     orbit_dataset,
     points_of,
 )
-from phasekit.labelled.continuation.cycle_special import CyclePoint
+from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
 from phasekit.labels.arguments import bad
 from phasekit.systems.problem import Problem
 
@@ -90,7 +90,7 @@ class CycleBranch(Branch):
         return cast(Orbits, self._table).points
 
     def _special_point(self, found: Any, index: int, eigenvalues: Any) -> CyclePoint[Self]:
-        return CyclePoint.placed(self.problem, self.curve, found, eigenvalues, index, self)
+        return cycle_point(self.problem, self.curve, found, eigenvalues, index, self)
 
     def orbit(self, i: int) -> xr.Dataset:
         """The orbit of a point over time, with its numbers as scalars.

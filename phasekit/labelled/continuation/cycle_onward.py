@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.extended import extended
 from phasekit.bifurcation.continuation.walk import run
+from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_points import clock_code
@@ -53,7 +54,7 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
         walker = CycleWalk(cycles)
         tracks = (None, run(walker, start, "forward")[1])
         origin = Stop("period_doubling", where)
-        return CycleBranch.of_tracks(problem, walker, start, tracks, point.branch.record, origin)
+        return branch_of(CycleBranch, problem, walker, start, tracks, point.branch.record, origin)
     dx, _ = starts.other_tangent(cycles, here.orbit, checked.W, (here.dx, here.dy))
     sides = [starts.off(cycles, here.orbit, k * dx, size) for k in (1.0, -1.0)]
     one, two = (first_point(cycles, side, f"beside {where}").orbit for side in sides)
@@ -64,7 +65,7 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
     start = replace(here, dx=dx / length, dy=dy / length, sign=0.0, arclength=0.0, step=0.0)
     walker = CycleWalk(cycles)
     tracks = run(walker, start, options.directions)
-    return CycleBranch.of_tracks(problem, walker, start, tracks, point.branch.record)
+    return branch_of(CycleBranch, problem, walker, start, tracks, point.branch.record)
 
 
 def point_curve(
@@ -102,7 +103,7 @@ def point_curve(
         start = start.flipped()
     walker = CycleWalk(made)
     tracks = run(walker, start, options.directions)
-    return CycleBranch.of_tracks(problem, walker, start, tracks, point.branch.record)
+    return branch_of(CycleBranch, problem, walker, start, tracks, point.branch.record)
 
 
 def _options(cycles: Cycles, options: Any) -> ContinuationOptions:

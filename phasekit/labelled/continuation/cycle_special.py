@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import xarray as xr
 
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.family import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
 from phasekit.labelled.continuation.onward import Of
@@ -24,19 +26,6 @@ class CyclePoint(SpecialPoint[Of]):
     """
 
     way: ClassVar[str] = "orbit"
-
-    @classmethod
-    def placed(
-        cls, problem: Problem, curve: Any, found: Any, eigenvalues: Any, index: int, branch: Of
-    ) -> Self:
-        """A special point of a branch of periodic orbits."""
-        point = found.point
-        return cls(
-            found.kind, fixed(point.orbit.x[0]),
-            MappingProxyType(parameters_at(problem, curve, point.orbit)), found.interval,
-            point.residual, found.status, found.message,
-            MappingProxyType(dict(found.normal_form)), fixed(eigenvalues), index, found, branch,
-        )  # fmt: skip
 
     @property
     def corank(self) -> int:
@@ -57,3 +46,16 @@ class CyclePoint(SpecialPoint[Of]):
     def __getitem__(self, name: str) -> float:
         """A state, a parameter or the period by name."""
         return self.period if name == "period" else super().__getitem__(name)
+
+
+def cycle_point(
+    problem: Problem, cycles: Cycles, found: Found, multipliers: Any, index: int, branch: Of
+) -> CyclePoint[Of]:
+    """A special point of a branch of periodic orbits."""
+    point = found.point
+    return CyclePoint(
+        found.kind, fixed(point.orbit.x[0]),
+        MappingProxyType(parameters_at(problem, cycles, point.orbit)), found.interval,
+        point.residual, found.status, found.message, MappingProxyType(dict(found.normal_form)),
+        fixed(multipliers), index, found, branch,
+    )  # fmt: skip

@@ -23,7 +23,7 @@ from phasekit.bifurcation.continuation.points.hopf_families import (
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
-from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
@@ -91,7 +91,7 @@ def from_hopf(
     message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
     walker = CycleWalk(cycles)
     tracks = (None, run(walker, start, "forward")[1])
-    return CycleBranch.of_tracks(problem, walker, start, tracks, {}, Stop("hopf", message))
+    return branch_of(CycleBranch, problem, walker, start, tracks, {}, Stop("hopf", message))
 
 
 def _families(point: SpecialPoint[Branch]) -> tuple[list[Family], list[str]]:
@@ -154,7 +154,7 @@ def continue_orbit(
     try_events(cycles, start.orbit)
     walker = CycleWalk(cycles)
     tracks = run(walker, start, options.directions)
-    return CycleBranch.of_tracks(problem, walker, start, tracks, record)
+    return branch_of(CycleBranch, problem, walker, start, tracks, record)
 
 
 def _family(

@@ -24,7 +24,7 @@ from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
-from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -125,7 +125,7 @@ def point_curve(
         )
     made, start = begun
     walker = CurveWalk(made)
-    return Branch.of_tracks(problem, walker, start, run(walker, start, options.directions), {})
+    return branch_of(Branch, problem, walker, start, run(walker, start, options.directions), {})
 
 
 def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:
@@ -168,7 +168,7 @@ def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) ->
     assert forward is not None
     curve, forward = _to_other_end(curve, problem, start, forward)
     walker = CurveWalk(curve)
-    return Branch.of_tracks(twice, walker, start, (None, forward), point.branch.record)
+    return branch_of(Branch, twice, walker, start, (None, forward), point.branch.record)
 
 
 def _to_other_end(
@@ -250,4 +250,4 @@ def switch(
     start = Sample(point.special.u, others[direction], curve.at(point.special.u)[1])
     walker = CurveWalk(curve)
     tracks = run(walker, start, options.directions)
-    return Branch.of_tracks(problem, walker, start, tracks, point.branch.record)
+    return branch_of(Branch, problem, walker, start, tracks, point.branch.record)

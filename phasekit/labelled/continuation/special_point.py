@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar, Generic, Self
+from typing import Any, ClassVar, Generic
 
 import numpy as np
 import numpy.typing as npt
@@ -117,27 +117,6 @@ class SpecialPoint(Generic[Of]):
 
     #: What leads on from it (`lead`).
     way: ClassVar[str] = "point"
-
-    @classmethod
-    def placed(
-        cls, problem: Problem, curve: Curve, found: Placed, eigenvalues: Complex, index: int,
-        branch: Of,
-    ) -> Self:  # fmt: skip
-        """A special point of a branch, angles wrapped."""
-        n, special = curve.n, found.special
-        parameters = dict(problem.parameters)
-        for i, name in enumerate(branch.free):
-            parameters[name] = float(special.u[n + i])
-        x = special.u[:n].copy()
-        for j in range(n):
-            if curve.period[j] > 0.0:
-                x[j] = wrap(x[j], float(curve.period[j]))
-        return cls(
-            special.kind, fixed(x), MappingProxyType(parameters), special.interval,
-            special.residual, special.status, special.message,
-            MappingProxyType(dict(special.normal_form)), fixed(eigenvalues), index, special,
-            branch,
-        )  # fmt: skip
 
     @property
     def corank(self) -> int:
@@ -304,3 +283,22 @@ def fixed(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
 def _point_of(branch: Of, place: int) -> SpecialPoint[Of]:
     point: SpecialPoint[Of] = branch.special_points[place]
     return point
+
+
+def special_point(
+    problem: Problem, curve: Curve, found: Placed, eigenvalues: Complex, index: int, branch: Of
+) -> SpecialPoint[Of]:
+    """A special point of a branch, angles wrapped."""
+    n, special = curve.n, found.special
+    parameters = dict(problem.parameters)
+    for i, name in enumerate(branch.free):
+        parameters[name] = float(special.u[n + i])
+    x = special.u[:n].copy()
+    for j in range(n):
+        if curve.period[j] > 0.0:
+            x[j] = wrap(x[j], float(curve.period[j]))
+    return SpecialPoint(
+        special.kind, fixed(x), MappingProxyType(parameters), special.interval, special.residual,
+        special.status, special.message, MappingProxyType(dict(special.normal_form)),
+        fixed(eigenvalues), index, special, branch,
+    )  # fmt: skip
