@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from phasekit import extend as extend
     from phasekit import plot as plot
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
+    from phasekit.cells.offered import quantities as quantities
     from phasekit.errors import AttractorKind as AttractorKind
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
@@ -116,7 +117,6 @@ if TYPE_CHECKING:
     from phasekit.systems.system import Reduced as Reduced
     from phasekit.systems.system import System as System
     from phasekit.systems.term import Term as Term
-    from phasekit.table.quantities import quantities as quantities
 
 _MODULES = {
     "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),
@@ -189,7 +189,7 @@ _MODULES = {
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.boundary_problem": ("BoundaryProblem",),
     "phasekit.systems.problem": ("Problem",),
-    "phasekit.table.quantities": ("quantities",),
+    "phasekit.cells.offered": ("quantities",),
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
     "phasekit.labelled.run_up": ("run_up",),
     "phasekit.labelled.section": ("poincare_section",),

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 import functools
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.cells.start_grid import start_grid
+from phasekit.cells.start_grid import STARTS, StartGrid
 from phasekit.errors import AttractorKind, FlowEquilibriumKind
-from phasekit.labels.arguments import bad
+from phasekit.labels.arguments import bad, numeric, unknown, whole
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import corners, equilibria_of
+from phasekit.systems.rests import corners, equilibria_of, natural_window
 from phasekit.table.attractors import SLOTS
 from phasekit.table.equations import rows_of
 from phasekit.table.quantities import TABLE
@@ -29,8 +30,13 @@ Array = npt.NDArray[np.float64]
 LOOKS, SMOOTH = 256, 16
 #: Kinds of equilibria that attract.
 STABLE = (FlowEquilibriumKind.STABLE_NODE, FlowEquilibriumKind.STABLE_FOCUS)
-#: Looks at an attractor that does not repeat itself.
-MANY = 4096
+#: Looks at an attractor that does not repeat itself, and motions that are seen side by side.
+MANY, BESIDE = 4096, 64
+#: What is said of a function along an attractor.
+PARTS = ("min_{}", "max_{}", "mean_{}", "min_{}_error", "max_{}_error")
+#: Longest period of an orbit with a multiplier of size 1 that is looked for, and how near, in
+#: units of the states, a motion must have come.
+LONG_MARGINAL, NEAR_MARGINAL = 8, 0.1
 
 
 def table_of(system: Any, law: Equations) -> Table:
@@ -46,19 +52,96 @@ def table_of(system: Any, law: Equations) -> Table:
         rows = tuple(row for row in own.values() if row.group in groups)
         passes.append(Pass(function, (*law.names, *more), groups, rung, rows=rows))
 
-    starts = tuple(f"state_{name}" for name in law.states)
-    if law.time is None:
-        add(functools.partial(equilibria, _unset(system)), (), "equilibria")
-    add(functools.partial(exponents, law), (*starts, "time"), "lyapunov")
+    states = tuple(f"state_{name}" for name in law.states)
+    problem = _unset(system) if law.time is None else None
+    if problem is not None:
+        rest = functools.partial(equilibria, problem, natural_window(system))
+        passes.append(
+            Pass(
+                rest,
+                tuple(problem.parameters),
+                ("equilibria",),
+                rung,
+                rows=tuple(row for row in own.values() if row.group == "equilibria"),
+            )
+        )
+    add(functools.partial(exponents, law), (*states, "time"), "lyapunov")
     along = functools.partial(along_attractor, law, observables)
-    add(along, starts, "period", "extrema")
-    add(functools.partial(attractors, law), (), "attractors")
-    add(functools.partial(fractions, law), (), "attractors", "basin_fractions")
+    add(along, states, "period", "extrema")
+    add(functools.partial(attractors, law), starts_of(law), "attractors")
+    add(functools.partial(fractions, law), starts_of(law), "attractors", "basin_fractions")
     groups = {row.group for row in own.values()}
     fitting = [one for one in TABLE.fitting(system.standing) if groups.isdisjoint(one.groups)]
     theirs = {group for one in fitting for group in one.groups}
     others = [row for row in TABLE.rows.values() if row.group in theirs and row.name not in own]
     return Table((*own.values(), *others), (*passes, *fitting))
+
+
+def starts_of(law: Equations) -> tuple[str, ...]:
+    """Inputs that say from which states attractors are looked for: of each state a range."""
+    return tuple(f"{end}_{name}" for name in law.states for end in ("starts", "first", "last"))
+
+
+def chosen_starts(
+    law: Equations, asked: Any, window: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
+    """These inputs, for a number of states in the window, or for a grid as of `attractors`.
+
+    Raises
+    ------
+    ParameterError
+        If a state has no window, or its values are not at equal distances.
+    """
+    grid = isinstance(asked, Mapping)
+    if not grid:
+        number = whole("starts", STARTS if asked is None else asked, "a number of states >= 1")
+        each = max(int(number ** (1.0 / len(law.states)) + 1e-9), 1)
+    for name in asked if grid else ():
+        if name not in law.states:
+            raise unknown("starts: state", name, law.states)
+    found: dict[str, float] = {}
+    for name in law.states:
+        if grid and name in asked:
+            argument = f"starts[{name!r}]"
+            wants = "a number, or a 1-D array of increasing values at equal distances"
+            axis = np.atleast_1d(np.asarray(numeric(argument, asked[name], None, wants), float))
+            even = axis.ndim == 1 and axis.size and np.isfinite(axis).all()
+            if even and axis.size > 1:
+                steps = np.diff(axis)
+                even = bool(np.ptp(steps) <= 1e-9 * np.ptp(axis)) and steps[0] > 0.0
+            if not even:
+                raise bad(argument, asked[name], wants)
+            found[f"starts_{name}"] = float(axis.size)
+            found[f"first_{name}"], found[f"last_{name}"] = float(axis[0]), float(axis[-1])
+            continue
+        if name in window:
+            low, high = map(float, window[name])
+        elif name in law.periods:
+            low, high = -0.5 * law.periods[name], 0.5 * law.periods[name]
+        elif name in law.start:
+            low = high = float(law.start[name])
+        else:
+            wants = f"values of {name} as well, of which the system has no window"
+            raise bad("starts", asked, wants, "as in starts={'x': np.linspace(-2, 2, 32), ...}")
+        count = 1 if grid or low == high else each
+        half = 0.5 * (high - low) / count
+        found[f"starts_{name}"] = float(count)
+        found[f"first_{name}"], found[f"last_{name}"] = low + half, high - half
+    return found
+
+
+def _grid_of(law: Equations, parameters: dict[str, float], given: list[float]) -> StartGrid:
+    """The grid that such inputs say."""
+    axes, fixed = dict[str, Array](), dict[str, Any]()
+    for i, name in enumerate(law.states):
+        count, first, last = given[3 * i : 3 * i + 3]
+        if count > 1.0:
+            axes[name] = np.linspace(first, last, int(count))
+        else:
+            fixed[name] = first
+    if not axes:  # one state
+        axes = {law.states[0]: np.array([fixed.pop(law.states[0])])}
+    return StartGrid(law, axes, fixed, parameters)
 
 
 def _unset(system: Any) -> Problem:
@@ -88,9 +171,9 @@ def _back(shape: tuple[int, ...], found: Mapping[str, Any]) -> dict[str, Any]:
     return {name: values.reshape(shape + values.shape[1:]) for name, values in found.items()}
 
 
-def equilibria(problem: Problem, *arrays: Any) -> dict[str, Any]:
-    """Equilibria in the window, of each cell."""
-    low, high = corners(problem, None)
+def equilibria(problem: Problem, window: Any, *arrays: Any) -> dict[str, Any]:
+    """Equilibria in a window, by default that of the problem, of each cell."""
+    low, high = corners(problem, window)
     shape, cells = _cells(len(arrays), arrays)
     names, size = tuple(problem.parameters), int(np.prod(shape, dtype=int))
     ones = {
@@ -155,14 +238,14 @@ def _found(law: Equations, arrays: Iterable[Any], *, shares: bool) -> dict[str, 
         )
         for name, row in rows.items()
     }  # fmt: skip
-    for k, own, _ in cells:
+    for k, own, given in cells:
         parameters = dict(zip(law.names, own, strict=True))
-        grid = start_grid(law, parameters, None, None)
-        states = grid.starts()
+        grid = _grid_of(law, parameters, given)
+        states = grid.states()
         values = {name: np.asarray(value) for name, value in parameters.items()}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # what is open stands in the shares
-            search = find_of(law, values, states, grid.widths)
+            search = find_of(law, values, grid.starts(), grid.widths)
             places = {0: np.arange(len(states), dtype=float)}
             spread = basins(search, places, states) if shares else None
         one = search.result()
@@ -193,9 +276,9 @@ def along_attractor(
 
     shape, cells = _cells(len(law.names), arrays)
     size = int(np.prod(shape, dtype=int))
-    period = np.full(size, np.nan)
+    period, found = np.full(size, np.nan), list[_Attracted]()
     names = (*law.states, *observables)
-    ends = {f"{w}_{name}": np.full(size, np.nan) for name in names for w in ("min", "max", "mean")}
+    ends = {part.format(name): np.full(size, np.nan) for name in names for part in PARTS}
     symbols = symbols_of([*law.states, *law.names, law.time or "time"])
     functions = {
         name: sp.lambdify(list(symbols.values()), formula, ["scipy", "numpy"])
@@ -207,59 +290,135 @@ def along_attractor(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # NaN says which are lost
             search = find_of(law, values, np.array([start]), widths)
-            if not search.found or search.found[0].kind is AttractorKind.UNKNOWN:
-                continue
-            one = search.found[0]
+            one = next(iter(search.found), None)
+            if one is not None and one.kind is AttractorKind.UNKNOWN:
+                one = _marginal(law, values, search, one)
+        if one is not None:
             period[k] = one.period
-            times, states = _way_along(law, values, search, one)
+            found.append(_Attracted(k, own, search, one))
+    for cell, times, states in _ways_along(law, found):
         data = {name: states[:, i] for i, name in enumerate(law.states)}
         with np.errstate(all="ignore"):
             for name, function in functions.items():
-                data[name] = np.broadcast_to(function(*states.T, *own, times), len(states))
+                column = function(*states.T, *cell.own, times)
+                data[name] = np.broadcast_to(column, len(states))
         for name, column in data.items():
-            smooth = not isinstance(law, Map) and len(column) > 1
-            ends[f"min_{name}"][k] = -_peak(-column) if smooth else column.min()
-            ends[f"max_{name}"][k] = _peak(column) if smooth else column.max()
-            ends[f"mean_{name}"][k] = column[: max(len(column) - smooth, 1)].mean()
+            seen = _ends_of(law, cell, column)
+            for part, value in zip(PARTS, seen, strict=True):
+                ends[part.format(name)][cell.place] = value
     return _back(shape, {"period": period}), _back(shape, ends)
 
 
-def _way_along(
-    law: Equations, values: Mapping[str, Any], search: Any, one: Any
-) -> tuple[Array, Array]:
-    """Times and states along an attractor, of a periodic one over one period and its end."""
+class _Attracted(NamedTuple):
+    """The attractor to which the motion of one cell comes."""
+
+    place: int
+    own: list[float]
+    search: Any
+    one: Any
+
+
+def _marginal(law: Equations, values: Mapping[str, Any], search: Any, one: Any) -> Any:
+    """The periodic orbit with a multiplier of size 1 that a motion comes to, if it does.
+
+    It comes the nearer, the slower: by the terms of higher order.
+    """
+    from phasekit.motion.variational import returned
+
+    if law.time is None and not isinstance(law, Map):
+        return None
+    points, steps = one.points, search.leg
+    for q in range(1, LONG_MARGINAL + 1):
+        near = points[-2 * q * (len(points) // (4 * q)) :: q].mean(axis=0)
+        closed = returned(law, values, near, q * steps, search.units, NEAR_MARGINAL)
+        if closed is None:
+            continue
+        growth = float(np.abs(np.linalg.eigvals(closed[1])).max())
+        first, last = (
+            float(search.apart(points[part], closed[0]).max()) for part in _parts(len(points), q)
+        )
+        if abs(growth - 1.0) < 1e-6 and last < min(first, NEAR_MARGINAL):
+            orbit = search.run(closed[0][None], q, 0).states[0]
+            return replace(one, kind=AttractorKind.CYCLE, points=orbit, multiplier=1.0)
+    return None
+
+
+def _parts(size: int, q: int) -> tuple[slice, slice]:
+    """Every q-th state of the first and the last tenth."""
+    tenth = max(size // 10, q)
+    begin = (size - 1) % q
+    return slice(begin, tenth, q), slice(begin + q * ((size - tenth) // q), None, q)
+
+
+def _ways_along(
+    law: Equations, found: Sequence[_Attracted]
+) -> Iterator[tuple[_Attracted, Array, Array]]:
+    """Times and states along attractors, of periodic ones over one period and its end."""
     from phasekit.motion.strobe import strobe
 
-    if isinstance(law, Map) or one.period == 0.0 and one.is_periodic:
-        points = one.points if one.is_periodic else _more(law, values, search, one)
-        return np.arange(float(len(points))), points
-    if not one.is_periodic:
-        looks, leg = MANY, search.leg / (SMOOTH if law.time is not None else 1.0)
-    else:
-        whole = one.period if law.time is None else one.period * search.leg
-        looks = LOOKS * SMOOTH * (1 if law.time is None else max(int(one.period), 1))
-        leg = whole / looks
-    found = strobe(law, values, one.points[:1], leg, looks + 1, **search.tolerances)
-    times: Array = leg * np.arange(looks + 1.0)
-    return times, np.asarray(found.states[0])
+    moving: dict[int, list[tuple[_Attracted, float]]] = {}
+    for cell in found:
+        one, steps = cell.one, isinstance(law, Map)
+        if one.is_periodic and (steps or one.period == 0.0):
+            yield cell, np.arange(float(len(one.points))), one.points
+        elif not one.is_periodic:
+            leg = cell.search.leg / (1.0 if steps or law.time is None else SMOOTH)
+            moving.setdefault(MANY, []).append((cell, leg))
+        else:
+            forced = law.time is not None
+            turns = max(int(one.period), 1) if forced else 1
+            whole = one.period * (cell.search.leg if forced else 1.0)
+            looks = LOOKS * SMOOTH * turns
+            moving.setdefault(looks, []).append((cell, whole / looks))
+    for looks, many in moving.items():  # those of as many looks side by side
+        cells, legs = [cell for cell, _ in many], np.array([leg for _, leg in many])
+        for part in range(0, len(cells), BESIDE):
+            some, leg = cells[part : part + BESIDE], legs[part : part + BESIDE]
+            columns = np.array([cell.own for cell in some]).reshape(len(some), -1).T
+            values = dict(zip(law.names, columns, strict=True))
+            states = np.array([cell.one.points[0] for cell in some])
+            seen = strobe(law, values, states, leg, looks + 1, **some[0].search.tolerances)
+            for i, cell in enumerate(some):
+                yield cell, leg[i] * np.arange(looks + 1.0), np.asarray(seen.states[i])
 
 
-def _more(law: Equations, values: Mapping[str, Any], search: Any, one: Any) -> Array:
-    """More iterates on an attractor that does not repeat itself."""
-    from phasekit.motion.strobe import strobe
+def _ends_of(law: Equations, cell: _Attracted, column: Array) -> tuple[float, ...]:
+    """Least, greatest and mean value along an attractor, and the errors of the first two."""
+    one, rounding = cell.one, cell.search.rtol * float(np.abs(column).max())
+    if len(column) == 1 or (one.is_periodic and isinstance(law, Map)):
+        return column.min(), column.max(), column.mean(), rounding, rounding
+    if not one.is_periodic:  # seen for so long: what the halves differ by
+        half = len(column) // 2
+        first, last = column[:half], column[half:]
+        errors = abs(first.min() - last.min()), abs(first.max() - last.max())
+        return column.min(), column.max(), column.mean(), *errors
+    closed = abs(float(column[-1] - column[0]))  # what a period is not closed by
+    (low, below), (high, above) = _peak(-column[:-1]), _peak(column[:-1])
+    return -low, high, column[:-1].mean(), below + closed + rounding, above + closed + rounding
 
-    found = strobe(law, values, one.points[-1:], search.leg, MANY, **search.tolerances)
-    return np.asarray(found.states[0])
 
+def _peak(column: Array) -> tuple[float, float]:
+    """The greatest value of a smooth periodic function seen at equal distances, and its error.
 
-def _peak(column: Array) -> float:
-    """The greatest value of a smooth function seen at equal distances, by a parabola."""
+    By a quartic through five values; the error is its distance from the parabola.
+    """
     top = int(np.argmax(column))
-    if not 0 < top < len(column) - 1:
-        return float(column[top])
-    before, at, after = column[top - 1 : top + 2]
-    bend = before - 2.0 * at + after
-    return float(at - (after - before) ** 2 / (8.0 * bend)) if bend < 0.0 else float(at)
+    v = np.take(column, range(top - 2, top + 3), mode="wrap")
+    slope, bend = 0.5 * (v[3] - v[1]), v[3] - 2.0 * v[2] + v[1]
+    if not bend < 0.0:
+        return float(v[2]), float(np.ptp(v))
+    parabola = float(v[2] - slope**2 / (2.0 * bend))
+    d1 = (v[0] - 8.0 * v[1] + 8.0 * v[3] - v[4]) / 12.0
+    d2 = (-v[0] + 16.0 * v[1] - 30.0 * v[2] + 16.0 * v[3] - v[4]) / 12.0
+    d3 = (-v[0] + 2.0 * v[1] - 2.0 * v[3] + v[4]) / 2.0
+    d4 = v[0] - 4.0 * v[1] + 6.0 * v[2] - 4.0 * v[3] + v[4]
+    x = -slope / bend
+    for _ in range(4):
+        x -= (d1 + x * (d2 + x * (d3 / 2.0 + x * d4 / 6.0))) / (d2 + x * (d3 + x * d4 / 2.0))
+    quartic = float(v[2] + x * (d1 + x * (d2 / 2.0 + x * (d3 / 6.0 + x * d4 / 24.0))))
+    if not abs(x) <= 1.0:
+        return parabola, float(np.ptp(v[1:4]))
+    return quartic, abs(quartic - parabola)
 
 
 def start_of(law: Equations, name: str) -> float:

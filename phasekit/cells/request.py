@@ -54,7 +54,8 @@ class Request:
     def is_open(self) -> bool:
         """Whether equilibria are numbered, so that the length of their dims is yet to be found."""
         where = self.system.standing
-        return not where.rung.labels_fixed and self.table.offers(where, "equilibria")
+        fixed = where.rung.labels_fixed and self.table is TABLE
+        return not fixed and self.table.offers(where, "equilibria")
 
     @property
     def states(self) -> frozenset[str]:

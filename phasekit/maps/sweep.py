@@ -62,7 +62,8 @@ def sweep(
         ``attractors`` and ``basin_fractions`` of motions from its window; and of the motion from
         one state, by default the middle of the window, ``lyapunov`` after a ``duration`` (a map:
         ``n`` iterations), and the ``period`` and ``extrema`` of the attractor to which it comes:
-        ``min_``, ``max_`` and ``mean_`` of each state and observable.
+        ``min_``, ``max_`` and ``mean_`` of each state and observable, ``_error`` beside the first
+        two. So it is of systems with terms, for what no other line of the table bears.
     store : path, URL or zarr store, optional
         Put the map there: a name that ends in ``.zarr``, a URL that fsspec knows, or a store of
         zarr (Zarr v3), tile by tile, so that it need not fit into memory; or a name that ends in
@@ -87,7 +88,10 @@ def sweep(
         ``"float32"`` to store numbers in single precision, or the dtypes of quantities by name.
         They are computed in double precision.
     **axes_by_name
-        Axes by keyword in place of `axes`.
+        Axes by keyword in place of `axes`; and ``starts=``, the states from which attractors and
+        their basins are looked for: how many of the window (256), or values of states at equal
+        distances, ``{"x": np.linspace(-2, 2, 100), "y": 0.0}``, as the grid of `basins`. The
+        result has their number and ends as coordinates ``starts_x``, ``first_x``, ``last_x``.
 
     Returns
     -------
@@ -134,7 +138,7 @@ def sweep(
         flag("progress", progress)
     place = None if store is None else target_of(store)
     system = as_system(system)
-    table, rows = _selected(system, of)
+    table, rows = _selected(system, of, starts="starts" in {**_plain(axes), **axes_by_name})
     if place is not None and not place.is_netcdf:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
@@ -204,22 +208,56 @@ def plan_sweep(
 ) -> Job:
     """Return what `sweep` with a Zarr store would have to do; nothing is computed or written."""
     system = as_system(system)
-    table, rows = _selected(system, of)
+    table, rows = _selected(system, of, starts="starts" in _plain(axes))
     request = _asked(system, axes, {}, rows, table, loaded=True)
     options = StoreOptions.of(request, chunks, dtype, overwrite=overwrite)
     return plan_job(target_of(store), request, options)
 
 
-def _selected(system: System, of: Any) -> tuple[Table, tuple[Quantity, ...]]:
-    """Return the table that a system has, and the rows of it that are named, or offered."""
+def _plain(axes: Any) -> Mapping[str, Any]:
+    return axes if isinstance(axes, Mapping) else {}
+
+
+def _selected(
+    system: System, of: Any, *, starts: bool = False
+) -> tuple[Table, tuple[Quantity, ...]]:
+    """Return the table that a system has, and the rows of it that are named, or offered.
+
+    Where it is said which states motions ``starts`` from, those of its equations.
+    """
     if (law := equations_of(system)) is None:
-        return TABLE, select(of, system.standing if of is OFFERED else None)
+        own = None if of is OFFERED else _own_table(system, of, starts)
+        if own is None:
+            return TABLE, select(of, system.standing if of is OFFERED else None)
+        return own, own.select(of)
     from phasekit.cells.equations import table_of  # here: it loads sympy
 
     table = table_of(system, law)
     if of is OFFERED:
         of = ("equilibria",) if law.time is None else ("attractors",)
     return table, table.select(of)
+
+
+def _own_table(system: System, of: Any, starts: bool) -> Table | None:
+    """The rows of the first-order equations of a system with terms, where these alone answer."""
+    names = (of,) if isinstance(of, str) else tuple(of) if isinstance(of, Iterable) else ()
+    if system.standing.traits is None or not all(isinstance(name, str) for name in names):
+        return None
+    groups = {name: TABLE.rows[name].group if name in TABLE.rows else name for name in names}
+    if not starts and all(TABLE.offers(system.standing, group) for group in groups.values()):
+        return None
+    from phasekit.cells.equations import table_of
+
+    table = table_of(system, system.equations())
+    known = {*table.offered, *(row.group for row in table.offered.values())}
+    return table if known.issuperset(names) else None
+
+
+def _law(system: System, table: Table) -> Any:
+    """The equations whose rows a table has; None for the table of all."""
+    if (law := equations_of(system)) is None and table is not TABLE:
+        return system.equations()
+    return law
 
 
 def _asked(
@@ -262,10 +300,12 @@ def _swept(
             raise ParameterError(f"{name}: got it in axes and as a keyword, wants it once")
     given.update(by_name)
     declared = [parameter.name for parameter in system.declared]
-    known = _states_of(system)
+    starts = given.pop("starts", None) if "starts" not in declared else None
+    law = _law(system, table)
+    known = _states_of(law)
     called: dict[str, str] = {}
     for key in given:
-        name = key if key in declared or key in known else _state_called(key, system)
+        name = key if key in declared or key in known else _state_called(key, system, law)
         if name not in declared and name not in known:
             raise _unknown_axis(system, key, rows, table)
         if name in called or (name != key and name in given):
@@ -295,36 +335,42 @@ def _swept(
                 f"to change a fixed parameter use system.replace({name}=...)",
             )
     if table is not TABLE:
-        states |= _middles(system, rows, table, states)
+        states |= _middles(system, rows, table, states, starts)
+    elif starts is not None:
+        raise bad("starts", starts, "nothing for these quantities: no motions start from a grid")
     return swept, states, called
 
 
-def _state_called(key: Any, system: System) -> str:
+def _state_called(key: Any, system: System, law: Any) -> str:
     """Return the state that an argument of the labelled functions is, which may have its name."""
-    if (law := equations_of(system)) is not None:
+    coordinate = getattr(system, "coordinate", None)
+    if law is not None:
+        if system.standing.traits is not None:
+            stem = str(key).removesuffix("0")
+            key = {coordinate: "phi", f"d{coordinate}": "dphi"}.get(stem, stem)
         clock = "n" if isinstance(law, Map) else "duration"
         own = str(key).removesuffix("0")
         return "time" if key in ("t", clock) else f"state_{own if own in law.states else key}"
     stem = str(key).rstrip("0")
-    coordinate = getattr(system, "coordinate", None)
     if isinstance(coordinate, str) and stem in (coordinate, f"d{coordinate}"):
         stem = "phi" if stem == coordinate else "dphi"
-    return "time" if stem == "t" else f"state_{stem}"
+    return "time" if stem in ("t", "duration") else f"state_{stem}"
 
 
-def _states_of(system: System) -> tuple[str, ...]:
+def _states_of(law: Any) -> tuple[str, ...]:
     """The states that a sweep may be told, by the names of the table."""
-    law = equations_of(system)
     return tuple(STATES) if law is None else (*(f"state_{x}" for x in law.states), "time")
 
 
 def _middles(
-    system: System, rows: tuple[Quantity, ...], table: Table, given: Mapping[str, Value]
-) -> dict[str, Value]:
-    """States at the start that are needed and not given."""
-    from phasekit.cells.equations import start_of
+    system: System, rows: tuple[Quantity, ...], table: Table, given: Mapping[str, Value],
+    starts: Any,
+) -> dict[str, Value]:  # fmt: skip
+    """States at the start that are needed and not given, and starts of motions to attractors."""
+    from phasekit.cells.equations import chosen_starts, start_of, starts_of
+    from phasekit.systems.rests import natural_window
 
-    law: Any = equations_of(system)
+    law = _law(system, table)
     needs = needs_of(system, passes_of(system, rows, table=table))
     names = dict.fromkeys(name for one in needs.values() for name in one)
     if "time" in names and "time" not in given:
@@ -332,12 +378,22 @@ def _middles(
         raise bad(
             clock, None, f"{'iterations' if clock == 'n' else 'a time'} for lyapunov, {clock}="
         )
-    starts = {f"state_{name}": name for name in law.states}
-    return {
+    found: dict[str, Value] = {
         key: start_of(law, name)
-        for key, name in starts.items()
+        for key, name in {f"state_{name}": name for name in law.states}.items()
         if key in names and key not in given
     }
+    if names.keys().isdisjoint(starts_of(law)):
+        if starts is not None:
+            wants = "nothing for these quantities: no motions start from a grid"
+            raise bad("starts", starts, wants)
+        return found
+    coordinate = getattr(system, "coordinate", "phi")
+    own = {coordinate: "phi", f"d{coordinate}": "dphi"} if system.standing.traits else {}
+    natural = {own.get(name, name): ends for name, ends in (natural_window(system) or {}).items()}
+    if isinstance(starts, Mapping):
+        starts = {own.get(name, name): values for name, values in starts.items()}
+    return found | chosen_starts(law, starts, {**natural, **law.window})
 
 
 def _valid(system: System, rows: tuple[Quantity, ...], table: Table) -> list[str]:
@@ -345,7 +401,7 @@ def _valid(system: System, rows: tuple[Quantity, ...], table: Table) -> list[str
     needs = needs_of(system, passes_of(system, rows, table=table))
     needed = {name for names in needs.values() for name in names}
     declared = [parameter.name for parameter in system.declared]
-    return declared + [name for name in _states_of(system) if name in needed]
+    return declared + [name for name in _states_of(_law(system, table)) if name in needed]
 
 
 def _unknown_axis(

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from phasekit.errors import FlowEquilibriumKind
 from phasekit.labels.arguments import bad, reals, unknown
 from phasekit.laws.formulas import symbols_of
+from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import zeros_in_box
 from phasekit.systems.problem import Problem
@@ -22,6 +23,8 @@ Array = npt.NDArray[np.float64]
 STARTS = 256
 #: Operations of an iterate from which on it is searched, and nothing proved.
 LONG = 2_000
+#: Places along a coordinate at which its force is asked for.
+PLACES = 513
 #: Distance, in units of the box, within which two ends of it are one equilibrium.
 SAME = 1e-8
 
@@ -133,6 +136,67 @@ def corners(problem: Problem, box: Any, argument: str = "box") -> tuple[Array, A
             raise bad(argument, box, f"(low, high) of every state; {name!r} has none")
     low, high = np.array(ends).T
     return low, high
+
+
+def natural_window(system: Any) -> dict[str, tuple[float, float]] | None:
+    """Where the motions of a system in a potential are, which has no window of a user's own.
+
+    Its interval, or the circle; and rates half as great again as that with which a motion comes
+    down from the highest barrier, or as that of a rotation under the torque. None for others.
+    """
+    if not issubclass(system.standing.rung, (Conservative, Routhian)):
+        return None
+    bare = getattr(system, "system", system) if system.standing.traits is not None else system
+    law = bare.law_of_parameters
+    x, turn = law.coordinate, law.period
+    ends = getattr(bare, "interval", None) if turn is None else (-0.5 * turn, 0.5 * turn)
+    if ends is None:
+        return None
+    low, high = map(float, ends)
+    places = np.linspace(low, high, PLACES)
+    speed = 0.0
+    for values in _corner_values(bare):
+        force = _force_on(law, bare, values, places)
+        if not np.isfinite(force).all():
+            return None
+        work = np.concatenate([[0.0], np.cumsum(0.5 * (force[1:] + force[:-1]))])
+        work *= (high - low) / (PLACES - 1)
+        if turn is not None:  # what is lost in a turn is no barrier
+            work -= np.linspace(0.0, work[-1], PLACES)
+        speed = max(speed, float(np.sqrt(2.0 * np.ptp(work))))
+    if system is not bare:
+        given = {name: np.abs(np.asarray(value)) for name, value in system.parameters.items()}
+        push = given.get("torque", np.zeros(1)).max()
+        push += sum(v.max() for n, v in given.items() if n.endswith("amplitude"))
+        damping, drag = (given.get(n, np.zeros(1)).min() for n in ("damping", "quadratic"))
+        fast = [push / damping] if damping > 0.0 else []
+        fast += [np.sqrt(push / drag)] if drag > 0.0 else []
+        speed += float(min(fast, default=0.0))
+    if not speed > 0.0:
+        return None
+    rate = {f"d{x}": (-1.5 * speed, 1.5 * speed)}
+    return rate if turn is not None else {x: (low, high), **rate}
+
+
+def _corner_values(system: Any) -> list[dict[str, float]]:
+    """Values of the parameters: of arrays the least and the greatest, each beside the others'."""
+    found: list[dict[str, float]] = [{}, {}]
+    for name in system.formula_inputs():
+        array = np.asarray(system.parameters[name], float)
+        found[0][name], found[1][name] = float(np.nanmin(array)), float(np.nanmax(array))
+    return found[:1] if found[0] == found[1] else found
+
+
+def _force_on(law: Any, system: Any, values: Mapping[str, float], places: Array) -> Array:
+    """The acceleration at rest at places along a coordinate."""
+    import sympy as sp
+
+    symbols = symbols_of([law.coordinate, *values])
+    formula = law.acceleration_formula(symbols, sp.Integer(0), sp.Integer(0))
+    function = sp.lambdify(list(symbols.values()), formula, ["scipy", "numpy"])
+    with np.errstate(all="ignore"):
+        found = function(places, *values.values())
+    return np.array(np.broadcast_to(found, places.shape), float)
 
 
 def _enclosed(problem: Problem, low: Array, high: Array) -> tuple[Array, str]:

@@ -91,11 +91,13 @@ def rows_of(law: Equations, formulas: Iterable[str] = ()) -> dict[str, Quantity]
     ]  # fmt: skip
     for name in (*law.states, *formulas):
         found += [
-            row(f"{word}_{name}", "extrema", (), "float64", law.units.get(name, "1"),
+            row(word.format(name), "extrema", (), "float64", law.units.get(name, "1"),
                 f"{text} {name} along the attractor of the motion", equation, RECURRENCE, LONG)
             for word, text, equation in (
-                ("min", "least", f"min {name}(t)"), ("max", "greatest", f"max {name}(t)"),
-                ("mean", "mean", f"mean of {name}(t)"),
+                ("min_{}", "least", f"min {name}(t)"), ("max_{}", "greatest", f"max {name}(t)"),
+                ("mean_{}", "mean", f"mean of {name}(t)"),
+                ("min_{}_error", "estimated error of the least", f"error of min {name}(t)"),
+                ("max_{}_error", "estimated error of the greatest", f"error of max {name}(t)"),
             )
         ]  # fmt: skip
     over_grid = attractors.rows_of(law).values()

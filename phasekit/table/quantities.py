@@ -48,8 +48,8 @@ def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:
 class Quantities(Mapping[str, Quantity]):
     """The quantities that a sweep offers, by name; prints as a table."""
 
-    def __init__(self) -> None:
-        self._rows = TABLE.offered
+    def __init__(self, rows: Mapping[str, Quantity] | None = None) -> None:
+        self._rows = TABLE.offered if rows is None else dict(rows)
 
     @property
     def groups(self) -> dict[str, tuple[str, ...]]:
@@ -97,23 +97,3 @@ class Quantities(Mapping[str, Quantity]):
             )
         ]
         return f"<table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
-
-
-def quantities() -> Quantities:
-    """List what `sweep(of=...)` takes: quantities and groups of them, with units and meaning.
-
-    Returns
-    -------
-    Quantities
-        A mapping of name to row; a row has ``group``, ``dims``, ``units``, ``long_name``,
-        ``equation`` and ``source``. Printed, it is a table.
-
-    Examples
-    --------
-    >>> import phasekit as pk
-    >>> pk.quantities()["winding_area"].units
-    's-1'
-    >>> "figure_eight" in pk.quantities().groups["separatrices"]
-    True
-    """
-    return Quantities()

@@ -207,3 +207,118 @@ def test_where_there_may_be_more_equilibria_is_counted(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert pk.sweep(formula, mu=[0.5, 1.0], of="equilibria").complete.values.all()
+
+
+def test_the_share_of_henons_basin_is_that_of_a_grid_by_hand():
+    axis = np.linspace(-2.0, 2.0, 41)
+    ds = pk.sweep(HENON, a=[1.4], of="basin_fractions", starts={"x": axis, "y": axis})
+    x, y = (part.ravel() for part in np.meshgrid(axis, axis))
+    with np.errstate(all="ignore"):
+        for _ in range(400):
+            x, y = 1.0 - 1.4 * x**2 + y, 0.3 * x
+    stays = np.isfinite(x).mean()
+    assert ds.basin_fraction[0, 0].item() == pytest.approx(stays, abs=1e-12)
+    assert ds.escaped_fraction.item() == pytest.approx(1.0 - stays, abs=1e-12)
+    share = np.sqrt(stays * (1.0 - stays) / x.size)
+    assert ds.basin_fraction_error[0, 0].item() == pytest.approx(share, rel=0.01)
+    assert ds.starts_x.item() == 41
+    assert (ds.first_x.item(), ds.last_y.item()) == (-2.0, 2.0)
+    few = pk.sweep(HENON, a=[1.4], of="basin_fractions", starts=100)
+    assert few.starts_y.item() == 10
+    assert few.first_x.item() == pytest.approx(-1.8)
+    line = pk.sweep(HENON, a=[1.4], of="attractors", starts={"x": axis, "y": 0.1})
+    assert (line.starts_y.item(), line.n_attractors.item()) == (1, 1)
+
+
+def test_stored_maps_know_their_starts(tmp_path):
+    how = {"of": "basin_fractions", "a": [1.3, 1.4]}
+    axes = {"x": np.linspace(-2, 2, 6), "y": np.linspace(-1, 1, 5)}
+    ds = pk.sweep(HENON, **how, starts=axes, store=tmp_path / "map.zarr", workers=1)
+    again = pk.sweep(HENON, **how, starts=axes)
+    xr.testing.assert_equal(ds.load(), again)
+    with pytest.raises(pk.StoreError, match="first_x|starts_x"):
+        pk.sweep(HENON, **how, starts=64, store=tmp_path / "map.zarr", workers=1)
+
+
+@pytest.mark.parametrize(
+    ("starts", "message"),
+    [
+        ({"z": [0.0, 1.0]}, "starts: state 'z' is unknown"),
+        ({"x": [0.0, 1.0, 3.0]}, r"starts\['x'\]: got .* at equal distances"),
+        ({"x": [1.0, 0.0]}, r"starts\['x'\]"),
+        (0, "starts: got 0"),
+        ("many", "starts: got 'many'"),
+    ],
+)
+def test_starts_have_to_be_a_number_or_a_grid(starts, message):
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.sweep(HENON, a=[1.4], of="attractors", starts=starts)
+    with pytest.raises(pk.ParameterError, match="starts: .* nothing for these quantities"):
+        pk.sweep(HENON, a=[1.4], of="equilibria", starts=64)
+    with pytest.raises(pk.ParameterError, match="starts: .* nothing for these quantities"):
+        pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1, 0.2], starts=64)
+
+
+FRICTION = pk.Perturbed(
+    pk.Potential("x^4/4 - x^2/2", "x", interval=(-3, 3)), damping=0.2,
+    terms=pk.Term("-mu*dphi^3", {"mu": 0.3}),
+)  # fmt: skip
+
+
+def test_a_system_with_a_term_is_mapped_as_its_equations():
+    same = pk.Problem(
+        {"phi": "dphi", "dphi": "phi - phi^3 - d*dphi - mu*dphi^3"},
+        parameters={"d": 0.2, "mu": 0.3}, window={"phi": (-2, 2), "dphi": (-2, 2)},
+    )  # fmt: skip
+    axes = {"phi": np.linspace(-2, 2, 8), "dphi": np.linspace(-2, 2, 8)}
+    mine = {f"{'d' * (name == 'dphi')}x": axis for name, axis in axes.items()}
+    of = ["equilibria", "attractors", "basin_fractions"]
+    ds = pk.sweep(FRICTION, mu=[0.1, 0.3], of=of, starts=mine)
+    other = pk.sweep(same, mu=[0.1, 0.3], of=of, starts=axes)
+    assert ds.n_equilibria.values.tolist() == [3, 3]
+    np.testing.assert_allclose(ds.x, other.x, atol=1e-12)
+    np.testing.assert_allclose(np.sort_complex(ds.eigenvalue), np.sort_complex(other.eigenvalue))
+    for name in ("attractor_phi", "attractor_exponent", "basin_fraction", "n_attractors"):
+        np.testing.assert_allclose(ds[name], other[name], atol=1e-9)
+    assert ds.isel(mu=0).phasekit.system() == FRICTION.replace(mu=0.1)
+    long = pk.sweep(FRICTION, mu=[0.1, 0.3], of="lyapunov", x=1.2, dx=0.1, duration=200.0)
+    np.testing.assert_allclose(long.lyapunov_exponent[:, 0], -0.1, atol=1e-2)
+
+
+def test_extremes_of_cycles_are_within_their_errors():
+    hopf = pk.Problem(
+        {"x": "m*x - 2*y - x*(x^2 + y^2)", "y": "2*x + m*y - y*(x^2 + y^2)"},
+        parameters={"m": 1.0}, window={"x": (-3, 3), "y": (-3, 3)},
+        observables={"sum": "3*x + 4*y"},
+    )  # fmt: skip
+    m = np.array([-0.5, 0.25, 1.0, 4.0])
+    ds = pk.sweep(hopf, m=m, of=["period", "extrema"], x=0.3, y=0.1)
+    radius = np.sqrt(np.maximum(m, 0.0))
+    np.testing.assert_allclose(ds.period, [0.0, np.pi, np.pi, np.pi], rtol=1e-9)
+    for name, size in (("x", 1.0), ("y", 1.0), ("sum", 5.0)):
+        assert (ds[f"max_{name}_error"].values < 1e-6).all()
+        for end, sign in (("max", 1.0), ("min", -1.0)):
+            off = np.abs(ds[f"{end}_{name}"].values - sign * size * radius)
+            assert (off <= ds[f"{end}_{name}_error"].values + 1e-9).all()
+        np.testing.assert_allclose(ds[f"mean_{name}"], 0.0, atol=1e-9)
+    wide = pk.sweep(LOGISTIC, r=[3.7, 4.0], of="extrema", x=0.3)
+    assert (wide.max_x.values <= 1.0).all()
+    assert (wide.max_x_error.values > 0.0).all()
+
+
+def test_where_a_multiplier_is_one_the_period_is_still_told():
+    ds = pk.sweep(LOGISTIC, r=[2.9, 3.0, 3.1], of=["period", "extrema"], x=0.3)
+    assert ds.period.values.tolist() == [1.0, 1.0, 2.0]
+    assert ds.max_x.values[1] == pytest.approx(2 / 3, abs=1e-9)
+
+
+def test_the_rows_of_a_system_are_listed():
+    rows = pk.quantities(NEURON)
+    assert {"max_speed", "min_v_error", "lyapunov_exponent"} <= set(rows)
+    assert rows["max_v"].long_name.startswith("greatest v")
+    assert "equilibria" not in pk.quantities(WELL).groups
+    assert "topology" in pk.quantities(pk.Reduced(0.1, 0.2))
+    assert "topology" not in rows
+    assert {"kramers", "attractors"} & set(pk.quantities(FRICTION).groups)
+    with pytest.raises(pk.ParameterError, match="system: got 3"):
+        pk.quantities(3)

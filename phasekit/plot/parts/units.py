@@ -15,7 +15,7 @@ from phasekit.labels.conversion import in_si
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.units import UNITS_OF, converted, factor, si_unit, usual
 from phasekit.systems.registry import models
-from phasekit.table.quantities import quantities
+from phasekit.table.quantities import Quantities
 
 Angles = Literal["rad", "deg"]
 
@@ -162,5 +162,5 @@ def _unit_names() -> dict[str, str]:
     """Return the names that quantities, parameters and states have anywhere, with their units."""
     parameters = {p.name: p.units for model in models().values() for p in model.declared}
     states = {name: units for name, (units, _) in STATES.items()}
-    rows = {name: row.units for name, row in quantities().items()}
+    rows = {name: row.units for name, row in Quantities().items()}
     return {**UNITS_OF, **parameters, **states, **rows}
