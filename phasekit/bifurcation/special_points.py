@@ -143,27 +143,27 @@ for _kind in (
     PointKind(
         "cusp", "CP", "two folds meet: three equilibria merge into one",
         "quadratic coefficient of the fold", "fold, and the coefficient is zero",
-        (), "*", 12, "ORANGE", None, None, BOTH,
+        ("c",), "*", 12, "ORANGE", None, None, BOTH,
     ),
     PointKind(
         "bogdanov_takens", "BT", "a double eigenvalue zero: a fold and a Hopf curve meet",
         "w v of the fold; k of the Hopf point", "fold, and w v = 0; Hopf point, and k = 0",
-        (), "P", 9, "SKY", "hopf",
+        ("a", "b"), "P", 9, "SKY", "hopf",
     ),
     PointKind(
         "generalized_hopf", "GH", "the first Lyapunov coefficient of a Hopf point is zero",
         "first Lyapunov coefficient", "Hopf point, and l1 = 0",
-        (), "h", 9, "SKY", None,
+        ("l2", "omega"), "h", 9, "SKY", None,
     ),
     PointKind(
         "zero_hopf", "ZH", "an eigenvalue zero beside a pair on the imaginary axis",
         "determinant of f_x along a Hopf curve, real part of a pair along folds",
-        "Hopf point and fold", (), "X", 9, "SKY", None,
+        "Hopf point and fold", ("b", "c", "d", "e", "theta", "omega"), "X", 9, "SKY", None,
     ),
     PointKind(
         "hopf_hopf", "HH", "two pairs of eigenvalues on the imaginary axis",
         "real part of another pair along a Hopf curve", "Hopf point, and another pair",
-        (), "H", 9, "SKY", None,
+        ("p11", "p12", "p21", "p22", "theta", "delta", "omega1", "omega2"), "H", 9, "SKY", None,
     ),
     PointKind(
         "fold_of_cycles", "LPC", "two periodic orbits merge and vanish",
@@ -186,36 +186,36 @@ for _kind in (
     PointKind(
         "resonance_1", "R1", "two multipliers of a map or cycle are 1; fold and torus curve meet",
         "w v of the fold; angle of the pair", "fold, and w v = 0; torus point, and the angle is 0",
-        (), "P", 9, "GREEN", None,
+        ("a", "b"), "P", 9, "GREEN", None,
     ),
     PointKind(
         "resonance_2", "R2", "two multipliers of a map or cycle are -1; flip and torus curve meet",
         "w v of the period doubling; angle of the pair",
         "period doubling, and w v = 0; torus point, and the angle is half a turn",
-        (), "P", 9, "ORANGE", None,
+        ("c", "d"), "P", 9, "ORANGE", None,
     ),
     PointKind(
         "resonance_3", "R3", "a pair of multipliers of a map or cycle at a third of a turn",
         "angle of the pair", "torus point, and the angle is a third of a turn",
-        (), "^", 8, "SKY", None,
+        ("a",), "^", 8, "SKY", None,
     ),
     PointKind(
         "resonance_4", "R4", "a pair of multipliers of a map or cycle at a quarter of a turn",
         "angle of the pair", "torus point, and the angle is a quarter of a turn",
-        (), "s", 8, "SKY", None,
+        ("a", "b"), "s", 8, "SKY", None,
     ),
     PointKind(
         "fold_flip", "LPPD", "multipliers 1 and -1 of a map or cycle together",
         "product of 1 + mu along folds, of mu - 1 along period doublings",
-        "fold and period doubling", (), "X", 9, "ORANGE", None,
+        "fold and period doubling", ("a", "b", "e"), "X", 9, "ORANGE", None,
     ),
     PointKind(
         "generalized_flip", "GPD", "c of a period doubling of a map or cycle is zero",
-        "c of the period doubling", "period doubling, and c = 0", (), "h", 9, "ORANGE", None,
+        "c of the period doubling", "period doubling, and c = 0", ("e",), "h", 9, "ORANGE", None,
     ),
     PointKind(
         "chenciner", "CH", "the coefficient d of a torus point of a map or cycle is zero",
-        "d of the torus point", "torus point, and d = 0", (), "H", 9, "GREEN", None,
+        "d of the torus point", "torus point, and d = 0", ("e", "angle"), "H", 9, "GREEN", None,
     ),
     PointKind(
         "cycle_branch_point", "BPC", "families of periodic orbits cross",

@@ -379,6 +379,11 @@ class Curve:
         third = self.field.third(self.active)
         return self._derive(third, u, np.concatenate([a, b, c]), self.n)
 
+    def derivative(self, u: Array, *z: Array) -> Array:
+        """The derivative of f along as many directions as are given, of a symbolic field."""
+        function = self.field.derivative(self.active, len(z))
+        return self._derive(function, u, np.concatenate(z), self.n)
+
     def _derive(self, function: Any, u: Array, z: Array, count: int) -> Array:
         n, m = self.n, self.m
         place = 2 * m

@@ -10,11 +10,12 @@ several directions are combinations of lines (polarisation), and a line is sampl
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
-from math import factorial
+from math import comb, factorial
 from typing import Any
 
 import numpy as np
@@ -142,6 +143,45 @@ class Derivatives:
         total = total - self._along(a - b + c, 3) + self._along(a - b - c, 3)
         return (size / 24.0) * total
 
+    def form(self, *z: Vector) -> Estimate:
+        """The derivative of f along one to five directions."""
+        if len(z) <= 3:
+            short: Callable[..., Estimate] = (self.first, self.second, self.third)[len(z) - 1]
+            return short(*z)
+        if any(np.iscomplexobj(one) for one in z):
+            return _multilinear(self.form, *z)
+        z = tuple(self._full(one) for one in z)
+        if self.curve.field.steps > 1:
+            return self._chained(*z)
+        if self.exact:
+            return self._rounded(self.curve.derivative(self.u, *z))
+        balanced, size = self._balanced(*z)
+        return size * self._polarised(balanced) if size else self._nothing()
+
+    def _polarised(self, z: Sequence[Array]) -> Estimate:
+        """The derivative along directions by those along lines.
+
+        Of a direction m times these are its multiples m, m - 2, ..., -m, weighted as in a binomial
+        of differences.
+        """
+        different: dict[bytes, tuple[Array, int]] = {}
+        for one in z:
+            _, times = different.get(one.tobytes(), (one, 0))
+            different[one.tobytes()] = one, times + 1
+        order = len(z)
+        total = self._nothing()
+        if len(different) == 1:
+            return self._along(z[0], order)
+        for taken in product(*(range(times + 1) for _, times in different.values())):
+            left = tuple(times - k for k, (_, times) in zip(taken, different.values(), strict=True))
+            if (sum(taken), taken) >= (sum(left), left):
+                continue  # the opposite line, which gives the same, or none
+            parts = list(zip(different.values(), taken, strict=True))
+            line = np.sum([(times - 2 * k) * one for (one, times), k in parts], axis=0)
+            weight = math.prod(comb(times, k) for (_, times), k in parts) * (-1.0) ** sum(taken)
+            total = total + self._along(line, order) * weight
+        return total * (2.0 ** (1 - order) / factorial(order))
+
     def noise(self) -> Array:
         """Size of the rounding errors of f near the point, of whatever it does inside as well."""
         return self._noise_of(self.reach, None)
@@ -164,28 +204,34 @@ class Derivatives:
         return Estimate(np.asarray(value), error)
 
     def _chained(self, *z: Array) -> Estimate:
-        """The second or third derivative of a map applied many times, by those of its steps."""
+        """A derivative of a map applied many times, by those of its steps.
+
+        What a step makes of directions together is the sum over all ways to part them, of its
+        derivative along what the steps before have made of the parts (Faa di Bruno).
+        """
         if self._steps is None:
             self._steps = self._of_steps()
-        n = self.curve.n
-        lines = [Estimate(one[:n], np.zeros(n)) for one in z]
-        twos = {(i, j): self._nothing() for j in range(len(z)) for i in range(j)}
-        three = self._nothing()
+        n, order = self.curve.n, len(z)
+        full = (1 << order) - 1  # sets of directions are sums of powers of 2
+        found = {
+            some: Estimate(z[some.bit_length() - 1][:n], np.zeros(n))
+            if some & (some - 1) == 0
+            else self._nothing()
+            for some in range(1, full + 1)
+        }
         for d in self._steps:
-            full = [np.append(line.value, one[n:]) for line, one in zip(lines, z, strict=True)]
-            if len(z) == 3:
-                three = d.turned(three) + d.third(*full)
-                for (i, j), two in twos.items():
-                    (k,) = {0, 1, 2} - {i, j}
-                    three = three + d.second(full[k], two.value)
-            twos = {
-                (i, j): d.turned(two) + d.second(full[i], full[j]) for (i, j), two in twos.items()
-            }
-            lines = [
-                d.turned(line) + Estimate(d.slopes[:, n:] @ one[n:], np.zeros(n))
-                for line, one in zip(lines, z, strict=True)
-            ]
-        return three if len(z) == 3 else twos[0, 1]
+            after = {}
+            for some, whole in found.items():
+                total = d.turned(whole)
+                if some & (some - 1) == 0:
+                    own = z[some.bit_length() - 1][n:]
+                    total = total + Estimate(d.slopes[:, n:] @ own, np.zeros(n))
+                for parts in _parted(some):
+                    given = [np.append(found[one].value, _parameters(z, one, n)) for one in parts]
+                    total = total + d.form(*given)
+                after[some] = total
+            found = after
+        return found[full]
 
     def _of_steps(self) -> list[Derivatives]:
         """The derivatives of each step of a map that is applied many times."""
@@ -310,9 +356,10 @@ class _Ladder:
         if order == 0:
             return Estimate(self.middle, self.noise), 0, False
         count, n = self.even.shape
-        data = self.even if order == 2 else self.odd
-        errors = self.errors / self.steps[:, None] ** (2 if order == 2 else 1)
-        least = 2 if order == 3 else 1
+        data = self.odd if order % 2 else self.even
+        errors = self.errors / self.steps[:, None] ** (1 if order % 2 else 2)
+        place_of = (order - 1) // 2  # among the squares of the step
+        least = 1 + place_of
         values = np.full((WINDOW + 1, count, n), np.nan)
         noises = np.full((WINDOW + 1, count, n), np.inf)
         for width in range(least, WINDOW + 1):
@@ -327,7 +374,9 @@ class _Ladder:
                     (count - width + 1, n, width), float, given, 0, (step, across, step)
                 )
                 found = windows @ by
-                kept[width, place] = found / self.steps[place, None] ** 2 if order == 3 else found
+                if place_of:
+                    found = found / self.steps[place, None] ** (2 * place_of)
+                kept[width, place] = found
         return self._best(values, noises, least)
 
     def _best(self, values: Array, noises: Array, least: int) -> tuple[Estimate, int, bool]:
@@ -371,8 +420,32 @@ def _weights(order: int, width: int) -> Array:
     """
     squares = 4.0 ** -np.arange(width)
     wanted = np.zeros(width)
-    wanted[1 if order == 3 else 0] = {1: 1.0, 2: 2.0, 3: 6.0}[order]
+    wanted[(order - 1) // 2] = factorial(order)
     return np.asarray(np.linalg.solve(np.vander(squares, increasing=True).T, wanted))
+
+
+def _parted(some: int) -> list[tuple[int, ...]]:
+    """All ways to part a set, a sum of powers of 2, into two or more sets."""
+
+    def ways(left: int) -> list[tuple[int, ...]]:
+        if not left:
+            return [()]
+        lowest = left & -left
+        rest, found, other = left - lowest, [], left - lowest
+        while True:  # over all sets of the rest, which the lowest is joined to
+            found += [(lowest | other, *more) for more in ways(rest & ~other)]
+            if not other:
+                return found
+            other = (other - 1) & rest
+
+    return [parts for parts in ways(some) if len(parts) > 1]
+
+
+def _parameters(z: Sequence[Array], some: int, n: int) -> Array:
+    """The parts along parameters of a set of directions: none of several together."""
+    if some & (some - 1):
+        return np.zeros(len(z[0]) - n)
+    return z[some.bit_length() - 1][n:]
 
 
 def _multilinear(form: Any, *directions: Vector) -> Estimate:
@@ -381,15 +454,22 @@ def _multilinear(form: Any, *directions: Vector) -> Estimate:
         [(np.real(z), 1.0), (np.imag(z), 1j)] if np.iscomplexobj(z) else [(z, 1.0)]
         for z in directions
     ]
-    total: Estimate | None = None
+    # In any order a form is the same.
+    weights: dict[tuple[bytes, ...], complex] = {}
+    vectors: dict[bytes, Array] = {}
     for chosen in product(*parts):
-        vectors = [vector for vector, _ in chosen]
-        if all(np.any(z) for z in vectors):
-            factor: complex = 1.0
-            for _, one in chosen:
-                factor = factor * one
-            part: Estimate = form(*vectors) * (factor + 0j)
-            total = part if total is None else total + part
+        factor: complex = 1.0
+        for vector, unit in chosen:
+            factor = factor * unit
+            vectors[vector.tobytes()] = vector
+        if all(np.any(vector) for vector, _ in chosen):
+            names = tuple(vector.tobytes() for vector, _ in chosen)
+            names = tuple(sorted(names)) if len(names) > 3 else names
+            weights[names] = weights.get(names, 0.0) + factor
+    total: Estimate | None = None
+    for names, factor in weights.items():
+        part: Estimate = form(*(vectors[name] for name in names)) * (factor + 0j)
+        total = part if total is None else total + part
     if total is None:
         total = form(*(0.0 * np.real(z) for z in directions))
     return total

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.long_formulas import long_formulas
+from phasekit.bifurcation.continuation.long_formulas import LongFormulas, long_formulas
 from phasekit.errors import ParameterError
 from phasekit.numerics import differences
 from phasekit.numerics.differences import DERIVED
@@ -56,6 +56,10 @@ class Field:
 
     def third(self, active: tuple[int, ...]) -> Any:
         """Third derivative along the three directions that z holds, of a symbolic field."""
+        raise NotImplementedError
+
+    def derivative(self, active: tuple[int, ...], order: int) -> Any:
+        """The derivative along so many directions, which z holds, of a symbolic field."""
         raise NotImplementedError
 
     def values(self, u: Array, par: Array, active: tuple[int, ...]) -> Array:
@@ -115,6 +119,10 @@ class SymbolicField(Field):
     def third(self, active: tuple[int, ...]) -> int:
         """Machine code for the third derivative along three directions."""
         return _third(self.expressions, self.states, self.parameters, active)
+
+    def derivative(self, active: tuple[int, ...], order: int) -> int:
+        """Machine code for the derivative of an order along as many directions."""
+        return _derivative(self.expressions, self.states, self.parameters, active, order)
 
 
 def refuse_uncompiled(expression: Any, states: set[Any], argument: str) -> None:
@@ -279,3 +287,15 @@ def _third(
         ]
     places.update({symbol: (2, i) for i, symbol in enumerate(z)})
     return compile_expressions(along, places)
+
+
+@functools.lru_cache(maxsize=64)
+def _derivative(
+    expressions: tuple[Any, ...],
+    states: tuple[str, ...],
+    parameters: tuple[str, ...],
+    active: tuple[int, ...],
+    order: int,
+) -> int:
+    u, places = unknowns_of(states, parameters, active)
+    return LongFormulas(expressions, places, len(u)).derivative(order)

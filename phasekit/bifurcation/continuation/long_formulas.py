@@ -101,8 +101,12 @@ class LongFormulas:
 
     def third(self) -> int:
         """Address of the third derivative along the three directions that z holds."""
+        return self.derivative(3)
+
+    def derivative(self, order: int) -> int:
+        """Address of the derivative of an order along as many directions, which z holds."""
         along = self.values
-        for k in range(3):
+        for k in range(order):
             along = self._along(along, k * self.m)
         return self._compiled(dict(enumerate(along)), len(along))
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import BRANCH, EVENT, HOPF, TORUS
 from phasekit.bifurcation.continuation.normal_form import zero_along
 from phasekit.bifurcation.continuation.path import Path, Sample, between, bracket_root
@@ -87,7 +90,17 @@ def find_on(curve: Curve, path: Path) -> tuple[list[Placed], tuple[str, ...]]:
                     gap = np.dot(ahead, special.u - path.u[i, :m])
                     square = np.dot(ahead, chord[:m])
                     found.append(Placed(i, float(gap / square), special))
-    return _without_echoes(curve, unique(curve, path, found)), tuple(messages)
+    kept = _without_echoes(curve, unique(curve, path, found))
+    return [replace(one, special=_described(curve, one.special)) for one in kept], tuple(messages)
+
+
+def _described(curve: Curve, special: Special) -> Special:
+    """A point with its normal form, where it is known well enough to have one."""
+    if special.status != CONVERGED:
+        return special
+    (form,) = {test.form for test in looked_for_on(curve) if test.kind == special.kind}
+    found, words = form(Derivatives(curve, special.u))
+    return replace(special, normal_form=found, message=words)
 
 
 def _vanishes(values: Array) -> bool:

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.path import Sample
 
 Array = npt.NDArray[np.float64]
@@ -34,6 +35,8 @@ class CurveTest:
         Whether there are such points of flows (False), of maps (True), or of both.
     coefficient : str
         What messages call the function.
+    form : callable
+        The normal form at a point of the derivatives given, and what is to be said of it.
     """
 
     kind: str
@@ -43,6 +46,7 @@ class CurveTest:
     holds: Callable[[Curve, Sample], bool] = lambda curve, s: True
     of: tuple[bool, ...] = (False,)
     coefficient: str = ""
+    form: Callable[[Derivatives], tuple[dict[str, float], str]] = lambda d: ({}, "")
 
     def value(self, curve: Curve, s: Sample) -> float:
         """The function at one point."""

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation import normal_form as forms
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels.defining import FOLD
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.continuation.points.null_vectors import left_and_right
+from phasekit.bifurcation.continuation.reduction import Reduction, critical, described
+from phasekit.bifurcation.continuation.units import force_sizes
 
 Array = npt.NDArray[np.float64]
 
@@ -24,4 +27,12 @@ def quadratic(curve: Curve, u: Array, slopes: Array) -> Array:
     return np.asarray(np.einsum("ki,kij,kj->k", p, bent, v))
 
 
-TESTS = (CurveTest("cusp", FOLD, quadratic, of=(False, True)),)
+def normal_form(d: forms.Derivatives) -> tuple[dict[str, float], str]:
+    """Of xi' = c xi^3, of maps xi -> xi + c xi^3, with |q| = 1 ([Kuznetsov2004] 8.2, 9.2)."""
+    at = critical(d, [1.0 if d.curve.discrete else 0.0], [(0,)])
+    c = Reduction(d, at, 3).coefficient(0, (3,))
+    rows = force_sizes(d.curve, d.u)
+    return described({"c": (c, forms.unit_of(d, rows, at.left[0], at.right[0], 3))})
+
+
+TESTS = (CurveTest("cusp", FOLD, quadratic, of=(False, True), form=normal_form),)
