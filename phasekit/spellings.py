@@ -13,10 +13,14 @@ from phasekit.errors import ParameterError
 DEPRECATED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "capture": {"perturbed": "system"},
+        "damped_portrait": {"perturbed": "system"},
+        "derivatives": {"time": "t"},
         "escape_rate": {"perturbed": "system"},
         "first_passage": {"longest": "duration"},
+        "iterated": {"times": "n"},
         "lyapunov": {"perturbed": "system", "time": "duration"},
         "melnikov": {"perturbed": "system"},
+        "nullclines": {"what": "system"},
         "quiet_frequencies": {"perturbed": "system"},
         "resonances": {"perturbed": "system"},
         "retrapping_torque": {"perturbed": "system"},
@@ -48,7 +52,11 @@ def respelled(function: str, keywords: dict[str, Any], level: int = 3) -> dict[s
     for name in former.keys() & keywords.keys():
         if former[name] in now:
             raise ParameterError(f"{name}: got it besides {former[name]}, wants {former[name]}")
-        text = f"{function}({name}=...) is now {function}({former[name]}=...)"
-        warnings.warn(text, DeprecationWarning, stacklevel=level)
+        deprecate(f"{function}({name}=...)", f"{function}({former[name]}=...)", level + 1)
         now[former[name]] = keywords[name]
     return now
+
+
+def deprecate(former: str, now: str, level: int = 3) -> None:
+    """Warn that what is written so is written otherwise now."""
+    warnings.warn(f"{former} is now {now}", DeprecationWarning, stacklevel=level)

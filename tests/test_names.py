@@ -1,6 +1,8 @@
 """Wrong guesses are answered with the right name."""
 
+import ast
 import dataclasses
+from pathlib import Path
 
 import pytest
 
@@ -112,3 +114,18 @@ def test_explore_names_only_what_it_takes():
 def test_a_problem_is_answered_by_what_takes_it():
     with pytest.raises(pk.ParameterError, match="pk.periodic_orbit .* take a Problem"):
         pk.orbits(PROBLEM, 1.0, 1.0)
+
+
+#: What a function is not called: words that say neither what it returns nor what it does.
+VAGUE = {
+    "at", "known", "made", "noted", "of", "one", "place", "said", "some", "told", "worded",
+}  # fmt: skip
+
+
+def test_functions_are_named_by_what_they_return_or_do():
+    vague = []
+    for path in sorted(Path(pk.__file__).parent.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef) and node.name.strip("_") in VAGUE:
+                vague.append(f"{path.name}: {node.name}")
+    assert vague == ["rotation.py: at"]  # public: `CoupledRotation.at`

@@ -164,10 +164,10 @@ def _(law: Any, values: Values, names: Names, limits: Limits) -> Loci:
 @branches_along.register
 def _(law: Machines, values: Values, parameter: str, span: Span) -> Along:
     """Those of a function with the same equilibria, with the energies of the amended potential."""
-    atlas = Atlas.of(steady_line(law, values, {parameter: span}))
+    atlas = Atlas.from_line(steady_line(law, values, {parameter: span}))
 
     def amended(at: Any, phi: Any) -> tuple[Any, Any, Any]:
-        one = law.at({**values, parameter: np.asarray(at)})
+        one = law.with_values({**values, parameter: np.asarray(at)})
         height, _, bend = one.potential(phi)
         return height, bend, support_inertia(one.machine, phi)[0] ** 2
 
@@ -187,7 +187,7 @@ def _(law: Machines, values: Values, parameter: str, span: Span) -> Along:
 @branches_along.register(Conservative)
 @branches_along.register(PerturbedLaw)
 def _(law: Any, values: Values, parameter: str, span: Span) -> Along:
-    atlas = Atlas.of(steady_line(law, values, {parameter: span}))
+    atlas = Atlas.from_line(steady_line(law, values, {parameter: span}))
     found = atlas.curves()
     return Along(found, atlas.joints.meetings, atlas.missing)
 

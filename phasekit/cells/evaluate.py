@@ -43,7 +43,7 @@ class Cells:
     widths: dict[str, int] = field(default_factory=dict)  # of dims whose labels are numbered
 
     @classmethod
-    def of(
+    def from_inputs(
         cls, model: type[System], passes: Sequence[Pass], inputs: Mapping[str, FloatArray]
     ) -> Cells:
         """Return cells of which all passes are computed."""
@@ -174,7 +174,9 @@ def fill(
     columns: numbered.Columns | None = None,
 ) -> None:
     """Compute one tile straight into its part of the results; keep what has open columns."""
-    cells = Cells.of(model, passes, {name: cut(array, tile) for name, array in arrays.items()})
+    cells = Cells.from_inputs(
+        model, passes, {name: cut(array, tile) for name, array in arrays.items()}
+    )
     with np.errstate(over="ignore"):  # where a result is kept in single precision
         for name, result in results.items():
             result[tile] = cells.computed[name]
@@ -247,7 +249,7 @@ def columns_of_sample(request: Request, most: int = 256) -> dict[str, int]:
             for name, array in arrays.items():
                 own = [p if n > 1 else [0] for p, n in zip(places, array.shape, strict=True)]
                 arrays[name] = array[np.ix_(*own)]
-            several.append(Cells.of(type(request.system), part.passes, arrays).widths)
+            several.append(Cells.from_inputs(type(request.system), part.passes, arrays).widths)
     return numbered.greatest(several)
 
 
@@ -287,7 +289,7 @@ def _spread(values: xr.DataArray, dims: Sequence[str]) -> Any:
 
 def _found_in_block(model: type[System], part: Part, *arrays: FloatArray) -> tuple[Any, Any]:
     """Return the numbers of columns that a block needs, and what its search left open."""
-    cells = Cells.of(model, part.passes, dict(zip(part.inputs, arrays, strict=True)))
+    cells = Cells.from_inputs(model, part.passes, dict(zip(part.inputs, arrays, strict=True)))
     return cells.widths, numbered.stretches(cells.computed)
 
 
@@ -300,7 +302,7 @@ def _block(
 ) -> Any:
     """Compute one block of a lazy graph."""
     shape = np.broadcast_shapes(*(np.shape(array) for array in arrays))
-    cells = Cells.of(model, (one,), dict(zip(names, arrays, strict=True)))
+    cells = Cells.from_inputs(model, (one,), dict(zip(names, arrays, strict=True)))
     results = []
     for row in rows:
         values = numbered.resized(cells.computed[row.name], row, row.label_shape)

@@ -64,7 +64,7 @@ def fitted(
     lines = [line for one in passes for line in (one, *one.behind)]
     if (resting or any(map(is_numbered, rows))) and not any(map(_finds, lines)):
         passes = [*passes, search]
-    rows = [_worded(row, system, _labels({}, row)) for row in with_errors(system, rows)]
+    rows = [_with_words(row, system, _labels({}, row)) for row in with_errors(system, rows)]
     return rows, [_telling(p, system) for p in passes]
 
 
@@ -101,12 +101,12 @@ def _labels(widths: Widths, row: Quantity) -> dict[str, Labels]:
     return {**labels, **{dim: (range(widths.get(dim, 0)), text) for dim, text in texts.items()}}
 
 
-def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+def with_words(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
     """Return rows without label dims with the words that the system's results have."""
-    return [_worded(row, system, dict(row.labels or LABELS)) for row in rows]
+    return [_with_words(row, system, dict(row.labels or LABELS)) for row in rows]
 
 
-def _worded(row: Quantity, system: System, labels: dict[str, Labels]) -> Quantity:
+def _with_words(row: Quantity, system: System, labels: dict[str, Labels]) -> Quantity:
     words: dict[str, Any] = {"labels": labels, **variant(row, system.standing.rung)}
     words |= system.law.words(row.name, row.units, row.long_name)
     if row.name == "n_equilibria":

@@ -278,7 +278,7 @@ def fitted(
     if not kept:
         raise bad("of", rows[0].name, f"quantities that a {type(system).__name__} has")
     if where.rung.labels_fixed:
-        return worded(system, kept), passes
+        return with_words(system, kept), passes
     labelled = any(dim in ("equilibrium", "saddle") for row in kept for dim in row.dims)
     labelled |= any(row.group == "equilibria" for row in kept)
     if where.is_within(Standing(Conservative, Trait.TORQUED)):
@@ -286,7 +286,7 @@ def fitted(
     followed = where.traits is not None or {row.group for row in kept} <= _FOLLOWED
     if followed and not labelled:
         kept = list(numbered.with_errors(system, kept))
-        return numbered.worded(system, kept), passes  # no equilibrium is looked for
+        return numbered.with_words(system, kept), passes  # no equilibrium is looked for
     if not TABLE.offers(where, "equilibria"):  # states of their own, and no labels
         return kept, passes
     (search,) = passes_of(system, [ROWS["phi"]])
@@ -297,13 +297,13 @@ def fitted(
 _FOLLOWED = {"lyapunov", "stroboscopic"}
 
 
-def worded(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
+def with_words(system: System, rows: Sequence[Quantity]) -> Sequence[Quantity]:
     """Return rows with what a system's law alone says of them."""
     where = system.standing
     if equations_of(system) is not None:
         return rows  # which are of this law alone
     if not where.rung.labels_fixed:
-        return numbered.worded(system, rows)
+        return numbered.with_words(system, rows)
     if where.traits is None and where.rung.words is Law.words:
         return rows
     words: list[Any] = [system.law.words(row.name, row.units, row.long_name) for row in rows]

@@ -12,7 +12,7 @@ import xarray as xr
 from phasekit.bifurcation.along import Along, branches_along
 from phasekit.bifurcation.curves import Curve, Meeting
 from phasekit.bifurcation.special_points import KINDS
-from phasekit.cells.request import worded
+from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import EquilibriumKind
 from phasekit.labels.arguments import bad, pair, unknown
@@ -214,7 +214,7 @@ def _dataset(system: System, parameter: str, found: Along) -> xr.Dataset:
         return array
 
     about = {
-        row.name: row.attrs for row in worded(system, [ROWS[n] for n in names if n != "label"])
+        row.name: row.attrs for row in with_words(system, [ROWS[n] for n in names if n != "label"])
     }
     about["label"] = _LABEL if named else {"long_name": "number of the equilibrium"}
     data = {name: variable(dims, table(name), about[name]) for name in names}

@@ -9,7 +9,7 @@ import xarray as xr
 
 from phasekit.bifurcation.along import Loci, loci_in
 from phasekit.bifurcation.curves import Cusp
-from phasekit.cells.request import worded
+from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import ParameterError
 from phasekit.labelled.atlas import limits, resting, tell_missing
@@ -130,7 +130,7 @@ def _dataset(system: System, names: tuple[str, str], box: Any, found: Loci) -> x
     (x, y), pieces = names, found.curves
     about = {name: input_attrs(system, name) for name in names}
     exact = system.standing.is_within(Trigonometric)
-    (angle,) = worded(system, [ROWS["phi"]])
+    (angle,) = with_words(system, [ROWS["phi"]])
     curves = ("curve", "point")
     data = {
         "phi": variable(

@@ -14,7 +14,7 @@ from phasekit.bifurcation.along import Points, mergers_along
 from phasekit.bifurcation.exact.critical import critical_reduced
 from phasekit.bifurcation.exact.fold_values import fold_values
 from phasekit.cells.evaluate import evaluate
-from phasekit.cells.request import worded
+from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import MergerKind
 from phasekit.labelled.atlas import limits, resting, tell_missing
@@ -99,7 +99,7 @@ def critical(system: Any, parameter: str, span: Any = None) -> xr.Dataset:
     else:
         inputs = system.formula_inputs()
         solve = system.critical_values.get(parameter)
-        function = functools.partial(_by_name, solve or _of(system, parameter), inputs)
+        function = functools.partial(_by_name, solve or _fold_values(system, parameter), inputs)
     for declared in system.declared:
         if declared.name == parameter:  # not an input: neither its value nor its axis counts
             system = system.replace(**{parameter: declared.example})
@@ -151,7 +151,7 @@ def _in_span(system: System, parameter: str, span: Any) -> xr.Dataset:
         for j, (at, phi, kind, error) in enumerate(points.found):
             table[0][k, j], table[1][k, j], errors[k, j] = at, phi, error
             kinds[k, j] = MergerKind[kind.upper()]
-    angle, value = worded(system, [ROWS["phi"], ROWS["critical_fold"]])
+    angle, value = with_words(system, [ROWS["phi"], ROWS["critical_fold"]])
     on = (*dims, "fold")
     about: dict[str, tuple[Any, dict[str, Any]]] = {
         "critical_fold": (table[0], {**value.attrs, "units": units, "equation": "V' = V'' = 0"}),
@@ -185,7 +185,7 @@ _FLAGS = {
 }
 
 
-def _of(system: System, parameter: str) -> Callable[..., Any]:
+def _fold_values(system: System, parameter: str) -> Callable[..., Any]:
     law = system.trigonometric()
     return lambda **values: fold_values(law, parameter, values)
 

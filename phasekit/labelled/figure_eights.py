@@ -77,7 +77,7 @@ def figure_eights(
     ways = _ways(system, path)
     refuse_too_large({"figure_eights": 8 * n}, {"s": n})
     s = np.linspace(0.0, 1.0, n)
-    ds = separatrices(_at(system, ways, s))
+    ds = separatrices(_system_on(system, ways, s))
     marks = _marks(system, ways, s)
     invalid = [i for i, mark in enumerate(marks) if mark.number < 0]
     if invalid:
@@ -118,7 +118,7 @@ def _straight(first: float, last: float, s: FloatArray) -> FloatArray:
     return np.asarray(first + s * (last - first))
 
 
-def _at(
+def _system_on(
     system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], s: FloatArray
 ) -> System:
     changes = {name: xr.DataArray(way(s), dims="path") for name, way in ways.items()}
@@ -156,7 +156,7 @@ class Mark(NamedTuple):
 def _marks(
     system: System, ways: Mapping[str, Callable[[FloatArray], FloatArray]], s: FloatArray
 ) -> list[Mark]:
-    at = _at(system, ways, s)
+    at = _system_on(system, ways, s)
     if isinstance(at.law, Formula):  # areas, which take longest, change nothing
         points, found = topology(at.law, *_values(at, s))
         columns: Any = found.topology, found.figure_eight, points.n_equilibria
@@ -217,7 +217,7 @@ def _count_changes(
     """Where the number of equilibria changes between two places, to rounding."""
     while high - low > _ROUNDING:
         s = np.linspace(low, high, _FEW)
-        at = _at(system, ways, s)
+        at = _system_on(system, ways, s)
         law: Any = at.law
         count = number(law, *_values(at, s))
         i = int(np.flatnonzero(count[1:] != count[0])[0])

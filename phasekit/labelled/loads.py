@@ -86,7 +86,7 @@ def rotators(
     array([   0., -100.,    0.])
     """
     system, states = _states(disk, phi, dphi, ddphi, domega1)
-    return _at(system, select("rotators"), states)
+    return _loads(system, select("rotators"), states)
 
 
 @state_arguments
@@ -153,7 +153,7 @@ def bearing_forces(
     rows = select("bearing_forces")
     if carrier:
         rows = tuple(_in_carrier(row) for row in rows)
-    return _at(system, rows, states, carrier=carrier)
+    return _loads(system, rows, states, carrier=carrier)
 
 
 @state_arguments
@@ -209,7 +209,7 @@ def fixed_bearing_forces(
         raise bad("rho_b1", rho_b1, "a distance between the bearings that is not zero")
     system, states = _states(disk, phi, dphi, ddphi, domega1)
     states["rho_b1"] = ("rho_b1", rho_b1)
-    return _at(system, select("fixed_bearing_forces"), states)
+    return _loads(system, select("fixed_bearing_forces"), states)
 
 
 # ------------------------------------------------------------------------------ at states
@@ -257,7 +257,7 @@ def _is_zero(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool) and value == 0
 
 
-def _at(
+def _loads(
     system: System,
     rows: tuple[Quantity, ...],
     states: Mapping[str, tuple[str, Any]],

@@ -210,7 +210,7 @@ def _families(
     marks = marks[np.diff(marks, prepend=-np.inf) > SAME * scale]
     edges = np.append(marks, top)
     found: dict[Wells, _Family] = {}
-    walls = _Walls.of(system, points, SAME * scale)
+    walls = _Walls.from_system(system, points, SAME * scale)
     for low, high in zip(edges[:-1], edges[1:], strict=True):
         middle = 0.5 * (low + high)
         here = [k for k in centers if energy[k] <= low + SAME * scale]
@@ -242,7 +242,7 @@ class _Walls:
     same: float
 
     @classmethod
-    def of(cls, system: System, points: xr.Dataset, same: float) -> _Walls:
+    def from_system(cls, system: System, points: xr.Dataset, same: float) -> _Walls:
         """The saddles of a system; energies that differ by less than `same` are one.
 
         None where equilibria are degenerate, for of these only some count as saddles.

@@ -219,7 +219,7 @@ class Followed(NamedTuple):
     n: int
     skip: int
 
-    def at(self, values: Array, x: Array) -> Seen:
+    def seen(self, values: Array, x: Array) -> Seen:
         """What is seen at values, from a state of each."""
         law, n, skip, count = self.law, self.n, self.skip, len(values)
         own = {name: np.full(count, value) for name, value in self.fixed.items()}
@@ -256,11 +256,11 @@ class Followed(NamedTuple):
 
 def _samples(followed: Followed, values: Array, start: Array, *, from_last: bool) -> Seen:
     if not from_last:
-        return followed.at(values, np.tile(start, (len(values), 1)))
+        return followed.seen(values, np.tile(start, (len(values), 1)))
     law, rows, x = followed.law, list[Seen](), start
     widths = np.array([np.ptp(law.window.get(name, (0.0, 0.0))) for name in law.states])
     for k in range(len(values)):
-        one = followed.at(values[k : k + 1], x[None])
+        one = followed.seen(values[k : k + 1], x[None])
         rows.append(one)
         x = one.ends[0] if np.isfinite(one.ends[0]).all() else start
         if one.resting[0]:

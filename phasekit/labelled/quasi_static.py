@@ -22,7 +22,7 @@ from phasekit.bifurcation.exact.quasi_static import (
 )
 from phasekit.bifurcation.numerical.quasi_static import Track
 from phasekit.bifurcation.numerical.steady import steady_line
-from phasekit.cells.request import worded
+from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import ParameterError
 from phasekit.labelled.atlas import resting, single, tell_missing
@@ -375,7 +375,7 @@ def _labelled(
     complete: bool,
 ) -> xr.Dataset:
     size = len(next(iter(steps.values())))
-    rows = worded(system, [ROWS[name] for name in columns])
+    rows = with_words(system, [ROWS[name] for name in columns])
     data = {row.name: variable(("step",), columns[row.name], row.attrs) for row in rows}
     jumped = np.zeros(size, bool)
     jumped[jumps["step"]] = True

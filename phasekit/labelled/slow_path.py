@@ -38,16 +38,16 @@ def slow_path(system: System, law: Equations, path: Mapping[str, Any], x0: Any) 
     start = _start(law, x0)
     places = np.arange(count)
 
-    def at(place: float) -> dict[str, FloatArray]:
+    def inputs(place: float) -> dict[str, FloatArray]:
         return {
             name: np.asarray(np.interp(place, places, steps[name]) if name in steps else value)
             for name, value in parameters.items()
         }
 
     widths = np.array([np.ptp(law.window.get(name, (0.0, 0.0))) for name in law.states])
-    units = units_of(law, at(0.0), start[None], widths)
+    units = units_of(law, inputs(0.0), start[None], widths)
     units = np.where(widths > 0.0, units, np.maximum(units, np.abs(start)))
-    track = SlowPath(law, at, units, RTOL)
+    track = SlowPath(law, inputs, units, RTOL)
     with notice(f"following an attractor along {count:,} steps"):
         kept = track.settled(start[None], 0.0)
         if kept is None:

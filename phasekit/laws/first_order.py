@@ -103,7 +103,7 @@ class FirstOrder:
         push = law.force(at) + law.euler_formula(at, _EULER)
         used = {name: law.parameter_at(name, at) for name in law.inputs}
         acceleration = law.base.acceleration_formula({**used, law.base.coordinate: x}, v, push)
-        own = [term.at(rate, at) for term in law.own for rate in term.rates]
+        own = [term.value(rate, at) for term in law.own for rate in term.rates]
         return [v, acceleration, *own]
 
     def __call__(self, x: Any, **values: Any) -> list[float]:

@@ -159,7 +159,7 @@ class Standing:
     """None of a base alone; of a base with terms none need act."""
 
     @classmethod
-    def of(cls, rung: type[Law] | Standing) -> Standing:
+    def from_rung(cls, rung: type[Law] | Standing) -> Standing:
         """A rung as where a base alone stands."""
         return rung if isinstance(rung, Standing) else cls(rung)
 
@@ -169,7 +169,7 @@ class Standing:
         What takes a base alone takes no terms, but what needs no more than a `Law` takes any, and
         what needs a `Flow`, which a law with terms is as well.
         """
-        wanted = Standing.of(where)
+        wanted = Standing.from_rung(where)
         rung, traits = wanted.rung, wanted.traits
         if traits is None and self.traits is not None:
             return rung is Law or rung is Flow

@@ -95,33 +95,33 @@ class PerturbedLaw(Law):
 
     # ------------------------------------------------------------------ terms
 
-    def _of(self, kind: type[Term]) -> tuple[Any, ...]:
+    def _terms(self, kind: type[Term]) -> tuple[Any, ...]:
         return tuple(term for term in self.terms if isinstance(term, kind))
 
     @property
     def harmonics(self) -> int:
         """Number of harmonics of the forcing."""
-        return len(self._of(Forcing))
+        return len(self._terms(Forcing))
 
     @property
     def modulated(self) -> tuple[str, ...]:
         """Parameters of the base that harmonics are added to."""
-        return tuple(term.varies for term in self._of(Modulation))
+        return tuple(term.varies for term in self._terms(Modulation))
 
     @property
     def drifting(self) -> tuple[str, ...]:
         """Parameters of the base that drift."""
-        return tuple(term.varies for term in self._of(Drift))
+        return tuple(term.varies for term in self._terms(Drift))
 
     @property
     def prescribed(self) -> Any:
         """The function or table of time that a parameter is, or None."""
-        return next((term.function for term in self._of(Prescribed)), None)
+        return next((term.function for term in self._terms(Prescribed)), None)
 
     @property
     def own(self) -> tuple[Own, ...]:
         """Terms of one's own."""
-        return self._of(Own)
+        return self._terms(Own)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -225,7 +225,7 @@ class PerturbedLaw(Law):
         least = {n: math.ulp(0.0) for n in self.names if n.endswith("_frequency")}
         bounds = {**domains, **{n: (low, math.inf) for n, low in least.items()}}
         bounds["kT"] = (0.0, math.inf)
-        for term in self._of(Own):
+        for term in self._terms(Own):
             bounds |= {name: (low, high) for name, low, high in term.domains}
         for name, (low, high) in bounds.items():
             if name in values:
@@ -241,7 +241,7 @@ class PerturbedLaw(Law):
 
     def forcing(self, values: Mapping[str, Any]) -> list[tuple[Any, Any, Any]]:
         """The harmonics of the forcing."""
-        return [self.harmonic(values, term.names) for term in self._of(Forcing)]
+        return [self.harmonic(values, term.names) for term in self._terms(Forcing)]
 
     def euler(self, values: Mapping[str, Any]) -> tuple[Any, Any, Any]:
         """(E0, Es, Ec) of the torque ``(E0 + Es sin phi + Ec cos phi) omega'(t)``."""

@@ -223,9 +223,9 @@ class Own(Term):
 
     def force(self, at: Instant) -> Any:
         """The formula there, or what stands for the function."""
-        return self.at(self.force_law, at)
+        return self.value(self.force_law, at)
 
-    def at(self, law: Any, at: Instant) -> Any:
+    def value(self, law: Any, at: Instant) -> Any:
         """The value of a formula, or what stands for that of a function."""
         from phasekit.laws.formulas import symbols_of
 

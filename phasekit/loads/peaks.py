@@ -99,7 +99,7 @@ def at_states(
 
 
 @inline
-def place(distance: float) -> float:
+def node(distance: float) -> float:
     """Place of a node on the unit arc."""
     return distance if distance > 0.0 else 1.0 + distance
 
@@ -250,7 +250,7 @@ def over_arc(
                         stride = 1 << (SAMPLED - 1 - level)
                         at = (q if level == 0 else 2 * (q - first) + 1) * stride
                         samples[b, measure, at] = value
-                        places[at] = place(distance[q])
+                        places[at] = node(distance[q])
         first += count
         for measure in range(MEASURES):
             settled[measure] = level >= SAMPLED - 1

@@ -16,7 +16,7 @@ from zarr.storage import WrapperStore
 from phasekit.errors import StoreError
 from phasekit.labels.coordinates import LABELS
 from phasekit.maps import files
-from phasekit.maps.damage import AGAIN, damage, place
+from phasekit.maps.damage import AGAIN, damage, tile_words
 from phasekit.maps.keys import DOCUMENT, GROUP
 from phasekit.maps.marks import Index, Mark
 from phasekit.maps.packed import Packed
@@ -142,8 +142,8 @@ class Checked(WrapperStore[Any]):
         if wrong is not None:
             raise StoreError(
                 f"store: {self.name} is damaged, or was changed after it was opened: {name} in "
-                f"the tile {place(part, index, self.plan.sizes)} {wrong}; {AGAIN}, and open the "
-                "map again"
+                f"the tile {tile_words(part, index, self.plan.sizes)} {wrong}; {AGAIN}, and open "
+                "the map again"
             )
         return found
 

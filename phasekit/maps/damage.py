@@ -42,7 +42,7 @@ async def damage(found: Any, mark: Mark, name: str, prototype: Any) -> str | Non
     data = found.as_numpy_array()
     if not sound(data):
         return "has another checksum than its data"
-    if Chunk.of(data) != chunk:
+    if Chunk.from_bytes(data) != chunk:
         return "has other data than were written there"
     return None
 
@@ -65,7 +65,7 @@ async def _undecodable(found: Any, prototype: Any) -> str | None:
     return None
 
 
-def place(part: Any, index: Index, sizes: Mapping[str, int]) -> str:
+def tile_words(part: Any, index: Index, sizes: Mapping[str, int]) -> str:
     """Write where a tile lies, as messages do."""
     bounds = (f"{piece.start}:{piece.stop}" for piece in part.region(index, sizes))
     return f"[{', '.join(bounds)}]"
@@ -147,7 +147,7 @@ def refuse(name: str, damaged: Sequence[Damage], sizes: Mapping[str, int]) -> No
 def describe(damaged: Sequence[Damage], sizes: Mapping[str, int]) -> str:
     """Name damaged tiles."""
     named = [
-        f"the tile {place(one.part, one.index, sizes)} of {_few_names(one.part)} {one.what}"
+        f"the tile {tile_words(one.part, one.index, sizes)} of {_few_names(one.part)} {one.what}"
         for one in damaged[:NAMED]
     ]
     more = len(damaged) - len(named)

@@ -61,7 +61,7 @@ class Left:
         cells: int = sum(prod(piece.stop - piece.start for piece in region) for region in done)
         return self.part.cells(self.sizes) - cells
 
-    def at(self, number: int) -> Index:
+    def tile(self, number: int) -> Index:
         """Return one of the tiles, by its place among those that are left."""
         before = self._done - np.arange(len(self._done))  # tiles that are left before each
         return _index_of(number + int(np.searchsorted(before, number, side="right")), self.grid)
@@ -87,7 +87,7 @@ class Left:
         """Return at most so many tiles, evenly over those that are left."""
         count = len(self)
         chosen = sorted({i * (count - 1) // max(most - 1, 1) for i in range(most)})
-        return list(self.tiles(place, request, map(self.at, chosen)))
+        return list(self.tiles(place, request, map(self.tile, chosen)))
 
     def tiles(
         self, place: Place, request: Request, indices: Iterable[Index] | None = None
@@ -117,7 +117,7 @@ class Left:
                 self.plan.generation,
                 part.name,
                 index,
-                made_of.of(index, self.sizes),
+                made_of.digest(index, self.sizes),
                 index in marked,
                 region,
                 type(request.system),

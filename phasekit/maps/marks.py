@@ -40,7 +40,7 @@ class Chunk:
     checksum: str
 
     @classmethod
-    def of(cls, data: Any) -> Chunk:
+    def from_bytes(cls, data: Any) -> Chunk:
         """Return what is recorded of bytes that end with a checksum."""
         return cls(len(data), bytes(data[-TAIL:]).hex())
 
@@ -120,7 +120,7 @@ class Inputs:
             self.values.append((np.asarray(ordered.data, np.float64), places))
         self._piece = functools.cache(self._digest)
 
-    def of(self, index: Index, sizes: Mapping[str, int]) -> str:
+    def digest(self, index: Index, sizes: Mapping[str, int]) -> str:
         """Return the digest of a tile of a map of these sizes."""
         if not self.part.checked:
             return ""
@@ -199,4 +199,4 @@ def _expected(
         for i, n, dim in zip(index, part.chunks, part.dims, strict=True):
             if sizes[dim] > old.sizes[dim] and i >= old.sizes[dim] // n:
                 return None
-    return inputs.of(index, sizes)
+    return inputs.digest(index, sizes)

@@ -29,7 +29,7 @@ class StoreOptions:
     compressor: str = "lz4"  # one of blosc's
 
     @classmethod
-    def of(
+    def from_request(
         cls,
         request: Request,
         chunks: Any = None,

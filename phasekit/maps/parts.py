@@ -55,7 +55,7 @@ class StoredPart:
         return self.inputs is not None
 
     @property
-    def known(self) -> Mapping[str, Quantity]:
+    def rows_by_name(self) -> Mapping[str, Quantity]:
         """Rows that it may hold, by name."""
         rows = rows_of(is_open=self.columns is not None)
         return {**rows, **{row.name: row for row in self.own}} if self.own else rows
@@ -63,7 +63,7 @@ class StoredPart:
     @property
     def rows(self) -> tuple[Quantity, ...]:
         """The rows of the table, with the dtypes that are stored."""
-        known = self.known
+        known = self.rows_by_name
         rows = tuple(replace(known[name], dtype=dtype) for name, dtype in self.quantities.items())
         return rows if self.columns is None else sized(rows, self.columns)
 

@@ -230,7 +230,7 @@ def _check(plan: Plan) -> None:
         wants(set(part.dims) <= plan.sizes.keys(), f"dims of {part.name}")
         wants(len(part.chunks) == len(set(part.dims)) == len(part.dims), f"dims of {part.name}")
         wants(all(type(n) is int and 0 < n <= 2**63 for n in part.chunks), f"chunks of {part.name}")
-        known_rows = part.known
+        known_rows = part.rows_by_name
         for name, dtype in part.quantities.items():
             wants(name in known_rows, f"the quantity {name!r}")
             kinds = _KINDS.get(known_rows[name].dtype, (known_rows[name].dtype,))

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import assemble
-from phasekit.cells.request import Request, worded
+from phasekit.cells.request import Request, with_words
 from phasekit.cells.schema import label_coords, own_names
 from phasekit.errors import ParameterError, PhasekitError, StoreError
 from phasekit.labels.coordinates import LABELS, STATES
@@ -165,7 +165,7 @@ def _documents(
     group.attrs.put({**attrs, _NAMED: " ".join(sorted(named))} if named else attrs)
     for part in plan.parts:
         _create_marks(group, part, part.grid(plan.sizes))
-        for row in worded(system, part.rows):
+        for row in with_words(system, part.rows):
             shape = tuple(plan.sizes[dim] for dim in part.dims) + row.label_shape
             _create(group, part, row, shape, compressor)
     kept.pop(PLAN_KEY, None)  # is written last

@@ -143,7 +143,7 @@ def sweep(
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
         request = _asked(system, axes, axes_by_name, rows, table, loaded=True)
-        options = StoreOptions.of(
+        options = StoreOptions.from_request(
             request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
         warn_of_invalid(request.system.declared, request.system.parameters)
@@ -210,7 +210,7 @@ def plan_sweep(
     system = as_system(system)
     table, rows = _selected(system, of, starts="starts" in _plain(axes))
     request = _asked(system, axes, {}, rows, table, loaded=True)
-    options = StoreOptions.of(request, chunks, dtype, overwrite=overwrite)
+    options = StoreOptions.from_request(request, chunks, dtype, overwrite=overwrite)
     return plan_job(target_of(store), request, options)
 
 

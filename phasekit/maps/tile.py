@@ -200,7 +200,7 @@ def _write(tile: Tile, results: Mapping[str, Any], open_: tuple[float, ...] = ()
         if plan is None:  # removed meanwhile: nothing is left of it
             files.remove(store, held)
         raise
-    written = {key: Chunk.of(value.as_numpy_array()) for key, value in held.items()}
+    written = {key: Chunk.from_bytes(value.as_numpy_array()) for key, value in held.items()}
     chunks = {row.name: written.get(key) for row, key in zip(tile.rows, _keys(tile), strict=True)}
     mark = Mark(tile.made_of, chunks, _columns(tile, results), open_)
     marks[tile.index] = mark.text() if tile.made_of else 1
@@ -229,7 +229,7 @@ def _evened(tile: Tile, mark: Mark) -> dict[str, Any] | None:
         recorded = mark.chunks[row.name]
         if (data is None) != (recorded is None):
             return None
-        if data is not None and not (sound(data) and Chunk.of(data) == recorded):
+        if data is not None and not (sound(data) and Chunk.from_bytes(data) == recorded):
             return None
         had = tuple(
             mark.columns.get(dim, n) for dim, n in zip(row.dims, row.label_shape, strict=True)

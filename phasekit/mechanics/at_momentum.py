@@ -98,10 +98,10 @@ class Machines(Routhian):
 
     def constants_of(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The constants of the parameters."""
-        one = self.at(values)
+        one = self.with_values(values)
         return {**one.machine._asdict(), "p": one.p}
 
-    def at(self, values: Mapping[str, Any]) -> AtMomentum:
+    def with_values(self, values: Mapping[str, Any]) -> AtMomentum:
         """The machines of some values, at the momentum that they keep."""
         v = {name: np.asarray(values[name], float) for name in self.names if name in values}
         with np.errstate(all="ignore"):

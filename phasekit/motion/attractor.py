@@ -181,7 +181,7 @@ class Search:
         def first(orbit: Array) -> tuple[float, ...]:
             return tuple(np.round(self.wrapped(orbit[0]) / self.units, 9).tolist())
 
-        def place(one: Attractor) -> tuple[float, ...]:
+        def sort_key(one: Attractor) -> tuple[float, ...]:
             if one.is_periodic:
                 return (0.0, round(one.period, 9), *first(one.points))
             mean = self.wrapped(one.points)[:, 0].mean()
@@ -191,7 +191,7 @@ class Search:
             if one.is_periodic:
                 turned = (np.roll(one.points, -i, axis=0) for i in range(len(one.points)))
                 one.points = min(turned, key=first)
-        self.found.sort(key=place)
+        self.found.sort(key=sort_key)
 
     def result(self) -> Attractors:
         """What was found: periodic orbits first."""

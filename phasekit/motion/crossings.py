@@ -133,7 +133,7 @@ def crossings(
         before = np.concatenate([part.which[full] for part in parts], axis=1)
         counts = [(before == i).sum(axis=1) for i in range(len(watched))]
         already, rest = np.stack(counts, axis=-1), last.which[full, -1]
-        then = follow(job.of(full), last.state[full, -1], begin, rest, already, room)
+        then = follow(job.part(full), last.state[full, -1], begin, rest, already, room)
         parts.append(_spread(then, full, count))
     return _joined(parts)
 
@@ -153,7 +153,7 @@ class _Job:
     atol: float
     most: int
 
-    def of(self, cells: Index) -> _Job:
+    def part(self, cells: Index) -> _Job:
         """The same for some cells."""
         values, more = cells_of(self.values, cells), cells_of(self.more, cells)
         return replace(self, values=values, more=more)

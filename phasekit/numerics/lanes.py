@@ -75,18 +75,18 @@ class LaneWriter(Writer):
         """The same truth in all lanes."""
         return ir.Constant(self.truth, [int(value)] * LANES)
 
-    def place(self, array: Any, index: int) -> Any:
+    def pointer(self, array: Any, index: int) -> Any:
         """Pointer to an entry."""
-        start = super().place(array, index * LANES)
+        start = super().pointer(array, index * LANES)
         return self.builder.bitcast(start, self.kind.as_pointer())
 
     def load(self, array: Any, index: int) -> Any:
         """Load an entry; arrays are aligned as doubles are."""
-        return self.builder.load(self.place(array, index), align=8)
+        return self.builder.load(self.pointer(array, index), align=8)
 
     def store(self, value: Any, index: int) -> None:
         """Store an entry of the result."""
-        self.builder.store(value, self.place(self.arrays[3], index), align=8)
+        self.builder.store(value, self.pointer(self.arrays[3], index), align=8)
 
     def library(self, name: str, *args: Any) -> Any:
         """Call a function: sine and cosine as polynomials, others lane by lane."""

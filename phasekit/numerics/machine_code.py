@@ -172,13 +172,13 @@ class Writer:
 
     def load(self, array: Any, index: int) -> Any:
         """An entry of an argument."""
-        return self.builder.load(self.place(array, index))
+        return self.builder.load(self.pointer(array, index))
 
     def store(self, value: Any, index: int) -> None:
         """Store an entry of the result."""
-        self.builder.store(value, self.place(self.arrays[3], index))
+        self.builder.store(value, self.pointer(self.arrays[3], index))
 
-    def place(self, array: Any, index: int) -> Any:
+    def pointer(self, array: Any, index: int) -> Any:
         """Pointer to an entry."""
         return self.builder.gep(array, [ir.Constant(ir.IntType(64), index)])
 

@@ -31,8 +31,8 @@ from phasekit.perturbation.rates import (
     combined,
     empty,
     masked,
-    place,
     returning,
+    scatter,
 )
 from phasekit.perturbation.wells import escape_from_wells
 from phasekit.phase.exact.orbits import energy_rises, orbits_at_energy
@@ -71,11 +71,11 @@ def escape_rate(law: PerturbedLaw, *parameters: npt.ArrayLike, center: int | Non
     if not isinstance(law.base, Formula):
         level = np.flatnonzero(flat["torque"] == 0.0)
         own = law.coefficients({name: x[level] for name, x in flat.items()})
-        few = Cells(*vars(heat.at(level)).values(), *map(np.asarray, own))
+        few = Cells(*vars(heat.take(level)).values(), *map(np.asarray, own))
         found.append((level, level_escape(few, center or 0)))
     lines = torqued.grounds(law, [flat[name] for name in law.names], CELLS, lined=True)
     for turns, part in lines:
-        found.append((part, escape_from_wells(turns, heat.at(part), center)))
+        found.append((part, escape_from_wells(turns, heat.take(part), center)))
     fields = merged(found, damping.size)
     return Escape._make(x.reshape(shape + x.shape[1:]) for x in fields)
 
@@ -122,7 +122,7 @@ def level_escape(cells: Cells, number: int) -> Escape:
         loops.saddle_exponent[:, 0], spatial[:, 0],
     )  # fmt: skip
     out = empty(len(A), 2)
-    place(out, combined(cells, rate, way), row, 0, side)
+    scatter(out, combined(cells, rate, way), row, 0, side)
     mirror = arcs & np.isfinite(out.escape_rate[row, 0, side])
     # Over the winding saddle: out of one well, or out of both together.
     height = rises[:, 3]  # from the lower center, in which a cold particle is
@@ -138,7 +138,7 @@ def level_escape(cells: Cells, number: int) -> Escape:
     )  # fmt: skip
     found = combined(cells, whole, way)
     for which in (0, 1):
-        place(out, found, row, 1, which)
+        scatter(out, found, row, 1, which)
     for field in out:  # two saddles of one energy, one at each end
         field[mirror, 1] = np.nan if field.dtype.kind == "f" else EscapeRegime.ABSENT
         field[row[mirror], 1, 1 - side[mirror]] = field[row[mirror], 0, side[mirror]]

@@ -41,7 +41,7 @@ class Loops(NamedTuple):
 def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Steady:
     """All steady rotations under a constant torque on the shaft."""
     values = law.values(*parameters)
-    one = _machines(law).at(values)
+    one = _machines(law).with_values(values)
     return steady_at(one.machine, one.p, values["torque"] * one.machine.Jn)
 
 
@@ -69,44 +69,44 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
 
 def potential(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Amended potential less torque times phi at phi, the last of the inputs, in J."""
-    one, torque = _at(law, inputs[:-1])
+    one, torque = _machines_of(law, inputs[:-1])
     phi = np.asarray(inputs[-1], float)
     return np.asarray(one.potential(phi)[0] - torque * phi)
 
 
 def gradient(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Its first derivative at phi, the last of the inputs."""
-    one, torque = _at(law, inputs[:-1])
+    one, torque = _machines_of(law, inputs[:-1])
     return np.asarray(one.potential(np.asarray(inputs[-1], float))[1] - torque)
 
 
 def curvature(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Its second derivative at phi, the last of the inputs."""
-    one, torque = _at(law, inputs[:-1])
+    one, torque = _machines_of(law, inputs[:-1])
     return np.asarray(one.potential(np.asarray(inputs[-1], float))[2] + 0.0 * torque)
 
 
 def energy(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Energy of states (phi, dphi), the last of the inputs."""
-    one, _ = _at(law, inputs[:-2])
+    one, _ = _machines_of(law, inputs[:-2])
     phi, speed = (np.asarray(x, float) for x in inputs[-2:])
     return np.asarray(0.5 * one.inertia(phi)[0] * speed * speed + potential(law, *inputs[:-1]))
 
 
 def phase_velocity(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Speed at phi on the level of an energy, the last of the inputs; NaN where out of reach."""
-    one, _ = _at(law, inputs[:-2])
+    one, _ = _machines_of(law, inputs[:-2])
     kinetic = np.asarray(inputs[-1], float) - potential(law, *inputs[:-1])
     inertia = one.inertia(np.asarray(inputs[-2], float))[0]
     return np.asarray(np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan) / inertia))
 
 
-def _at(law: Machines | PerturbedLaw, parameters: Any) -> tuple[AtMomentum, Any]:
+def _machines_of(law: Machines | PerturbedLaw, parameters: Any) -> tuple[AtMomentum, Any]:
     """The machines, and the torques on their shafts in N m."""
     if isinstance(law, Machines):
-        return law.at(law.values(*parameters)), 0.0
+        return law.with_values(law.values(*parameters)), 0.0
     values = law.values(*parameters)
-    one = _machines(law).at(values)
+    one = _machines(law).with_values(values)
     return one, values["torque"] * one.machine.Jn
 
 
@@ -125,7 +125,7 @@ def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Arra
     values = law.values(*parameters)
     shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
     flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
-    one = _machines(law).at(flat)
+    one = _machines(law).with_values(flat)
     columns = np.stack([np.broadcast_to(x, flat["torque"].shape) for x in (*one.machine, one.p)])
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)

@@ -50,7 +50,7 @@ class Ladder(Protocol):
     def take(self, rows: Index) -> Ladder:
         """The families of some cells, which may repeat."""
 
-    def at(self, u: Array) -> tuple[Array, Any]:
+    def levels(self, u: Array) -> tuple[Array, Any]:
         """Energies above where the ladder stands, negative below, and orbits at some rungs."""
 
     def motion(self, gap: Array, orbit: Any, time: Array) -> tuple[Array, Array]:
@@ -71,7 +71,7 @@ class ClosedLadder:
     separates: Any = True
 
     @classmethod
-    def of(cls, A: Array, B: Array, C: Array, family: int) -> ClosedLadder:
+    def from_coefficients(cls, A: Array, B: Array, C: Array, family: int) -> ClosedLadder:
         """The ladder of a family, a code of `OrbitFamily`."""
         points, loops = phase_space(A, B, C)
         rises = energy_rises(A, B, C)
@@ -101,7 +101,7 @@ class ClosedLadder:
         few = {name: getattr(self, name)[rows] for name in ("height", "saddle", "side", "rungs")}
         return replace(self, coefficients=(A, B, C), **few)
 
-    def at(self, u: Array) -> tuple[Array, Any]:
+    def levels(self, u: Array) -> tuple[Array, Any]:
         """Energies above the saddle, and orbits."""
         gap = self.sign * self.height[:, None] * np.exp(u)
         a, b, c = (x[:, None] for x in self.coefficients)
@@ -140,7 +140,7 @@ class NumericalLadder:
     sense: Array
 
     @classmethod
-    def of(cls, ground: Ground, code: Array) -> NumericalLadder:
+    def from_ground(cls, ground: Ground, code: Array) -> NumericalLadder:
         """The ladders of families, one code each; of 0 that of the lowest center."""
         points, rows = ground.points, np.arange(code.size)
         centers = points.kind == EquilibriumKind.CENTER
@@ -184,7 +184,7 @@ class NumericalLadder:
         few = {name: x[rows] for name, x in vars(self).items() if name != "ground"}
         return NumericalLadder(self.ground.take(rows), **few)
 
-    def at(self, u: Array) -> tuple[Array, Any]:
+    def levels(self, u: Array) -> tuple[Array, Any]:
         """Energies above the saddle or center, and orbits."""
         gap = (self.sign * self.height)[:, None] * np.exp(u)
         many = self.take(np.repeat(np.arange(len(u)), u.shape[1]))

@@ -61,7 +61,7 @@ class Paths:
         self.parameters = [p[:, None, None, None] for p in parameters]
 
     @classmethod
-    def of(
+    def from_formula(
         cls, formula: Formula, parameters: list[Array], loops: Separatrices, points: int
     ) -> Paths:
         """Follow the separatrices of a potential."""
@@ -223,7 +223,7 @@ def _quiet(
 ) -> Quiet:  # fmt: skip
     """Zeros of the sine transform of the speed, which is odd about the turning point."""
     formula: Any = law.base
-    paths = Paths.of(formula, [values[name] for name in formula.names], loops, POINTS[1])
+    paths = Paths.from_formula(formula, [values[name] for name in formula.names], loops, POINTS[1])
     shape = (*paths.dphi.shape[:-1], number)
     found = Quiet(np.full(shape, np.nan), np.full(shape, np.nan))
     ends = np.isin(loops.loop, (Loop.LOBE, Loop.LOBES))[..., None]
@@ -267,7 +267,7 @@ def _cells(
     points: int,
 ) -> tuple[Melnikov, Any]:  # fmt: skip
     """Melnikov's function by so many points in time, and in which cells they were too few."""
-    paths = Paths.of(formula, [values[name] for name in formula.names], loops, points)
+    paths = Paths.from_formula(formula, [values[name] for name in formula.names], loops, points)
     held = np.ones(len(loops.saddle_phi), bool)
     turned = np.flatnonzero(values["torque"] != 0.0)
     if turned.size:

@@ -50,7 +50,7 @@ class Heat:
     damping: Array
     kT: Array
 
-    def at(self, part: Any) -> Heat:
+    def take(self, part: Any) -> Heat:
         """That of some cells."""
         return Heat(self.damping[part], self.kT[part])
 
@@ -119,7 +119,7 @@ def combined(cells: Heat, first: Array, way: Exit) -> tuple[Array, Array, Any, A
     return np.where(sure, rate, np.nan), height, regime, np.where(sure, error, np.nan)
 
 
-def place(out: Escape, found: tuple[Any, ...], row: Any, saddle: Any, side: Any) -> None:
+def scatter(out: Escape, found: tuple[Any, ...], row: Any, saddle: Any, side: Any) -> None:
     """Put what is found for some cells where its saddle and side stand."""
     fields: tuple[Any, ...] = out
     for field, value in zip(fields, found, strict=True):

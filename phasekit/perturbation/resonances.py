@@ -80,11 +80,11 @@ def _ladders(law: PerturbedLaw, values: Values, family: int) -> list[tuple[Any, 
         own = law.coefficients({name: x[level] for name, x in values.items()})
         A, B, C = map(np.asarray, own)
         if level.size:
-            found.append((level, ClosedLadder.of(A, B, C, family or 1)))
+            found.append((level, ClosedLadder.from_coefficients(A, B, C, family or 1)))
         family = torqued.code_of_numbers(family)
     for ground, part in torqued.grounds(law, [values[name] for name in law.names], CELLS):
         if ground.points.phi.shape[1]:
-            found.append((part, NumericalLadder.of(ground, np.full(len(part), family))))
+            found.append((part, NumericalLadder.from_ground(ground, np.full(len(part), family))))
     return found
 
 
@@ -96,7 +96,7 @@ def _resonant(
     nu = drive[0][1]
     frequency = np.concatenate([m * nu / n for n in orders])
     cell = np.tile(np.arange(len(nu)), len(orders))
-    scanned = ladder.at(ladder.rungs)[1].frequency[cell]
+    scanned = ladder.levels(ladder.rungs)[1].frequency[cell]
     above, known = scanned > frequency[:, None], np.isfinite(scanned)
     changes = (above[:, 1:] != above[:, :-1]) & known[:, 1:] & known[:, :-1]
     found = np.full((2, len(cell)), np.nan)
@@ -118,7 +118,7 @@ def _bisected(ladder: Ladder, ends: tuple[Array, Array], frequency: Array, start
     low, high = ends
     for _ in range(HALVINGS):
         middle = 0.5 * (low + high)
-        same = (ladder.at(middle[:, None])[1].frequency[:, 0] > frequency) == start
+        same = (ladder.levels(middle[:, None])[1].frequency[:, 0] > frequency) == start
         low, high = np.where(same, middle, low), np.where(same, high, middle)
     return 0.5 * (low + high)
 
@@ -129,7 +129,7 @@ def _widths(
 ) -> tuple[Array, Array]:  # fmt: skip
     """Actions and half-widths of resonances of known rungs."""
     steps = at[:, None] + STEP * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    gap, orbit = ladder.at(steps)
+    gap, orbit = ladder.levels(steps)
     # dOmega/du over dh/du = gap, times Omega = dh/dJ
     slope = contract(orbit.frequency, np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12.0 * STEP))
     twist = slope / gap[:, 2] * frequency

@@ -30,8 +30,8 @@ from phasekit.perturbation.rates import (
     combined,
     empty,
     masked,
-    place,
     returning,
+    scatter,
 )
 from phasekit.phase.numerical.families import rise_at_end
 from phasekit.phase.numerical.turns import Turns
@@ -67,10 +67,10 @@ class Wells:
         self.slot = np.take_along_axis(slots, turns.label, axis=1)
         self.saddles = (self.slot >= 0) & np.isfinite(self.phi)
 
-    def at(self, rows: Index) -> Wells:
+    def take(self, rows: Index) -> Wells:
         """Those of some rows."""
         few = object.__new__(Wells)
-        few.turns, few.heat, few.size = self.turns.take(rows), self.heat.at(rows), self.size
+        few.turns, few.heat, few.size = self.turns.take(rows), self.heat.take(rows), self.size
         few.row = np.arange(rows.size)
         few.loops = type(self.loops)._make(x[rows] for x in self.loops)
         for name in ("phi", "centers", "slot", "saddles"):
@@ -88,7 +88,7 @@ class Wells:
         column = np.argmin(way, axis=1)
         return np.where(np.isfinite(way[self.row, column]), column, -1)
 
-    def place(self, column: Index) -> Array:
+    def coordinates(self, column: Index) -> Array:
         """Coordinates of equilibria, NaN where there are none."""
         return np.where(column >= 0, self.phi[self.row, column], np.nan)
 
@@ -118,7 +118,7 @@ class Wells:
         start, kT = self.phi[self.row, column], self.heat.kT
         lengths = []
         for side in (-1.0, 1.0):
-            there = np.abs(self.place(self.nearest(start, side, self.centers)) - start)
+            there = np.abs(self.coordinates(self.nearest(start, side, self.centers)) - start)
             far = self.beyond(start, np.full(start.shape, side), -FAR * kT)
             lengths.append(np.where(np.isnan(there), far, there))
         depth = self._below(start)
@@ -142,7 +142,7 @@ class Basin:
     def __init__(self, wells: Wells, left: Index, right: Index) -> None:
         self.wells, self.ends = wells, (left, right)
         low, high = (
-            np.where(end >= 0, wells.place(end), far)
+            np.where(end >= 0, wells.coordinates(end), far)
             for end, far in ((left, -np.inf), (right, np.inf))
         )
         self.inside = wells.centers & (wells.phi > low[:, None]) & (wells.phi < high[:, None])
@@ -157,9 +157,9 @@ class Basin:
             for end, side in zip(self.ends, (-1.0, 1.0), strict=True)
         ]
 
-    def at(self, rows: Index) -> Basin:
+    def take(self, rows: Index) -> Basin:
         """Those of some rows."""
-        return Basin(self.wells.at(rows), *(end[rows] for end in self.ends))
+        return Basin(self.wells.take(rows), *(end[rows] for end in self.ends))
 
     @property
     def side(self) -> Array:
@@ -171,7 +171,7 @@ class Basin:
         wells, at = self.wells, self.wells.phi[self.wells.row, center]
         found = []
         for side in (-1.0, 1.0):
-            end = wells.place(wells.nearest(at, side, wells.saddles))
+            end = wells.coordinates(wells.nearest(at, side, wells.saddles))
             far = wells.beyond(at, np.full(at.shape, side), rise)
             found.append(np.where(np.isnan(end), at + side * far, end))
         return found[0], found[1]
@@ -184,7 +184,7 @@ class Basin:
         for number in range(int(self.number.max(initial=0))):
             nth = self.inside & (np.cumsum(self.inside, axis=1) == number + 1)
             some = np.flatnonzero(nth.any(axis=1))
-            few = self if some.size == len(kT) else self.at(some)
+            few = self if some.size == len(kT) else self.take(some)
             center = nth[some].argmax(axis=1)
             rise = height[some] + FAR * kT[some]
             ends = few.bounds(center, rise)
@@ -229,23 +229,23 @@ def escape_from_wells(turns: Turns, heat: Heat, number: int | None) -> Escape:
     center, there = turns.center(number)
     there = there & np.isfinite(heat.kT)
     rows = np.flatnonzero(there)
-    few, at = wells.at(rows), wells.phi[rows, center[rows]]
+    few, at = wells.take(rows), wells.phi[rows, center[rows]]
     ends = (few.nearest(at, side, few.saddles) for side in (-1.0, 1.0))
     basin = Basin(few, *ends)
     while rows.size:
         kept = np.flatnonzero(np.isfinite(np.minimum(*basin.heights)))
         low = np.where(basin.side > 0.0, basin.ends[1], basin.ends[0])
         kept = kept[low[kept] >= 0]
-        basin, rows, low = basin.at(kept), rows[kept], low[kept]
+        basin, rows, low = basin.take(kept), rows[kept], low[kept]
         if not rows.size:
             break
         far, holds = _beyond(basin, low)
         last, rest = np.flatnonzero(~holds), np.flatnonzero(holds)
         if last.size:
-            _outwards(out, basin.at(last), rows[last])
+            _outwards(out, basin.take(last), rows[last])
         if not rest.size:
             break
-        basin, rows, low, far = basin.at(rest), rows[rest], low[rest], far[rest]
+        basin, rows, low, far = basin.take(rest), rows[rest], low[rest], far[rest]
         right = basin.side > 0.0
         other = Basin(basin.wells, np.where(right, low, far), np.where(right, far, low))
         _between(out, basin, other, rows, low)
@@ -286,7 +286,7 @@ def _between(out: Escape, basin: Basin, other: Basin, rows: Index, low: Index) -
         np.isfinite(ratio * back), height, loss, _exponents(wells, low), wells.spatial(low),
     )  # fmt: skip
     where = (side < 0.0).astype(int)
-    place(out, combined(wells.heat, rate, way_out), rows, wells.slot[wells.row, low], where)
+    scatter(out, combined(wells.heat, rate, way_out), rows, wells.slot[wells.row, low], where)
 
 
 def _outwards(out: Escape, basin: Basin, rows: Index) -> None:
@@ -307,7 +307,7 @@ def _outwards(out: Escape, basin: Basin, rows: Index) -> None:
     for end, column in enumerate(basin.ends):
         there = np.flatnonzero((column >= 0) & np.isfinite(basin.heights[end]))
         lower = right if end else ~right
-        few, own = wells.at(there), column[there]
+        few, own = wells.take(there), column[there]
 
         def factor(scale: float, power: float, some: Index = there, low: Any = lower) -> Array:
             return np.where(low, *rims(scale, power))[some]
@@ -317,7 +317,7 @@ def _outwards(out: Escape, basin: Basin, rows: Index) -> None:
             _exponents(few, own), few.spatial(own),
         )  # fmt: skip
         found = combined(few.heat, rate[there], way_out)
-        place(out, found, rows[there], few.slot[few.row, own], 1 - end)
+        scatter(out, found, rows[there], few.slot[few.row, own], 1 - end)
 
 
 def _exponents(wells: Wells, column: Index) -> Array:

@@ -211,7 +211,7 @@ def _under_torque(
 
 @answers.register
 def _(law: Routhian, values: Mapping[str, float]) -> Answers:
-    path = ArcLength.of(law)
+    path = ArcLength.from_law(law)
     ground = path.ground()
     found = separatrices(ground)
     loops: Any = type(found)(*(field[0] for field in found))

@@ -70,7 +70,7 @@ class LevelCurves:
     summit: float
 
     @classmethod
-    def of(cls, known: Answers, cut: float | None = None) -> LevelCurves:
+    def from_answers(cls, known: Answers, cut: float | None = None) -> LevelCurves:
         """Make them of what is known of a system, which cuts a circle open unless told where."""
         low, high = known.ends
         if cut is not None and known.period is not None:

@@ -120,7 +120,7 @@ def bearing_forces(
     if isinstance(disk, xr.Dataset):
         disk, shown = Units.of_dataset(disk, angles, units)
     else:
-        shown = Units.of(angles, units)
+        shown = Units.from_arguments(angles, units)
     over_time = _choice("x", x, ("phi", "time")) == "time"
     if over_time and cut is not None:
         raise bad("cut", cut, "None, for the time is not on a circle")

@@ -168,7 +168,7 @@ def branch(
         y = first.free[1] if plane else first.problem_state[0]
     several, columns = _columns(several, x, y, sel)
     held = {str(c.name): str(c.attrs.get("units", "")) for c in columns[0]}
-    shown = Units.of(angles, units, held)
+    shown = Units.from_arguments(angles, units, held)
     circle = Circle.of_axis(columns[0][1], shown, cut)
     stretch = [shown.scale(*item) for item in held.items()]
     axes = style.axes_for(ax, legend=legend)

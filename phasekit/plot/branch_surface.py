@@ -117,7 +117,7 @@ def branch_surface(
     box = [folds.attrs[ends] for ends in ("xlim", "ylim")]
     seen = view_of(law, values, (x, y), (tuple(box[0]), tuple(box[1])))
     held = {name: str(folds[name].attrs.get("units", "")) for name in (x, y)}
-    shown = Units.of(angles, units, held)
+    shown = Units.from_arguments(angles, units, held)
     place = str(folds["phi"].attrs["units"])
     stretch = np.array([shown.scale(*item) for item in [*held.items(), ("phi", place)]])
     circle = Circle(seen.ends[0], None)

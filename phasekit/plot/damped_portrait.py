@@ -15,7 +15,7 @@ from phasekit.errors import EquilibriumKind
 from phasekit.labelled.driven import perturbed_of
 from phasekit.labelled.motion import flow
 from phasekit.labelled.phase_space import equilibria
-from phasekit.labels.arguments import bad
+from phasekit.labels.arguments import bad, call_checked
 from phasekit.plot.parts import strokes, style
 from phasekit.plot.parts.circle import TURN
 from phasekit.plot.parts.plane import StatePlane
@@ -33,8 +33,9 @@ GROWTHS = 60
 SAMPLES = 100
 
 
+@call_checked
 def damped_portrait(
-    perturbed: Any,
+    system: Any,
     *,
     orbits: ArrayLike | None = None,
     angles: style.Angles = "rad",
@@ -50,7 +51,7 @@ def damped_portrait(
 
     Parameters
     ----------
-    perturbed : Perturbed
+    system : Perturbed
         One system with damping and perhaps a torque; nothing in it varies with time.
     orbits : array_like, optional
         Initial conditions (phi0, dphi0) in rad and rad/s, one pair or an array of pairs: motions
@@ -84,14 +85,18 @@ def damped_portrait(
     >>> len(ax.get_lines())
     10
     """
-    system = perturbed_of(perturbed)
+    system = perturbed_of(system)
     _refuse_varying(system)
     single(system)
     law: Any = system.system.law
     period = law.period
     on_angle = period is not None and abs(period - TURN) < 1e-12
-    plane = StatePlane.of(
-        Units.of(angles, units), period, cut, on_angle=on_angle, coordinate=law.coordinate
+    plane = StatePlane.from_arguments(
+        Units.from_arguments(angles, units),
+        period,
+        cut,
+        on_angle=on_angle,
+        coordinate=law.coordinate,
     )
     circle, (stretch, pace) = plane.circle, plane.scale
     points = _points(system)

@@ -97,7 +97,7 @@ def force_polygon(
     """
     if not isinstance(bearing, str) or bearing not in BEARINGS:
         raise bad("bearing", bearing, f"one of {', '.join(BEARINGS)}")
-    shown = Units.of("rad", units)
+    shown = Units.from_arguments("rad", units)
     scale, unit = shown.scale("force", "N"), shown.text("force", "N")
     loads = bearing_forces(disk, phi, dphi).sel(bearing=bearing)
     if loads.sizes.keys() - {"disk_axis", "component"}:

@@ -110,7 +110,7 @@ def hodograph(
     if not isinstance(rotator, str) or rotator not in ROTATORS:
         raise unknown("rotator", rotator, ROTATORS)
     flag("legend", legend)
-    shown = Units.of(angles, units)
+    shown = Units.from_arguments(angles, units)
     pair = _plane_of(rotator, plane)
     if isinstance(system, xr.Dataset):
         system, shown = Units.of_dataset(system, angles, units)

@@ -64,7 +64,7 @@ def multipliers(
     points = branch.points
     along = points[branch.free[0]]
     held = {str(along.name): str(along.attrs.get("units", ""))}
-    shown = Units.of("rad", units, held)
+    shown = Units.from_arguments("rad", units, held)
     values, _ = shown.shown(along)
     found = points["multiplier"].transpose("point", "multiplier").values
     axes = style.axes_for(ax, legend=False)

@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 
 from phasekit.errors import ParameterError
 from phasekit.labelled.nullclines import nullclines as found_nullclines
+from phasekit.labels.arguments import call_checked
 from phasekit.plot.parts import style
 from phasekit.plot.parts.units import Units, state_symbols
 
@@ -23,8 +24,9 @@ LOOKS: tuple[style.Look, ...] = (
 )
 
 
+@call_checked
 def nullclines(
-    what: Any, *, window: Any = None, units: Mapping[str, str] | None = None, legend: bool = True,
+    system: Any, *, window: Any = None, units: Mapping[str, str] | None = None, legend: bool = True,
     ax: Axes | None = None,
 ) -> Axes:  # fmt: skip
     r"""Draw the curves of a planar flow on which one of its states does not change.
@@ -33,7 +35,7 @@ def nullclines(
 
     Parameters
     ----------
-    what : Problem, system that states rates, or xarray.Dataset
+    system : Problem, system that states rates, or xarray.Dataset
         One flow of two states, or what `nullclines` returns for it.
     window : mapping of str to (float, float), optional
         Of a system: where to look; by default its window.
@@ -64,7 +66,7 @@ def nullclines(
     >>> [text.get_text() for text in ax.get_legend().get_texts()]
     ['$\\dot v = 0$', '$\\dot w = 0$']
     """
-    ds = what if isinstance(what, xr.Dataset) else found_nullclines(what, window)
+    ds = system if isinstance(system, xr.Dataset) else found_nullclines(system, window)
     names = [
         str(name).removeprefix("nullcline_")
         for name in ds.data_vars
@@ -72,7 +74,7 @@ def nullclines(
     ]
     if "nullcline_of" not in ds or len(names) != 2:
         raise ParameterError(
-            "what: got a Dataset without nullclines, wants a flow of two states, or what "
+            "system: got a Dataset without nullclines, wants a flow of two states, or what "
             "pk.nullclines returns for one"
         )
     ds = ds.rename({f"nullcline_{name}": name for name in names})

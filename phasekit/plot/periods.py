@@ -81,7 +81,7 @@ def period_energy(
     >>> ax.get_xlabel()
     'energy $h$ (s$^{-2}$)'
     """
-    shown = Units.of("rad", units)
+    shown = Units.from_arguments("rad", units)
     families, points, loops = _families(system, n, energy_max, shown)
     axes = style.axes_for(ax, legend=legend)
 
@@ -162,7 +162,7 @@ def frequency_action(
     >>> ax.get_ylabel()
     'frequency $\\omega$ (rad/s)'
     """
-    shown = Units.of("rad", units)
+    shown = Units.from_arguments("rad", units)
     families, points, loops = _families(system, n, energy_max, shown)
     natural = points.natural_frequency.values * shown.scale("frequency", "rad/s")
     axes = style.axes_for(ax, legend=legend)

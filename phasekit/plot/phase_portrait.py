@@ -157,7 +157,9 @@ def phase_portrait(
     if color_by is not None:
         one_of("color_by", color_by, tuple(COLORED))
     shown = Shown(angles, units, cut)
-    picture = Picture.of(system, energies, orbits, shown, 2.0 if color_by is not None else 1.0)
+    picture = Picture.from_arguments(
+        system, energies, orbits, shown, 2.0 if color_by is not None else 1.0
+    )
     axes = style.axes_for(ax, legend=legend)
     land, scale = picture.land, picture.scale
     drawn = strokes.Strokes(axes, land, picture.circle, scale)
@@ -248,7 +250,7 @@ class Picture:
     circle: Circle
 
     @classmethod
-    def of(
+    def from_arguments(
         cls,
         system: Any,
         energies: ArrayLike | None,
@@ -261,7 +263,7 @@ class Picture:
         known = land.answers
         place = known.coordinate, "rad" if known.is_angle else ""
         rate = f"d{known.coordinate}", "rad/s" if known.is_angle else ""
-        units = Units.of(shown.angles, shown.units, dict((place, rate)))
+        units = Units.from_arguments(shown.angles, shown.units, dict((place, rate)))
         if units.angles != "rad" and not known.is_angle:
             wants = "'rad' for a coordinate that is not an angle of period 2 pi"
             raise bad("angles", shown.angles, wants)
@@ -270,7 +272,9 @@ class Picture:
             if known.turn is None:
                 raise bad("cut", shown.cut, "None, for the coordinate is not on a circle")
             low = Circle.cut_at(shown.cut, scale[0], known.turn).low
-            land = LevelCurves.of(known if known.cut_at is None else known.cut_at(low), low)
+            land = LevelCurves.from_answers(
+                known if known.cut_at is None else known.cut_at(low), low
+            )
         chosen = (
             land.levels(1.0 / (6.0 * density)) if energies is None else levels_of(land, energies)
         )
@@ -312,7 +316,7 @@ class Picture:
 
 def curves_of(system: Any) -> LevelCurves:
     """Return the level curves of one system."""
-    return LevelCurves.of(answers(*single(system)))
+    return LevelCurves.from_answers(answers(*single(system)))
 
 
 def _colors(

@@ -60,7 +60,7 @@ def poincare_section(
     ds = labels.dataset(dataset, "dataset", ("section_phi", "section_dphi"), "pk.stroboscopic")
     ds, shown = Units.of_dataset(ds, angles, units)
     on_angle = ds.section_phi.attrs.get("units") == "rad"
-    plane = StatePlane.of(
+    plane = StatePlane.from_arguments(
         shown, TURN if on_angle else None, cut, on_angle=on_angle,
         coordinate=ds.attrs.get("phasekit_coordinate"),
     )  # fmt: skip

@@ -65,7 +65,7 @@ def potential_well(
     True
     """
     shown = Shown(angles, units, cut)
-    picture = Picture.of(system, energies, orbits, shown)
+    picture = Picture.from_arguments(system, energies, orbits, shown)
     well, *others = _panels(ax)
     _draw_well(well, picture)
     if not others:

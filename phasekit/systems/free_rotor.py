@@ -184,7 +184,7 @@ class FreeGyroRotor(RotorStates):
                 raise unknown(f"parameter of {type(self).__name__}", name, names)
         disk = changes.pop("disk", self.disk)
         own = {n: changes.pop(n, getattr(self, n)) for n in ("carrier_inertia", "momentum")}
-        return type(self)._of(disk.replace(**changes) if changes else disk, own)
+        return type(self)._from_parameters(disk.replace(**changes) if changes else disk, own)
 
     @classmethod
     def from_dataset(cls, ds: xr.Dataset) -> Self:
@@ -207,10 +207,10 @@ class FreeGyroRotor(RotorStates):
         refuse_another(ds, cls.__name__)
         values = parameter_values(ds, cls.declared)
         own = {n: values.pop(n, None) for n in ("carrier_inertia", "momentum")}
-        return cls._of(GyroRotorDisk(**values), own)
+        return cls._from_parameters(GyroRotorDisk(**values), own)
 
     @classmethod
-    def _of(cls, disk: GyroRotorDisk, own: dict[str, Any]) -> Self:
+    def _from_parameters(cls, disk: GyroRotorDisk, own: dict[str, Any]) -> Self:
         """A machine of parameters some of which may be arrays, cells of a map."""
         declared = {parameter.name: parameter for parameter in cls.declared}
         kept = {k: None if v is None else declared[k].check(v) for k, v in own.items()}

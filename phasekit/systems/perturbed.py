@@ -157,7 +157,7 @@ class Perturbed(System):
         own = {p.name: p.check(given[p.name]) for p in parts.OWN}
         drive = parts.Drive(base, forcing, modulation, drift)
         kept, laws = parts.own_terms(terms, base)
-        declared = [parts.worded(p, own[p.name]) for p in parts.OWN] + drive.declared
+        declared = [parts.with_words(p, own[p.name]) for p in parts.OWN] + drive.declared
         declared += [p for term in kept for p in term.declared]
         parts.refuse_taken(base, declared)
         varying = {*drive.modulation, *drive.drift}

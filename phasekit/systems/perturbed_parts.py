@@ -215,7 +215,7 @@ def per_second(units: str) -> str:
     return " ".join([part for part in parts if part[:2] != "s-"] + [f"s{power - 1}"])
 
 
-def worded(parameter: Parameter, value: Value) -> Parameter:
+def with_words(parameter: Parameter, value: Value) -> Parameter:
     """Return a parameter; one of damping that drives is called so."""
     words = DRIVES.get(parameter.name)
     if words is None or not isinstance(value, float) or value >= 0.0:

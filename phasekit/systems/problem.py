@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
@@ -13,7 +14,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.bifurcation.continuation.iterated_field import MOST, IteratedField
-from phasekit.labels.arguments import Value, bad, flag, reals, same, unknown, whole
+from phasekit.labels.arguments import Value, bad, call_checked, flag, reals, same, unknown, whole
 from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
@@ -422,12 +423,13 @@ class Problem(ProblemSources, System):
         problem = self.replace(**changes) if changes else self
         return problem.derivatives(x, at)[0]
 
-    def iterated(self, times: int) -> Problem:
+    @functools.partial(call_checked, name="iterated")
+    def iterated(self, n: int) -> Problem:
         """The n-th iterate of the map: its fixed points are the periodic orbits of period n.
 
         Parameters
         ----------
-        times : int
+        n : int
             How often, >= 1.
 
         Returns
@@ -445,12 +447,12 @@ class Problem(ProblemSources, System):
         >>> logistic.iterated(2)([0.5]).round(6).tolist()
         [0.512]
         """
-        times = whole("times", times, "a whole number >= 1")
+        n = whole("n", n, "a whole number >= 1")
         if not self.map:
             raise bad("problem", self, "a map, to be applied several times")
-        total = times * self.times
+        total = n * self.times
         if total > MOST:
-            raise bad("times", times, f"a whole number from 1 to {MOST // self.times}")
+            raise bad("n", n, f"a whole number from 1 to {MOST // self.times}")
         copy = self.replace()
         if total > 1:
             step = getattr(self._own, "base", self._own)
@@ -468,14 +470,15 @@ class Problem(ProblemSources, System):
         symbols = symbols_of(self.parameters)
         return float(self.period.subs({symbols[k]: v for k, v in self.parameters.items()}))
 
-    def derivatives(self, x: npt.ArrayLike, time: float = 0.0) -> tuple[FloatArray, FloatArray]:
+    @functools.partial(call_checked, name="derivatives")
+    def derivatives(self, x: npt.ArrayLike, t: float = 0.0) -> tuple[FloatArray, FloatArray]:
         """Value of f and its Jacobian matrix, at a time if f depends on it.
 
         Parameters
         ----------
         x : array_like, shape (n,)
             The state.
-        time : float, default 0.0
+        t : float, default 0.0
             Of a forced system.
 
         Returns
@@ -496,7 +499,7 @@ class Problem(ProblemSources, System):
         if x.shape != (n,):
             raise bad("x", x, wants)
         refuse_arrays(self)
-        par = np.array([*self.parameters.values(), *(time for _ in self._times())])
+        par = np.array([*self.parameters.values(), *(t for _ in self._times())])
         return jet_of(self._own, par, x)
 
     def __eq__(self, other: object) -> bool:

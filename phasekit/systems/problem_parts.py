@@ -502,4 +502,4 @@ def jet_of(field: Field, par: Array, x: Array) -> tuple[Array, Array]:
         field, EQUILIBRIUM, par, (), np.maximum(np.abs(x), 1e-3), np.zeros(n), -infinite, infinite,
         ContinuationOptions(),
     )  # fmt: skip
-    return curve.at(x)
+    return curve.evaluate(x)

@@ -474,7 +474,7 @@ def stands_on(
     """
     if system.standing.is_within(where):
         return system
-    wanted = Standing.of(where)
+    wanted = Standing.from_rung(where)
     if system.standing.traits is not None:
         more = system.standing.traits & ~(wanted.traits or Trait(0)) & OWN_TRAITS
         if more and wanted.traits is not None:

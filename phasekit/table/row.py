@@ -123,7 +123,7 @@ class Pass:
     @property
     def standing(self) -> Standing:
         """The rung for which it holds, and the traits that it bears."""
-        return Standing.of(self.of)
+        return Standing.from_rung(self.of)
 
     @property
     def resolved(self) -> Callable[..., Any]:
@@ -255,7 +255,7 @@ class Table:
 
     def offers(self, where: type[Law] | Standing, group: str) -> bool:
         """Whether a group is computed on a rung, or where a law stands."""
-        where = Standing.of(where)
+        where = Standing.from_rung(where)
         return any(where.is_within(one) for one in self.standings_of(group))
 
     def plan(
@@ -266,7 +266,7 @@ class Table:
         Groups that are not computed there are left out.
         """
         missing = {row.group for row in rows}
-        lines, chosen = self.fitting(Standing.of(where)), list[Pass]()
+        lines, chosen = self.fitting(Standing.from_rung(where)), list[Pass]()
         for candidate in lines:
             if missing.issuperset(candidate.groups):
                 chosen.append(candidate)

@@ -158,7 +158,7 @@ def test_derivatives_of_every_form(form):
     u = np.array([0.7, -0.4, 0.35, 0.9])
     at = dict(zip(symbols, u, strict=True))
     first = f.jacobian(symbols)
-    value, slopes = curve.at(u)
+    value, slopes = curve.evaluate(u)
     np.testing.assert_allclose(value, np.array(f.subs(at).tolist(), float).ravel(), rtol=1e-14)
     wanted = np.array(first.subs(at).tolist(), float)
     np.testing.assert_allclose(slopes, wanted, rtol=1e-11, atol=1e-11)

@@ -143,9 +143,29 @@ def test_calls_by_the_first_argument_s_old_name_go_on_working():
         assert pk.melnikov(perturbed=DRIVEN).identical(pk.melnikov(DRIVEN))
 
 
+def test_old_spellings_of_problems_and_pictures_go_on_working():
+    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 3.2}, map=True)
+    forced = pk.Problem("cos(w*t) - x", "x", {"w": 2.0}, time="t", period="2*pi/w")
+    with pytest.warns(DeprecationWarning, match=r"iterated\(times=\.\.\.\) is now iterated\(n="):
+        assert logistic.iterated(times=2) == logistic.iterated(2)
+    with pytest.warns(DeprecationWarning, match=r"derivatives\(time=.* is now derivatives\(t="):
+        value, _ = forced.derivatives([0.5], time=0.3)
+    assert value == pytest.approx(np.cos(0.6) - 0.5, rel=1e-15)
+    damped = pk.Perturbed(pk.Coefficients(1.0, 0.35, 0.12), damping=0.1)
+    with pytest.warns(DeprecationWarning, match=r"damped_portrait\(perturbed=.*\(system="):
+        pk.plot.damped_portrait(perturbed=damped)
+    planar = pk.Problem(["y", "-x - y"], ("x", "y"), {}, window={"x": (-1, 1), "y": (-1, 1)})
+    with pytest.warns(DeprecationWarning, match=r"nullclines\(what=.* is now nullclines\(system="):
+        pk.plot.nullclines(what=planar)
+    branch = pk.continuation(pk.Problem("mu - x", "x", {"mu": 0.0}), "mu", span=(-1, 1))
+    with pytest.warns(DeprecationWarning, match=r"Branch.known\(\) is now \(Branch.curve, "):
+        assert branch.known() == (branch.curve, branch.problem)
+
+
 def test_no_old_spelling_is_one_of_now():
     for name, spellings in DEPRECATED.items():
-        function = getattr(pk, name, None) or getattr(pk.plot, name)
+        homes = (pk.plot, pk.Problem) if name in ("nullclines",) else (pk, pk.plot, pk.Problem)
+        function = next(getattr(home, name) for home in homes if hasattr(home, name))
         names = inspect.signature(function).parameters
         assert spellings.keys().isdisjoint(names)
         assert names.keys() >= set(spellings.values())

@@ -575,7 +575,7 @@ def test_tiles_need_no_list():
     job = plan_sweep(DISK, axes, of="n_equilibria", store="none.zarr", chunks=10)
     assert (job.cells, job.count) == (10**12, 10**10)
     assert next(job.tiles()).index == (0, 0)
-    assert job.left[0].at(10**10 - 1) == (10**5 - 1, 10**5 - 1)
+    assert job.left[0].tile(10**10 - 1) == (10**5 - 1, 10**5 - 1)
     samples = job.left[0].samples(job.place, job.request, 2)
     assert [tile.index for tile in samples] == [(0, 0), (10**5 - 1, 10**5 - 1)]
 
@@ -587,7 +587,7 @@ def test_tiles_that_are_left_are_found_between_those_that_are_done(tmp_path):
     for name in ("c.0.1", "c.1.0"):
         (path / "sweep" / "part0" / name).unlink()
     left = plan_sweep(DISK, AXES, of=CALL["of"], store=path, chunks=CALL["chunks"]).left[0]
-    assert list(left.indices()) == [left.at(k) for k in range(len(left))]
+    assert list(left.indices()) == [left.tile(k) for k in range(len(left))]
     assert list(left.indices()) == [(0, 1), (1, 0), (2, 1)]
     assert left.cells == 2 + 4 + 1
 

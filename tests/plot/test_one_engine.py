@@ -57,7 +57,7 @@ RUNGS = {
 def test_rungs_agree_on_the_same_law(rung):
     land, scale = RUNGS[rung]
     if land is None:
-        land = LevelCurves.of(answers(EvenRouthian(), {}))
+        land = LevelCurves.from_answers(answers(EvenRouthian(), {}))
     exact = curves_of(pk.Coefficients(3.7, 1.3, 0.4))
     known, other = exact.answers, land.answers
     for name in ("phi", "saddle_phi", "turning_offset"):

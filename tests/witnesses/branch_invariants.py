@@ -24,7 +24,7 @@ def check(curve: Any, path: Any, placed: Any, eigenvalues: Any, conservative: bo
         assert special.status == "converged" or special.message, special
         if special.kind == "hopf":
             assert special.normal_form["omega"] > 0.0, special
-            values = np.linalg.eigvals(curve.at(special.u)[1][:, : curve.n])
+            values = np.linalg.eigvals(curve.evaluate(special.u)[1][:, : curve.n])
             assert np.any(values.imag != 0.0), (special, values)
         branching = special.kind in ("branch_point", "pitchfork", "transcritical")
         if branching and special.status == "converged":
@@ -40,7 +40,7 @@ def _every_point_is_one(curve: Any, path: Any) -> None:
     assert len(path.residual) == path.count
     for i in np.flatnonzero(~(path.residual <= ROUNDING)):
         u = path.u[i, :m]
-        value, slopes = curve.at(u)
+        value, slopes = curve.evaluate(u)
         terms = np.abs(slopes) @ np.maximum(np.abs(u), curve.scale[:m])
         known = np.all(np.abs(value) <= ROUNDING * terms)
         assert known or path.messages, (u, value, terms, path.residual[i])

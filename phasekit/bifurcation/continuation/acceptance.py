@@ -56,7 +56,7 @@ def accepted(
             if vain >= VAIN:
                 break
     poor = np.flatnonzero(~(left <= bound))
-    return better, _said(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
+    return better, _residual_words(curve, [better.get(i, u[i]) for i in poor.tolist()], bound)
 
 
 def on_bound(curve: Curve, track: Track) -> Track:
@@ -76,7 +76,7 @@ def on_bound(curve: Curve, track: Track) -> Track:
         return track
     u = u + length[j] * t
     u[j] = bound[j]
-    value, slopes = curve.at(u)
+    value, slopes = curve.evaluate(u)
     if not np.all(np.abs(value) <= ROUNDING * (np.abs(slopes) @ np.abs(u))):
         return track
     record, state = track.record.copy(), track.state.copy()
@@ -111,7 +111,7 @@ def nearer(
 
 def residual_at(curve: Curve, u: Array) -> float:
     """|f| beside its terms at one point, whose sizes need few digits."""
-    return float(curve.residuals(u[None], curve.at(u, sharp=False)[1][None])[0])
+    return float(curve.residuals(u[None], curve.evaluate(u, sharp=False)[1][None])[0])
 
 
 def without_rounding(curve: Curve, u: Array) -> Array:
@@ -130,11 +130,11 @@ def rounded(curve: Curve, u: Array) -> Array:
     return zeros
 
 
-def _said(curve: Curve, points: list[Array], bound: float) -> str:
+def _residual_words(curve: Curve, points: list[Array], bound: float) -> str:
     """What is left of f, in words; nothing if unknowns of their scales would leave as much."""
     sizes = []
     for u in points:
-        value, slopes = curve.at(u)
+        value, slopes = curve.evaluate(u)
         terms = np.abs(slopes) @ np.maximum(np.abs(u[: curve.m]), curve.scale[: curve.m])
         with np.errstate(all="ignore"):
             sizes.append(np.max(np.where(value == 0.0, 0.0, np.abs(value) / terms)))
@@ -145,7 +145,7 @@ def _said(curve: Curve, points: list[Array], bound: float) -> str:
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
     where = [f"{name} = {number:.6g}" for name, number in zip(names, u, strict=False)]
     where = where if len(where) <= 4 else [*where[:3], "..."]
-    noise = np.all(np.abs(curve.at(u)[0]) <= 10.0 * Derivatives(curve, u).noise())
+    noise = np.all(np.abs(curve.evaluate(u)[0]) <= 10.0 * Derivatives(curve, u).noise())
     return (
         f"{many} points solve f = 0 to {max(sizes):.1e} of its terms, which exceeds rounding"
         f"{' of numbers: f itself is not known better' if noise else ''}; the worst at "

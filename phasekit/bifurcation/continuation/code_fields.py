@@ -170,7 +170,7 @@ class PythonField(Field):
             if begin == m:
                 return
 
-            def at(j: int, h: float) -> Array:
+            def shifted_value(j: int, h: float) -> Array:
                 if j < n:
                     shifted = x.copy()
                     shifted[j] += h
@@ -180,19 +180,21 @@ class PythonField(Field):
                 p[free[j - n]] = values[j]
                 return value
 
-            lines = [functools.partial(at, j) for j in range(begin, m)]
+            lines = [functools.partial(shifted_value, j) for j in range(begin, m)]
             if sharp:
                 slopes[:, begin:] = sharp_slopes(lines, middle, values[begin:], self.sizes[begin:])
                 return
             for j in range(begin, m):
                 h = COARSE * coarse(values[j], self.sizes[j])
-                ahead, behind = at(j, h), at(j, -h)
+                ahead, behind = shifted_value(j, h), shifted_value(j, -h)
                 slopes[:, j] = (ahead - behind) / (2.0 * h)
                 bent = np.abs(ahead + behind - 2.0 * middle)
                 # Next to an edge of the domain, not where f itself turns within a step.
                 if (
                     np.any(bent > BENT * np.abs(ahead - behind))
-                    and not np.isfinite(at(j, NEAR * h) + at(j, -NEAR * h)).all()
+                    and not np.isfinite(
+                        shifted_value(j, NEAR * h) + shifted_value(j, -NEAR * h)
+                    ).all()
                 ):
                     line = lines[j - begin]
                     slopes[:, j] = _shorter(line, middle, slopes[:, j], bent, h, values[j])
@@ -208,7 +210,7 @@ class PythonField(Field):
         m = n + len(free)
         exact: Any = self.jacobian
 
-        def at(u: Array, par: Array) -> tuple[Array, dict[str, float]]:
+        def values_at(u: Array, par: Array) -> tuple[Array, dict[str, float]]:
             p = dict(zip(names, par.tolist(), strict=True))
             p.update(zip(free, u[n:m].tolist(), strict=True))
             return u[:n].copy(), p
@@ -230,11 +232,11 @@ class PythonField(Field):
                     shifted = u.copy()
                     shifted[j] += k * h
                     if in_state:
-                        x, p = at(shifted, par)
+                        x, p = values_at(shifted, par)
                         bent[:, j] += k * (self.slopes(x, p) @ z[:n]) / (2.0 * h)
                     else:
-                        difference = self.value(*at(shifted + along * z, par)) - self.value(
-                            *at(shifted - along * z, par)
+                        difference = self.value(*values_at(shifted + along * z, par)) - self.value(
+                            *values_at(shifted - along * z, par)
                         )
                         bent[:, j] += k * difference / (4.0 * h * along)
 

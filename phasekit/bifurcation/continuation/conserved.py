@@ -171,7 +171,7 @@ def _gradient(curve: Any, u: Array) -> str:
     n, m = curve.n, curve.m
     if n < 2 or not deficient(curve, u):
         return ""
-    slopes, scale = curve.at(u)[1], curve.scale[:m]
+    slopes, scale = curve.evaluate(u)[1], curve.scale[:m]
     rows, columns = _units(curve, u, slopes)
     left, sizes, _ = np.linalg.svd(slopes * columns * rows[:, None])
     rank = int(np.sum(sizes > _error(curve) * sizes[0]))
@@ -191,7 +191,7 @@ def _gradient(curve: Any, u: Array) -> str:
 
 def deficient(curve: Any, u: Array, slopes: Array | None = None) -> bool:
     """Whether f_u has no full rank at a point, in whatever units."""
-    slopes = curve.at(u)[1] if slopes is None else slopes
+    slopes = curve.evaluate(u)[1] if slopes is None else slopes
     if curve.n > MANY or not np.isfinite(slopes).all():
         return False
     scaled = slopes * curve.scale[: curve.m]
@@ -229,7 +229,7 @@ def _units(curve: Any, u: Array, slopes: Array) -> tuple[Array, Array]:
 def _beside(curve: Any, u: Array, rows: Array, columns: Array, rank: int) -> Array | None:
     """The equilibrium next to a point, in all unknowns, by Newton's method of least changes."""
     for _ in range(STEPS):
-        value, slopes = curve.at(u)
+        value, slopes = curve.evaluate(u)
         scaled = slopes * columns * rows[:, None]
         if not (np.isfinite(scaled).all() and np.isfinite(value).all()):
             return None
@@ -238,5 +238,5 @@ def _beside(curve: Any, u: Array, rows: Array, columns: Array, rank: int) -> Arr
         u = u + step * columns
         if np.max(np.abs(step)) <= 1e-12:
             break
-    left_over = np.max(np.abs(curve.at(u)[0] * rows))
+    left_over = np.max(np.abs(curve.evaluate(u)[0] * rows))
     return np.asarray(u) if max(np.max(np.abs(step)), left_over) <= SETTLED else None

@@ -59,7 +59,7 @@ class Cubics:
         """Points with their angles brought by so many turns."""
         return np.asarray(u - self.curve.period[: self.curve.m] * turns)
 
-    def at(self, i: npt.NDArray[np.int64], s: Array) -> tuple[Array, Array]:
+    def points(self, i: npt.NDArray[np.int64], s: Array) -> tuple[Array, Array]:
         """Points on the cubics of steps, and their derivatives by length."""
         h, s = self.length[i][:, None], s[:, None]
         a, b, ta, tb = self.u[i], self.u[i + 1], h * self.t[i], h * self.t[i + 1]
@@ -77,7 +77,7 @@ class Cubics:
     def hull(self, parts: Parts, turns: Array) -> tuple[Array, Array]:
         """Boxes around parts of the cubics: around the control points of Bezier's form."""
         width = (parts.high - parts.low)[:, None] * self.length[parts.step][:, None]
-        (a, ta), (b, tb) = (self.at(parts.step, s) for s in (parts.low, parts.high))
+        (a, ta), (b, tb) = (self.points(parts.step, s) for s in (parts.low, parts.high))
         corners = np.stack([a, a + width * ta / 3.0, b - width * tb / 3.0, b])
         around = np.abs(self.off[parts.step])  # of what is no cubic
         shift = self.curve.period[: self.curve.m] * turns[parts.step]

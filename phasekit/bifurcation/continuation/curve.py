@@ -21,7 +21,7 @@ from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.stops import Stop as Stop
-from phasekit.bifurcation.continuation.stops import said
+from phasekit.bifurcation.continuation.stops import track_stop
 from phasekit.numerics import differences
 from phasekit.numerics.waits import stage
 
@@ -78,7 +78,7 @@ class Track:
         record = np.concatenate([self.record, more.record])
         return Track(record, np.concatenate([self.slopes, more.slopes]), more.state, more.stop)
 
-    def at(self, state: Array) -> Track:
+    def with_state(self, state: Array) -> Track:
         """The same with another state to go on from."""
         return replace(self, state=state)
 
@@ -223,7 +223,7 @@ class Curve:
         if self.field.compiled:  # where kernels are interpreted
 
             def first(u: Array, par: Array, z: Array, out: Array) -> None:
-                out[: self.n * (1 + self.m)] = np.append(*self.at(u, sharp=sharp))
+                out[: self.n * (1 + self.m)] = np.append(*self.evaluate(u, sharp=sharp))
 
             mode = differences.DERIVED
 
@@ -275,25 +275,25 @@ class Curve:
         )  # fmt: skip
 
     @functools.cached_property
-    def _known(self) -> dict[tuple[Any, ...], Any]:
+    def _memory(self) -> dict[tuple[Any, ...], Any]:
         """What was last asked for of derivatives: special points ask for the same many times."""
         return {}
 
     def _once(self, make: Callable[..., Any], *given: Any) -> Any:
         key = (make.__name__, *(z.tobytes() if isinstance(z, np.ndarray) else z for z in given))
-        found = self._known.get(key)
+        found = self._memory.get(key)
         if found is None:
-            if len(self._known) >= min(LAST, MOST // (self.n * self.m)):
-                self._known.clear()
-            found = self._known[key] = make(*given)
+            if len(self._memory) >= min(LAST, MOST // (self.n * self.m)):
+                self._memory.clear()
+            found = self._memory[key] = make(*given)
         return found
 
-    def at(self, u: Array, *, sharp: bool = True) -> tuple[Array, Array]:
+    def evaluate(self, u: Array, *, sharp: bool = True) -> tuple[Array, Array]:
         """F and its derivatives by states and free parameters, to a few digits unless sharp."""
-        value, slopes = self._once(self._at, np.asarray(u[: self.m], dtype=float), sharp)
+        value, slopes = self._once(self._evaluate, np.asarray(u[: self.m], dtype=float), sharp)
         return value.copy(), slopes.copy()
 
-    def _at(self, u: Array, sharp: bool) -> tuple[Array, Array]:
+    def _evaluate(self, u: Array, sharp: bool) -> tuple[Array, Array]:
         n, m = self.n, self.m
         out = 2 * m
         spare = out + n + n * m
@@ -460,7 +460,7 @@ class Curve:
         """Say why a track ends in the state w."""
         if reason == trace.NOT_FINITE and self.field.failure is not None:
             self._fail_beyond(w)
-        return said(self, reason, which, w)
+        return track_stop(self, reason, which, w)
 
     def _fail_beyond(self, w: Array) -> None:
         """Let the field tell of what f raises next on the way, not of what it raised elsewhere."""
@@ -470,7 +470,7 @@ class Curve:
         )
         step = self.options.min_step
         while step <= self.options.max_step:
-            value, slopes = self._at(u + step * tangent, False)
+            value, slopes = self._evaluate(u + step * tangent, False)
             if not (np.isfinite(value).all() and np.isfinite(slopes).all()):
                 return
             step *= 2.0

@@ -139,7 +139,7 @@ class CurveWalk:
             there = path.ends[0 if along < 0.0 else 1]
             u = path.u[i, : curve.m] if there is None else there.special.u
             at = float(u[curve.n])
-            residual = float(np.max(np.abs(curve.at(u)[0])))
+            residual = float(np.max(np.abs(curve.evaluate(u)[0])))
             special = Special(
                 "end", u, (at, at), residual, "converged", stop.message, tangent=path.tangent[i]
             )

@@ -63,7 +63,7 @@ class Estimate:
         """The product with a vector, which is conjugated."""
         return Estimate(np.vdot(p, self.value), float(np.abs(p) @ np.abs(self.error)))
 
-    def known(self, digits: float = 1.0) -> bool:
+    def has_digits(self, digits: float = 1.0) -> bool:
         """Whether so many digits are known, in the largest entry; of zero, whether it is exact."""
         size, error = np.max(np.abs(self.value)), np.max(np.abs(self.error))
         return bool(error <= 10.0**-digits * size)
@@ -84,7 +84,7 @@ class Derivatives:
         self.curve, self.u = curve, np.array(u[: curve.m])
         self.exact = curve.field.exact
         self.reach = np.maximum(np.abs(self.u), curve.scale[: curve.m])
-        self.value, self.slopes = curve.at(self.u)
+        self.value, self.slopes = curve.evaluate(self.u)
         # By line: samples by level, and derivatives by order.
         self._lines: dict[bytes, tuple[dict[int, Array], dict[int, Estimate]]] = {}
         self._noise: Array | None = None
@@ -275,7 +275,7 @@ class Derivatives:
         given = self.curve.field.slopes_along(self.curve.par, self.curve.active, self.u, z)
         length = float((np.abs(z) / self.reach).max())
         noise = self._noise_of(z, given)
-        middle = self._at(given)
+        middle = self._value(given)
         # Terms of f may cancel, as along a null vector, where their rounding does not.
         terms = np.abs(self.slopes) @ np.abs(z) if given is None else np.zeros(self.curve.n)
         first, last = 1, LEVELS
@@ -297,7 +297,7 @@ class Derivatives:
             else:
                 return estimate
 
-    def _at(self, given: Any) -> Array:
+    def _value(self, given: Any) -> Array:
         """F, or what stands for it, at the point."""
         if given is not None:
             return np.asarray(self._values(self.u[None], given)[0])

@@ -62,7 +62,7 @@ def brackets(
     tests = Tests(*(getattr(tests, f.name)[keep] for f in fields(tests)))
     seek = _Seek(curve, pairs, neutral, saddles)
     found: list[Bracket] = []
-    sample = functools.cache(functools.partial(seek.known, path, keep, tests))
+    sample = functools.cache(functools.partial(seek.sample, path, keep, tests))
     for i in seek.interesting(tests):
         for bracket in seek.explore(sample(i), sample(i + 1), DEPTH, force=True):
             found.append(replace(bracket, index=int(keep[i]), neutral=neutral))
@@ -198,7 +198,7 @@ class _Seek:
             three = np.exp(three - np.max(three, axis=0))
         return three[0], three[1], three[2]
 
-    def known(self, path: Path, keep: npt.NDArray[np.int64], tests: Tests, i: int) -> Sample:
+    def sample(self, path: Path, keep: npt.NDArray[np.int64], tests: Tests, i: int) -> Sample:
         """A point of the path whose test functions are known."""
         k = keep[i]
         sample = Sample(path.u[k], path.tangent[k], path.slopes[k])
@@ -223,7 +223,7 @@ class _Seek:
         """
         curve = self.curve
 
-        def of(sample: Sample) -> float:
+        def test(sample: Sample) -> float:
             if name == "fold":
                 return float(sample.tangent[curve.n] / curve.scale[curve.n])
             if name == "branch":
@@ -231,7 +231,7 @@ class _Seek:
                 return float(np.exp(np.minimum(volume - unit, 50.0))) * float(sign)
             return float(getattr(self.tests(sample), name))
 
-        return of
+        return test
 
     def explore(self, a: Sample, b: Sample, depth: int, *, force: bool) -> Iterator[Bracket]:
         """Brackets between two points; the interval is halved where it holds more than one."""

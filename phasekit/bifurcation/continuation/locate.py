@@ -151,7 +151,7 @@ def _several(curve: Curve, bracket: Bracket, count: int, u: Array, kind: str) ->
     """Eigenvalues that cross, and it is not known how: said, not refined."""
     return Special(
         kind, u, interval_of(curve, bracket),
-        float(np.max(np.abs(curve.at(u)[0]))), GUESS,
+        float(np.max(np.abs(curve.evaluate(u)[0]))), GUESS,
         f"{count} eigenvalues cross together: a multiple point, which is not refined",
         tangent=bracket.a.tangent,
     )  # fmt: skip

@@ -78,7 +78,7 @@ def unit_of(d: Derivatives, rows: Array, p: Vector, q: Vector, order: int) -> fl
     return float(np.abs(p) @ rows) * float(np.max(np.abs(q) / scale)) ** order
 
 
-def known(coefficient: Estimate, unit: float) -> float:
+def real_part(coefficient: Estimate, unit: float) -> float:
     """The real part of a coefficient, NaN where its error hides it."""
     value, error = float(np.real(coefficient.value)), float(np.max(coefficient.error))
     sure = error <= DIGITS * abs(value) or error <= SMALL * unit

@@ -104,7 +104,7 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     better, message = accepted(curve, u, tangent, residual, fixed)
     for i, found in better.items():
         u[i] = found
-        where = curve.at(found)[1]
+        where = curve.evaluate(found)[1]
         residual[i] = curve.residuals(found[None], where[None])[0]
         if isinstance(slopes, np.ndarray):
             slopes[i] = where
@@ -138,8 +138,8 @@ class Slopes:
     def __getitem__(self, places: Any) -> Array:
         """Those at one point, or at several."""
         if np.ndim(self.u[places]) == 1:
-            return self.curve.at(self.u[places], sharp=self.sharp)[1]
-        return np.array([self.curve.at(u, sharp=self.sharp)[1] for u in self.u[places]])
+            return self.curve.evaluate(self.u[places], sharp=self.sharp)[1]
+        return np.array([self.curve.evaluate(u, sharp=self.sharp)[1] for u in self.u[places]])
 
     def chunks(self) -> Iterator[slice]:
         """The points, so many at a time that their derivatives take little memory."""
@@ -168,7 +168,7 @@ def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArra
         doubtful = least < DOUBTFUL * np.nanmax(size)
     if doubtful.any():
         for i in np.flatnonzero(doubtful):
-            slopes[i] = curve.at(u[i])[1]
+            slopes[i] = curve.evaluate(u[i])[1]
         values = eigenvalues_of(curve.linear(slopes), accuracy=accuracy)
     return slopes, values
 

@@ -80,7 +80,7 @@ def scaled(curve: Curve, u: Array, given: dict[int, float]) -> Curve:
         scale[zero] = [natural.get(i, np.nan) for i in zero.tolist()]
         middle = np.nanmedian(scale[zero]) if natural else 1.0
         there = curve.replace(scale=np.where(np.isnan(scale), middle, scale))
-        scale[:n] = _balanced(there.at(u)[1][:, :n], scale[:n])
+        scale[:n] = _balanced(there.evaluate(u)[1][:, :n], scale[:n])
     low, high = curve.low.copy(), curve.high.copy()
     for i in np.flatnonzero(curve.period[:n] == 0.0).tolist():
         if not np.isfinite(low[i]) and not np.isfinite(high[i]):
@@ -96,7 +96,7 @@ def _motion(curve: Curve, u: Array) -> tuple[Array, Array]:
     than f is still like that.
     """
     n = curve.n
-    value, slopes = curve.at(u)
+    value, slopes = curve.evaluate(u)
     ends = np.repeat(u[None], 2, axis=0)
     ends[:, n] = curve.low[n], curve.high[n]
     with np.errstate(all="ignore"):

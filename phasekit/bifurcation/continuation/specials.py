@@ -45,7 +45,7 @@ def find(curve: Curve, path: Path) -> Specials:
             f"neutral saddles were not looked for, of {curve.n} states there may be very many: "
             f"detect={[*curve.detect, 'neutral_saddle']} looks for them",
         )
-    every = sorted([*placed, *events], key=_place)
+    every = sorted([*placed, *events], key=_order)
     return Specials(every, eigenvalues, messages)
 
 
@@ -74,10 +74,10 @@ def _find(
         return placed, path.eigenvalues, messages
     placed, zeros = find_on(curve, path) if looked_for(EQUILIBRIUM) else ([], ())
     found, eigenvalues, messages = _bifurcations(curve, path)
-    return sorted([*found, *placed], key=_place), eigenvalues, (*messages, *zeros)
+    return sorted([*found, *placed], key=_order), eigenvalues, (*messages, *zeros)
 
 
-def _place(one: Placed) -> tuple[int, float]:
+def _order(one: Placed) -> tuple[int, float]:
     return one.index, one.along
 
 
@@ -102,7 +102,7 @@ def _bifurcations(
         for special in locate(curve, bracket):
             if not wanted(special, detect):
                 continue
-            placed.append(place(curve, path, bracket, _rounded(curve, special)))
+            placed.append(placement(curve, path, bracket, _rounded(curve, special)))
     placed = unique(curve, path, placed)
     # The start of a closed curve is its end as well.
     if path.closed and len(placed) > 1:
@@ -130,7 +130,7 @@ def wanted(special: Special, detect: tuple[str, ...]) -> bool:
     return KINDS[special.kind].detected in (None, *detect)
 
 
-def place(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:
+def placement(curve: Curve, path: Path, bracket: Bracket, special: Special) -> Placed:
     """Where on the path a special point stands."""
     first = None
     # A bracket may hold points that lie too near to a branch point to say anything.

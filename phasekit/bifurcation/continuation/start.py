@@ -26,7 +26,7 @@ def settle(curve: Curve, u: Array, names: str) -> Array:
         hybrid and Levenberg-Marquardt methods find one.
     """
     found = _settled(curve, u, names)
-    if not np.isfinite(curve.at(found)[1]).all():
+    if not np.isfinite(curve.evaluate(found)[1]).all():
         raise ConvergenceError(
             f"x0: the derivatives of f are not finite at the equilibrium x = "
             f"{found[: curve.n].tolist()} that {names} leads to{_edges(curve, found)}; give "
@@ -51,7 +51,7 @@ def _edges(curve: Curve, u: Array) -> str:
 def _settled(curve: Curve, u: Array, names: str) -> Array:
     n = curve.n
     curve.field.failure = None
-    value, _ = curve.at(u)
+    value, _ = curve.evaluate(u)
     if not np.isfinite(value).all():
         failure = curve.field.failure
         said = "" if failure is None else f" (it raised {type(failure).__name__}: {failure})"
@@ -62,18 +62,18 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
     row[n] = 1.0
     point = curve.refine(u, row, iterations=30)
     if point.converged and np.isfinite(point.residual).all():
-        return rounded(curve, _at(point.u, u, n))
+        return rounded(curve, _with_parameters(point.u, u, n))
 
     def vanishes(u: Array) -> bool:
         """Whether f does: beside its terms, and what it was where the search began."""
-        found, slopes = curve.at(u)
+        found, slopes = curve.evaluate(u)
         size = np.abs(slopes) @ np.abs(u[: curve.m]) + np.abs(value)
         return bool(np.all(np.abs(found) <= 1e-12 * size))
 
     if not np.any(value):
         return u  # an equilibrium, but one where f_x is singular
     if np.isfinite(point.u).all() and vanishes(point.u):
-        return _at(point.u, u, n)
+        return _with_parameters(point.u, u, n)
 
     from scipy.optimize import root
 
@@ -85,7 +85,7 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
 
     def jacobian(x: Array) -> Array:
         tried[:n] = x
-        return curve.at(tried)[1][:, :n]
+        return curve.evaluate(tried)[1][:, :n]
 
     for method in ("hybr", "lm"):
         try:
@@ -97,7 +97,7 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
         point = curve.refine(guess, row, iterations=30)
         close = np.max(np.abs(point.u - guess) / np.maximum(curve.scale, np.abs(guess))) < 1e-3
         if point.converged and close:
-            return _at(point.u, u, n)
+            return _with_parameters(point.u, u, n)
         if vanishes(guess):
             return guess
     raise ConvergenceError(
@@ -107,7 +107,7 @@ def _settled(curve: Curve, u: Array, names: str) -> Array:
     )
 
 
-def _at(found: Array, asked: Array, n: int) -> Array:
+def _with_parameters(found: Array, asked: Array, n: int) -> Array:
     """The point with the parameters that were asked for, to the last bit."""
     return np.concatenate([found[:n], asked[n:]])
 
@@ -115,7 +115,7 @@ def _at(found: Array, asked: Array, n: int) -> Array:
 def tangent_of(curve: Curve, u: Array) -> Array:
     """The unit tangent towards a larger parameter; at a branch point that of the steepest."""
     n = curve.n
-    _, slopes = curve.at(u)
+    _, slopes = curve.evaluate(u)
     directions = nullspace(slopes, curve.scale[: curve.m])
     if len(directions) == 1:
         t = directions[0]

@@ -36,7 +36,7 @@ def place_of(curve: Any, w: Array) -> str:
     return where + (", ..." if len(names) > 4 else "")
 
 
-def said(curve: Any, reason: int, which: int, w: Array) -> Stop:
+def track_stop(curve: Any, reason: int, which: int, w: Array) -> Stop:
     """Say why a track of a `Curve` ends in the state w."""
     names = [*curve.field.states, *(curve.field.parameters[i] for i in curve.active)]
     where = place_of(curve, w)

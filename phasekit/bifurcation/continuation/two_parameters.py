@@ -156,19 +156,19 @@ def _changes(
 def _locate(curve: Curve, a: Sample, b: Sample, test: CurveTest) -> Special | None:
     n = curve.n
 
-    def at(s: Sample) -> float:
+    def criterion(s: Sample) -> float:
         return test.value(curve, s)
 
-    best, _, _ = bracket_root(curve, a, b, at, steps=60, width=1e-15)
-    value = abs(at(best))
-    size = max(abs(at(a)), abs(at(b)))
+    best, _, _ = bracket_root(curve, a, b, criterion, steps=60, width=1e-15)
+    value = abs(criterion(best))
+    size = max(abs(criterion(a)), abs(criterion(b)))
     if not test.holds(curve, best):
         return None
     # A test function that jumps instead of passing zero is no point.
     if not value <= 1e-3 * size:
         return None
     ends = float(min(a.u[n], b.u[n])), float(max(a.u[n], b.u[n]))
-    residual = max(value, float(np.max(np.abs(curve.at(best.u)[0]))))
+    residual = max(value, float(np.max(np.abs(curve.evaluate(best.u)[0]))))
     sharp = value <= max(1e-6, 1e2 * curve.field.accuracy) * size
     return Special(
         test.kind, best.u[: curve.m], ends, residual, CONVERGED if sharp else GUESS,

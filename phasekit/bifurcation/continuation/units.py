@@ -29,7 +29,7 @@ def scale_at(curve: Curve, u: Array) -> Array:
     """
     n, m = curve.n, curve.m
     scale = np.array(curve.scale[:m])
-    moved = np.abs(curve.at(u)[1] * scale)
+    moved = np.abs(curve.evaluate(u)[1] * scale)
     states = np.zeros(m)
     states[:n] = scale[:n]
     by_states = np.max(moved[:, :n], axis=1) + np.max(
@@ -49,7 +49,7 @@ def force_sizes(curve: Curve, u: Array, scale: Array | None = None) -> Array:
     The second ones count because all first ones of an entry may vanish at a special point.
     """
     scale = curve.scale[: curve.m] if scale is None else scale
-    sizes = np.max(np.abs(curve.at(u)[1] * scale), axis=1)
+    sizes = np.max(np.abs(curve.evaluate(u)[1] * scale), axis=1)
     sizes = sizes + np.max(np.abs(curve.bend(u, scale) * scale), axis=1)
     return np.asarray(np.where((sizes > 0.0) & np.isfinite(sizes), sizes, 1.0))
 

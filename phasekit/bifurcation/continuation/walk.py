@@ -44,7 +44,7 @@ class Track(Protocol):
     def joined(self, more: Self) -> Self:
         """It and what follows."""
 
-    def at(self, state: Any) -> Self:
+    def with_state(self, state: Any) -> Self:
         """The same with another state to go on from."""
 
 
@@ -241,7 +241,7 @@ def go_on(walker: Walker, start: Any, tracks: Tracks, points: int) -> Tracks:
 def _longer(walker: Walker, start: Any, track: Any, points: int) -> Any:
     if wished(track.stop, walker.ends) and track.count:
         # The state behind the last point, which is followed again.
-        track = track.at(walker.follow(walker.begin(start), track.count, start).state)
+        track = track.with_state(walker.follow(walker.begin(start), track.count, start).state)
     return _followed(walker, start, track.state, points, track)
 
 

@@ -80,15 +80,15 @@ def _of_one(law: Trigonometric, parameter: str, values: dict[str, float]) -> lis
         for x in _non_negative_roots(path.discriminant):
             if sign := path.sign(A, x):
                 folds[sign > 0].append(x)
-    parameters = ([_at(path, x) for x in slot] for slot in (*folds, at_zero))
+    parameters = ([_parameter(path, x) for x in slot] for slot in (*folds, at_zero))
     return [min((x for x in slot if low <= x <= high), default=math.nan) for slot in parameters]
 
 
-def _at(path: Path, x: Fraction) -> float:
+def _parameter(path: Path, x: Fraction) -> float:
     """The parameter at x in units of the span; of an angle NaN beyond it."""
     if path.parameter not in path.law.angles:
         return float(x)
-    return path.at(x) if x <= 1 else math.nan
+    return path.along(x) if x <= 1 else math.nan
 
 
 def _turns(polynomial: fmpq_poly, x: Fraction) -> bool:

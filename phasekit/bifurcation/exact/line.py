@@ -51,10 +51,10 @@ class Path:
 
     @cached_property
     def _products(self) -> list[fmpq_poly]:
-        def place(i: int) -> fmpq_poly:
+        def product(i: int) -> fmpq_poly:
             return self.polynomial(lambda v: self.law.products(v)[i])
 
-        return [place(i) for i in range(3)]
+        return [product(i) for i in range(3)]
 
     def polynomial(self, factor: Factor) -> fmpq_poly:
         """Return a factor of the law as a polynomial of x."""
@@ -67,7 +67,7 @@ class Path:
             values.append(Fraction(factor({**fixed, self.parameter: here})))
         return interpolate([rational(v) for v in values])
 
-    def at(self, x: Fraction) -> float:
+    def along(self, x: Fraction) -> float:
         """Return the parameter at x."""
         low, high = self._ends
         u = float(Fraction(low) + (Fraction(high) - Fraction(low)) * x)

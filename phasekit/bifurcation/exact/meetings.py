@@ -69,7 +69,7 @@ def survey(path: Path) -> tuple[list[Event], list[Interval]]:
         kinds = {kind for _, kind in group}
         x = group[0][0]
         sign = path.sign(path.common, x) * path.sign(A, x)
-        events.append(Event(x, path.at(x), sign, *(kind in kinds for kind in range(4))))
+        events.append(Event(x, path.along(x), sign, *(kind in kinds for kind in range(4))))
     lefts = [Fraction(0), *(group[-1][0] for group in groups)]
     rights = [*(group[0][0] for group in groups), Fraction(1)]
     intervals = []

@@ -135,7 +135,7 @@ class Plane:
         for i, u, path in self.net:
             for x in unit_roots(polynomial(path), SEEDS):
                 point = np.empty(2)
-                point[i], point[1 - i] = u, self.unit(path.at(x), 1 - i)
+                point[i], point[1 - i] = u, self.unit(path.along(x), 1 - i)
                 yield i, u, point
 
 

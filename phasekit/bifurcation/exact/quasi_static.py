@@ -51,7 +51,7 @@ class Segment(Path):
             values.append(Fraction(factor({**fixed, **here})))
         return interpolate([rational(v) for v in values])
 
-    def at(self, x: Fraction) -> float:
+    def along(self, x: Fraction) -> float:
         """Return x: how far along the line."""
         return float(x)
 
@@ -93,10 +93,10 @@ class Walk:
             That of the first step. The steps end where there is no force.
         """
         events, intervals = self._events
-        place = self._place(0, None, sheet != 0)
+        place = self._interval(0, None, sheet != 0)
         sheets, jumps = [sheet], list[Jump]()
         for step in range(1, len(self.at)):
-            to = self._place(step, place, None)
+            to = self._interval(step, place, None)
             while place != to:
                 way = 1 if to > place else -1
                 event = events[place if way > 0 else place - 1]
@@ -110,7 +110,7 @@ class Walk:
             sheets.append(sheet)
         return sheets, jumps, False
 
-    def _place(self, step: int, near: int | None, inside: bool | None) -> int:
+    def _interval(self, step: int, near: int | None, inside: bool | None) -> int:
         """The interval in which a step is; next to an event the one with as many equilibria."""
         _, intervals = self._events
         values, value = self._places, self.at[step]

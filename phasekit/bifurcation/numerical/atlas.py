@@ -53,7 +53,7 @@ class Atlas:
     _seen: dict[tuple[int, int], tuple[float, Array]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, line: Line) -> Atlas:
+    def from_line(cls, line: Line) -> Atlas:
         """Find all events of a line, and join the arcs there."""
         found = mergers(line)
         low, high = line.span
@@ -236,7 +236,7 @@ class Atlas:
                 way = rate if side.side == 0 else -rate
                 low = m.x == self.line.formula.ends[0]
                 ends = [side.take(way * side.step)] if (way > 0.0) == low else []
-            for end, x in ((end, side.place(end)) for end in ends):
+            for end, x in ((end, side.position(end)) for end in ends):
                 at = math.copysign(math.inf, x) if math.isinf(m.x) else m.x
                 self.joints.place[end] = self.joints.note(Meeting(m.at, at, "end"))
 
@@ -298,7 +298,7 @@ class _Near:
 
         return [End(self.interval, label, self.side) for label in sorted(near, key=offset)]
 
-    def place(self, end: End) -> float:
+    def position(self, end: End) -> float:
         """Where an arc is."""
         return float(self.phi[end.label])
 

@@ -105,7 +105,7 @@ def _cusp(plane: Plane, z: Array) -> Cusp:
 
 def _crossings(plane: Plane, x: Any, phi: float, order: int, kind: str) -> tuple[list[Locus], bool]:
     """Curves on which V' or V'' vanishes at a coordinate, and whether these are all."""
-    equation, curves = plane.at(phi, order), list[Trace]()
+    equation, curves = plane.vanishing(phi, order), list[Trace]()
     starts, complete = plane.extremes(x, order)
     name = "exit" if order == 1 else kind
     for (i, u), found, _ in plane.found_on_edges:

@@ -79,7 +79,9 @@ def bounds_of(
 ) -> Bounds:
     """Bounds of derivatives of V, so often by x and by the place on a line."""
     terms = terms_of(formula, moving)
-    return Bounds([terms.of(*order) for order in orders], [terms.x, terms.s, *terms.parameters])
+    return Bounds(
+        [terms.derivative(*order) for order in orders], [terms.x, terms.s, *terms.parameters]
+    )
 
 
 def enclosed(bounds: Any, columns: Sequence[Any], numbers: Mapping[Any, float]) -> Any:

@@ -34,7 +34,7 @@ class Terms(NamedTuple):
     s: Any
     parameters: tuple[Any, ...]
 
-    def of(self, order: int, along: int = 0) -> Any:
+    def derivative(self, order: int, along: int = 0) -> Any:
         """A derivative of V, so often by x and by the place on the line."""
         return _derived(self.slope, self.x, self.s, order, along)
 
@@ -142,4 +142,4 @@ def rate_of(formula: Formula, moving: tuple[str, ...], order: int, along: int) -
 
     terms = terms_of(formula, moving)
     arguments = [terms.x, terms.s, *terms.parameters]
-    return array_function(array_code(arguments, terms.of(order, along), shared))
+    return array_function(array_code(arguments, terms.derivative(order, along), shared))

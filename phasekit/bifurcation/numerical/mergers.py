@@ -97,7 +97,7 @@ def window(line: Line) -> tuple[float, float]:
 
 def _in_window(line: Line, cuts: Sequence[float]) -> tuple[list[Merger], list[Boxes]]:
     terms, found, lost = line.terms, list[Merger](), list[Boxes]()
-    f = [terms.slope, terms.of(2)]
+    f = [terms.slope, terms.derivative(2)]
     margin = _MARGIN * (cuts[-1] - cuts[0]) if line.circle else 0.0
     for low, high in zip(cuts[::2], cuts[1::2], strict=True):
         if low < high:

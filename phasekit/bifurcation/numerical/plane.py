@@ -174,7 +174,7 @@ class Plane:
         rows = [self.row(jet, order, 2, 3) for order in (1, 2)]
         return np.array([f for f, _ in rows]), np.array([d for _, d in rows])
 
-    def at(self, x: float, order: int) -> Equations:
+    def vanishing(self, x: float, order: int) -> Equations:
         """The equation of the set where V' or V'' vanishes at a coordinate."""
 
         def equation(z: Array) -> tuple[Array, Array]:

@@ -204,7 +204,7 @@ class Track:
         line = self.line(step)
         if not line.moving:
             return column
-        atlas = Atlas.of(line)
+        atlas = Atlas.from_line(line)
         self.missing = self.missing or atlas.missing
         low, high = line.span
         back = len(line.moving) == 1 and next(iter(line.moving.values()))[0] == high
@@ -244,7 +244,7 @@ class _Walk:
             begin = self.atlas.span[1 if self.back else 0]
             label = self._jump(order[0], begin, x)
         for k in order:
-            here = self._at(k, leaving=True)
+            here = self._positions(k, leaving=True)
             if label is None or here[label] != here[label]:
                 return None
             if k == order[-1]:
@@ -254,7 +254,7 @@ class _Walk:
                 return None
         return None
 
-    def _at(self, k: int, *, leaving: bool) -> Array:
+    def _positions(self, k: int, *, leaving: bool) -> Array:
         """Where the arcs of an interval are next to its end, or next to its begin."""
         return self.atlas.beside(k, 1 if leaving != self.back else 0)[1]
 
@@ -268,7 +268,7 @@ class _Walk:
 
     def _nearest(self, k: int, x: float) -> int | None:
         """The arc of a center that is nearest at the begin of an interval."""
-        phi, bent = self._at(k, leaving=False), self._kinds(k, leaving=False)
+        phi, bent = self._positions(k, leaving=False), self._kinds(k, leaving=False)
         away = np.where(bent > 0.0, np.abs(self.track._near(phi, x) - x), np.inf)
         return int(np.argmin(away)) if np.isfinite(away).any() else None
 
@@ -300,7 +300,7 @@ class _Walk:
                 and bent[other.label] > 0.0
             ]  # fmt: skip
             if after:
-                phi = self._at(nxt, leaving=False)
+                phi = self._positions(nxt, leaving=False)
                 x = joints.meetings[place].phi
                 return max(after, key=lambda one: float(self.track._near(phi[one], x)))
             if joints.meetings[place].kind == "end":
@@ -310,7 +310,7 @@ class _Walk:
         x = (
             joints.meetings[place].phi
             if place is not None
-            else float(self._at(k, leaving=True)[label])
+            else float(self._positions(k, leaving=True)[label])
         )
         return self._jump(nxt, event, x)
 
@@ -324,7 +324,7 @@ class _Walk:
         third = line.derivative(3, 0, event, x)
         if third and abs(line.derivative(1, 1, event, x)) > 0.0:
             way = -math.copysign(1.0, third)  # a fold: the force is that of the square
-        phi = self._at(nxt, leaving=False)
+        phi = self._positions(nxt, leaving=False)
         column = self.track._ahead(phi, x, way) if phi.size else -1
         if column < 0:
             self.track.gone = "nothing stops the motion"
@@ -359,7 +359,7 @@ class _Walk:
     def _certain(self, nxt: int, event: float, x: float, there: float, way: float) -> bool:
         """Whether the next barrier beyond a center is higher than where the motion began."""
         formula, line = self.track.formula, self.atlas.line
-        phi = self._at(nxt, leaving=False)
+        phi = self._positions(nxt, leaving=False)
         column = self.track._ahead(phi, there + 1e-9 * way * (1.0 + abs(there)), way)
         start = line.height(event, x)
         if formula.period is not None and line.height(event, x + formula.period) == start:

@@ -131,7 +131,7 @@ def strip(
 ) -> tuple[list[Merger], list[Boxes], float]:
     """What happens in a strip about one: mergers, what is not decided, and its half width."""
     terms, size = line.terms, high - low
-    crossings, lost = zeros_along(line, terms.of(2).subs(terms.x, point.x), point.middle)
+    crossings, lost = zeros_along(line, terms.derivative(2).subs(terms.x, point.x), point.middle)
     found = [_crossing(line, point, s, error) for s, error in crossings]
     half = _WIDE * size
     while True:

@@ -35,6 +35,7 @@ from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, unknown, whole
 from phasekit.labels.equality import equal, same_fields
 from phasekit.numerics.waits import notice
+from phasekit.spellings import deprecate
 from phasekit.systems.problem import Problem
 
 if TYPE_CHECKING:
@@ -132,8 +133,7 @@ class Branch:
     [0.38490017946, -0.38490017946]
     >>> branch.to_dataset().special_kind.values.tolist()
     ['end', 'fold', 'fold', 'end']
-    >>> curve, problem = branch.known()
-    >>> problem is cubic
+    >>> branch.problem is cubic
     True
     >>> plt.close(branch.plot().figure)
 
@@ -403,14 +403,14 @@ class Branch:
             low[i], high[i] = first, last
         return {"low": low, "high": high}
 
-    def known(self) -> tuple[Any, Problem]:
-        """The curve and the problem.
+    if not TYPE_CHECKING:
 
-        Returns
-        -------
-        tuple of (curve, Problem)
-        """
-        return self.curve, self.problem
+        def __getattr__(self, name: str) -> Any:
+            """An older name, with a warning."""
+            if name == "known":
+                deprecate("Branch.known()", "(Branch.curve, Branch.problem)")
+                return lambda: (self.curve, self.problem)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Save everything, to be loaded and extended exactly.

@@ -96,7 +96,7 @@ def points_of(
         kappa[own] = path.u[:, -1]
     residual = np.empty(total)
     residual[own] = path.residual
-    residual[mine] = curve.residuals(u[mine], [curve.at(point)[1] for point in u[mine]])
+    residual[mine] = curve.residuals(u[mine], [curve.evaluate(point)[1] for point in u[mine]])
     one_of_many = any(NOT_ISOLATED in stop.message for stop in path.stops)
     table = functools.partial(
         _dataset, problem, curve, u, t, info, values, label, record, kappa, residual, one_of_many
@@ -107,7 +107,7 @@ def points_of(
 def eigenvalues_at(curve: Curve, u: FloatArray) -> npt.NDArray[np.complex128]:
     """Eigenvalues of f_x at a point; NaN where f is not finite."""
     return np.asarray(
-        eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)[0]
+        eigenvalues_of(curve.linear(curve.evaluate(u)[1])[None], accuracy=curve.field.accuracy)[0]
     )
 
 

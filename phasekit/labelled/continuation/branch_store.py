@@ -90,7 +90,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
     for name, functions in (("record", record), ("events", events)):
         if functions is not None and not isinstance(functions, Mapping):
             raise bad(name, functions, "a mapping from names to functions, or None")
-    place = _place(path)
+    place = _existing(path)
     with _open(place) as ds:
         stored = Stored(ds, str(place), _bytes(place))
         given = None if problem is None else as_problem(problem)
@@ -107,7 +107,7 @@ def load(path: str | PathLike[str], problem: Any, record: Any, events: Any = Non
     return branch
 
 
-def _place(path: Any) -> Path:
+def _existing(path: Any) -> Path:
     try:
         text = fspath(path)
     except TypeError:

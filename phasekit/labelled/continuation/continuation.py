@@ -177,7 +177,7 @@ def continuation(
     curve = guessed(curve, u, given)
     u = settle(curve, u, where)
     curve = scaled(curve, u, given)
-    start = Sample(u, tangent_of(curve, u), curve.at(u)[1])
+    start = Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
     with notice(f"following equilibria along {parameter}"):
         walker = CurveWalk(curve)
         tracks = run(walker, start, options.directions)
@@ -278,7 +278,7 @@ def _refuse_turns(curve: Curve, u: FloatArray) -> None:
     n = curve.n
     if not curve.discrete or not curve.period.any():
         return
-    gap = curve.at(u)[0]
+    gap = curve.evaluate(u)[0]
     if not np.isfinite(gap).all():
         return
     period = curve.period[:n]

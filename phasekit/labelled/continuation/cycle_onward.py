@@ -38,7 +38,7 @@ def _switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> C
         raise bad("point", point.kind, "a period doubling or a branch point")
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    cycles, problem = point.branch.known()
+    cycles, problem = point.branch.curve, point.branch.problem
     options = _options(cycles, options)
     if isinstance(direction, bool) or direction != 0:
         raise bad("direction", direction, "0: there is one other branch")
@@ -78,7 +78,7 @@ def point_curve(
         raise bad("point", point.branch.kind, "a point of a branch of periodic orbits")
     if point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    cycles, problem = point.branch.known()
+    cycles, problem = point.branch.curve, point.branch.problem
     check_parameter(problem, parameter)
     if parameter == point.branch.parameter:
         raise bad("parameter", parameter, "another one than that of the branch")

@@ -72,7 +72,7 @@ def from_hopf(
         raise bad("point", point.kind, "a Hopf point")
     if point.branch.kind != "equilibrium":
         raise bad("point", point.branch.kind, "a Hopf point of a branch of equilibria")
-    curve, problem = point.branch.known()
+    curve, problem = point.branch.curve, point.branch.problem
     options = curve.options if options is None else check_options(options)
     n, name = curve.n, point.branch.parameter
     span = float(curve.low[n]), float(curve.high[n])
@@ -96,8 +96,8 @@ def from_hopf(
 
 def _families(point: SpecialPoint[Branch]) -> tuple[list[Family], list[str]]:
     """The families at a Hopf point, and of several what is to be said."""
-    curve, _ = point.branch.known()
-    values, vectors = np.linalg.eig(curve.at(point.special.u)[1][:, : curve.n])
+    curve = point.branch.curve
+    values, vectors = np.linalg.eig(curve.evaluate(point.special.u)[1][:, : curve.n])
     pairs = np.flatnonzero(values.imag > 0.0)
     if not len(pairs):
         raise bad("point", "no pair of complex eigenvalues", "a Hopf point that has converged")

@@ -148,19 +148,19 @@ def _grow(branches: list[Branch], first: int, depth: int) -> None:
 
 def path_of(branch: Branch) -> tuple[Curve, Path]:
     """The traced path of a branch."""
-    curve, _ = branch.known()
+    curve = branch.curve
     return curve, join(curve, branch.start, *branch.tracks)
 
 
 def _same(a: SpecialPoint[Branch], b: SpecialPoint[Branch]) -> bool:
-    curve, _ = a.branch.known()
+    curve = a.branch.curve
     gap = turned(curve, a.special.u[: curve.m] - b.special.u[: curve.m])
     return bool(np.max(np.abs(gap / curve.scale[: curve.m])) < 1e-6)
 
 
 def _led(branches: list[Branch], point: SpecialPoint[Branch], t: FloatArray) -> bool:
     """Whether both ways along another branch are known already."""
-    curve, _ = point.branch.known()
+    curve = point.branch.curve
     for sign in (1.0, -1.0):
         step = sign * curve.options.initial_step * t
         probe = curve.refine(point.special.u + step, curve.weight * t)
@@ -181,7 +181,7 @@ def _repeats(branches: list[Branch], fresh: Branch) -> bool:
 
 
 def _is_on_branches(branches: list[Branch], start: Problem, guess: Any, parameter: str) -> bool:
-    curve, _ = branches[0].known()
+    curve = branches[0].curve
     row = np.zeros(curve.size)
     row[curve.n] = 1.0
     u = np.append(np.atleast_1d(guess), start.parameters[parameter])

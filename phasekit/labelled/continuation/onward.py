@@ -33,8 +33,13 @@ class Origin(Protocol):
     def special_points(self) -> tuple[Any, ...]:
         """The points in order."""
 
-    def known(self) -> tuple[Any, Any]:
-        """What was followed, and its problem."""
+    @property
+    def curve(self) -> Any:
+        """The equations of what was followed."""
+
+    @property
+    def problem(self) -> Any:
+        """Their problem."""
 
 
 #: The branch of a special point.

@@ -84,7 +84,7 @@ def point_curve(
         raise bad("point", point.kind, f"one of {', '.join(valid)}")
     if point.branch.kind != "equilibrium":
         raise bad("point", point.branch.kind, "a point of a branch of equilibria")
-    curve, problem = point.branch.known()
+    curve, problem = point.branch.curve, point.branch.problem
     if point.corank > 1:
         raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
     if (point.special.extra is None and along != "event") or point.status != "converged":
@@ -155,7 +155,7 @@ def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) ->
     ParameterError
         If the point has not converged, or the map applied twice is too long a formula.
     """
-    curve, problem = point.branch.known()
+    curve, problem = point.branch.curve, point.branch.problem
     if point.status != "converged" or point.special.extra is None:
         raise bad("point", point.status, "a point that has converged", point.message)
     options = curve.options if options is None else check_options(options)
@@ -163,7 +163,7 @@ def doubled(point: SpecialPoint[Branch], options: ContinuationOptions | None) ->
     curve = curve.replace(options=options, field=twice.field)
     tangent = np.append(point.special.extra, 0.0)
     tangent = tangent / curve.length(tangent)
-    start = Sample(point.special.u, tangent, curve.at(point.special.u)[1])
+    start = Sample(point.special.u, tangent, curve.evaluate(point.special.u)[1])
     _, forward = run(CurveWalk(curve), start, "forward")
     assert forward is not None
     curve, forward = _to_other_end(curve, problem, start, forward)
@@ -185,7 +185,7 @@ def _to_other_end(
         away = curve.length(special.u - start.u) > 1e-6
         if KINDS[special.kind].label != "BP" or not away:
             continue
-        residual = once.residuals(special.u[None], once.at(special.u)[1][None])
+        residual = once.residuals(special.u[None], once.evaluate(special.u)[1][None])
         if np.max(np.abs(residual)) < 1e-9:
             name = special.kind
             at = f"{_free(curve)} = {special.u[curve.n]:.9g}"
@@ -238,7 +238,7 @@ def switch(
     """
     if KINDS[point.kind].label != "BP":
         raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
-    curve, problem = point.branch.known()
+    curve, problem = point.branch.curve, point.branch.problem
     others = point.special.others
     if not others:
         raise bad("point", point.status, "a branch point whose directions are known", point.message)
@@ -247,7 +247,7 @@ def switch(
         raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
     options = curve.options if options is None else check_options(options)
     curve = curve.replace(options=options)
-    start = Sample(point.special.u, others[direction], curve.at(point.special.u)[1])
+    start = Sample(point.special.u, others[direction], curve.evaluate(point.special.u)[1])
     walker = CurveWalk(curve)
     tracks = run(walker, start, options.directions)
     return branch_of(Branch, problem, walker, start, tracks, point.branch.record)

@@ -61,9 +61,9 @@ class IterationWriter(LaneWriter):
         b, (x, p, real, limits) = self.builder, self.arrays
         one, zero = self.constant(1.0), self.constant(0.0)
         state, t = self.load(real, OUTCOME), self.load(real, T)
-        b.store(t, self.place(clock, 0), align=8)
+        b.store(t, self.pointer(clock, 0), align=8)
         for row in (1, 2):
-            b.store(zero, self.place(clock, row), align=8)
+            b.store(zero, self.pointer(clock, row), align=8)
         b.call(code, [x, p, clock, out])
         running = b.fcmp_ordered("==", state, self.constant(RUNNING))
         whole = self.boolean(True)
@@ -71,7 +71,7 @@ class IterationWriter(LaneWriter):
             value = self.load(out, i)
             size = self._intrinsic("fabs", value)
             whole = b.and_(whole, b.fcmp_ordered("<", size, self.constant(np.inf)))
-            b.store(b.select(running, value, self.load(x, i)), self.place(x, i), align=8)
+            b.store(b.select(running, value, self.load(x, i)), self.pointer(x, i), align=8)
         now = b.select(running, b.fadd(t, one), t)
         new = b.select(
             b.fcmp_ordered(">=", now, self.load(real, END)),
@@ -82,9 +82,9 @@ class IterationWriter(LaneWriter):
         gone = b.select(running, one, zero)
         rows = (T, now), (OUTCOME, new), (COUNT, count), (GONE, gone), (START, t), (SCALE, one)
         for row, value in rows:
-            b.store(value, self.place(real, row), align=8)
+            b.store(value, self.pointer(real, row), align=8)
         ended = b.bitcast(b.fcmp_ordered("!=", new, state), ir.IntType(LANES))
         none = b.icmp_unsigned("==", ended, ir.Constant(ended.type, 0))
-        first = b.load(super(LaneWriter, self).place(limits, ALONE * LANES))
+        first = b.load(super(LaneWriter, self).pointer(limits, ALONE * LANES))
         alone = b.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
         return b.and_(none, b.not_(alone))

@@ -123,7 +123,7 @@ class StepWriter(LaneWriter):
         curves = self._curves(law, order, t, start, h, per)
         own = map(self._size, start[: law.degree * law.width])
         size = functools.reduce(self._larger, own, self.load(real, SIZE))
-        b.store(size, self.place(real, SIZE), align=8)
+        b.store(size, self.pointer(real, SIZE), align=8)
         allowed = self._allowed(law, curves, size, h, per)
         next_ = self._mul(self._part(order, curves, allowed, per, refused), h)
         far, long = self._size(rest), self._size(next_)
@@ -137,7 +137,7 @@ class StepWriter(LaneWriter):
         good = b.fcmp_ordered("<=", error, self.constant(1.0))
         going = b.and_(good, running)
         for i, (old, new) in enumerate(zip(start, ends, strict=True)):
-            b.store(b.select(going, new, old), self.place(x, i), align=8)
+            b.store(b.select(going, new, old), self.pointer(x, i), align=8)
         self._keep(
             keep, [b.select(going, taken, self.constant(0.0)), t, h, *itertools.chain(*curves)]
         )
@@ -160,23 +160,23 @@ class StepWriter(LaneWriter):
         new = b.select(b.and_(b.not_(good), short), self.constant(FAILED), new)
         refused = b.select(good, self.constant(0.0), self.constant(1.0))
         for row, value in ((T, now), (H, h), (COUNT, count), (REFUSED, refused)):
-            b.store(value, self.place(real, row), align=8)
+            b.store(value, self.pointer(real, row), align=8)
         new = b.select(running, new, state)
-        b.store(new, self.place(real, OUTCOME), align=8)
+        b.store(new, self.pointer(real, OUTCOME), align=8)
         ended = b.bitcast(b.fcmp_ordered("!=", new, state), ir.IntType(LANES))
         none = b.icmp_unsigned("==", ended, ir.Constant(ended.type, 0))
         return b.and_(none, b.not_(alone))
 
     def _asked(self, row: int) -> Any:
         """Whether a limit is not 0; it is the same in all lanes."""
-        first = self.builder.load(super(LaneWriter, self).place(self.arrays[3], row * LANES))
+        first = self.builder.load(super(LaneWriter, self).pointer(self.arrays[3], row * LANES))
         return self.builder.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
 
     def _keep(self, keep: Any, values: Iterable[Any]) -> None:
         """Leave a step where the caller finds it."""
         with self.builder.if_then(keep):
             for row, value in enumerate(values):
-                self.builder.store(value, self.place(self.arrays[2], KEPT + row), align=8)
+                self.builder.store(value, self.pointer(self.arrays[2], KEPT + row), align=8)
 
     def _curves(
         self, law: Law, order: int, t: Any, start: Sequence[Any], h: Any, per: Any

@@ -120,13 +120,13 @@ class _Entry:
     def do(self, text: str) -> None:
         self.lines.append(f"  {text}")
 
-    def at(self, base: str, offset: int, kind: str) -> str:
+    def load(self, base: str, offset: int, kind: str) -> str:
         place = self.op(f"getelementptr i8, ptr {base}, i64 {offset}")
         return self.op(f"load {kind}, ptr {place}")
 
     def python(self, name: str) -> str:
         """The address of a type, an object or a function of Python's."""
-        return self.at("@python", 8 * _PLACES[name], "ptr")
+        return self.load("@python", 8 * _PLACES[name], "ptr")
 
     def demand(self, condition: str) -> None:
         """Go on only if it holds."""
@@ -135,7 +135,7 @@ class _Entry:
         self.lines.append(f"b{self.count}:")
 
     def demand_type(self, x: str, *names: str) -> None:
-        kind = self.at(x, HEAD - 8, "ptr")
+        kind = self.load(x, HEAD - 8, "ptr")
         found = None
         for name in names:
             same = self.op(f"icmp eq ptr {kind}, {self.python(name)}")
@@ -147,11 +147,11 @@ class _Entry:
         """The parts of an argument."""
         if isinstance(kind, Tuple):
             self.demand_type(x, "tuple")
-            length = self.at(x, HEAD, "i64")
+            length = self.load(x, HEAD, "i64")
             self.demand(self.op(f"icmp eq i64 {length}, {len(kind.kinds)}"))
             found = []
             for i, one in enumerate(kind.kinds):
-                found += self.numbers(one, self.at(x, HEAD + 8 + 8 * i, "ptr"))
+                found += self.numbers(one, self.load(x, HEAD + 8 + 8 * i, "ptr"))
             return found
         if isinstance(kind, Array):
             return self.array(kind, x)
@@ -186,11 +186,11 @@ class _Entry:
 
     def array(self, kind: Array, x: str) -> list[str]:
         self.demand_type(x, "ndarray")
-        ndim = self.at(x, HEAD + 8, "i32")
-        descr = self.at(x, HEAD + 40, "ptr")
-        number = self.at(descr, HEAD + 12, "i32")
-        order = self.at(descr, HEAD + 10, "i8")
-        flags = self.at(x, HEAD + 48, "i32")
+        ndim = self.load(x, HEAD + 8, "i32")
+        descr = self.load(x, HEAD + 40, "ptr")
+        number = self.load(descr, HEAD + 12, "i32")
+        order = self.load(descr, HEAD + 10, "i8")
+        flags = self.load(x, HEAD + 48, "i32")
         mask = self.op(f"and i32 {flags}, {_WHOLE | _ALIGNED}")
         own = "<" if sys.byteorder == "little" else ">"
         native = [self.op(f"icmp eq i8 {order}, {ord(one)}") for one in ("=", "|", own)]
@@ -205,10 +205,10 @@ class _Entry:
         for test in tests[1:]:
             found = self.op(f"and i1 {found}, {test}")
         self.demand(found)
-        parts = [self.at(x, HEAD, "ptr")]
+        parts = [self.load(x, HEAD, "ptr")]
         for offset in (16,) if kind.whole else (16, 24):
-            first = self.at(x, HEAD + offset, "ptr")
-            parts += [self.at(first, 8 * i, "i64") for i in range(kind.ndim)]
+            first = self.load(x, HEAD + offset, "ptr")
+            parts += [self.load(first, 8 * i, "i64") for i in range(kind.ndim)]
         return parts
 
     def object(self, kind: Kind, parts: tuple[str, ...]) -> str:
@@ -243,7 +243,7 @@ def entry_text(form: Form, kinds: tuple[Kind, ...]) -> str:
     entry = _Entry()
     parts: list[str] = []
     for i, kind in enumerate(kinds):
-        parts += entry.numbers(kind, entry.at("%args", 8 * i, "ptr"))
+        parts += entry.numbers(kind, entry.load("%args", 8 * i, "ptr"))
     thread = entry.op(f"call ptr {entry.python('PyEval_SaveThread')}()")
     results = _call(entry, form, kinds, parts)
     entry.do(f"call void {entry.python('PyEval_RestoreThread')}(ptr {thread})")
@@ -284,7 +284,7 @@ def frame_text(form: Form, kinds: tuple[Kind, ...]) -> str:
     parts = []
     types = [one for kind in kinds for one in kind.types]
     for i, one in enumerate(types):
-        part = entry.at("%frame", 8 * i, "i64" if one == "i1" else one)
+        part = entry.load("%frame", 8 * i, "i64" if one == "i1" else one)
         parts.append(entry.op(f"trunc i64 {part} to i1") if one == "i1" else part)
     results = _call(entry, form, kinds, parts)
     for i, (one, part) in enumerate(zip(form.result.types, results, strict=True)):

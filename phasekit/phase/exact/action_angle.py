@@ -87,7 +87,7 @@ def orbits_with_angles(
     angles: Arrays = (np.empty(size, np.int8), np.empty(size), np.empty(size))
     launch(kernels.action_angle, arrays, size, (out, angles), threads)
     return (
-        Orbits.of(out, shape),
+        Orbits.from_kernel(out, shape),
         Angles(*(array.reshape(shape) for array in angles)),
     )
 

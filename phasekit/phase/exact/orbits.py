@@ -39,7 +39,7 @@ class Orbits(NamedTuple):
     """Half the way from the least angle to the greatest, rad."""
 
     @classmethod
-    def of(cls, arrays: Arrays, shape: tuple[int, ...]) -> Self:
+    def from_kernel(cls, arrays: Arrays, shape: tuple[int, ...]) -> Self:
         """Return what a kernel found, from `allocate`, in the shape of its cells."""
         found = [array.reshape(shape) for array in arrays]
         return cls._make([*found, 0.5 * (found[-1] - found[-2])])
@@ -94,7 +94,7 @@ def orbits(
     arrays = (*cells.arrays, cells.numbers(shape), flat(phi0, shape), flat(dphi0, shape))
     out = allocate(shape)
     launch(kernels.orbits, arrays, out[0].size, (out,), threads)
-    return Orbits.of(out, shape)
+    return Orbits.from_kernel(out, shape)
 
 
 def orbits_at_energy(
@@ -233,7 +233,7 @@ def _at_levels(
     )
     out = allocate(shape)
     launch(kernels.levels, arrays, out[0].size, (out,), threads)
-    return Orbits.of(out, shape)
+    return Orbits.from_kernel(out, shape)
 
 
 def allocate(shape: tuple[int, ...]) -> Arrays:

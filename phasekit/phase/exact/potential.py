@@ -21,7 +21,7 @@ def potential(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.Arr
     >>> float(potential(2.0, 1.0, 0.5, 0.0))
     0.0
     """
-    A, B, C, cos, sin = _at(A, B, C, phi)
+    A, B, C, cos, sin = _arrays(A, B, C, phi)
     with np.errstate(invalid="ignore"):
         return np.asarray((0.5 * A * cos - B) * cos - C * sin)
 
@@ -34,7 +34,7 @@ def gradient(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.Arra
     >>> float(gradient(2.0, 1.0, 0.5, 0.0))
     -0.5
     """
-    A, B, C, cos, sin = _at(A, B, C, phi)
+    A, B, C, cos, sin = _arrays(A, B, C, phi)
     with np.errstate(invalid="ignore"):
         return np.asarray((B - A * cos) * sin - C * cos)
 
@@ -47,7 +47,7 @@ def curvature(A: npt.ArrayLike, B: npt.ArrayLike, C: npt.ArrayLike, phi: npt.Arr
     >>> float(curvature(2.0, 1.0, 0.5, 0.0))
     -1.0
     """
-    A, B, C, cos, sin = _at(A, B, C, phi)
+    A, B, C, cos, sin = _arrays(A, B, C, phi)
     with np.errstate(invalid="ignore"):
         return np.asarray(B * cos - A * (cos - sin) * (cos + sin) + C * sin)
 
@@ -82,7 +82,7 @@ def phase_velocity(
     return np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan))
 
 
-def _at(*values: npt.ArrayLike) -> tuple[Array, ...]:
+def _arrays(*values: npt.ArrayLike) -> tuple[Array, ...]:
     """Coefficients as arrays, and cosine and sine of the angle, NaN where it is infinite."""
     *coefficients, phi = (np.asarray(value, dtype=float) for value in values)
     with np.errstate(invalid="ignore"):

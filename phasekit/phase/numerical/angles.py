@@ -61,12 +61,12 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
     whole = np.where(turns, orbit.period, 0.5 * orbit.period)
     size, rows = x.size, np.arange(x.size)
 
-    def at(owner: Index, times: Array) -> MotionWithErrors:
+    def motion(owner: Index, times: Array) -> MotionWithErrors:
         return flow(ground, start, speed, owner, times)
 
     grid = np.linspace(0.0, 1.0, _GRID + 1)
     owner = np.repeat(rows, grid.size)
-    places = at(owner, (whole[:, None] * grid).reshape(-1))[0].reshape(size, grid.size)
+    places = motion(owner, (whole[:, None] * grid).reshape(-1))[0].reshape(size, grid.size)
     sense = np.where(turns & (v > 0.0), 1.0, -1.0)[:, None]
     passed = np.clip(np.sum(sense * (places - x[:, None]) <= 0.0, axis=1) - 1, 0, _GRID - 1)
     first, last = places[rows, passed], places[rows, passed + 1]
@@ -77,7 +77,7 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
         pace = 2.0 * np.pi / orbit.period
         step, going = np.zeros(size), rows
         for _ in range(_STEPS):
-            here, rate, *_ = at(going, time[going])
+            here, rate, *_ = motion(going, time[going])
             push, tempo = -ground.systems.take(going).slope(here), pace[going]
             off = (tempo * (x[going] - here), target[going] - rate)
             pull = np.hypot(tempo * rate, push)  # whose square may not be a double
@@ -88,7 +88,7 @@ def _angles(ground: Ground, orbit: Orbits, x: Array, v: Array) -> tuple[Array, A
             going = going[np.abs(pace * step)[going] > 4e-15]
             if not going.size:
                 break
-        here, rate, *blurs = at(rows, time)
+        here, rate, *blurs = motion(rows, time)
         left = pace * np.abs(x - here) + np.abs(target - rate)
         size_of = np.hypot(pace * rate, ground.systems.slope(here))
         left = left + pace * blurs[0] + blurs[1]

@@ -92,7 +92,7 @@ class ArcLength:
     place: Wave
 
     @classmethod
-    def of(cls, law: Routhian) -> ArcLength:
+    def from_law(cls, law: Routhian) -> ArcLength:
         """Integrate sqrt(M), a Fourier series, term by term, and invert the sum.
 
         Raises

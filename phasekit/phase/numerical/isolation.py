@@ -98,7 +98,7 @@ def _isolate(systems: Systems) -> Isolated:
     complete = np.ones(systems.size, dtype=bool)
     unproved: list[list[tuple[float, float]]] = []
     for i in range(systems.size):
-        own = [_Run(*values) for values in runs.of(slice(firsts[i], firsts[i + 1]))]
+        own = [_Run(*values) for values in runs.runs(slice(firsts[i], firsts[i + 1]))]
         if any(run.verdict == 0 for run in own):
             single = systems.take(np.array([i]))
             for run in [run for run in own if run.verdict == 0]:
@@ -235,7 +235,7 @@ class _Runs(NamedTuple):
     left: npt.NDArray[np.int8]
     right: npt.NDArray[np.int8]
 
-    def of(self, part: slice) -> Iterator[tuple[Any, ...]]:
+    def runs(self, part: slice) -> Iterator[tuple[Any, ...]]:
         """The runs of a row."""
         return zip(*(field[part].tolist() for field in self[1:]), strict=True)
 

@@ -106,7 +106,7 @@ def along(*constants: float) -> Along:
     ParameterError
         If its inertia or its energies are unusable.
     """
-    path = ArcLength.of(AtMomentum(TwoDegrees(*constants[:-1]), constants[-1]))
+    path = ArcLength.from_law(AtMomentum(TwoDegrees(*constants[:-1]), constants[-1]))
     ground = path.ground()
     place = wrapped(path.place(ground.points.phi[0]))
     columns = np.argsort(place)
@@ -147,10 +147,10 @@ class Cells:
     shape: tuple[int, ...]
 
     @classmethod
-    def of(cls, law: Machines, inputs: Any, states: Any = ()) -> Cells:
+    def from_inputs(cls, law: Machines, inputs: Any, states: Any = ()) -> Cells:
         """Lay out parameters and states that broadcast."""
         values = law.values(*inputs)
-        one = law.at(values)
+        one = law.with_values(values)
         own = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
         columns = np.stack(
             [np.array(np.broadcast_to(x, own), float).reshape(-1) for x in (*one.machine, one.p)]
@@ -186,7 +186,7 @@ class Cells:
 
 def separatrices(law: Machines, *parameters: npt.ArrayLike) -> Separatrices:
     """Separatrices, the saddles in the order of their angles."""
-    cells = Cells.of(law, parameters)
+    cells = Cells.from_inputs(law, parameters)
     each = [NOTHING if one is None else one.separatrices for one in cells.machines]
     width = max((len(one.loop) for one in each), default=0)
     fields = []
@@ -213,7 +213,7 @@ def widened(name: str, values: Any, width: int) -> Any:
 
 def orbits(law: Machines, *inputs: npt.ArrayLike) -> Orbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
-    cells, parts = Cells.of(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Orbits]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Orbits]]()
     for one, rows, (phi, dphi) in cells.each():
         found = rounds.orbits(one.rows(rows.size), one.path.length(phi), dphi * one.path.scale(phi))
         parts.append((rows, one.path.by_coordinate(found)))
@@ -222,7 +222,7 @@ def orbits(law: Machines, *inputs: npt.ArrayLike) -> Orbits:
 
 def orbits_at_energy(law: Machines, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
-    cells, parts = Cells.of(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
     for one, rows, (level,) in cells.each():
         column = _center(one, center)
         if column is None:
@@ -238,7 +238,7 @@ def orbits_at_gap(
     law: Machines, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> Orbits:
     """Orbits by their energy above a saddle: its number, or the lowest; side 0 left, 1 right."""
-    cells, parts = Cells.of(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
     for one, rows, (gap,) in cells.each():
         column = _saddle(one, saddle)
         if column is None:
@@ -255,7 +255,7 @@ def orbits_at_gap(
 
 def angles(law: Machines, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     """Angle variables of states (phi, dphi), the last of the inputs."""
-    cells, parts = Cells.of(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Any]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Any]]()
     for one, rows, (phi, dphi) in cells.each():
         found = find_angles(one.rows(rows.size), one.path.length(phi), dphi * one.path.scale(phi))
         parts.append((rows, found._replace(orbit_family=one.codes(found.orbit_family, back=True))))
@@ -265,7 +265,7 @@ def angles(law: Machines, *inputs: npt.ArrayLike) -> AnglesWithErrors:
 
 def state_of(law: Machines, *inputs: npt.ArrayLike) -> StateWithErrors:
     """States by action, angle variable and code of the family, the last of the inputs."""
-    cells, parts = Cells.of(law, inputs[:-3], inputs[-3:]), list[tuple[Index, Any]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-3], inputs[-3:]), list[tuple[Index, Any]]()
     for one, rows, (action, angle, family) in cells.each():
         s, speed, off, blur = states_of_action(
             one.rows(rows.size), action, angle, one.codes(family)
@@ -279,7 +279,7 @@ def separatrix_motion_with_errors(
     law: Machines, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> MotionWithErrors:
     """Motion on the separatrix of a saddle at times, the last of the inputs."""
-    cells, parts = Cells.of(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Any]]()
+    cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Any]]()
     for one, rows, (time,) in cells.each():
         column = _saddle(one, saddle)
         if column is None:

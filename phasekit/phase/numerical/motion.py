@@ -212,14 +212,14 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
     step = 0.25 / (np.sqrt(np.abs(exponent)) + 1e-3)
 
     def trusted(few: Index, stages: Array) -> npt.NDArray[np.bool_]:
-        near, _, _ = _place(branch, own[few], stages[..., 0])
+        near, _, _ = _distances(branch, own[few], stages[..., 0])
         x = branch.saddle[own[few], None] + branch.side * near
         systems = branch.ground.systems
         size = np.max(np.abs(systems.take(own[few]).slope(x)), axis=1)
         return smooth(systems, own[few], np.min(x, axis=1), np.max(x, axis=1), size)
 
     w = follow(rate, start[rows, None], own, time[rows], step, trusted)[0][:, 0]
-    near, far, slope = _place(branch, own, w[:, None])
+    near, far, slope = _distances(branch, own, w[:, None])
     pace = _pace(branch, own, w[:, None])
     u, d = near[:, 0], far[:, 0]
     length = branch.length[own]
@@ -229,7 +229,7 @@ def _along(branch: Branch, owner: Index, start: Array, time: Array) -> tuple[Arr
     return x, v
 
 
-def _place(branch: Branch, own: Index, w: Array) -> tuple[Array, Array, Array]:
+def _distances(branch: Branch, own: Index, w: Array) -> tuple[Array, Array, Array]:
     """Distances from the saddle and from the far end at w, and du/dw."""
     length = branch.length[own, None]
     with np.errstate(over="ignore"):
@@ -252,7 +252,7 @@ def _pace(branch: Branch, own: Index, w: Array) -> Array:
     held = np.clip(w, -300.0, 300.0)
     # The turning point itself has neither speed nor slope.
     held = np.where((held == 0.0) & ~branch.joins[own, None], 1e-8, held)
-    near, far, slope = _place(branch, own, held)
+    near, far, slope = _distances(branch, own, held)
     result = np.empty(w.shape)
     low = near <= far
     for end, distance, sign, part in (

@@ -243,7 +243,7 @@ def exact_heights(base: Fraction, coefficients: list[Fraction], x: Array) -> tup
     height = [base, *(c / (k + 1) for k, c in enumerate(coefficients))]
     bend = [k * c for k, c in enumerate(coefficients)][1:] or [Fraction(0)]
 
-    def at(numbers: list[Any]) -> Callable[[float], float]:
+    def evaluator(numbers: list[Any]) -> Callable[[float], float]:
         def value(place: float) -> float:
             total: Any = Fraction(0)
             for c in reversed(numbers):
@@ -255,4 +255,4 @@ def exact_heights(base: Fraction, coefficients: list[Fraction], x: Array) -> tup
 
         return value
 
-    return np.array([at(height)(p) for p in x]), np.array([at(bend)(p) for p in x])
+    return np.array([evaluator(height)(p) for p in x]), np.array([evaluator(bend)(p) for p in x])

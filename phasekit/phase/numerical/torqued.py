@@ -99,7 +99,7 @@ class Cells:
     shape: tuple[int, ...]
 
     @classmethod
-    def of(cls, law: PerturbedLaw, inputs: Any, states: Any) -> Cells:
+    def from_inputs(cls, law: PerturbedLaw, inputs: Any, states: Any) -> Cells:
         """Lay out parameters and states that broadcast."""
         base, used, torque, own = _parts(law, inputs)
         columns = np.stack([np.broadcast_to(x, own).reshape(-1) for x in (*used, torque)]) + 0.0
@@ -123,7 +123,7 @@ class Cells:
             return self.base.points(self.own, self.torque)
         return _kept(self.base, False, *(p.tobytes() for p in (*self.own, self.torque)))
 
-    def at(self, cells: Index) -> list[Array]:
+    def parameters(self, cells: Index) -> list[Array]:
         """Parameters of the potential of some cells."""
         return [p[self.number[cells]] for p in self.own]
 
@@ -196,17 +196,17 @@ phase_velocity = _of_formula(functions.phase_velocity, 2)
 
 def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Any:
     """All equilibria under a constant torque."""
-    return _equilibria(Cells.of(law, parameters, ()))
+    return _equilibria(Cells.from_inputs(law, parameters, ()))
 
 
 def separatrices(law: PerturbedLaw, *parameters: npt.ArrayLike) -> TorquedSeparatrices:
     """Separatrices under a constant torque, of the saddles of the turn of the states."""
-    return _separatrices(Cells.of(law, parameters, ()))
+    return _separatrices(Cells.from_inputs(law, parameters, ()))
 
 
 def phase_space(law: PerturbedLaw, *parameters: npt.ArrayLike) -> tuple[Any, TorquedSeparatrices]:
     """Equilibria and separatrices at once."""
-    cells = Cells.of(law, parameters, ())
+    cells = Cells.from_inputs(law, parameters, ())
     return _equilibria(cells), _separatrices(cells)
 
 
@@ -220,7 +220,7 @@ def _separatrices(cells: Cells) -> TorquedSeparatrices:
     gain = turn * cells.torque[cells.number]
     parts: list[tuple[Index, Any]] = []
     if flat.size or not cells.number.size:
-        found = cells.base.level("separatrices", cells.at(flat))
+        found = cells.base.level("separatrices", cells.parameters(flat))
         # A formula without parameters is one system.
         rows = [x if cells.own else np.broadcast_to(x, (flat.size, *x.shape)) for x in found]
         parts.append((flat, (*rows, gain[flat])))
@@ -238,11 +238,11 @@ def grounds(
 
     Those in closed form are left out where no torque acts.
     """
-    cells = Cells.of(law, parameters, ())
+    cells = Cells.from_inputs(law, parameters, ())
     found: list[tuple[Ground, Index]] = []
     level = cells.level()
     if level.size and not isinstance(cells.base, Named):
-        own = cells.at(level)
+        own = cells.parameters(level)
         if lined:
             still = np.zeros(level.size)
             points = cells.base.points(own, still)
@@ -276,7 +276,7 @@ def lines_of(*cells: Array) -> tuple[Any, Turns]:
 
 def orbits(law: PerturbedLaw, *inputs: npt.ArrayLike) -> TorquedOrbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
-    cells = Cells.of(law, inputs[:-2], inputs[-2:])
+    cells = Cells.from_inputs(law, inputs[:-2], inputs[-2:])
     x, v = cells.states
 
     def start(turns: Turns, some: Index) -> tuple[rounds.States, Array, Array]:
@@ -292,7 +292,7 @@ def orbits_at_energy(
     law: PerturbedLaw, *inputs: npt.ArrayLike, center: int | None = None
 ) -> TorquedOrbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
-    cells = Cells.of(law, inputs[:-1], inputs[-1:])
+    cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
     (h,) = cells.states
 
     def start(turns: Turns, some: Index) -> tuple[rounds.States, Array, Array]:
@@ -311,7 +311,7 @@ def orbits_at_gap(
     side: int = 1,
 ) -> TorquedOrbits:
     """Orbits by their energy above a saddle, the last of the inputs; side 0 left, 1 right."""
-    cells = Cells.of(law, inputs[:-1], inputs[-1:])
+    cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
     (gap,) = cells.states
 
     def start(turns: Turns, some: Index) -> tuple[rounds.States, Array, Array]:
@@ -326,12 +326,12 @@ def orbits_at_gap(
 
 def angles(law: PerturbedLaw, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     """Angle variables of states (phi, dphi), the last of the inputs; NaN where they run."""
-    cells = Cells.of(law, inputs[:-2], inputs[-2:])
+    cells = Cells.from_inputs(law, inputs[:-2], inputs[-2:])
     x, v = cells.states
     flat = cells.level()
     parts: list[tuple[Index, Any]] = []
     if flat.size:
-        parts.append((flat, cells.base.level("angles", cells.at(flat), x[flat], v[flat])))
+        parts.append((flat, cells.base.level("angles", cells.parameters(flat), x[flat], v[flat])))
     for turns, some in cells.turns():
         parts.append((some, find_angles(turns, turns.home(x[some])[0], v[some])))
     found = cells.answered(parts, AnglesWithErrors)
@@ -341,12 +341,12 @@ def angles(law: PerturbedLaw, *inputs: npt.ArrayLike) -> AnglesWithErrors:
 
 def state_of(law: PerturbedLaw, *inputs: npt.ArrayLike) -> StateWithErrors:
     """States by action, angle variable and code of the family, the last of the inputs."""
-    cells = Cells.of(law, inputs[:-3], inputs[-3:])
+    cells = Cells.from_inputs(law, inputs[:-3], inputs[-3:])
     flat = cells.level()
     parts: list[tuple[Index, Any]] = []
     if flat.size or not cells.number.size:
         states = (x[flat] for x in cells.states)
-        parts.append((flat, cells.base.level("state_of", cells.at(flat), *states)))
+        parts.append((flat, cells.base.level("state_of", cells.parameters(flat), *states)))
     for turns, some in cells.turns():
         action, angle, family = (x[some] for x in cells.states)
         if turns.named:
@@ -362,13 +362,13 @@ def separatrix_motion_with_errors(
 
     NaN on the side where it runs away, for there it has no turning point from which to count.
     """
-    cells = Cells.of(law, inputs[:-1], inputs[-1:])
+    cells = Cells.from_inputs(law, inputs[:-1], inputs[-1:])
     (time,) = cells.states
     parts: list[tuple[Index, Any]] = []
     flat = cells.level()
     if flat.size:
         level = functools.partial(cells.base.level, "separatrix_motion_with_errors")
-        parts.append((flat, level(cells.at(flat), time[flat], saddle=saddle, side=side)))
+        parts.append((flat, level(cells.parameters(flat), time[flat], saddle=saddle, side=side)))
     for turns, some in cells.turns():
         column, there = turns.saddle(saddle)
         rows = np.flatnonzero(there)
@@ -385,7 +385,9 @@ def _orbits(cells: Cells, name: str, start: Callable[..., Any], **options: Any) 
     parts: list[tuple[Index, Any]] = []
     flat = cells.level()
     if flat.size or not cells.number.size:
-        found = cells.base.level(name, cells.at(flat), *(x[flat] for x in cells.states), **options)
+        found = cells.base.level(
+            name, cells.parameters(flat), *(x[flat] for x in cells.states), **options
+        )
         parts.append((flat, (*found, np.where(found.orbit_kind >= 0, 0.0, np.nan))))
     for turns, some in cells.turns():
         states, v, energies = start(turns, some)

@@ -94,7 +94,7 @@ class Turns(Ground):
     named: bool
 
     @classmethod
-    def of(
+    def from_formula(
         cls, formula: Formula, own: list[Array], torque: Array, points: Equilibria,
         rise: tuple[Array, Array] | None = None, *, named: bool = False,
     ) -> Turns:  # fmt: skip

@@ -83,7 +83,7 @@ class Unpushed:
 
     def turns(self, points: Any, own: list[Array], torque: Array) -> Turns:
         """Systems under torques on the line, of which these are found."""
-        return Turns.of(reduced(self.formula), own, torque, points)
+        return Turns.from_formula(reduced(self.formula), own, torque, points)
 
 
 class Named(Unpushed):
@@ -115,7 +115,9 @@ class Named(Unpushed):
             error = _EPS * size[:, None] / np.abs(points.curvature)
         proofs = [count.astype(np.int16), count >= 0, gaps, none, error]
         few = Equilibria._make([*points[:6], *proofs])
-        return Turns.of(self.formula, own, torque, few, _rises(own, torque, few), named=True)
+        return Turns.from_formula(
+            self.formula, own, torque, few, _rises(own, torque, few), named=True
+        )
 
 
 @functools.singledispatch

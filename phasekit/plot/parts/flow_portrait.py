@@ -89,7 +89,7 @@ class View:
     circles: tuple[Circle, Circle]
 
     @classmethod
-    def of(cls, axes: Axes, problem: Problem, window: Any, plane: Any) -> View:
+    def from_arguments(cls, axes: Axes, problem: Problem, window: Any, plane: Any) -> View:
         """Check a window and a plane."""
         low, high = corners(problem, window, "window")
         names = problem.state
@@ -144,7 +144,8 @@ class View:
             unit = self.problem.unit_of(name) or "1"
             text = f"${symbols[i]}$" + (f" ({printed(unit)})" if unit not in ("", "1") else "")
             if circle.period is not None and abs(circle.period - TURN) < 1e-12:
-                style.circle_axis(self.axes, which, Units.of("rad", None, {}), circle, name)  # type: ignore[arg-type]
+                units = Units.from_arguments("rad", None, {})
+                style.circle_axis(self.axes, which, units, circle, name)  # type: ignore[arg-type]
             else:
                 self.axes.set(**{f"{which}lim": (self.low[i], self.high[i])})
             self.axes.set(**{f"{which}label": text})
@@ -164,7 +165,7 @@ def flow_portrait(
             raise bad(name, True, "False, for a flow of more than two states")
     starts = _starts(problem, orbits)
     axes = style.axes_for(ax, legend=legend)
-    view = View.of(axes, problem, window, plane)
+    view = View.from_arguments(axes, problem, window, plane)
     rests = equilibria_of(problem, view.low, view.high)
     handles: list[Artist] = []
     found: list[Cycle] | None = [] if planar else None

@@ -35,7 +35,7 @@ class StatePlane:
     coordinate: str = "x"
 
     @classmethod
-    def of(
+    def from_arguments(
         cls, units: Units, period: float | None, cut: Any, *, on_angle: bool, coordinate: Any = None
     ) -> StatePlane:
         """Check `angles` and `cut` of a picture against its coordinate."""

@@ -52,7 +52,9 @@ class Units:
     chosen: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, angles: Any, units: Any = None, own: Mapping[str, str] | None = None) -> Units:
+    def from_arguments(
+        cls, angles: Any, units: Any = None, own: Mapping[str, str] | None = None
+    ) -> Units:
         """Check what a picture got for `angles` and `units`; `own` are units of its own names."""
         asked: object = angles
         if not isinstance(asked, str) or asked not in ("rad", "deg"):
@@ -76,7 +78,7 @@ class Units:
         """
         held = {str(name): str(one.attrs.get("units", "")) for name, one in ds.variables.items()}
         si = {name: si_unit(unit) or unit for name, unit in held.items()}
-        asked = cls.of(angles, units, si)
+        asked = cls.from_arguments(angles, units, si)
         others = {name: unit for name, unit in held.items() if si[name] != unit}
         ds = in_si(ds)
         return ds, cls(asked.angles, {**others, **asked.chosen})
@@ -115,7 +117,7 @@ class Units:
 
 def as_units(angles: Angles | Units) -> Units:
     """Return `Units`, where the unit of angles may stand for them."""
-    return angles if isinstance(angles, Units) else Units.of(angles)
+    return angles if isinstance(angles, Units) else Units.from_arguments(angles)
 
 
 def printed(unit: str) -> str:

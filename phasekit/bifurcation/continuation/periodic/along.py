@@ -196,7 +196,7 @@ def mean(mesh: Array, x: Array, weights: Array, value: Array, out: Array) -> Non
 
 
 @kernel
-def place(
+def fill_numbers(
     mesh: Array, x: Array, y: Array, turns: Array, scale: Array, width: Array, own: int,
     weights: Array, value: Array, out: Array,
 ) -> None:  # fmt: skip

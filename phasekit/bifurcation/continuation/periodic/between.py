@@ -57,7 +57,7 @@ class Stretch:
     rows: Any = None
     length: float = 0.0
 
-    def at(self, s: float) -> Point | None:
+    def point(self, s: float) -> Point | None:
         """The point at a distance; None if Newton's method finds none."""
         (a, b), ((dx, dy), (ex, ey)) = self.ends, self.tangents
         t, h = s / self.length, self.length
@@ -95,7 +95,7 @@ def root(stretch: Stretch, test: Value) -> Point | None:
         )
         if not low < s < high:
             s = 0.5 * (low + high)
-        point = stretch.at(s)
+        point = stretch.point(s)
         if point is None:
             return None
         value = test(point, forced)
@@ -132,7 +132,7 @@ def branching(stretch: Stretch, test: Value) -> Point | None:
     low, high = 0.0, stretch.length
     for _ in range(1 if cycles.closes else ZOOMS):  # determinants are smooth, borders not
         nodes = 0.5 * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
-        points = [stretch.at(float(low + s * (high - low))) for s in nodes]
+        points = [stretch.point(float(low + s * (high - low))) for s in nodes]
         made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
         if len(made) < NODES - 2:
             return None

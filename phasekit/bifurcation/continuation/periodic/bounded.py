@@ -91,9 +91,9 @@ class Bounded(Cycles):
         rows[-1], rows_y[-1], target[-1] = own[1], own_y[1], at[1] + own_y[1] @ orbit.y
         if self.phased:
             rows[0], target[0] = own[0], at[0]
-        return self.at(orbit, rows, rows_y, target)
+        return self.rows_beside(orbit, rows, rows_y, target)
 
-    def at(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Rows:
+    def rows_beside(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Rows:
         """The rows with the time as it is, and the conditions linear beside an orbit."""
         rows, rows_y, target = rows.copy(), rows_y.copy(), target.copy()
         k = int(self.phased)
@@ -203,12 +203,12 @@ def differences_of(function: Callable[[Array], Array], u: Array, scale: Array) -
     for i in range(len(u)):
         h = STEP * max(abs(float(u[i])), float(scale[i]))
 
-        def at(k: float, i: int = i) -> Array:
+        def value_at(k: float, i: int = i) -> Array:
             moved = u.copy()
             moved[i] += k
             return function(moved)
 
-        near, wide = ((at(k) - at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
+        near, wide = ((value_at(k) - value_at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
         columns.append((4.0 * near - wide) / 3.0)
     return np.stack(columns, axis=-1)
 
@@ -273,19 +273,19 @@ class IntegralFunction:
         each = [np.ravel(self.function(one.copy(), **values)) for one in x]
         return np.array(each, dtype=float).reshape(len(x), self.count).T
 
-    def _at(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
+    def _points(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
         c = collocation.scheme(bounded.m)
         x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)
         return np.outer(np.diff(orbit.mesh), c.weights).ravel(), x
 
     def values(self, bounded: Bounded, orbit: Orbit) -> Array:
         """The integrals."""
-        weights, x = self._at(bounded, orbit)
+        weights, x = self._points(bounded, orbit)
         return np.asarray(self._values(bounded, x, orbit.y[1:]) @ weights)
 
     def slopes(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
         """Their derivatives."""
-        weights, x = self._at(bounded, orbit)
+        weights, x = self._points(bounded, orbit)
         n = bounded.n
 
         def moved(by: Array) -> Array:

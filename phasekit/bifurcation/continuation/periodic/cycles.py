@@ -255,7 +255,7 @@ class Cycles:
         rows_y[-1, 1:] = dy[1:] / self.width**2
         return rows, rows_y, at + rows_y @ orbit.y
 
-    def at(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Any:
+    def rows_beside(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Any:
         """The bordering rows beside an orbit, if they are not the same everywhere; else None."""
         return None
 
@@ -288,7 +288,7 @@ class Cycles:
         while True:
             if jets.given:
                 values = jets(mesh, x, y, self.m, local.sizes)
-            rows, rows_y, target = self.at(Orbit(mesh, x, y), rows, rows_y, target) or (
+            rows, rows_y, target = self.rows_beside(Orbit(mesh, x, y), rows, rows_y, target) or (
                 rows, rows_y, target,
             )  # fmt: skip
             end, steps, side, residual, trace, size, length = newton.newton(

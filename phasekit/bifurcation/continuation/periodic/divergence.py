@@ -136,7 +136,7 @@ def fold_form(it: Across, dx: Array, stretch: float) -> dict[str, float]:
     v, _, _ = function(it, np.ones(line.n))
     whole = float(np.sqrt(it.mean(np.sum(v * v, axis=1))))
     # A function has one side of the flow all along.
-    side = 1.0 if it.mean(np.sum(e * line.at(dx) / scale, axis=1)) >= 0.0 else -1.0
+    side = 1.0 if it.mean(np.sum(e * line.values(dx) / scale, axis=1)) >= 0.0 else -1.0
     line.size = sum(it.mean(np.abs(one)) for one in terms) / whole
     return {"a": side * a / whole, "b": side * b * whole}
 

@@ -309,12 +309,12 @@ def _from(
     return replace(point, dx=side * found.dx, dy=side * found.dy, sign=side * found.sign)
 
 
-def place(cycles: Cycles, orbit: Orbit) -> Array:
+def fingerprint(cycles: Cycles, orbit: Orbit) -> Array:
     """Numbers that tell orbits apart, whatever their phase."""
     own, c = cycles.own, collocation.scheme(cycles.m)
     width = cycles.width[: len(cycles.active)]
     out = np.empty(len(width) + 1 + 2 * own)
-    along.place(
+    along.fill_numbers(
         orbit.mesh, orbit.x, orbit.y, cycles.turns, cycles.scale, width, own, c.weights, c.value,
         out,
     )  # fmt: skip
@@ -328,7 +328,10 @@ def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:
     near = abs(b - a) + made.step * cycles.width[0]
     if before.since_start < FEW or not min(a, b) - near <= p <= max(a, b) + near:
         return False
-    one, two = (place(cycles, o) - place(cycles, start.orbit) for o in (before.orbit, made.orbit))
+    one, two = (
+        fingerprint(cycles, o) - fingerprint(cycles, start.orbit)
+        for o in (before.orbit, made.orbit)
+    )
     along = two - one
     length = float(along @ along)
     if not length > 0.0:
@@ -343,6 +346,6 @@ def _closes(cycles: Cycles, before: State, made: Point, start: Point) -> bool:
     if abs(b - a) if k == 0 else abs(made.orbit.y[2] - before.orbit.y[2]):
         met = at_value(cycles, before, made, k, float(start.orbit.y[1 + k]))
         if met is not None:
-            apart = place(cycles, met.orbit) - place(cycles, start.orbit)
+            apart = fingerprint(cycles, met.orbit) - fingerprint(cycles, start.orbit)
             return bool(np.max(np.abs(apart)) < SAME)
     return False

@@ -46,7 +46,7 @@ from phasekit.bifurcation.continuation.periodic.normal_forms import (
     at_doubling,
     at_fold,
     at_torus,
-    known,
+    coefficients,
 )
 from phasekit.bifurcation.continuation.periodic.on_curves import SAME, OrbitTest, looked_for_on
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of, still, vertical
@@ -194,7 +194,7 @@ def _between(cycles: Cycles, a: Point, b: Point, depth: int) -> list[Found]:
     explained = abs(gap) <= sum(moves) and (gap - sum(moves)) % 2 == 0
     if explained or depth == 0:
         return sorted(kept, key=lambda one: one.point.arclength)
-    middle = stretch.at(0.5 * stretch.length)
+    middle = stretch.point(0.5 * stretch.length)
     if middle is None or not middle.trusted:
         return sorted(kept, key=lambda one: one.point.arclength)
     return [*_between(cycles, a, middle, depth - 1), *_between(cycles, middle, b, depth - 1)]
@@ -269,7 +269,7 @@ def _form_of_fold(cycles: Cycles, point: Point) -> Form:
         return lambda one: lambda line: at_fold(line, one.dx, growth=growth)
 
     ways = (math.inf, -math.inf) if single(cycles) else (math.inf,)
-    return known(cycles, point, {"a": 1, "b": -1}, *map(way, ways))
+    return coefficients(cycles, point, {"a": 1, "b": -1}, *map(way, ways))
 
 
 def _form_of_branching(cycles: Cycles, point: Point) -> Form:
@@ -278,7 +278,7 @@ def _form_of_branching(cycles: Cycles, point: Point) -> Form:
         other = other_tangent(cycles, one.orbit, _condensed(cycles, one), own)
         return lambda line: at_branching(line, own, other)
 
-    return known(cycles, point, {"a": 1, "c": 2}, way, crossing=True)
+    return coefficients(cycles, point, {"a": 1, "c": 2}, way, crossing=True)
 
 
 def _form_of_doubling(cycles: Cycles, point: Point) -> Form:
@@ -286,7 +286,7 @@ def _form_of_doubling(cycles: Cycles, point: Point) -> Form:
         v = null_vector(cycles, one.orbit, _condensed(cycles, one), -1.0)
         return lambda line: at_doubling(line, v)
 
-    return known(cycles, point, {"c": 2}, way)
+    return coefficients(cycles, point, {"c": 2}, way)
 
 
 def _form_of_torus(cycles: Cycles, point: Point) -> Form:
@@ -294,7 +294,7 @@ def _form_of_torus(cycles: Cycles, point: Point) -> Form:
     if not pairs:
         return {}, ""
     angle = cmath.phase(min(pairs, key=lambda mu: abs(abs(mu) - 1.0)))
-    return known(
+    return coefficients(
         cycles, point, {"d": 2, "d_imag": 2}, lambda one: lambda line: at_torus(line, angle)
     )
 

@@ -124,7 +124,7 @@ class Extended(Cycles):
             return replace(found, orbit=guess)
         orbit = found.orbit
         line = Linear(self.folds, orbit)
-        beside = line.at(np.ascontiguousarray(guess.x[:, n:]))
+        beside = line.values(np.ascontiguousarray(guess.x[:, n:]))
         near, v, rate = function(across(line), self.scale[n:])
         was, now = (
             float(line.weights @ np.sum((one / self.scale[n:]) ** 2, axis=1))

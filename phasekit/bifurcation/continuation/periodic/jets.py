@@ -99,7 +99,7 @@ class Jets:
         begin = 0
         if field.jacobian is not None:
             slopes[:, :, :n] = [
-                field.slopes(one.copy(), self._at(given, i)) for i, one in enumerate(x)
+                field.slopes(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)
             ]
             begin = n
         columns = []
@@ -108,7 +108,7 @@ class Jets:
             size = float(np.max(np.abs(x[:, j] if j < n else self._p(given, j - n))))
             h = STEP * 2.0 ** np.floor(np.log2(max(size, sizes[j])))
 
-            def at(k: float, j: int = j) -> Array:
+            def value_at(k: float, j: int = j) -> Array:
                 if j >= n:
                     name = names[j - n]
                     return self._values(x, given | {name: given[name] + k})
@@ -116,11 +116,11 @@ class Jets:
                 shifted[:, j] += k
                 return self._values(shifted, given)
 
-            wide, near = ((at(k) - at(-k)) / (2.0 * k) for k in (2.0 * h, h))
-            columns.append((j, at, h, (wide, near)))
+            wide, near = ((value_at(k) - value_at(-k)) / (2.0 * k) for k in (2.0 * h, h))
+            columns.append((j, value_at, h, (wide, near)))
             noise += lines.EPSILON * h / STEP * np.max(np.abs(near), axis=0)
-        for j, at, h, sides in columns:
-            slopes[:, :, j] = lines.slope_along(at, h, noise, sides=sides)
+        for j, line, h, sides in columns:
+            slopes[:, :, j] = lines.slope_along(line, h, noise, sides=sides)
         out[:, n:] = slopes.reshape(len(x), -1)
         out[~np.isfinite(f).all(axis=1), :] = np.nan
         return out
@@ -128,7 +128,7 @@ class Jets:
     def _p(self, given: dict[str, Any], k: int) -> Any:
         return given[self.field.parameters[self.active[k]]]
 
-    def _at(self, given: dict[str, Any], i: int) -> dict[str, Any]:
+    def _parameters(self, given: dict[str, Any], i: int) -> dict[str, Any]:
         """The parameters at one of many times."""
         return {k: float(v[i]) if isinstance(v, np.ndarray) else v for k, v in given.items()}
 
@@ -155,4 +155,6 @@ class Jets:
 
     def _each(self, x: Array, given: dict[str, Any]) -> Array:
         field: Any = self.field
-        return np.array([field.value(one.copy(), self._at(given, i)) for i, one in enumerate(x)])
+        return np.array(
+            [field.value(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)]
+        )

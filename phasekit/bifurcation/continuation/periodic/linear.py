@@ -45,7 +45,7 @@ class Linear:
             found = found + time * self.slopes[:, :, self.n]
         return np.asarray(found)
 
-    def at(self, h: Array) -> Array:
+    def values(self, h: Array) -> Array:
         """Values of a function at all Gauss points, one after another."""
         return collocation.at_gauss(h, self.m).reshape(-1, h.shape[1])
 
@@ -72,12 +72,12 @@ class Linear:
             whole = self._jets(o.x + dx, o.y + dy)
             return whole[:, self.n :].reshape(self.slopes.shape)[:, :, : self.n]
 
-        return OfMatrices(matrices, self.at, cycles.scale, cycles.width)
+        return OfMatrices(matrices, self.values, cycles.scale, cycles.width)
 
     def _wide(self, v: Array, y: Array) -> Array:
         """States and active parameters at all Gauss points; of a forced system with its time."""
         out = np.zeros((len(self.A), self.slopes.shape[2]))
-        out[:, : self.n] = self.at(v)
+        out[:, : self.n] = self.values(v)
         if self.cycles.forced:
             out[:, self.n] = y[0] * self.times
         out[:, out.shape[1] - len(y) + 1 :] = y[1:]
@@ -103,14 +103,14 @@ class Linear:
         ``size`` is that of the coefficient, did they not cancel.
         """
         scale = np.tile(self.cycles.scale, v.shape[1] // self.n)
-        sizes = (float(np.sqrt(np.mean((one / scale) ** 2))) for one in (self.at(v), *terms))
+        sizes = (float(np.sqrt(np.mean((one / scale) ** 2))) for one in (self.values(v), *terms))
         whole = next(sizes)
         self.size = sum(sizes) / whole if whole > 0.0 else 0.0
         return np.asarray(sum(terms))
 
     def times_A(self, v: Array) -> Array:
         """A v at all Gauss points."""
-        return np.asarray(np.einsum("kij,kj->ki", self.A, self.at(v)))
+        return np.asarray(np.einsum("kij,kj->ki", self.A, self.values(v)))
 
     def solve(
         self, g: Array, columns: list[Array], rows: list[Array], sigma: float = 1.0,
@@ -180,7 +180,7 @@ class Linear:
 
         v' = A v - alpha f: a part along f, a shift of time, leaves that as it is.
         """
-        at, alpha = self.at(self.unit(v)), 0.0
+        at, alpha = self.values(self.unit(v)), 0.0
         for _ in range(2):
             nothing = np.zeros_like(self.f)
             v, unknowns = self.solve(
@@ -188,7 +188,7 @@ class Linear:
             )
             one = self.unit(v)
             alpha = float(unknowns[1] * np.max(np.abs(one)) / np.max(np.abs(v)))
-            at = self.at(one)
+            at = self.values(one)
         return one, alpha
 
     def unit(self, v: Array) -> Array:
@@ -211,5 +211,5 @@ def wave(line: Linear, omega: float) -> Array:
             right=np.array([1.0, 0.0]),
         )  # fmt: skip
         v = line.unit(v)
-        at = line.at(v)
+        at = line.values(v)
     return v

@@ -91,14 +91,14 @@ class OfValues:
     def second(self, v: Array, dy: Array, u: Array, variant: int) -> Array:
         """The second derivative of f along (v, dy) and along u."""
         a, b = self.wide(v, dy).ravel(), self.wide(u, np.zeros(1)).ravel()
-        return self._one(self.derivatives.second(a, b), variant)
+        return self._form(self.derivatives.second(a, b), variant)
 
     def third(self, v: Array, u: Array, variant: int) -> Array:
         """C(v, v, u)."""
         a, b = (self.wide(one, np.zeros(1)).ravel() for one in (v, u))
-        return self._one(self.derivatives.third(a, a, b), variant)
+        return self._form(self.derivatives.third(a, a, b), variant)
 
-    def _one(self, found: Estimate, variant: int) -> Array:
+    def _form(self, found: Estimate, variant: int) -> Array:
         value = np.asarray(found.value).reshape(self.shape)
         if variant == 0:
             return value
@@ -142,7 +142,7 @@ class _Whole:
     def slopes_along(self, par: Array, active: tuple[int, ...], u: Array, z: Array) -> None:
         """Nothing is known without differences of f."""
 
-    def at(self, u: Array) -> tuple[Array, Any]:
+    def values_and_slopes(self, u: Array) -> tuple[Array, Any]:
         """Values and derivatives, those of each point by its own unknowns alone."""
         from scipy.sparse import bsr_array
 

@@ -39,7 +39,7 @@ UNTRIED = "how coefficients go with the mesh is not known: on a finer one there 
 VERTICAL = 1e-5  # part along the parameter, beside its span, of a tangent that does not move it
 
 
-def known(
+def coefficients(
     cycles: Cycles,
     point: Point,
     powers: dict[str, int],
@@ -136,7 +136,7 @@ def at_fold(
     else:
         # A part along the flow, which depends on how phases are compared, would count in its size.
         v, alpha = line.across(dx)
-    at = line.at(v)
+    at = line.values(v)
     columns = rows = [at] if cycles.forced else [at, line.f]
     bent = line.total(v, 0.5 * line.second(v, v), -alpha * line.times_A(v))
     a = line.solve(bent, columns, rows)[1][0]
@@ -166,7 +166,7 @@ def at_branching(
     moved = (k * p + j * r) * cycles.width[0]
     h, h_y = (k * dx + j * ex) / moved, (k * dy + j * ey) / moved
     v, alpha = (line.unit(v), 0.0) if cycles.forced else line.across(v)
-    at = line.at(v)
+    at = line.values(v)
     columns = rows = [at] if cycles.forced else [at, line.f]
     stretch = float(h_y[0]) / orbit.y[0]
     g = line.moved(h, h_y, v) + stretch * line.times_A(v)
@@ -188,7 +188,7 @@ def at_branching(
 def at_doubling(line: Linear, v: Array) -> dict[str, float]:
     """The coefficient c of a period doubling: the doubled orbits are stable beside it if c < 0."""
     v = line.unit(v)
-    at = line.at(v)
+    at = line.values(v)
     g = line.second(v, v)
     if line.cycles.forced:
         h, unknown = line.solve(g, [], [])
@@ -226,11 +226,13 @@ def at_torus(line: Linear, angle: float, v: Array | None = None) -> dict[str, fl
         np.hstack([line.third(u, u) + line.third(w, u), line.third(u, w) + line.third(w, w)]),
         np.hstack([2.0 * second(u, h), 2.0 * second(w, h)]),
         np.hstack([second(u, p) + second(w, q), second(u, q) - second(w, p)]),
-        np.hstack([line.times_A(u) + omega * line.at(w), line.times_A(w) - omega * line.at(u)]),
+        np.hstack(
+            [line.times_A(u) + omega * line.values(w), line.times_A(w) - omega * line.values(u)]
+        ),
     ]
     terms[3] *= -2.0 * a1
     cubic = line.total(v, *(0.5 * one for one in terms))
-    at = line.at(v)
+    at = line.values(v)
     around = np.hstack([-at[:, n:], at[:, :n]])  # i v
     _, d = line.solve(cubic, [at, around], [at, around], turn=omega)
     return {"d": float(d[0]), "d_imag": float(d[1]), "angle": angle}

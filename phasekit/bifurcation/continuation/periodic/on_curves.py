@@ -171,7 +171,7 @@ def _torus(cycles: Extended, point: Point, variant: int = 0) -> Sized:
     return at_torus(line, angle, v)["d"] * unit, line.size * unit
 
 
-def _at(turn: float) -> Callable[[Extended, Point], float]:
+def _turn_test(turn: float) -> Callable[[Extended, Point], float]:
     """How far the pair of multipliers is from a part of a turn."""
     cosine = round(math.cos(2.0 * math.pi * turn), 15)
     return lambda cycles, point: math.cos(_angle(cycles, point)) - cosine
@@ -182,7 +182,7 @@ def _zero(value: float) -> float:
     return 0.0 if abs(value) < SAME else value
 
 
-def _of(test: Callable[[Point, bool], float]) -> Callable[[Extended, Point], float]:
+def _multiplier_test(test: Callable[[Point, bool], float]) -> Callable[[Extended, Point], float]:
     """A function of the multipliers alone; none where they are not known."""
     return lambda cycles, point: test(point, cycles.forced) if point.trusted else math.nan
 
@@ -193,10 +193,10 @@ _OTHER = "the distance of another multiplier from 1 or -1"
 for _test in (
     OrbitTest("cusp", FOLD, _bend, bent=True, coefficient=_A),
     OrbitTest("resonance_1", FOLD, _meet, bent=True),
-    OrbitTest("fold_flip", FOLD, _of(doubling_test), coefficient=_OTHER),
+    OrbitTest("fold_flip", FOLD, _multiplier_test(doubling_test), coefficient=_OTHER),
     OrbitTest("generalized_flip", DOUBLING, _doubled, bent=True, coefficient=_C),
-    OrbitTest("fold_flip", DOUBLING, _of(determinant), coefficient=_OTHER),
-    OrbitTest("resonance_2", DOUBLING, _of(second_doubling), coefficient=_OTHER),
+    OrbitTest("fold_flip", DOUBLING, _multiplier_test(determinant), coefficient=_OTHER),
+    OrbitTest("resonance_2", DOUBLING, _multiplier_test(second_doubling), coefficient=_OTHER),
     OrbitTest(
         "resonance_1", TORUS, lambda cycles, p: _zero(math.sin(0.5 * _angle(cycles, p))),
         blurred=True, coefficient=_PAIR,
@@ -205,8 +205,8 @@ for _test in (
         "resonance_2", TORUS, lambda cycles, p: _zero(math.cos(0.5 * _angle(cycles, p))),
         blurred=True, coefficient=_PAIR,
     ),
-    OrbitTest("resonance_3", TORUS, _at(1.0 / 3.0), coefficient=_PAIR),
-    OrbitTest("resonance_4", TORUS, _at(0.25), coefficient=_PAIR),
+    OrbitTest("resonance_3", TORUS, _turn_test(1.0 / 3.0), coefficient=_PAIR),
+    OrbitTest("resonance_4", TORUS, _turn_test(0.25), coefficient=_PAIR),
     OrbitTest("chenciner", TORUS, _torus, bent=True, coefficient=_D),
 ):  # fmt: skip
     look_for(_test)

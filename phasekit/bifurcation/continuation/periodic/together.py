@@ -11,7 +11,7 @@ import numpy as np
 from phasekit.bifurcation.continuation.periodic.between import Stretch, root
 from phasekit.bifurcation.continuation.periodic.criteria import complex_pair, nontrivial
 from phasekit.bifurcation.continuation.periodic.family import Found
-from phasekit.bifurcation.continuation.periodic.normal_forms import at_torus, known
+from phasekit.bifurcation.continuation.periodic.normal_forms import at_torus, coefficients
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.special_points import KINDS
 
@@ -46,7 +46,7 @@ def together(stretch: Stretch, found: list[Found]) -> list[Found]:
     made = Found("torus", point, -1, interval, "converged", message, form)
     if len(pairs) > 1:
         return [made]
-    form, message = known(
+    form, message = coefficients(
         stretch.cycles, point, {"d": 2, "d_imag": 2},
         lambda one: lambda line: at_torus(line, form["angle"]),
     )  # fmt: skip

@@ -43,7 +43,7 @@ class Track:
         """It and what follows."""
         return Track((*self.points, *more.points), more.state, more.stop)
 
-    def at(self, state: State) -> Track:
+    def with_state(self, state: State) -> Track:
         """The same with another state to go on from."""
         return replace(self, state=state)
 

@@ -65,7 +65,7 @@ def _inverse(curve: Curve, point: Singular) -> Array:
     m = curve.m
     scale = curve.scale[:m]
     basis = point.right / scale[:, None]
-    scaled = curve.at(point.u)[1] * scale / point.rows[:, None]
+    scaled = curve.evaluate(point.u)[1] * scale / point.rows[:, None]
     scaled = scaled - point.left @ (point.left.T @ scaled)
     across = np.eye(m) - basis @ basis.T  # of the plane of the circle
     return np.asarray(scale[:, None] * np.linalg.pinv(scaled @ across, rcond=1e-9))

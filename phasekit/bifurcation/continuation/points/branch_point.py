@@ -145,7 +145,7 @@ def _degenerate(curve: Curve, bracket: Bracket, best: Sample) -> Special:
         message = f"{len(others) + 1} branches meet; {message}"
     return Special(
         "branch_point", best.u, interval_of(curve, bracket),
-        float(np.max(np.abs(curve.at(best.u)[0]))), GUESS, message,
+        float(np.max(np.abs(curve.evaluate(best.u)[0]))), GUESS, message,
         tangent=best.tangent if own is None else own, others=tuple(others),
         corank=point.corank,
     )  # fmt: skip
@@ -156,7 +156,7 @@ def null_spaces(curve: Curve, u: Array, tolerance: float = 1e-7) -> Singular:
     n, m = curve.n, curve.m
     scale = scale_at(curve, u)
     rows = force_sizes(curve, u, scale)
-    f, slopes = curve.at(u)
+    f, slopes = curve.evaluate(u)
     left, values, right = np.linalg.svd(slopes * scale / rows[:, None])
     k = max(1, int(np.sum(values <= tolerance * max(1.0, values[0]))))
     return Singular(
@@ -168,7 +168,7 @@ def null_spaces(curve: Curve, u: Array, tolerance: float = 1e-7) -> Singular:
 def directions_at(curve: Curve, u: Array) -> list[Array]:
     """Unit tangents of the branches through a point of a branch; at a regular point one tangent."""
     point = null_spaces(curve, u, 1e-9)
-    scaled = curve.at(u)[1] * scale_at(curve, u) / point.rows[:, None]
+    scaled = curve.evaluate(u)[1] * scale_at(curve, u) / point.rows[:, None]
     if np.linalg.svd(scaled, compute_uv=False)[-1] > 1e-9:
         t = point.right[:, -1]
         return [t / curve.length(t)]
@@ -188,16 +188,18 @@ def normal_form(d: forms.Derivatives, tangent: Array, *, pitchfork: bool) -> dic
     along = tangent[: n + 1] / tangent[n]
     length = float(np.max(np.abs(along) / d.curve.scale[: n + 1]))
     bent = d.second(q, q)
-    form = {"d": forms.known(d.second(q, along).dot(p), forms.unit_of(d, rows, p, q, 1) * length)}
+    form = {
+        "d": forms.real_part(d.second(q, along).dot(p), forms.unit_of(d, rows, p, q, 1) * length)
+    }
     if not pitchfork:
-        form["a"] = forms.known(bent.dot(p) * 0.5, forms.unit_of(d, rows, p, q, 2))
+        form["a"] = forms.real_part(bent.dot(p) * 0.5, forms.unit_of(d, rows, p, q, 2))
         return form
     h = forms.solve_off(jacobian, bent.value, q, p)
     loose = forms.solve_off(jacobian, bent.error, q, p)
     fed = d.second(q, h)
     fed = forms.Estimate(fed.value, fed.error + np.abs(d.second(q, loose).value))
     total = d.third(q, q, q) - 3.0 * fed
-    form["c"] = forms.known(total.dot(p) * (1.0 / 6.0), forms.unit_of(d, rows, p, q, 3))
+    form["c"] = forms.real_part(total.dot(p) * (1.0 / 6.0), forms.unit_of(d, rows, p, q, 3))
     return form
 
 

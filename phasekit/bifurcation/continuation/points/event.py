@@ -130,7 +130,7 @@ class _Seek:
     def _doubt(self, turns: Array) -> Array:
         """What a function changes by from the cubic of each step to the curve, half of it."""
         steps = np.arange(self.path.count - 1)
-        u, _ = self.cubics.at(steps, np.full(len(steps), 0.5))
+        u, _ = self.cubics.points(steps, np.full(len(steps), 0.5))
         on, off = (
             self.of.values(self.curve, self.cubics.turned(one, turns))
             for one in (u, u - self.cubics.off)
@@ -184,7 +184,7 @@ class _Seek:
         """Values at both ends of each part, and their rates by the length along the step."""
         values, rates = [], []
         for s in (parts.low, parts.high):
-            u, along = self.cubics.at(parts.step, s)
+            u, along = self.cubics.points(parts.step, s)
             u = self.cubics.turned(u, turns[parts.step])
             values.append(self.of.values(self.curve, u))
             rates.append(self.of.rates(self.curve, u, along))
@@ -192,7 +192,7 @@ class _Seek:
 
     def _middles(self, parts: Parts, turns: Array) -> Array:
         """Values in the middle of each part."""
-        u, _ = self.cubics.at(parts.step, 0.5 * (parts.low + parts.high))
+        u, _ = self.cubics.points(parts.step, 0.5 * (parts.low + parts.high))
         return self.of.values(self.curve, self.cubics.turned(u, turns[parts.step]))
 
     def _refined(self, i: int, part: tuple[float, float], turns: Array) -> list[Placed]:
@@ -324,7 +324,7 @@ class _Seek:
         gap = s.u - self.path.u[i]
         along = float(np.dot(curve.weight * chord, gap)) / square if square > 0.0 else 0.0
         ends = sorted((float(self.path.u[i, n]), float(self.path.u[i + 1, n])))
-        residual = float(np.max(np.abs(curve.at(s.u)[0])))
+        residual = float(np.max(np.abs(curve.evaluate(s.u)[0])))
         least = max(1e4 * self._noise(s, turns), SHARP * size)
         sharp = self.event.condition or abs(value) <= least
         special = Special(

@@ -69,9 +69,9 @@ def _turns(curve: Curve, u: Array, v: Array) -> bool:
     """Whether the eigenvalue vanishes at the point itself, by how fast it changes along v."""
     n = curve.n
     rows, scale = force_sizes(curve, u), curve.scale[:n]
-    left, _, _ = np.linalg.svd(curve.at(u)[1][:, :n] * scale / rows[:, None])
+    left, _, _ = np.linalg.svd(curve.evaluate(u)[1][:, :n] * scale / rows[:, None])
     w = left[:, -1] / rows
-    rest = abs(w @ curve.at(u)[1][:, :n] @ v)
+    rest = abs(w @ curve.evaluate(u)[1][:, :n] @ v)
     rate = abs(w @ curve.bend(u, v)[:, :n] @ v)
     return bool(rest <= 1e-8 * rate + 1e2 * curve.field.accuracy)
 
@@ -83,7 +83,7 @@ def normal_form(d: forms.Derivatives) -> dict[str, float]:
     q, p = forms.null_vectors(d.slopes[:, :n], d.curve.scale[:n], rows)
     unit = forms.unit_of(d, rows, p, q, 2)
     return {
-        "a": forms.known(d.second(q, q).dot(p) * 0.5, unit),
+        "a": forms.real_part(d.second(q, q).dot(p) * 0.5, unit),
         "b": float(p @ d.slopes[:, n]),
     }
 

@@ -60,7 +60,7 @@ def pair(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]:
         if any(curve.length(one.u - point.u) < ON and one.corank >= 2 for one in known):
             return []
         return [described(curve, bracket, best, point)]
-    slopes = curve.at(u)[1]
+    slopes = curve.evaluate(u)[1]
     values = _values(curve, slopes)
     i, j = _nearest_pair(values, saddles=saddles)
     kappa = float((values[i] * values[j]).real)
@@ -130,7 +130,8 @@ def pairs(curve: Curve, bracket: Bracket, count: int) -> Special:
         message += ": switch(direction=...) follows one of their families, if these are isolated"
     omega = float(np.mean(omegas) if alike else np.min(omegas, initial=np.inf))
     return Special(
-        "hopf", best.u, interval_of(curve, bracket), float(np.max(np.abs(curve.at(best.u)[0]))),
+        "hopf", best.u, interval_of(curve, bracket),
+        float(np.max(np.abs(curve.evaluate(best.u)[0]))),
         CONVERGED if sharp else GUESS, message,
         {"l1": np.nan, "omega": omega, "d": np.nan}, tangent=best.tangent,
     )  # fmt: skip
@@ -172,7 +173,7 @@ def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
     step = 1e2 * curve.field.accuracy * curve.length(tangent)
     changes = []
     for side in (step, -step):
-        values = _values(curve, curve.at(u + side * tangent[: curve.m])[1])
+        values = _values(curve, curve.evaluate(u + side * tangent[: curve.m])[1])
         # Of several pairs that cancel at once, the one that is meant.
         products = (values[:, None] * values)[np.triu_indices(len(values), 1)]
         changes.append(float(np.min(np.abs(products - kappa))))
@@ -222,9 +223,11 @@ def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
     motion = forms.motion(d)
     length = float(np.max(np.abs(motion) / d.curve.scale[: n + 1]))
     return {
-        "l1": forms.signed(terms, p, forms.known(total, forms.unit_of(d, rows, p, q, 3) / omega)),
+        "l1": forms.signed(
+            terms, p, forms.real_part(total, forms.unit_of(d, rows, p, q, 3) / omega)
+        ),
         "omega": float(omega),
-        "d": forms.known(d.second(q, motion).dot(p), forms.unit_of(d, rows, p, q, 1) * length),
+        "d": forms.real_part(d.second(q, motion).dot(p), forms.unit_of(d, rows, p, q, 1) * length),
     }
 
 

@@ -41,7 +41,7 @@ def period_doubling(curve: Curve, bracket: Bracket) -> Special:
     def system(z: Array) -> tuple[Array, Array]:
         """The equations f = 0, (A + 1) v = 0, |v| = 1, and their derivatives."""
         u, v = z[:m], z[m:]
-        f, slopes = curve.at(u)
+        f, slopes = curve.evaluate(u)
         B, A = curve.bend(u, v), curve.linear(slopes) + np.eye(n)
         row = np.concatenate([np.zeros(m), 2.0 * v / scale**2])
         matrix = np.block([[slopes, np.zeros((n, n))], [B, A]])
@@ -59,7 +59,9 @@ def period_doubling(curve: Curve, bracket: Bracket) -> Special:
         u = best.u
     form = {"c": np.nan} if message else normal_form(forms.Derivatives(curve, u))
     if not message:
-        values = eigenvalues_of(curve.linear(curve.at(u)[1])[None], accuracy=curve.field.accuracy)
+        values = eigenvalues_of(
+            curve.linear(curve.evaluate(u)[1])[None], accuracy=curve.field.accuracy
+        )
         double = np.isnan(form["c"]) and np.sum(np.abs(values + 1.0) < DOUBLE) > 1
         note = "c not known: two multipliers are -1" if double else forms.unknown(form)
     return Special(
@@ -82,7 +84,7 @@ def normal_form(d: forms.Derivatives) -> dict[str, float]:
     inverse = np.linalg.inv(-d.slopes[:, :n])
     fed = forms.fed(d, q, inverse @ bent.value, inverse, bent.error)
     terms = [(1.0 / 6.0) * d.third(q, q, q), 0.5 * fed]
-    c = forms.known((terms[0] + terms[1]).dot(p), forms.unit_of(d, rows, p, q, 3))
+    c = forms.real_part((terms[0] + terms[1]).dot(p), forms.unit_of(d, rows, p, q, 3))
     c = forms.signed(terms, p, c)
     # Where two multipliers are -1, `null_vectors` makes another product 1.
     return {"c": c if abs(float(p @ q) - 1.0) < 1e-9 else np.nan}

@@ -65,7 +65,7 @@ def candidates(curve: Curve, u: Array, reach: float) -> int:
     n = curve.n
     scale = scale_at(curve, u)
     rows = force_sizes(curve, u, scale)
-    scaled = curve.at(u)[1] * scale / rows[:, None]
+    scaled = curve.evaluate(u)[1] * scale / rows[:, None]
     if not np.isfinite(scaled).all():
         return 0
     left, values, right = np.linalg.svd(scaled)
@@ -88,7 +88,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     scale = scale_at(curve, u)
     rows = force_sizes(curve, u, scale)
     accuracy = accuracy_of(curve)
-    scaled = curve.at(u)[1] * scale / rows[:, None]
+    scaled = curve.evaluate(u)[1] * scale / rows[:, None]
     if not np.isfinite(scaled).all():
         return None
     left, _, right = np.linalg.svd(scaled)
@@ -96,7 +96,7 @@ def refine(curve: Curve, start: Array, k: int, reach: float) -> Singular | None:
     b = np.zeros(k)
     least, last, idle, fast = np.inf, np.inf, 0, True
     for _ in range(STEPS):
-        f, slopes = curve.at(u)
+        f, slopes = curve.evaluate(u)
         bordered = np.zeros((n + k + 1, m + k))
         bordered[:n, :m], bordered[:n, m:], bordered[n:, :m] = slopes * scale / rows[:, None], W, V
         if not np.isfinite(bordered).all() or not np.isfinite(f).all():

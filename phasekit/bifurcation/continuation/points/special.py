@@ -126,7 +126,7 @@ def solved(
 
 def tangent_at(curve: Curve, u: Array, near: Array) -> Array:
     """The unit tangent of the branch at a point, in the direction of another one."""
-    _, slopes = curve.at(u)
+    _, slopes = curve.evaluate(u)
     directions = nullspace(slopes, curve.scale[: curve.m])
     if len(directions) != 1:
         return near

@@ -55,7 +55,7 @@ def torus(curve: Curve, bracket: Bracket, known: list[Special]) -> list[Special]
     def system(z: Array) -> tuple[Array, Array]:
         """The equations f = 0, (A^2 - 2 k A + 1) v = 0, |v| = 1, l.v = 0, and derivatives."""
         u, v, k = z[:m], z[m : m + n], z[-1]
-        f, slopes = curve.at(u)
+        f, slopes = curve.evaluate(u)
         A = curve.linear(slopes)
         along = curve.bend(u, v)
         bent = A @ along + curve.bend(u, A @ v) - 2.0 * k * along
@@ -124,7 +124,7 @@ def normal_form(d: forms.Derivatives, angle: float) -> dict[str, float]:
     third = forms.fed(d, bar, twice @ double.value, twice, double.error)
     terms = [one * (0.5 * np.conj(turn)) for one in (d.third(q, q, bar), 2.0 * second, third)]
     unit = forms.unit_of(d, force_sizes(d.curve, d.u), p, q, 3)
-    total = forms.known((terms[0] + terms[1] + terms[2]).dot(p), unit)
+    total = forms.real_part((terms[0] + terms[1] + terms[2]).dot(p), unit)
     return {"d": forms.signed(terms, p, total), "angle": float(angle)}
 
 

@@ -144,7 +144,7 @@ def classify(j: int, i: int, w: Array) -> None:
 
 
 @inline
-def place(j: int, i: int, w: Array) -> None:
+def put_back(j: int, i: int, w: Array) -> None:
     """Angle and energy of point j, back in the frame that was given; NaN where absent."""
     p = j * BLOCK + i
     x = w[X + p]

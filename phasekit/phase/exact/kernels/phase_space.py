@@ -77,7 +77,7 @@ def solve(n: int, m: int, w: Array) -> None:
         for i in range(n):
             eq.classify(j, i, w)
         for i in range(stop):
-            eq.place(j, i, w)
+            eq.put_back(j, i, w)
         for i in range(stop):
             eq.measure(j, i, w)
         for i in range(stop, n):
