@@ -5,7 +5,7 @@ a class with `phasekit.Term` and a force is a term. The contributing guide has a
 
 ========================  ==========================================================================
 a quantity                `Quantity`, `Pass`, `add_quantity`; its rung: `Trigonometric`,
-                          `Conservative`, `Routhian`
+                          `Conservative`, `Routhian`, `Flow`, `Map`
 where it is computed      `Standing`, a rung with the `Trait`s that terms bring in
 a torque of the frame     `Rate`
 a kind of special point   `PointKind`, `add_point_kind`; where its function is zero, by
@@ -36,7 +36,7 @@ from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.special_points import PointKind
 from phasekit.bifurcation.special_points import look_for as add_point_test
 from phasekit.bifurcation.special_points import register as add_point_kind
-from phasekit.laws.ladder import Conservative, Routhian, Standing, Trait
+from phasekit.laws.ladder import Conservative, Flow, Map, Routhian, Standing, Trait
 from phasekit.laws.terms import Rate
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.plot.parts.labels import label, shown
@@ -53,6 +53,8 @@ __all__ = [
     "TORUS",
     "Conservative",
     "CurveTest",
+    "Flow",
+    "Map",
     "OrbitTest",
     "Pass",
     "PointKind",

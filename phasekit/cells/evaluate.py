@@ -27,7 +27,7 @@ from phasekit.labels.arguments import FloatArray
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import cut, refuse_too_large, tiles, variable
 from phasekit.systems.system import System
-from phasekit.table.quantities import ROWS, TABLE
+from phasekit.table.quantities import TABLE
 from phasekit.table.row import Pass, Quantity
 
 
@@ -64,7 +64,10 @@ class Cells:
             elif name in self.inputs:
                 self.computed[name] = self.model.in_domain(name, self.inputs[name])
             else:
-                self.run(TABLE.pass_of(ROWS[name].group, self.passes))
+                line = TABLE.line_for(name, self.passes)
+                if line is None:
+                    raise KeyError(name)
+                self.run(line)
         return self.computed[name]
 
     def run(self, one: Pass) -> None:

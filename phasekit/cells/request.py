@@ -153,8 +153,8 @@ def needs_of(system: System, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ..
             name = left.pop()
             if name in derived:
                 found.update(dict.fromkeys(own))
-            elif name in ROWS and name not in own_names:
-                left.extend(reversed(TABLE.pass_of(ROWS[name].group, passes).inputs))
+            elif name not in own_names and (line := TABLE.line_for(name, passes)) is not None:
+                left.extend(reversed(line.inputs))
             else:
                 found[name] = None
         needs[one] = tuple(found)
@@ -219,8 +219,8 @@ def passes_of(
     states = {*given, *system.parameters}
     return tuple(
         one.bound(system, states)
-        if table is not TABLE or ROWS.keys().isdisjoint(one.inputs)
-        else _whole(one, system, states)
+        if table.rows.keys().isdisjoint({*one.inputs} - states)
+        else _whole(one, system, states, table)
         for one in passes
     )
 
@@ -236,11 +236,11 @@ def equations_for(system: System, group: str = "") -> Equations | None:
     return law
 
 
-def _whole(one: Pass, system: System, states: set[str]) -> Pass:
+def _whole(one: Pass, system: System, states: set[str], table: Table) -> Pass:
     """Return a line for one system with those that it starts from."""
-    lines, missing = TABLE.behind(one, system.standing)
+    lines, missing = table.behind(one, system.standing)
     if missing is not None:
-        refuse(system, TABLE.standings_of(missing), missing)
+        refuse(system, table.standings_of(missing), missing)
     behind = tuple(other.bound(system, states) for other in lines)
     bound = one.bound(system, states)
     return replace(bound, behind=behind) if behind else bound

@@ -301,10 +301,14 @@ class Table:
             left += [name for name in able[0].inputs if name in self.rows]
         return found, None
 
-    def pass_of(self, group: str, chosen: Sequence[Pass]) -> Pass:
-        """Return the line for a group: one of those chosen, else one behind them."""
+    def line_for(self, name: str, chosen: Sequence[Pass]) -> Pass | None:
+        """Return the line for a quantity: one of those chosen, else one behind them; or None."""
         behind = (other for one in chosen for other in one.behind)
-        return next(one for one in (*chosen, *behind) if group in one.groups)
+        group = self.rows[name].group if name in self.rows else ""
+        for one in (*chosen, *behind):
+            if group in one.groups or any(row.name == name for row in one.rows):
+                return one
+        return None
 
     def call(self, one: Pass, *arrays: Any) -> dict[str, Any]:
         """Call the function of a pass; return the arrays by the names of the quantities."""

@@ -8,6 +8,8 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.extend import Map, Pass, Quantity, add_quantity
+from phasekit.table.quantities import TABLE
 
 NEURON = pk.Problem(
     {"v": "v - v**3/3 - w + I", "w": "eps*(v + a - b*w)"},
@@ -322,3 +324,23 @@ def test_the_rows_of_a_system_are_listed():
     assert {"kramers", "attractors"} & set(pk.quantities(FRICTION).groups)
     with pytest.raises(pk.ParameterError, match="system: got 3"):
         pk.quantities(3)
+
+
+def test_a_row_of_ones_own_starts_from_parameters_and_from_other_rows(monkeypatch):
+    monkeypatch.setattr(TABLE, "rows", dict(TABLE.rows))
+    monkeypatch.setattr(TABLE, "passes", TABLE.passes)
+
+    def spread(exponents, b):
+        return exponents.max(axis=-1) - exponents.min(axis=-1) + 0.0 * b
+
+    words = {"dtype": "float64", "units": "1", "long_name": "spread", "equation": "l1 - l2"}
+    row = Quantity("spread", "spread", (), source="[Ott2002]", of=Map, **words)
+    add_quantity(row, Pass(spread, ("lyapunov_exponent", "b"), ("spread",), of=Map))
+    assert "spread" in pk.quantities(HENON)
+    assert "spread" not in pk.quantities(NEURON)
+    how = {"a": [1.0, 1.2], "x": 0.1, "y": 0.1, "n": 100}
+    alone = pk.sweep(HENON, **how, of="spread")
+    beside = pk.sweep(HENON, **how, of=["spread", "lyapunov"])
+    exponents = beside.lyapunov_exponent
+    np.testing.assert_array_equal(alone.spread, exponents[:, 0] - exponents[:, 1])
+    np.testing.assert_array_equal(alone.spread, beside.spread)
