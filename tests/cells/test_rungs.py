@@ -325,7 +325,6 @@ def test_what_a_row_starts_from_is_that_of_the_same_rung(monkeypatch):
     )
     monkeypatch.setattr(TABLE, "passes", (*TABLE.passes, *lines))
     monkeypatch.setattr(request, "ROWS", TABLE.rows)
-    monkeypatch.setattr(evaluate, "ROWS", TABLE.rows)
     tilted = pk.Perturbed(pk.Coefficients(4.0, 1.0, 0.5), torque=0.2)
     as_formula = pk.Potential(
         "-cos(q) + a*cos(q)^2/2 - sin(q)/2", "q", {"a": 4.0}, period=2 * np.pi
