@@ -178,8 +178,8 @@ def test_errors_of_small_and_large_multipliers_are_told(monkeypatch, rate):
     assert int(right.n_unstable) == (rate > 0.0)
     own = Cycles.multipliers
 
-    def wrong(self, W, orbit):
-        values, log, trivial = own(self, W, orbit)
+    def wrong(self, W, orbit, *more):
+        values, log, trivial = own(self, W, orbit, *more)
         return values, log + 1e-4, trivial
 
     monkeypatch.setattr(Cycles, "multipliers", wrong)

@@ -14,7 +14,7 @@ from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, collocation, kernels, newton
 from phasekit.bifurcation.continuation.periodic.jets import Jets
-from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import across, hidden, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -23,6 +23,12 @@ LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale 
 MARGIN = 6.0  # that scale beside the orbit, where it is much larger
 REST = 1e-12  # amplitude, beside the size of a state, that is rounding
 MOST = 20_000  # intervals of a mesh that resolves them
+
+
+def _size(one: complex) -> float:
+    """Size of a multiplier by which it is sorted; what is not known comes last."""
+    size = abs(one)
+    return -1.0 if math.isnan(size) else size
 
 
 @dataclass(frozen=True, eq=False)
@@ -325,8 +331,12 @@ class Cycles:
         length = float(np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy))) or 1.0
         return Solution(orbit, dx / length, dy / length, 1, residual, 0.0, divergence, W)
 
-    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
+    def multipliers(
+        self, W: Array, orbit: Orbit, divergence: float = math.nan
+    ) -> tuple[Complex, float, float]:
         """Floquet multipliers, the logarithm of the size of their product, the trivial one's error.
+
+        Those that errors hide are NaN, where the ``divergence`` tells what errors are.
 
         Of an autonomous system one belongs to f along the orbit. The others are those across it,
         which stay accurate where the orbit comes near an equilibrium; it is itself a check.
@@ -339,11 +349,14 @@ class Cycles:
             trivial, off = across(G, f, self.scale, A)
             if not math.isnan(trivial):
                 others, log = multipliers(A)
-                whole = sorted([*others.tolist(), complex(trivial)], key=abs, reverse=True)
+                others[hidden(A, others, abs(log - divergence))] = math.nan
+                whole = sorted([complex(trivial), *others.tolist()], key=_size, reverse=True)
                 log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
                 return np.array(whole), log, abs(trivial - 1.0) + off
         values, log = multipliers(G)
-        return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+        trivial = 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+        values[hidden(G, values, abs(log - divergence))] = math.nan
+        return values, log, trivial
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """A mesh that resolves the variational equations, too; None if it is too fine.

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -66,13 +67,13 @@ JUMP = 1e-3  # part of the values at both ends above which a number has no zero 
 def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
     """All special points of a path, refined, in order.
 
-    And, in words, what is zero all along it, whose zeros are no points.
+    And, in words, where none are looked for, and what is zero all along, whose zeros are no points.
     """
     found: list[Found] = []
     critical = bool(tests_of(cycles))
     signs = [_signs(cycles, point) if critical else None for point in path.points]
     values = [_values(cycles, point) for point in path.points]
-    said = []
+    said = list(_hidden(cycles, path))
     for k, test in enumerate(_looked_for(cycles)):
         column = np.array([row[k] for row in values])
         if isinstance(test, OrbitTest) and test.vanishes(cycles, path.points, column):
@@ -98,6 +99,21 @@ def find(cycles: Cycles, path: Path) -> tuple[list[Found], tuple[str, ...]]:
                 here += _events(cycles, stops[k], stops[k + 1], at[k], at[k + 1])
         found += [replace(one, index=i) for one in here]
     return found, tuple(said)
+
+
+def _hidden(cycles: Cycles, path: Path) -> Iterator[str]:
+    """Where errors hide multipliers, in words."""
+    name = cycles.field.parameters[cycles.active[0]]
+    for hidden, part in groupby(path.points, lambda one: bool(np.isnan(one.multipliers).any())):
+        if not hidden:
+            continue
+        ends = [one.orbit.y for one in part]
+        a, b = (f"{name} = {y[1]:.9g} with period {y[0]:.6g}" for y in (ends[0], ends[-1]))
+        yield (
+            f"multipliers are not known from {a} to {b}: directions grow and decay along these "
+            f"orbits by so much more than over a period that errors hide them; special points that "
+            f"they tell are not looked for there"
+        )
 
 
 def _values(cycles: Cycles, point: Point) -> list[float]:

@@ -13,6 +13,7 @@ omega. Derivatives of f_x v by x are differences of f_x along v.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
@@ -25,7 +26,7 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Sol
 from phasekit.bifurcation.continuation.periodic.divergence import across, function, single
 from phasekit.bifurcation.continuation.periodic.jets import Jets
 from phasekit.bifurcation.continuation.periodic.linear import Linear
-from phasekit.bifurcation.continuation.periodic.multipliers import multipliers
+from phasekit.bifurcation.continuation.periodic.multipliers import hidden, multipliers
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -196,15 +197,20 @@ class Extended(Cycles):
             target[2] = 0.0
         return rows, rows_y, target
 
-    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
+    def multipliers(
+        self, W: Array, orbit: Orbit, divergence: float = math.nan
+    ) -> tuple[Complex, float, float]:
         """Floquet multipliers of the orbit itself."""
         if self.folds is not None:
             n = self.own
             alone = Orbit(orbit.mesh, np.ascontiguousarray(orbit.x[:, :n]), orbit.y[:3].copy())
-            return self.folds.multipliers(W, alone)
+            return self.folds.multipliers(W, alone, divergence)
         n, last = self.own, (self.m - 1) * self.n
-        values, log = multipliers(W[:, last : last + n, :n])
-        return values, log, 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+        G = W[:, last : last + n, :n]
+        values, log = multipliers(G)
+        trivial = 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+        values[hidden(G, values, abs(log - divergence))] = math.nan
+        return values, log, trivial
 
     def resolving(self, orbit: Orbit, reach: float) -> Array | None:
         """As of `Cycles`; an orbit that is solved for with its function has no other mesh."""

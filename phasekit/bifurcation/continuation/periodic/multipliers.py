@@ -17,6 +17,9 @@ ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative e
 PASSES = 12
 LARGEST = 709.0  # logarithm of the largest numbers
 ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
+LOST = 0.1  # relative change of a multiplier by errors of its matrices, from which it is not known
+INSIDE = 1e-2  # size of multipliers that stay inside the unit circle, whatever their digits
+LEAST = 1e-14  # relative error of a matrix
 
 
 @kernel
@@ -155,6 +158,25 @@ def multipliers(G: Array) -> tuple[Complex, float]:
         values += [complex(one) * size for one in found]
         first = last
     return np.array(sorted(values, key=abs, reverse=True)), logs
+
+
+def hidden(G: Array, values: Complex, error: float) -> npt.NDArray[np.bool_]:
+    """Which multipliers an error of the logarithm of their product hides.
+
+    Where directions grow and decay by much more along an orbit than over its period, left and right
+    vectors of a multiplier are all but orthogonal somewhere: small errors of the matrices make any
+    other one of it, though not of the product. So such errors are put into them. What stays far
+    inside the unit circle is not hidden.
+    """
+    if len(values) < 2 or not math.isfinite(error):
+        return np.zeros(len(values), bool)
+    sides = np.random.default_rng(11).choice([-1.0, 1.0], G.shape)
+    part = max(error / len(G), LEAST)
+    others = multipliers(G + part * np.abs(G).max(axis=(1, 2), keepdims=True) * sides)[0]
+    with np.errstate(all="ignore"):
+        moved = np.abs(others[:, None] / values - 1.0).min(axis=0)
+        outside = np.maximum(np.abs(values), np.abs(others)) >= INSIDE
+    return np.asarray(~(moved <= LOST) & outside)
 
 
 @kernel

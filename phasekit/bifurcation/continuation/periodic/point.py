@@ -127,8 +127,8 @@ class State:
 
 def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
     """A point of what Newton's method found."""
-    values, log, trivial = cycles.multipliers(s.W, s.orbit)
     divergence = cycles.divergence(s.divergence)
+    values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
     error = cycles.mesh_error(s.orbit)
     # An orbit may be smooth where its variational equations are stiff.
     least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
@@ -142,8 +142,8 @@ def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Poin
         fine = cycles.on_finer(orbit, dx, s.dy)
         if not fine.converged:
             fine = cycles.looked_at(orbit, dx, s.dy)
-        values, log, trivial = cycles.multipliers(fine.W, fine.orbit)
         divergence = cycles.divergence(fine.divergence)
+        values, log, trivial = cycles.multipliers(fine.W, fine.orbit, divergence)
         part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
         # The error of a decay goes with the power 2 m of the length of intervals.
         reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
