@@ -126,5 +126,5 @@ def test_multipliers_that_errors_hide_are_not_told(eps):
     assert (family.points.n_unstable.values[hidden] == -1).all()
     # The least is exp(-T), where the others are beyond 1.
     seen = np.abs(multipliers[:, 1]) >= 1.0
-    assert np.sum(seen) > 20
+    assert np.sum(seen) >= 10
     assert np.abs(multipliers[seen, 2]) == pytest.approx(np.exp(-period[seen]), rel=0.1)
