@@ -107,7 +107,9 @@ class Bounded(Cycles):
             k = here.stop
         return rows, rows_y, target
 
-    def multipliers(self, W: Array, orbit: Orbit) -> tuple[Complex, float, float]:
+    def multipliers(
+        self, W: Array, orbit: Orbit, divergence: float = 0.0
+    ) -> tuple[Complex, float, float]:
         """There are none."""
         return np.empty(0, complex), 0.0, 0.0
 
