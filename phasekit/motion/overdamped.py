@@ -297,9 +297,12 @@ class OverdampedSearch(PlaneSearch):
         waves = np.fft.fftfreq(number, 1.0 / number) * 1j * unit
         basis = np.fft.fft(np.eye(number), axis=0)
         one, two = (np.fft.ifft(waves[:, None] ** k * basis, axis=0).real for k in (1, 2))
+        # What moves may be far smaller than where it is, and is kept by itself.
+        middle = float(x.mean())
+        x = x - middle
         for _ in range(TRIES):
             v = one @ x + drift
-            force, slope, damping = partials(self.law, self.values, t, x + drift * t, v)
+            force, slope, damping = partials(self.law, self.values, t, middle + x + drift * t, v)
             missing = two @ x - force
             matrix = two - np.diag(slope) - damping[:, None] * one
             try:
@@ -308,8 +311,9 @@ class OverdampedSearch(PlaneSearch):
                 return None
             if not np.isfinite(step).all():
                 return None
-            x = x + step
-            if np.abs(step).max() < ENOUGH * (self.size + np.abs(x).max()):
+            middle += float(step.mean())
+            x = x + (step - step.mean())
+            if np.abs(step).max() < ENOUGH * (self.size + abs(middle) + np.abs(x).max()):
                 break
         else:
             # So it does at a degenerate rest, which the sign of the force shows to attract.
@@ -324,9 +328,9 @@ class OverdampedSearch(PlaneSearch):
         matrix = one - np.diag(damping)
         for _ in range(20):
             w = np.asarray(np.linalg.solve(matrix, slope - w**2), float)
-        there = float(np.real(np.fft.fft(x) @ np.exp(waves * self.step)) / number)
+        there = middle + float(np.real(np.fft.fft(x) @ np.exp(waves * self.step)) / number)
         v = one @ x + drift
-        return Orbit(x + drift * t, v, there + drift * self.step, float(w.mean()))
+        return Orbit(middle + x + drift * t, v, there + drift * self.step, float(w.mean()))
 
     def _take_rotation(self, x: Array, ends: Array) -> None:
         """Keep the rotation of which no orbit closes soon."""

@@ -55,7 +55,7 @@ def test_orbits_of_strongly_damped_systems_close_as_another_integrator_says(damp
 
 
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
-@pytest.mark.parametrize("damping", [1e3, 1e4, 1e5])
+@pytest.mark.parametrize("damping", [1e3, 1e5, 1e6, 1e9])
 def test_strong_damping_decides_where_a_drive_shakes_but_does_not_carry(damping, unit):
     well = pk.Potential("k*(x^4/4 - x^2/2)", "x", {"k": unit**2})
     system = pk.Perturbed(well, damping=damping * unit, forcing=pk.Harmonic(0.2 * unit**2, unit))
@@ -80,10 +80,10 @@ def test_an_overdamped_driven_rotation_by_its_closed_form(damping):
     assert ds.attractor_rotation.item() == pytest.approx(want, rel=3e-3)
 
 
-@pytest.mark.parametrize("power", [4, 6])
-def test_a_degenerate_rest_attracts_under_a_drive(power):
+@pytest.mark.parametrize(("power", "damping"), [(4, 1e3), (6, 1e3), (4, 1e6)])
+def test_a_degenerate_rest_attracts_under_a_drive(power, damping):
     well = pk.Potential(f"x^{power}/{power}", "x")
-    system = pk.Perturbed(well, damping=1e3, forcing=pk.Harmonic(0.3, 1.0))
+    system = pk.Perturbed(well, damping=damping, forcing=pk.Harmonic(0.3, 1.0))
     ds = pk.basins(system, phi=np.linspace(-1.0, 1.0, 4), dphi=[-1.0, 1.0])
     assert ds.attractor_kind.values.tolist() == [KIND.CYCLE]
     assert ds.basin_fraction.values.tolist() == [1.0]
