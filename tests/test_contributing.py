@@ -150,6 +150,10 @@ def test_a_system_is_one_class():
     places = pk.equilibria(hoop).phi.values
     np.testing.assert_allclose(places, [-aside, 0.0, aside, np.pi], atol=1e-13)
     assert names["ds"].isel(spin=2).phasekit.system() == hoop.replace(spin=3.0)
+    # Small oscillations of the slider: sqrt(g/(1 - share)), and slower when they are great.
+    slow = pk.orbits(names["slider"], 1e-6, 0.0).period.item()
+    assert slow == pytest.approx(2.0 * np.pi / np.sqrt(9.0 / 0.4), rel=1e-10)
+    assert names["orbit"].period.item() > slow
     # At its Hopf points the trace vanishes: 1 - v^2 = 0.8 eps.
     edge = np.sqrt(1.0 - 0.8 * nerve.eps)
     assert names["ignites"]["v"] == pytest.approx(-edge, rel=1e-10)

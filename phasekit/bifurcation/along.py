@@ -33,6 +33,7 @@ from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.at_momentum import Machines
 from phasekit.mechanics.two_degrees import support_inertia
 from phasekit.phase.exact.potential import curvature, gradient
+from phasekit.phase.numerical.inertial import Inertial
 
 Array = npt.NDArray[np.float64]
 Values = Mapping[str, float]
@@ -185,6 +186,7 @@ def _(law: Machines, values: Values, parameter: str, span: Span) -> Along:
 
 
 @branches_along.register(Conservative)
+@branches_along.register(Inertial)
 @branches_along.register(PerturbedLaw)
 def _(law: Any, values: Values, parameter: str, span: Span) -> Along:
     atlas = Atlas.from_line(steady_line(law, values, {parameter: span}))

@@ -123,7 +123,7 @@ def poincare_section(
     if direction > 1:
         raise bad("direction", direction, senses)
     tolerances = checked_tolerances(rtol, atol)
-    if issubclass(found.rung, Routhian):
+    if issubclass(found.rung, Routhian) and hasattr(found, "poincare"):
         if duration is None or n is not None:
             raise bad("n", n, "None, and a duration, for a FreeGyroRotor")
         arguments = {**states, "direction": direction, **tolerances}

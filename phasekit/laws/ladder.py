@@ -68,8 +68,10 @@ class Routhian(Flow):
     #: Name of the coordinate, and its period.
     coordinate: str
     period: float
-    #: The momentum that is constant: its name, value and unit.
-    momentum: tuple[str, float, str]
+    #: The momentum that is constant: its name, value and unit; None of a law that knows of none.
+    momentum: tuple[str, float, str] | None
+    #: The inertia over which terms are: that of the coordinate with all others held.
+    own_inertia: Any
 
     def potential(self, x: Any) -> tuple[Any, Any, Any]:
         """V and its first two derivatives."""
@@ -85,6 +87,34 @@ class Routhian(Flow):
 
     def acceleration_formula(self, symbols: Mapping[str, Any], rate: Any, push: Any) -> Any:
         """The acceleration as a sympy expression; push is a torque over the inertia of x alone."""
+        raise NotImplementedError
+
+
+class Routhians(Routhian):
+    """Such systems by their parameters, which may be arrays."""
+
+    #: All parameters, in order, and what is computed of them, on which alone the motion depends.
+    names: tuple[str, ...]
+    constants: tuple[str, ...]
+
+    def values(self, *arrays: Any) -> dict[str, Any]:
+        """Values of the parameters by name, NaN where they leave their domain."""
+        raise NotImplementedError
+
+    def constants_of(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """The constants of the parameters, by name."""
+        raise NotImplementedError
+
+    def alone(self, constants: tuple[float, ...]) -> Routhian:
+        """The system of some constants."""
+        raise NotImplementedError
+
+    def with_values(self, values: Mapping[str, Any]) -> Routhian:
+        """The systems of some values."""
+        raise NotImplementedError
+
+    def resting(self, values: Mapping[str, Any], torque: Any = None) -> Any:
+        """Columns of all equilibria, under a torque over the inertia of the coordinate alone."""
         raise NotImplementedError
 
 

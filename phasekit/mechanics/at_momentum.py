@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.laws.ladder import Routhian
+from phasekit.laws.ladder import Routhian, Routhians
+from phasekit.mechanics.steady import Steady, steady_at
 from phasekit.mechanics.two_degrees import (
     RelativeEquilibria,
     TwoDegrees,
@@ -46,6 +47,11 @@ class AtMomentum(Routhian):
         """The momentum p."""
         return "p", self.p, "kg m2 s-1"
 
+    @property
+    def own_inertia(self) -> Any:
+        """M22, kg m^2."""
+        return self.machine.Jn
+
     def potential(self, x: Any) -> tuple[Any, Any, Any]:
         """Amended potential and its first two derivatives, J."""
         return amended_potential(self.machine, self.p, x)
@@ -64,7 +70,7 @@ class AtMomentum(Routhian):
 
 
 @dataclass(frozen=True)
-class Machines(Routhian):
+class Machines(Routhians):
     """The same of machines by their parameters, which may be arrays.
 
     Attributes
@@ -91,10 +97,17 @@ class Machines(Routhian):
             found[name] = value if inside.all() else np.where(inside, value, np.nan)
         return found
 
-    @property
-    def constants(self) -> tuple[str, ...]:
-        """Names of what is computed of the parameters, on which alone the motion depends."""
-        return CONSTANTS
+    constants = CONSTANTS
+
+    def alone(self, constants: tuple[float, ...]) -> AtMomentum:
+        """The machine of some constants."""
+        return AtMomentum(TwoDegrees(*constants[:-1]), constants[-1])
+
+    def resting(self, values: Mapping[str, Any], torque: Any = None) -> Steady:
+        """All steady rotations, under a torque on the shaft over M22."""
+        one = self.with_values(values)
+        push = 0.0 if torque is None else torque * one.machine.Jn
+        return steady_at(one.machine, one.p, push)
 
     def constants_of(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """The constants of the parameters."""

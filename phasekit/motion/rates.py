@@ -16,11 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.laws.ladder import Conservative, Routhian
+from phasekit.laws.ladder import Conservative, Routhian, Routhians
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.laws.terms import Drag, Instant
 from phasekit.laws.trigonometric import Trigonometric
-from phasekit.mechanics.at_momentum import Machines
 
 Array = npt.NDArray[np.float64]
 
@@ -88,7 +87,7 @@ def rates_of(
     if _EULER[0] in code.names:
         euler = law.euler({name: np.asarray(value, float) for name, value in values.items()})
         known.update(zip(_EULER, euler, strict=True))
-    elif isinstance(law.base, Machines):
+    elif isinstance(law.base, Routhians):
         known.update({f"({n})": x for n, x in law.base.constants_of(values).items()})
     known["(sign)"] = 0.0
     columns = [np.atleast_1d(np.asarray(known[name], float)) for name in code.names]
@@ -141,7 +140,7 @@ def _compiled(law: Any, quadratic: bool, tangents: int, order: int) -> Rates:
     if isinstance(base, Trigonometric) and not law.varying:
         A, B, C = map(parameter, "ABC")
         slope = (B - A * sp.cos(x)) * sp.sin(x) - C * sp.cos(x)
-    elif isinstance(base, Machines):
+    elif isinstance(base, Routhians):
         constants = {base.coordinate: x, **{n: parameter(f"({n})") for n in base.constants}}
         slope = 0
     else:
@@ -153,7 +152,7 @@ def _compiled(law: Any, quadratic: bool, tangents: int, order: int) -> Rates:
     if quadratic:
         force += law.force(at, (Drag,))
     kink = list(used).index("(sign)") if "(sign)" in used else -1
-    if isinstance(base, Machines):
+    if isinstance(base, Routhians):
         force = base.acceleration_formula(constants, v, force)
     expressions = [v, force]
     places = {x: (_STATE, 0), v: (_STATE, 1), t: (_TIME, 0), w: (_TIME, 1), dw: (_TIME, 2)}

@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import Validity
+from phasekit.laws.ladder import Routhian, Routhians
 from phasekit.laws.perturbed import PerturbedLaw
-from phasekit.mechanics.at_momentum import AtMomentum, Machines
-from phasekit.mechanics.steady import Steady, steady_at
 from phasekit.perturbation.capture import Capture, energy_size, of_loops, weak
 from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
 from phasekit.perturbation.quadrature import CELLS, POINTS, Paths, along, closed, times_of
@@ -38,11 +37,10 @@ class Loops(NamedTuple):
     loop: npt.NDArray[np.int8]
 
 
-def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Steady:
+def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Any:
     """All steady rotations under a constant torque on the shaft."""
     values = law.values(*parameters)
-    one = _machines(law).with_values(values)
-    return steady_at(one.machine, one.p, values["torque"] * one.machine.Jn)
+    return _machines(law).resting(values, values["torque"])
 
 
 def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
@@ -67,33 +65,33 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
 # ------------------------------------------------------------------------- energies
 
 
-def potential(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
+def potential(law: Routhians | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Amended potential less torque times phi at phi, the last of the inputs, in J."""
     one, torque = _machines_of(law, inputs[:-1])
     phi = np.asarray(inputs[-1], float)
     return np.asarray(one.potential(phi)[0] - torque * phi)
 
 
-def gradient(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
+def gradient(law: Routhians | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Its first derivative at phi, the last of the inputs."""
     one, torque = _machines_of(law, inputs[:-1])
     return np.asarray(one.potential(np.asarray(inputs[-1], float))[1] - torque)
 
 
-def curvature(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
+def curvature(law: Routhians | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Its second derivative at phi, the last of the inputs."""
     one, torque = _machines_of(law, inputs[:-1])
     return np.asarray(one.potential(np.asarray(inputs[-1], float))[2] + 0.0 * torque)
 
 
-def energy(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
+def energy(law: Routhians | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Energy of states (phi, dphi), the last of the inputs."""
     one, _ = _machines_of(law, inputs[:-2])
     phi, speed = (np.asarray(x, float) for x in inputs[-2:])
     return np.asarray(0.5 * one.inertia(phi)[0] * speed * speed + potential(law, *inputs[:-1]))
 
 
-def phase_velocity(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
+def phase_velocity(law: Routhians | PerturbedLaw, *inputs: npt.ArrayLike) -> Array:
     """Speed at phi on the level of an energy, the last of the inputs; NaN where out of reach."""
     one, _ = _machines_of(law, inputs[:-2])
     kinetic = np.asarray(inputs[-1], float) - potential(law, *inputs[:-1])
@@ -101,18 +99,18 @@ def phase_velocity(law: Machines | PerturbedLaw, *inputs: npt.ArrayLike) -> Arra
     return np.asarray(np.sqrt(2.0 * np.where(kinetic >= 0.0, kinetic, np.nan) / inertia))
 
 
-def _machines_of(law: Machines | PerturbedLaw, parameters: Any) -> tuple[AtMomentum, Any]:
+def _machines_of(law: Routhians | PerturbedLaw, parameters: Any) -> tuple[Routhian, Any]:
     """The machines, and the torques on their shafts in N m."""
-    if isinstance(law, Machines):
+    if isinstance(law, Routhians):
         return law.with_values(law.values(*parameters)), 0.0
     values = law.values(*parameters)
     one = _machines(law).with_values(values)
-    return one, values["torque"] * one.machine.Jn
+    return one, values["torque"] * one.own_inertia
 
 
-def _machines(law: PerturbedLaw) -> Machines:
+def _machines(law: PerturbedLaw) -> Routhians:
     base = law.base
-    assert isinstance(base, Machines)
+    assert isinstance(base, Routhians)
     return base
 
 
@@ -125,8 +123,13 @@ def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Arra
     values = law.values(*parameters)
     shape = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
     flat = {n: np.array(np.broadcast_to(x, shape), float).reshape(-1) for n, x in values.items()}
-    one = _machines(law).with_values(flat)
-    columns = np.stack([np.broadcast_to(x, flat["torque"].shape) for x in (*one.machine, one.p)])
+    base = _machines(law)
+    constants, own_inertia = base.constants_of(flat), base.with_values(flat).own_inertia
+    weights = np.broadcast_to(np.asarray(own_inertia), flat["torque"].shape)
+    columns = np.stack(
+        [np.broadcast_to(constants[n], flat["torque"].shape) for n in base.constants]
+        or [np.zeros(flat["torque"].shape)]
+    )
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
     order = np.argsort(which.reshape(-1), kind="stable")
@@ -134,9 +137,9 @@ def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Arra
     for start in range(0, order.size, CELLS):
         rows = order[start : start + CELLS]
         machines, own = np.unique(which.reshape(-1)[rows], return_inverse=True)
-        known = [followed(cells[:, i], cells.shape[1] == 1) for i in machines]
+        known = [followed(base, cells[:, i], cells.shape[1] == 1) for i in machines]
         own_values = {name: x[rows] for name, x in flat.items()}
-        weight = np.asarray(one.machine.Jn).reshape(-1)[rows, None, None]
+        weight = weights.reshape(-1)[rows, None, None]
         parts.append(_part(law, known, own.reshape(-1), own_values, weight))
     width = max((part[0].loop.shape[1] for part in parts), default=0)
     fields = zip(*((*loops, size, *found) for loops, size, found in parts), strict=True)

@@ -6,6 +6,7 @@ one numerically, and motion at constant momenta along its arc length. One system
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from phasekit.phase.exact.separatrices import phase_space
 from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.arc_length import ArcLength
 from phasekit.phase.numerical.formula import Formula
+from phasekit.phase.numerical.inertial import Inertial
 from phasekit.phase.numerical.separatrices import separatrices
 
 Array = npt.NDArray[np.float64]
@@ -232,6 +234,12 @@ def _(law: Routhian, values: Mapping[str, float]) -> Answers:
         momentum=law.momentum,
         **present(law.equilibria(), loops._replace(saddle_phi=own, turning_offset=offset)),
     )
+
+
+@answers.register
+def _(law: Inertial, values: Mapping[str, float]) -> Answers:
+    found = answers(law.with_values(values), {})
+    return dataclasses.replace(found, units="s-2" if found.is_angle else "")
 
 
 def present(points: Any, loops: Any) -> dict[str, Any]:

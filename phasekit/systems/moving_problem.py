@@ -22,7 +22,8 @@ def moving_formulas(system: Any) -> Formulas:
         If a parameter is an array.
     """
     free = issubclass(system.rung, Routhian)
-    values = at_momentum(system) if free else numbers(system, system.formula_inputs())
+    carried = hasattr(system, "angular_momentum")
+    values = at_momentum(system) if carried else numbers(system, system.formula_inputs())
     law = system.law
     states = (law.coordinate, f"d{law.coordinate}")
     of = symbols_of([*states, *values])

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar
 
+import numpy as np
+
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad
 from phasekit.labels.coordinates import LABELS, STATES
-from phasekit.laws.ladder import Conservative, Flow, Law, Map
+from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
 from phasekit.systems import potential_parts as parts
 from phasekit.systems.parameter import Parameter
 from phasekit.table.numerical import NUMERICAL_ROWS
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 TAKEN = {*LABELS, *STATES, "point"}
 TAKEN |= {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
 
+#: Places at which an inertia is tried.
+TRIED = 64
 #: What a class may state of its law, and what belongs to it.
 LAWS = ("products", "potential", "rates", "step")
 #: Names that neither parameters nor states can have, because a class or a call has them.
@@ -165,6 +169,50 @@ class StatedPotential(Stated):
         return self._formula
 
 
+class StatedRouthian(StatedPotential):
+    """``M x'' + M' x'^2/2 + V' = 0`` by the formulas of V and of the inertia M."""
+
+    rung: ClassVar[type[Law]] = Routhian
+
+    def __init__(
+        self, title: str, formula: Any, inertia: str, where: Any, declared: Sequence[Parameter]
+    ) -> None:
+        from phasekit.phase.numerical.formula import make_formula
+        from phasekit.phase.numerical.inertial import Inertial
+
+        super().__init__(title, formula, where, declared)
+        if where.period is None:
+            hint = "on a line state the rates of the coordinate and its velocity as formulas"
+            wants = "one on a circle, beside an inertia: pk.angle(name)"
+            raise bad(f"coordinate of {title}", where, wants, hint)
+        mass = make_formula(
+            parts.expression(inertia), where.name, self.inputs, where.period, where.interval
+        )
+        self._law = Inertial(self._formula, mass)
+
+    def check(self, system: Any) -> None:
+        """Refuse what does not close on its circle, and an inertia that is not positive."""
+        from phasekit.phase.numerical.formula import check_period
+
+        super().check(system)
+        values = [system.parameters[name] for name in self.inputs]
+        check_period(self._law.mass, values)
+        if all(isinstance(value, float) for value in values):
+            places = self._law.period * np.arange(TRIED) / TRIED
+            with np.errstate(all="ignore"):
+                found = np.asarray(self._law.mass.values(places, *values))
+            if not np.all(found > 0.0):
+                raise ParameterError(
+                    f"inertia: got {self._law.mass.text} = {np.min(found):.6g} at "
+                    f"{self._law.coordinate} = {places[np.argmin(found)]:.6g}, wants one > 0 "
+                    "everywhere"
+                )
+
+    def law(self) -> Law:
+        """The formulas."""
+        return self._law
+
+
 class StatedRates(Stated):
     """``x' = f(x)`` by formulas of the states, or by a function; of a map ``x -> f(x)``."""
 
@@ -234,13 +282,15 @@ def stated(cls: type, declared: Sequence[Parameter]) -> Stated | None:
         given.remove("potential")
     if len(given) > 1:
         raise ParameterError(f"{title}: got {' and '.join(given)}, wants one law")
-    if isinstance(own.get("inertia"), str):
-        hint = "state the rates of the coordinate and its velocity as formulas"
-        raise bad(f"inertia of {title}", own["inertia"], "1, over which a potential is", hint)
+    inertia = own.get("inertia")
+    if isinstance(inertia, str) and given != ["potential"]:
+        raise bad(f"inertia of {title}", inertia, "a potential beside it")
     if not given or given == ["products"]:
         return None
     (name,) = given
     law = own[name].__func__ if isinstance(own[name], staticmethod) else own[name]
+    if name == "potential" and isinstance(inertia, str):
+        return StatedRouthian(title, law, inertia, own.get("coordinate"), declared)
     if name == "potential":
         return StatedPotential(title, law, own.get("coordinate"), declared)
     kinds: dict[str, Callable[..., Stated]] = {"rates": StatedRates, "step": StatedStep}

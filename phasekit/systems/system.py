@@ -51,6 +51,9 @@ class System(ModelValue):
     ``potential``
         A formula V of the ``coordinate`` (`angle` or `coordinate`), per unit of inertia, for
         ``x'' = -V'(x)``. It is answered like a `Potential`.
+    ``inertia``
+        A formula M > 0 of the coordinate, an angle, beside a potential: the energy is
+        ``M x'^2/2 + V``, and the motion ``M x'' + M' x'^2/2 + V' = 0``.
     ``rates``
         Formulas of ``x' = f(x)`` by state, or a function ``f(x, **parameters)``. It is answered
         like a `Problem`.

@@ -72,11 +72,13 @@ PASSES: tuple[Pass, ...] = (
             ("separatrix_motion_with_errors", ("time",), "motion", ("saddle", "side")),
         )
     ),
-    *(
-        Pass(f"phasekit.mechanics.steady:{name}", (*_FREE, *more), groups, Routhian, (), _KEPT)
-        for name, more, groups in (
-            ("steady", (), ("equilibria",)),
-            ("support_speed", ("phi",), ("steady_rotations",)),
-        )
+    Pass(_MACHINES + "equilibria", (LAW,), ("equilibria",), Routhian),
+    Pass(
+        "phasekit.mechanics.steady:support_speed",
+        (*_FREE, "phi"),
+        ("steady_rotations",),
+        Routhian,
+        (),
+        _KEPT,
     ),
 )

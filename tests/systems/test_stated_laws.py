@@ -283,10 +283,16 @@ def test_coordinates_are_checked_where_they_are_declared():
     assert pk.coordinate("x", interval=[-1, 2]).interval == (-1.0, 2.0)
 
 
-def test_an_inertia_of_ones_own_is_refused_and_not_left_out():
-    with pytest.raises(pk.ParameterError, match="inertia of Rod: got .*; state the rates"):
+def test_an_inertia_that_is_no_law_is_refused_and_not_left_out():
+    with pytest.raises(pk.ParameterError, match="inertia of Rod: got .*a potential beside it"):
 
         class Rod(pk.System):
-            coordinate = pk.angle("q")
-            potential = "-cos(q)"
+            rates = {"q": "-sin(q)"}
             inertia = "1 + cos(q)^2/2"
+
+    with pytest.raises(pk.ParameterError, match=r"coordinate of Line: got .*; on a line state the"):
+
+        class Line(pk.System):
+            coordinate = pk.coordinate("x", interval=(-1, 1))
+            potential = "x^2"
+            inertia = "1 + x^2"

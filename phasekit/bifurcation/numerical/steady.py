@@ -14,6 +14,7 @@ from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.laws.trigonometric import Trigonometric
 from phasekit.mechanics.at_momentum import Machines
 from phasekit.phase.numerical.formula import Formula, make_formula
+from phasekit.phase.numerical.inertial import Inertial
 from phasekit.phase.numerical.turns import torqued
 
 Span = tuple[float, float]
@@ -47,6 +48,11 @@ def _(law: Machines) -> Formula:
     V = law.resting_formula(symbols)
     names = tuple(name for name in law.names if symbols[name] in V.free_symbols)
     return make_formula(V, law.coordinate, names, law.period, None)
+
+
+@steady_formula.register
+def _(law: Inertial) -> Formula:
+    return law.formula
 
 
 @steady_formula.register

@@ -125,9 +125,10 @@ class ArcLength:
                 back = _fourier(lag, turn, law.period)
             if back.size:
                 return cls(law, length, Wave(1.0 / length.rate, turn, back))
-        name, value, _ = law.momentum
-        wants = "an inertia > 0 at every angle, and finite energies"
-        raise ParameterError(f"system: got one at {name} = {value:g}, wants {wants}")
+        wants = "an inertia > 0 at every place, and finite energies"
+        known = law.momentum
+        where = "one" if known is None else f"one at {known[0]} = {known[1]:g}"
+        raise ParameterError(f"system: got {where}, wants {wants}")
 
     @property
     def turn(self) -> float:

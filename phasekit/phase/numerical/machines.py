@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import EquilibriumKind, Loop, ParameterError, Topology
-from phasekit.mechanics.at_momentum import AtMomentum, Machines
-from phasekit.mechanics.two_degrees import TwoDegrees
+from phasekit.laws.ladder import Routhians
 from phasekit.phase.numerical import functions
 from phasekit.phase.numerical import motion as motions
 from phasekit.phase.numerical import orbits as rounds
@@ -34,7 +33,6 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.intp]
 Result = TypeVar("Result", bound=tuple[Any, ...])
 
-TURN = 2.0 * np.pi
 #: What stands where there is nothing, in place of NaN or 0.
 _EMPTY = {"loop": Loop.ABSENT, "topology": Topology.NOT_COMPUTED}
 
@@ -72,13 +70,14 @@ class Along:
         found, place = find_separatrices(self.ground), self.path.place
         fields = {name: field[0] for name, field in found._asdict().items()}
         phi = fields["saddle_phi"]
-        fields["saddle_phi"] = own = wrapped(place(phi))
+        turn = self.path.law.period
+        fields["saddle_phi"] = own = wrapped(place(phi), turn)
         reach = place(phi[:, None] + fields["turning_offset"]) - place(phi)[:, None]
         fields["turning_offset"] = np.where(
             np.isfinite(fields["turning_offset"]), reach, fields["turning_offset"]
         )
-        turning = fields["turning_phi"]
-        fields["turning_phi"] = np.where(np.isfinite(turning), wrapped(place(turning)), turning)
+        back = fields["turning_phi"]
+        fields["turning_phi"] = np.where(np.isfinite(back), wrapped(place(back), turn), back)
         order = np.argsort(own)
         return Separatrices(*(x[order] if np.ndim(x) else x for x in fields.values()))
 
@@ -98,29 +97,29 @@ class Along:
 
 
 @functools.lru_cache(maxsize=256)
-def along(*constants: float) -> Along:
-    """The machine of some constants, its momentum last.
+def along(law: Routhians, *constants: float) -> Along:
+    """The system of some constants.
 
     Raises
     ------
     ParameterError
         If its inertia or its energies are unusable.
     """
-    path = ArcLength.from_law(AtMomentum(TwoDegrees(*constants[:-1]), constants[-1]))
+    path = ArcLength.from_law(law.alone(constants))
     ground = path.ground()
-    place = wrapped(path.place(ground.points.phi[0]))
+    place = wrapped(path.place(ground.points.phi[0]), path.law.period)
     columns = np.argsort(place)
     saddles = saddles_of(ground)[1]
     return Along(path, ground, columns, saddles[np.argsort(place[saddles])])
 
 
-def wrapped(phi: Array) -> Array:
-    """Angles in (-pi, pi]."""
-    return np.asarray(np.pi - np.mod(np.pi - phi, TURN))
+def wrapped(phi: Array, turn: float) -> Array:
+    """Coordinates in (-turn/2, turn/2]."""
+    return np.asarray(0.5 * turn - np.mod(0.5 * turn - phi, turn))
 
 
-def followed(column: Array, alone: bool) -> Along | None:
-    """The machine of some constants; None of an invalid one of many.
+def followed(law: Routhians, column: Array, alone: bool) -> Along | None:
+    """The system of some constants; None of an invalid one of many.
 
     Raises
     ------
@@ -130,7 +129,7 @@ def followed(column: Array, alone: bool) -> Along | None:
     if not np.isfinite(column).all():
         return None
     try:
-        return along(*map(float, column))
+        return along(law, *map(float, column))
     except ParameterError:
         if alone:
             raise
@@ -147,16 +146,17 @@ class Cells:
     shape: tuple[int, ...]
 
     @classmethod
-    def from_inputs(cls, law: Machines, inputs: Any, states: Any = ()) -> Cells:
+    def from_inputs(cls, law: Routhians, inputs: Any, states: Any = ()) -> Cells:
         """Lay out parameters and states that broadcast."""
         values = law.values(*inputs)
-        one = law.with_values(values)
+        constants = law.constants_of(values)
         own = np.broadcast_shapes(*(np.shape(x) for x in values.values()))
         columns = np.stack(
-            [np.array(np.broadcast_to(x, own), float).reshape(-1) for x in (*one.machine, one.p)]
-        )
+            [np.array(np.broadcast_to(constants[n], own), float).reshape(-1)
+             for n in law.constants] or [np.zeros(1)]
+        )  # fmt: skip
         systems, which = np.unique(columns, axis=1, return_inverse=True)
-        found = [followed(column, systems.shape[1] == 1) for column in systems.T]
+        found = [followed(law, column, systems.shape[1] == 1) for column in systems.T]
         shape = np.broadcast_shapes(own, *map(np.shape, states))
         number = np.broadcast_to(which.reshape(own), shape)
         flat = (np.array(np.broadcast_to(x, shape), float).reshape(-1) for x in states)
@@ -184,7 +184,12 @@ class Cells:
         return kind(*fields)
 
 
-def separatrices(law: Machines, *parameters: npt.ArrayLike) -> Separatrices:
+def equilibria(law: Routhians, *parameters: npt.ArrayLike) -> Any:
+    """All equilibria, in the order of their coordinates."""
+    return law.resting(law.values(*parameters))
+
+
+def separatrices(law: Routhians, *parameters: npt.ArrayLike) -> Separatrices:
     """Separatrices, the saddles in the order of their angles."""
     cells = Cells.from_inputs(law, parameters)
     each = [NOTHING if one is None else one.separatrices for one in cells.machines]
@@ -211,7 +216,7 @@ def widened(name: str, values: Any, width: int) -> Any:
     return np.pad(values, more, constant_values=empty)
 
 
-def orbits(law: Machines, *inputs: npt.ArrayLike) -> Orbits:
+def orbits(law: Routhians, *inputs: npt.ArrayLike) -> Orbits:
     """Orbits through states (phi0, dphi0), the last of the inputs."""
     cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Orbits]]()
     for one, rows, (phi, dphi) in cells.each():
@@ -220,7 +225,7 @@ def orbits(law: Machines, *inputs: npt.ArrayLike) -> Orbits:
     return cells.gathered(parts, Orbits)
 
 
-def orbits_at_energy(law: Machines, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
+def orbits_at_energy(law: Routhians, *inputs: npt.ArrayLike, center: int | None = None) -> Orbits:
     """Orbits of an energy, the last of the inputs, round a center: its number, or the lowest."""
     cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
     for one, rows, (level,) in cells.each():
@@ -235,7 +240,7 @@ def orbits_at_energy(law: Machines, *inputs: npt.ArrayLike, center: int | None =
 
 
 def orbits_at_gap(
-    law: Machines, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
+    law: Routhians, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> Orbits:
     """Orbits by their energy above a saddle: its number, or the lowest; side 0 left, 1 right."""
     cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Orbits]]()
@@ -253,7 +258,7 @@ def orbits_at_gap(
     return cells.gathered(parts, Orbits)
 
 
-def angles(law: Machines, *inputs: npt.ArrayLike) -> AnglesWithErrors:
+def angles(law: Routhians, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     """Angle variables of states (phi, dphi), the last of the inputs."""
     cells, parts = Cells.from_inputs(law, inputs[:-2], inputs[-2:]), list[tuple[Index, Any]]()
     for one, rows, (phi, dphi) in cells.each():
@@ -263,7 +268,7 @@ def angles(law: Machines, *inputs: npt.ArrayLike) -> AnglesWithErrors:
     return result
 
 
-def state_of(law: Machines, *inputs: npt.ArrayLike) -> StateWithErrors:
+def state_of(law: Routhians, *inputs: npt.ArrayLike) -> StateWithErrors:
     """States by action, angle variable and code of the family, the last of the inputs."""
     cells, parts = Cells.from_inputs(law, inputs[:-3], inputs[-3:]), list[tuple[Index, Any]]()
     for one, rows, (action, angle, family) in cells.each():
@@ -276,7 +281,7 @@ def state_of(law: Machines, *inputs: npt.ArrayLike) -> StateWithErrors:
 
 
 def separatrix_motion_with_errors(
-    law: Machines, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
+    law: Routhians, *inputs: npt.ArrayLike, saddle: int | None = None, side: int = 1
 ) -> MotionWithErrors:
     """Motion on the separatrix of a saddle at times, the last of the inputs."""
     cells, parts = Cells.from_inputs(law, inputs[:-1], inputs[-1:]), list[tuple[Index, Any]]()
