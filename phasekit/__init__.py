@@ -49,7 +49,9 @@ if TYPE_CHECKING:
     from phasekit.labelled.basins import basins as basins
     from phasekit.labelled.bifurcation_set import bifurcation_set as bifurcation_set
     from phasekit.labelled.continuation.branch import Branch as Branch
+    from phasekit.labelled.continuation.connection import connection as connection
     from phasekit.labelled.continuation.continuation import continuation as continuation
+    from phasekit.labelled.continuation.cycle_branch import ConnectionBranch as ConnectionBranch
     from phasekit.labelled.continuation.cycle_branch import CycleBranch as CycleBranch
     from phasekit.labelled.continuation.diagram import diagram as diagram
     from phasekit.labelled.continuation.harmonic_record import fourier as fourier
@@ -141,9 +143,10 @@ _MODULES = {
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.atlas": ("branches",),
     "phasekit.labelled.continuation.branch": ("Branch",),
+    "phasekit.labelled.continuation.connection": ("connection",),
     "phasekit.labelled.continuation.continuation": ("continuation",),
     "phasekit.labelled.critical": ("critical",),
-    "phasekit.labelled.continuation.cycle_branch": ("CycleBranch",),
+    "phasekit.labelled.continuation.cycle_branch": ("ConnectionBranch", "CycleBranch"),
     "phasekit.labelled.continuation.diagram": ("diagram",),
     "phasekit.labelled.continuation.harmonic_record": ("fourier",),
     "phasekit.labelled.continuation.periodic_orbit": ("periodic_orbit",),

@@ -338,7 +338,7 @@ def _looks(one: Branch) -> list[style.Look]:
 def _size(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> float:
     """The size of what is drawn upwards: its values, or that of a state on scaled axes."""
     column = pair[1]
-    scale = np.ravel(getattr(one.curve, "scale", ()))  # periodic orbits have none
+    scale = np.ravel(getattr(one.walker.curve, "scale", ()))  # periodic orbits have none
     sizes = dict(zip((*one.problem_state, *one.free), scale, strict=False))
     values = np.abs(column.values[np.isfinite(column.values)])
     return float(max(values.max(initial=0.0), sizes.get(str(column.name), 0.0)))

@@ -205,6 +205,8 @@ class BoundaryProblem(Problem):
         ParameterError
             If it is nothing of the kind.
         """
+        if not isinstance(spec, Mapping) or not {"conditions", "integrals"} <= spec.keys():
+            raise bad("spec", spec, "what BoundaryProblem.specification returns")
         plain = Problem.from_specification(spec)
         if plain is None:
             return None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Self
 
-from phasekit.labels.arguments import bad
+from phasekit.labels.arguments import bad, flag
 from phasekit.laws.formulas import symbols_of, take_formula
 from phasekit.laws.ladder import Conservative
 from phasekit.systems.moving_problem import numbers
@@ -251,6 +251,7 @@ class ProblemSources:
         dict
             Numbers, strings, lists and mappings, which JSON can hold.
         """
+        flag("values", values)
         return specified(self, values)
 
     @classmethod

@@ -27,7 +27,7 @@ from phasekit.systems.trajectory import Trajectory
 
 #: What models share for the rest of the package, and results that only phasekit makes.
 MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
-RESULTS = (pk.Branch, pk.CycleBranch, pk.SpecialPoint)
+RESULTS = (pk.Branch, pk.CycleBranch, pk.ConnectionBranch, pk.SpecialPoint)
 
 
 class Odd:
@@ -203,6 +203,16 @@ def trajectory() -> Any:
 @functools.cache
 def map_() -> Any:
     return pk.Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
+
+
+def front() -> pk.Problem:
+    law = {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}
+    return pk.Problem(law, parameters={"c": 0.28, "a": 0.3})
+
+
+@functools.cache
+def connected() -> Any:
+    return pk.connection(front(), ([0.0, 0.0], [1.0, 0.0]), free="c")
 
 
 def bounded() -> pk.BoundaryProblem:
@@ -470,6 +480,13 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "SpinOrbit.tides": {"p": lambda: 1.5},
     "Explorer.save": {"path": lambda: "page.html"},
     "plot.multipliers": {"branch": cycles},
+    "connection": {
+        "problem": front, "orbit": lambda: ([0.0, 0.0], [1.0, 0.0]), "free": lambda: "c",
+    },
+    "ConnectionBranch.curve": {"parameter": lambda: "a", "span": lambda: (0.29, 0.31)},
+    "ConnectionBranch.save": {"path": lambda: "branch.zarr"},
+    "ConnectionBranch.extend": {"points": lambda: 1},
+    "ConnectionBranch.orbit": {"i": lambda: -1},
     "CycleBranch.save": {"path": lambda: "branch.zarr"},
     "CycleBranch.extend": {"points": lambda: 1},
     "CycleBranch.orbit": {"i": lambda: -1},
@@ -493,6 +510,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Problem.from_system": {"system": disk},
     "Problem.derivatives": {"x": lambda: [0.1]},
     "Problem.iterated": {"n": lambda: 2},
+    "BoundaryProblem.from_specification": {"spec": lambda: bounded().specification()},
     "Problem.described": {"words": lambda: {"x": {"long_name": "place", "units": "m"}}},
     "SpecialPoint.curve": {"parameter": lambda: "r"},
     "Branch.save": {"path": lambda: "branch.zarr"},
@@ -518,6 +536,7 @@ INSTANCES: dict[str, Callable[[], Any]] = {
     "Branch": branch,
     "SpecialPoint": lambda: branch().special_points[0],
     "CycleBranch": cycles,
+    "ConnectionBranch": connected,
     "Perturbed": driven,
     "Harmonic": lambda: pk.Harmonic(0.1, 1.0),
     "JosephsonJunction": lambda: pk.JosephsonJunction(plasma_frequency=1.0),

@@ -9,6 +9,8 @@ lead(
         "point.switch": "phasekit.labelled.continuation.point_curves:leave",
         "point.curve": "phasekit.labelled.continuation.point_curves:point_curve",
         "orbit.switch": "phasekit.labelled.continuation.cycle_onward:switched",
+        "connection": "phasekit.labelled.continuation.connection:connection",
+        "connection.curve": "phasekit.labelled.continuation.connection:curve",
         "orbit.curve": "phasekit.labelled.continuation.cycle_onward:point_curve",
     }
 )

@@ -169,7 +169,7 @@ class Branch:
         return tuple(self._special_point(*place) for place in self._places)
 
     def _special_point(self, found: Any, index: int, eigenvalues: Any) -> SpecialPoint[Self]:
-        return special_point(self.problem, self.curve, found, eigenvalues, index, self)
+        return special_point(self.problem, self.walker.curve, found, eigenvalues, index, self)
 
     @functools.cached_property
     def _points(self) -> xr.Dataset:
@@ -189,13 +189,13 @@ class Branch:
     @functools.cached_property
     def free(self) -> tuple[str, ...]:
         """The free parameters."""
-        names = self.curve.field.parameters
-        return tuple(names[i] for i in self.curve.active)
+        names = self.walker.curve.field.parameters
+        return tuple(names[i] for i in self.walker.curve.active)
 
     @property
     def problem_state(self) -> tuple[str, ...]:
         """The states."""
-        states: tuple[str, ...] = self.curve.field.states
+        states: tuple[str, ...] = self.walker.curve.field.states
         return states
 
     @property
@@ -297,7 +297,7 @@ class Branch:
         ParameterError
             If there is no such label, kind or event.
         """
-        events = [event.name for event in self.curve.events]
+        events = [event.name for event in self.walker.curve.events]
         _check_kind(label, events)
         return tuple(s for s in self.special_points if label in (s.label, s.kind, s.name))
 
@@ -379,7 +379,7 @@ class Branch:
         self, span: Sequence[float] | None, bounds: Mapping[str, Sequence[float]] | None
     ) -> dict[str, Any]:
         """Bounds of the curve that are replaced, checked."""
-        curve, names = self.curve, self.walker.bounded
+        curve, names = self.walker.curve, self.walker.bounded
         asked = dict(check_bounds(bounds))
         if span is not None:
             if len(self.free) != 1:
@@ -409,7 +409,7 @@ class Branch:
             """An older name, with a warning."""
             if name == "known":
                 deprecate("Branch.known()", "(Branch.curve, Branch.problem)")
-                return lambda: (self.curve, self.problem)
+                return lambda: (self.walker.curve, self.problem)
             raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
@@ -464,7 +464,7 @@ class Branch:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made again of what was traced, as when a branch is loaded."""
-        curve = self.curve
+        curve = self.walker.curve
         kept = {f.name: getattr(curve, f.name) for f in fields(curve) if f.name not in NOT_COMPARED}
         return _again, (
             type(self), type(self.walker), type(curve), self.problem, kept, self.start,
@@ -495,11 +495,15 @@ class Branch:
     @property
     def _followed(self) -> str:
         """What its points are, in words."""
-        held = getattr(self.curve, "held", None)
+        held = getattr(self.walker.curve, "held", None)
         if held is not None:
             return f"points of the event {held.name!r}"
-        words = {"equilibrium": "fixed points" if self.problem.map else "equilibria",
-                 "cycle": "periodic orbits", "boundary": "solutions"}  # fmt: skip
+        words = {
+            "equilibrium": "fixed points" if self.problem.map else "equilibria",
+            "cycle": "periodic orbits",
+            "boundary": "solutions",
+            "connection": "connections",
+        }
         return words.get(self.kind, f"{self.kind} points")
 
     def _head(self) -> str:

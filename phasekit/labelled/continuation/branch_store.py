@@ -26,7 +26,9 @@ from phasekit.systems.problem import Problem, as_problem
 
 _NAME = "Branch"
 #: What branches of orbits are of, and those of fixed points of maps may be as well.
-_OF_ORBITS = ("cycle", "boundary", "fold_of_cycles", "period_doubling", "torus")
+_OF_ORBITS = (
+    "cycle", "boundary", "connection", "fold_of_cycles", "period_doubling", "torus",
+)  # fmt: skip
 
 
 def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
@@ -42,7 +44,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
     form = _form(branch.kind, branch.problem)
     for name, array in form.arrays_of(branch).items():
         ds[f"raw_{name}"] = (tuple(f"raw_{name}_{k}" for k in range(array.ndim)), array)
-    curve = branch.curve
+    curve = branch.walker.curve
     spec = {
         "problem": branch.problem.specification(),
         "free": list(branch.free),
@@ -67,10 +69,7 @@ def save(branch: Branch, path: str | PathLike[str], overwrite: bool) -> None:
 
 def _form(kind: str, problem: Problem) -> Any:
     """The module that knows the arrays of such branches."""
-    if (
-        kind in ("cycle", "boundary", "fold_of_cycles", "period_doubling", "torus")
-        and not problem.map
-    ):
+    if kind in _OF_ORBITS and not problem.map:
         from phasekit.labelled.continuation import cycle_store
 
         return cycle_store

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, Self, cast
 
 import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.bifurcation.continuation.stops import Stop
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
@@ -21,8 +22,47 @@ from phasekit.labelled.continuation.cycle_points import (
     points_of,
 )
 from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
+from phasekit.labelled.continuation.onward import onward
+from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.arguments import bad
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
+
+
+@dataclass(frozen=True)
+class HomoclinicEnd(Stop):
+    """The end of a family at an orbit that takes infinite time.
+
+    Attributes
+    ----------
+    branch : CycleBranch
+        The family.
+    side : int
+        0 at its first point, -1 at its last one.
+    """
+
+    branch: CycleBranch = field(compare=False, repr=False)
+    side: int = field(compare=False, repr=False)
+
+    def connection(self, **keywords: Any) -> ConnectionBranch:
+        """The homoclinic orbit itself.
+
+        Parameters
+        ----------
+        **keywords
+            What `connection` takes besides the problem, the orbit and the free parameter.
+
+        Returns
+        -------
+        ConnectionBranch
+        """
+        branch = self.branch
+        keywords = {"free": branch.parameter, **keywords}
+        place = 0 if self.side == 0 else len(branch.path) - 1
+        value = float(branch.path[place].orbit.y[1])
+        problem = branch.problem.replace(**{branch.parameter: value})
+        found: ConnectionBranch = onward("connection")(problem, branch.orbit(place), **keywords)
+        return found
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -78,6 +118,16 @@ class CycleBranch(Branch):
     True
     """
 
+    def __post_init__(self) -> None:
+        """Let ends at homoclinic orbits lead on to these."""
+        stops = (
+            HomoclinicEnd(stop.reason, stop.message, self, side)
+            if stop.reason == "homoclinic" and self.kind == "cycle"
+            else stop
+            for stop, side in zip(self.stops, (0, -1), strict=True)
+        )
+        object.__setattr__(self, "stops", tuple(stops))
+
     @staticmethod
     def _tabulated(
         problem: Problem, walker: Any, found: Found, record: Record
@@ -90,7 +140,7 @@ class CycleBranch(Branch):
         return cast(Orbits, self._table).points
 
     def _special_point(self, found: Any, index: int, eigenvalues: Any) -> CyclePoint[Self]:
-        return cycle_point(self.problem, self.curve, found, eigenvalues, index, self)
+        return cycle_point(self.problem, self.walker.curve, found, eigenvalues, index, self)
 
     def orbit(self, i: int) -> xr.Dataset:
         """The orbit of a point over time, with its numbers as scalars.
@@ -115,7 +165,7 @@ class CycleBranch(Branch):
         if not -count <= at < count:
             raise bad("i", i, f"a whole number from {-count} to {count - 1}")
         label = str(self._points["special"].values[at])
-        return orbit_dataset(self.problem, self.curve, self.path[at], label)
+        return orbit_dataset(self.problem, self.walker.curve, self.path[at], label)
 
     def to_dataset(self) -> xr.Dataset:
         """The points, and the special points on the dim ``special_point``.
@@ -126,7 +176,7 @@ class CycleBranch(Branch):
             As `Branch.to_dataset`, with ``special_period``.
         """
         ds = super().to_dataset()
-        if self.curve.closes:
+        if self.walker.curve.closes:
             ds["special_period"] = (
                 "special_point", np.array([s["period"] for s in self.special_points]),
             )  # fmt: skip
@@ -139,7 +189,7 @@ class CycleBranch(Branch):
         period = rest.pop("period", None)
         wider = super()._wider(span, rest)
         if period is not None:
-            options = self.curve.options
+            options = self.walker.curve.options
             own = options.bounds.get("period", (-np.inf, np.inf))
             low, high = check_span(period, None, "bounds['period']")
             if low > own[0] or high < own[1]:
@@ -153,9 +203,77 @@ class CycleBranch(Branch):
 
     @property
     def _numbers(self) -> tuple[str, ...]:
-        return ("period",) if self.curve.closes else ()
+        return ("period",) if self.walker.curve.closes else ()
 
     def _notes(self) -> list[str]:
-        unknown = int(np.sum(self._points["n_unstable"].values < 0)) if self.curve.closes else 0
+        unknown = (
+            int(np.sum(self._points["n_unstable"].values < 0)) if self.walker.curve.closes else 0
+        )
         failed = f"multipliers fail their checks at {unknown} points: no detection there"
         return [*([failed] if unknown else []), *super()._notes()]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ConnectionBranch(CycleBranch):
+    """Orbits that connect equilibria: one, or a curve of them in one parameter more.
+
+    Made by `connection`, and by ``stop.connection()`` where a family of periodic orbits ends as
+    homoclinic.
+
+    Attributes
+    ----------
+    points : xarray.Dataset
+        On the dim ``point``: the free parameters by name; for each state x ``x_min``, ``x_max``,
+        ``x_mean`` and, at the equilibria, ``x_from`` and ``x_to``; ``duration``, the time between
+        the ends; ``truncation_error``, what the free parameters are off by since it is not
+        infinite; ``mesh_error`` and ``residual``; ``leading_unstable`` and ``leading_stable``, real
+        parts of the eigenvalues by which it leaves and arrives the slowest, with ``_imag``;
+        ``saddle_value``, their sum; ``n_intervals``, ``arclength``, ``special``, ``step``.
+    special_points : tuple of SpecialPoint
+        NSS, NSF, DRS, DRU, NDS, NDU, OFS, OFU, IFS, IFU, and ends.
+    stops : tuple of Stop
+        Why a curve ends: bound, shilnikov_hopf, non_central_saddle_node, bogdanov_takens,
+        max_points, stuck, closed.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> lorenz = pk.Problem(
+    ...     {"x": "s*(y - x)", "y": "r*x - y - x*z", "z": "x*y - b*z"},
+    ...     parameters={"r": 13.9, "s": 10.0, "b": 8 / 3},
+    ... )
+    >>> loop = pk.connection(lorenz, ([0, 0, 0], [0, 0, 0]), free="r")
+    >>> round(float(loop.points.r[0]), 9)
+    13.926557408
+    >>> curve = loop.curve("b", span=(2.5, 2.7))
+    >>> [stop.reason for stop in curve.stops]
+    ['bound', 'bound']
+    """
+
+    def curve(
+        self, parameter: str, span: Sequence[float] | None = None, *, options: Any = None
+    ) -> ConnectionBranch:
+        """The curve of such orbits in one parameter more.
+
+        Parameters
+        ----------
+        parameter : str
+            The other parameter.
+        span : (float, float), optional
+            Its range, which holds its value; ten times its size, or 1, to both sides if left out.
+        options : ContinuationOptions, optional
+            Steps, bounds, directions.
+
+        Returns
+        -------
+        ConnectionBranch
+
+        Raises
+        ------
+        ParameterError
+            If the parameter is none, or free already.
+        """
+        with notice(f"following connections along {parameter}"):
+            found = onward("connection.curve")(self, parameter, span, options)
+        made: ConnectionBranch = announced(found)
+        return made

@@ -12,6 +12,8 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.periodic import collocation
+from phasekit.bifurcation.continuation.periodic.bounded import Bounded
+from phasekit.bifurcation.continuation.periodic.connections import ends_of, spectra, truncation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.fourier import coefficients
@@ -151,6 +153,9 @@ def _dataset(
     data["n_intervals"] = (*data["n_intervals"], {"long_name": "mesh intervals"})
     if cycles.closes:
         _of_cycles(problem, cycles, points, data)
+    if isinstance(cycles, Bounded) and cycles.kind == "connection":
+        for name, (text, column) in _of_connections(problem, cycles, points).items():
+            data[name] = (dim, column, {"long_name": text})
     data["arclength"] = (dim, np.array([p.arclength for p in points]))
     data["special"] = (dim, np.array(labels, dtype=np.dtypes.StringDType()))
     data["step"] = (dim, np.array([p.step for p in points]))
@@ -193,6 +198,40 @@ def _of_cycles(
         (dim, "multiplier"), np.array([p.multipliers for p in points]),
         {"long_name": "Floquet multipliers, the largest first"},
     )  # fmt: skip
+
+
+def _of_connections(
+    problem: Problem, cycles: Bounded, points: Sequence[Point]
+) -> dict[str, tuple[str, FloatArray]]:
+    """Columns of connecting orbits alone: what they are called, and their values."""
+    n = len(problem.state)
+    rows = np.full((len(points), 7 + 2 * n), np.nan)
+    for row, point in zip(rows, points, strict=True):
+        orbit = point.orbit
+        rests = ends_of(cycles).rests(cycles, orbit)
+        found = spectra(cycles, orbit)
+        row[0] = orbit.y[0]
+        if rests is None or found is None:
+            continue
+        row[1] = np.max(np.abs(truncation(cycles, orbit)))
+        for k, values in enumerate((found.out, found.into)):
+            row[3 + 2 * k : 5 + 2 * k] = (values[0].real, abs(values[0].imag)) if len(values) else (
+                np.nan, np.nan,
+            )  # fmt: skip
+        row[2] = row[3] + row[5]
+        row[7:] = np.concatenate([rest.x for rest in rests])
+    names = {
+        "duration": "time between the ends of the orbit",
+        "truncation_error": "estimated error of the free parameters by its ends",
+        "saddle_value": "sum of the real parts of the leading eigenvalues",
+        "leading_unstable": "real part of the eigenvalue by which it leaves",
+        "leading_unstable_imag": "its imaginary part",
+        "leading_stable": "real part of the eigenvalue by which it arrives",
+        "leading_stable_imag": "its imaginary part",
+    }
+    names |= {f"{x}_from": f"{x} of the equilibrium that it leaves" for x in problem.state}
+    names |= {f"{x}_to": f"{x} of the equilibrium that it arrives at" for x in problem.state}
+    return {name: (words, rows[:, k].copy()) for k, (name, words) in enumerate(names.items())}
 
 
 def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> xr.Dataset:

@@ -40,7 +40,7 @@ class CyclePoint(SpecialPoint[Of]):
     @property
     def orbit(self) -> xr.Dataset:
         """The orbit over time."""
-        cycles, problem = self.branch.curve, self.branch.problem
+        cycles, problem = self.branch.walker.curve, self.branch.problem
         return orbit_dataset(problem, cycles, self.special.point, self.label)
 
     def __getitem__(self, name: str) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic.bounded import Bounded
+from phasekit.bifurcation.continuation.periodic.connections import Ends, ends_of
 from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
@@ -23,7 +25,7 @@ from phasekit.bifurcation.continuation.periodic.point import Point, State
 from phasekit.bifurcation.continuation.periodic.trace import Track
 from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
-from phasekit.labelled.continuation.cycle_branch import CycleBranch
+from phasekit.labelled.continuation.cycle_branch import ConnectionBranch, CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
 from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.systems.problem import Problem
@@ -37,13 +39,14 @@ _NUMBERS = (
     "arclength", "step", "newton_steps", "residual", "sign", "trivial_error", "liouville_error",
     "mesh_error",
 )  # fmt: skip
+CONNECTION = "connection"
 _FINITE = ("par", "turns", "scale", "period")
 
 
 def arrays_of(branch: CycleBranch) -> dict[str, FloatArray]:
     """What it takes to make the branch again, as arrays."""
     arrays: dict[str, FloatArray] = {
-        f"cycles_{name}": getattr(branch.curve, name) for name in _ARRAYS
+        f"cycles_{name}": getattr(branch.walker.curve, name) for name in _ARRAYS
     }
     arrays.update(_packed("start", [branch.start]))
     for side, track in zip(("backward", "forward"), branch.tracks, strict=True):
@@ -56,7 +59,11 @@ def arrays_of(branch: CycleBranch) -> dict[str, FloatArray]:
 def words_of(branch: CycleBranch) -> dict[str, Any]:
     """And what is no array."""
     origin = branch.origin
-    return {"multiple": branch.curve.multiple, "origin": [origin.reason, origin.message]}
+    curve = branch.walker.curve
+    words = {"multiple": curve.multiple, "origin": [origin.reason, origin.message]}
+    if branch.kind == CONNECTION:
+        words["connects"] = asdict(ends_of(curve))
+    return words
 
 
 def read(
@@ -74,13 +81,15 @@ def read(
         (start,) = _unpacked(stored, "start", cycles)
         tracks = stored.tracks(track_of)
         origin = Stop(*map(str, stored.spec["origin"]))
-    return CycleBranch, CycleWalk(cycles), start, tracks, origin
+    form = ConnectionBranch if stored.kind == CONNECTION else CycleBranch
+    return form, CycleWalk(cycles), start, tracks, origin
 
 
 def _cycles(stored: Stored, problem: Problem) -> Cycles:
-    kind, active = stored.kind, stored.active(problem, range(1, getattr(problem, "freed", 2) + 1))
+    most = len(problem.state) + 2 if stored.kind == CONNECTION else getattr(problem, "freed", 2)
+    kind, active = stored.kind, stored.active(problem, range(1, most + 1))
     forced = problem.time is not None
-    parts = {"cycle": 1, "boundary": 1, "fold_of_cycles": 2, "period_doubling": 2, "torus": 3}[kind]
+    parts = {"fold_of_cycles": 2, "period_doubling": 2, "torus": 3}.get(kind, 1)
     n, k = parts * len(problem.state), len(active)
     k += kind == "torus" or (kind == "fold_of_cycles" and not forced)
     shapes: dict[str, tuple[int, ...]] = {name: (n,) for name in ("turns", "scale", "period")}
@@ -98,6 +107,12 @@ def _cycles(stored: Stored, problem: Problem) -> Cycles:
     form: Any = Cycles if kind == "cycle" else functools.partial(Extended, kind=kind)
     if problem.bounded:
         form = functools.partial(Bounded, conditions=conditions_of(problem))
+    if kind == CONNECTION:
+        connects = dict(stored.spec["connects"])
+        connects["distances"] = tuple(float(one) for one in connects["distances"])
+        form = functools.partial(
+            Bounded, conditions=(Ends(**connects),), kind=CONNECTION, duration=None
+        )
     made: Cycles = form(
         problem.field, fixed=k == 2 and kind == "cycle", active=active, forced=forced,
         clock=clock_code(problem, active), multiple=multiple, options=stored.options(), **arrays,

@@ -41,6 +41,10 @@ class Origin(Protocol):
     def problem(self) -> Any:
         """Their problem."""
 
+    @property
+    def walker(self) -> Any:
+        """How they were followed."""
+
 
 #: The branch of a special point.
 Of = TypeVar("Of", bound=Origin)

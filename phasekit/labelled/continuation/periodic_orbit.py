@@ -156,7 +156,7 @@ def periodic_orbit(
         guesses = [sampled(problem, at, x, period, value, options.degree)]
         return _found(problem, guesses, options, "from the samples")
     x = x.reshape(n)
-    run = _Simulation(problem, units_of(problem, x))
+    run = Simulation(problem, units_of(problem, x))
     if period is not None:
         with notice("looking for a periodic orbit"):
             start = x if not settle else run(x, 0.0, _whole(problem, settle, period))[1][-1]
@@ -185,7 +185,7 @@ def _with_period(ds: xr.Dataset, period: float | None) -> xr.Dataset:
 
 
 def _turns(
-    problem: Problem, run: _Simulation, x: FloatArray, period: float, value: float, options: Any
+    problem: Problem, run: Simulation, x: FloatArray, period: float, value: float, options: Any
 ) -> Iterator[Any]:
     """Guesses from one turn: even in time, then denser where the motion is fast."""
     for samples in (SAMPLES, 0):
@@ -275,11 +275,12 @@ def _part(problem: Problem, cycles: Any, orbit: Any) -> Any:
     return None
 
 
-class _Simulation:
+class Simulation:
     """The motion of a problem from a state."""
 
-    def __init__(self, problem: Problem, units: FloatArray) -> None:
+    def __init__(self, problem: Problem, units: FloatArray, sign: float = 1.0) -> None:
         self.problem, self.units, n = problem, units, len(problem.state)
+        self.sign = sign  # -1: backwards in time
         par = np.array([*problem.parameters.values(), *([0.0] if problem.time else [])])
         field: Any = problem.field
 
@@ -302,11 +303,13 @@ class _Simulation:
         self.f: Callable[[float, FloatArray], FloatArray] = f
 
     def __call__(
-        self, x: FloatArray, begin: float, length: float, samples: int = 2, most: float = np.inf
-    ) -> tuple[FloatArray, FloatArray]:
+        self, x: FloatArray, begin: float, length: float, samples: int = 2, most: float = np.inf,
+        bound: float = np.inf,
+    ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
         """Times and states of the motion over some time; without samples, its own steps in parts.
 
-        So they are dense where the motion is fast. At most so many values of f are taken.
+        So they are dense where the motion is fast. At most so many values of f are taken, and it
+        ends where a state is larger than a bound.
         """
         from scipy.integrate import solve_ivp
 
@@ -318,7 +321,13 @@ class _Simulation:
                     f"x0: {most:g} values of f do not lead from {start.tolist()} over the time "
                     f"{length:.4g}; give a period"
                 )
-            return self.f(t, x)
+            return self.sign * self.f(t, x)
+
+        def within(t: float, x: FloatArray) -> float:
+            return bound - float(np.max(np.abs(x)))
+
+        within.terminal = True  # type: ignore[attr-defined]
+        bounded = np.isfinite(bound)
 
         start = x
         at = np.linspace(begin, begin + length, samples) if samples else None
@@ -327,7 +336,7 @@ class _Simulation:
             try:
                 solution = solve_ivp(
                     f, (begin, begin + length), x, method="LSODA", t_eval=at, rtol=1e-8,
-                    dense_output=not samples,
+                    dense_output=not samples, events=within if bounded else None,
                     atol=1e-10 * (float(np.max(np.abs(x) / self.units)) or 1e-6) * self.units,
                 )  # fmt: skip
             except (ValueError, ArithmeticError) as error:
@@ -337,7 +346,8 @@ class _Simulation:
                     f"x0: the simulation from {x.tolist()} failed: {error}"
                 ) from error
         states = np.asarray(solution.y)  # an empty list where f has no value at the start
-        if not solution.success or not np.isfinite(states).all() or states.shape[-1] < samples:
+        short = states.shape[-1] < (2 if bounded else samples)
+        if not (solution.success or bounded) or not np.isfinite(states).all() or short:
             raise ConvergenceError(
                 f"x0: the simulation from {x.tolist()} did not reach the time {length:.6g}: "
                 f"{solution.message}{self.problem.field.raised}"
@@ -346,11 +356,11 @@ class _Simulation:
             steps = np.arange(PARTS * (len(solution.t) - 1) + 1.0) / PARTS
             at = np.interp(steps, np.arange(len(solution.t)), solution.t)
             return at - begin, solution.sol(at).T
-        return at - begin, solution.y.T
+        return solution.t - begin, solution.y.T
 
 
 def _searched(
-    problem: Problem, x: FloatArray, settle: float | None, run: _Simulation, value: float,
+    problem: Problem, x: FloatArray, settle: float | None, run: Simulation, value: float,
     options: Any,
 ) -> xr.Dataset:  # fmt: skip
     """The orbit near a state from which a simulation returns, after ever longer transients."""
@@ -374,13 +384,13 @@ def _searched(
     raise ConvergenceError(f"x0: no periodic orbit was found; at first: {said}") from said
 
 
-def _pace(run: _Simulation, x: FloatArray) -> float:
+def _pace(run: Simulation, x: FloatArray) -> float:
     """A time in which the state moves by about its own size."""
     speed, size = (float(np.linalg.norm(one / run.units)) for one in (run.f(0.0, x), x))
     return 10.0 * (size or 1e-3) / speed if speed > 0.0 else 0.0
 
 
-def _return(problem: Problem, x: FloatArray, run: _Simulation) -> float:
+def _return(problem: Problem, x: FloatArray, run: Simulation) -> float:
     """Time until the motion crosses the plane across its start again, where it started."""
     pace = _pace(run, x)
     if not pace > 0.0:

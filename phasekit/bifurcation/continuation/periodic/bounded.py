@@ -21,7 +21,7 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-#: Rows over places, rows over y, and what the rows are to be at a solution.
+#: Rows over places, rows over y, and what goes with them: values, or what they are to be.
 Rows = tuple[Array, Array, Array]
 
 STEP = 2.0**-10  # of differences of fourth order, beside the size of what changes
@@ -34,11 +34,8 @@ class Condition(Protocol):
     def count(self) -> int:
         """How many."""
 
-    def values(self, bounded: Bounded, orbit: Orbit) -> Array:
-        """The numbers."""
-
-    def slopes(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
-        """Their derivatives by the values at all places and by y."""
+    def at(self, bounded: Any, orbit: Orbit) -> Rows:
+        """Their derivatives by the values at all places and by y, and the numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,28 +46,26 @@ class Bounded(Cycles):
     ----------
     conditions : tuple of Condition
         What vanishes.
-    phased : bool
-        Whether a solution has a phase, which is held: its equations do not know the time.
     kind : str
         What the branch of them is.
-    duration : float
-        The length of time.
+    duration : float or None
+        The length of time; None where it is free.
     """
 
     conditions: tuple[Condition, ...] = ()
-    phased: bool = False
     kind: str = "boundary"
-    duration: float = 1.0
+    duration: float | None = 1.0
 
     @property
     def bordering(self) -> int:
-        """Number of bordering rows: phase, time, conditions, direction."""
-        return 2 + self.phased + sum(one.count for one in self.conditions)
+        """Number of bordering rows: time, conditions, direction."""
+        timed = self.duration is not None
+        return 1 + timed + sum(one.count for one in self.conditions)
 
     @property
     def critical(self) -> bool:
         """Whether folds and branch points are looked for: not along curves of connections."""
-        return not self.phased
+        return self.kind == "boundary"
 
     @cached_property
     def closure(self) -> Array:
@@ -78,32 +73,30 @@ class Bounded(Cycles):
         return np.zeros(self.n)
 
     def rows(self, orbit: Orbit, dx: Array, dy: Array) -> Rows:
-        """Bordering rows: phase, length of time, conditions, direction; their values."""
+        """Bordering rows: length of time, conditions, direction; their values."""
         border, q, places = self.bordering, self.q, orbit.x.shape
-        own, own_y, at = np.zeros((2, *places)), np.zeros((2, q)), np.zeros(2)
+        own, at = np.zeros((2, *places)), np.zeros(2)
         c = collocation.scheme(self.m)
         along.borders(
-            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, not self.phased,
-            own, at,
-        )  # fmt: skip
-        own_y[1, 1:] = dy[1:] / self.width**2
+            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, True, own, at
+        )
         rows, rows_y, target = np.zeros((border, *places)), np.zeros((border, q)), np.zeros(border)
-        rows[-1], rows_y[-1], target[-1] = own[1], own_y[1], at[1] + own_y[1] @ orbit.y
-        if self.phased:
-            rows[0], target[0] = own[0], at[0]
+        rows[-1], rows_y[-1, 1:] = own[1], dy[1:] / self.width**2
+        target[-1] = at[1] + rows_y[-1] @ orbit.y
         return self.rows_beside(orbit, rows, rows_y, target)
 
     def rows_beside(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Rows:
         """The rows with the time as it is, and the conditions linear beside an orbit."""
         rows, rows_y, target = rows.copy(), rows_y.copy(), target.copy()
-        k = int(self.phased)
-        rows[k], rows_y[k], target[k] = 0.0, np.eye(self.q)[0], self.duration
-        k += 1
+        k = 0
+        if self.duration is not None:
+            rows[0], rows_y[0], target[0] = 0.0, np.eye(self.q)[0], self.duration
+            k = 1
         for one in self.conditions:
             here = slice(k, k + one.count)
-            rows[here], rows_y[here] = one.slopes(self, orbit)
+            rows[here], rows_y[here], values = one.at(self, orbit)
             linear = np.einsum("rkn,kn->r", rows[here], orbit.x) + rows_y[here] @ orbit.y
-            target[here] = linear - one.values(self, orbit)
+            target[here] = linear - values
             k = here.stop
         return rows, rows_y, target
 
@@ -149,26 +142,20 @@ class EndFormulas:
         """How many."""
         return len(self.formulas)
 
-    def _jet(self, bounded: Bounded, orbit: Orbit) -> Array:
+    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+        """Their derivatives, and the numbers."""
         u = np.concatenate([orbit.x[0], orbit.x[-1], orbit.y[1:]])
         given = _given(bounded, 2)
-        return np.array([one.slopes(given, u) for one in self.formulas])
-
-    def values(self, bounded: Bounded, orbit: Orbit) -> Array:
-        """The numbers."""
-        return self._jet(bounded, orbit)[:, 0]
-
-    def slopes(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
-        """Their derivatives."""
-        return _of_ends(bounded, orbit, self._jet(bounded, orbit)[:, 1:])
+        jet = np.array([one.slopes(given, u) for one in self.formulas])
+        return of_ends(orbit, jet[:, 1:], jet[:, 0])
 
 
-def _of_ends(bounded: Bounded, orbit: Orbit, found: Array) -> tuple[Array, Array]:
+def of_ends(orbit: Orbit, slopes: Array, values: Array) -> Rows:
     """Rows of derivatives by both ends and the free parameters."""
-    n = bounded.n
-    rows = np.zeros((len(found), *orbit.x.shape))
-    rows[:, 0], rows[:, -1] = found[:, :n], found[:, n : 2 * n]
-    return rows, np.hstack([np.zeros((len(found), 1)), found[:, 2 * n :]])
+    n = orbit.x.shape[1]
+    rows = np.zeros((len(slopes), *orbit.x.shape))
+    rows[:, 0], rows[:, -1] = slopes[:, :n], slopes[:, n : 2 * n]
+    return rows, np.hstack([np.zeros((len(slopes), 1)), slopes[:, 2 * n :]]), values
 
 
 @dataclass(frozen=True)
@@ -187,16 +174,12 @@ class EndFunction:
         found = self.function(u[:n].copy(), u[n : 2 * n].copy(), **values)
         return np.asarray(found, dtype=float).reshape(self.count)
 
-    def values(self, bounded: Bounded, orbit: Orbit) -> Array:
-        """The numbers."""
-        return self._value(bounded, np.concatenate([orbit.x[0], orbit.x[-1], orbit.y[1:]]))
-
-    def slopes(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
-        """Their derivatives."""
+    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+        """Their derivatives, and the numbers."""
         u = np.concatenate([orbit.x[0], orbit.x[-1], orbit.y[1:]])
         scale = _given(bounded, 2).scale
         found = differences_of(lambda at: self._value(bounded, at), u, scale)
-        return _of_ends(bounded, orbit, found)
+        return of_ends(orbit, found, self._value(bounded, u))
 
 
 def differences_of(function: Callable[[Array], Array], u: Array, scale: Array) -> Array:
@@ -205,12 +188,12 @@ def differences_of(function: Callable[[Array], Array], u: Array, scale: Array) -
     for i in range(len(u)):
         h = STEP * max(abs(float(u[i])), float(scale[i]))
 
-        def value_at(k: float, i: int = i) -> Array:
+        def at(k: float, i: int = i) -> Array:
             moved = u.copy()
             moved[i] += k
             return function(moved)
 
-        near, wide = ((value_at(k) - value_at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
+        near, wide = ((at(k) - at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
         columns.append((4.0 * near - wide) / 3.0)
     return np.stack(columns, axis=-1)
 
@@ -226,37 +209,28 @@ class IntegralFormulas:
         """How many."""
         return len(self.formulas)
 
-    def _jets(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
-        """Weights of all Gauss points, and value and derivatives of each formula there."""
+    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+        """Their derivatives, and the integrals."""
         c = collocation.scheme(bounded.m)
         x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)
         u = np.hstack([x, np.tile(orbit.y[1:], (len(x), 1))])
         given = _given(bounded, 1)
         found = np.array([np.delete(one._jet(given, u), 1, axis=1) for one in self.formulas])
-        return np.outer(np.diff(orbit.mesh), c.weights).ravel(), found
-
-    def values(self, bounded: Bounded, orbit: Orbit) -> Array:
-        """The integrals."""
-        weights, found = self._jets(bounded, orbit)
-        return np.asarray(found[:, :, 0] @ weights)
-
-    def slopes(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
-        """Their derivatives."""
-        weights, found = self._jets(bounded, orbit)
-        return _of_integrals(bounded, orbit, weights, found[:, :, 1:])
+        weights = np.outer(np.diff(orbit.mesh), c.weights).ravel()
+        return _of_integrals(bounded, orbit, weights, found[:, :, 1:], found[:, :, 0])
 
 
 def _of_integrals(
-    bounded: Bounded, orbit: Orbit, weights: Array, found: Array
-) -> tuple[Array, Array]:
-    """Rows of integrals, of derivatives by states and free parameters at all Gauss points."""
+    bounded: Bounded, orbit: Orbit, weights: Array, found: Array, values: Array
+) -> Rows:
+    """Rows of integrals, of values and derivatives at all Gauss points."""
     n, m = bounded.n, bounded.m
     shape = (orbit.intervals, m, n)
     rows = np.array(
         [collocation.functional(orbit.mesh, one[:, :n].reshape(shape), m) for one in found]
     ).reshape(len(found), *orbit.x.shape)
     by_y = np.einsum("k,rkp->rp", weights, found[:, :, n:])
-    return rows, np.hstack([np.zeros((len(found), 1)), by_y])
+    return rows, np.hstack([np.zeros((len(found), 1)), by_y]), np.asarray(values @ weights)
 
 
 @dataclass(frozen=True)
@@ -275,23 +249,16 @@ class IntegralFunction:
         each = [np.ravel(self.function(one.copy(), **values)) for one in x]
         return np.array(each, dtype=float).reshape(len(x), self.count).T
 
-    def _points(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
+    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+        """Their derivatives, and the integrals."""
         c = collocation.scheme(bounded.m)
         x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)
-        return np.outer(np.diff(orbit.mesh), c.weights).ravel(), x
-
-    def values(self, bounded: Bounded, orbit: Orbit) -> Array:
-        """The integrals."""
-        weights, x = self._points(bounded, orbit)
-        return np.asarray(self._values(bounded, x, orbit.y[1:]) @ weights)
-
-    def slopes(self, bounded: Bounded, orbit: Orbit) -> tuple[Array, Array]:
-        """Their derivatives."""
-        weights, x = self._points(bounded, orbit)
+        weights = np.outer(np.diff(orbit.mesh), c.weights).ravel()
         n = bounded.n
 
         def moved(by: Array) -> Array:
             return self._values(bounded, x + by[:n], orbit.y[1:] + by[n:])
 
-        found = differences_of(moved, np.zeros(n + bounded.q - 1), _given(bounded, 1).scale)
-        return _of_integrals(bounded, orbit, weights, found)
+        nothing = np.zeros(n + bounded.q - 1)
+        found = differences_of(moved, nothing, _given(bounded, 1).scale)
+        return _of_integrals(bounded, orbit, weights, found, moved(nothing))

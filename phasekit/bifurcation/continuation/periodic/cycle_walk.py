@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, where
 from phasekit.bifurcation.continuation.periodic.events import find
 from phasekit.bifurcation.continuation.periodic.family import Found, Path, join
 from phasekit.bifurcation.continuation.periodic.point import Point, State
-from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow, where
+from phasekit.bifurcation.continuation.periodic.trace import Track, begin, follow
 from phasekit.bifurcation.continuation.periodic.vertical import said_of
 from phasekit.bifurcation.continuation.specials import NOT_SEARCHED
 from phasekit.bifurcation.continuation.stops import Stop

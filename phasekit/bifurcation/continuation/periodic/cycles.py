@@ -403,3 +403,11 @@ class Cycles:
         at = collocation.times(mesh, self.m)
         moved = [collocation.interpolate(orbit.mesh, one, self.m, at) for one in (orbit.x, *more)]
         return Orbit(mesh, moved[0], orbit.y.copy()), tuple(moved[1:])
+
+
+def where(cycles: Cycles, orbit: Orbit) -> str:
+    """The period, if it is one, and the free parameters, in words."""
+    names = ["period", *(cycles.field.parameters[i] for i in cycles.active)]
+    # On curves of folds and tori kappa or omega follows.
+    values = list(zip(names, orbit.y.tolist(), strict=False))[0 if cycles.closes else 1 :]
+    return ", ".join(f"{name} = {value:.9g}" for name, value in values)

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic import along, collocation, homoclinic, starts
 from phasekit.bifurcation.continuation.periodic.between import Stretch, root
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.connections import ending
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, where
 from phasekit.bifurcation.continuation.periodic.extended import TORUS, Extended
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 
@@ -64,6 +65,10 @@ def end_of(
             stays = before.orbit.y[0] == value
             last = None if stays else at_value(cycles, before, made, -1, value)
             return last, Stop("bound", f"period met its {side} bound {value:.9g}")
+    if getattr(cycles, "kind", "") == "connection":
+        why = ending(cycles, made.orbit, start.orbit)  # type: ignore[arg-type]
+        if why is not None:
+            return None, Stop(why[0], f"{why[1]}; the last at {where(cycles, before.orbit)}")
     if homoclinic.near(cycles, made, start) and not homoclinic.awaited(cycles, made.orbit):
         return made, homoclinic.stop(cycles, made.orbit)
     grown = _without_bound(cycles, made)

@@ -214,5 +214,4 @@ for _test in (
 
 def looked_for_on(cycles: Cycles) -> tuple[OrbitTest, ...]:
     """What is looked for along a family or a curve."""
-    kind = cycles.kind if isinstance(cycles, Extended) else CYCLE
-    return tuple(functions_along(kind))
+    return tuple(functions_along(getattr(cycles, "kind", CYCLE)))

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic import collocation, ends
 from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution, where
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 from phasekit.numerics.waits import stage
 
@@ -139,14 +139,6 @@ def _unscaled(cycles: Cycles, local: Cycles, found: Solution) -> tuple[Solution,
         f.message, f.length,
     )  # fmt: skip
     return made, length
-
-
-def where(cycles: Cycles, orbit: Orbit) -> str:
-    """The period, if it is one, and the free parameters, in words."""
-    names = ["period", *(cycles.field.parameters[i] for i in cycles.active)]
-    # On curves of folds and tori kappa or omega follows.
-    values = list(zip(names, orbit.y.tolist(), strict=False))[0 if cycles.closes else 1 :]
-    return ", ".join(f"{name} = {value:.9g}" for name, value in values)
 
 
 def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float] | str:

@@ -1,0 +1,216 @@
+"""Connecting orbits: exact ones, published values, their errors, and what is refused."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import phasekit as pk
+
+LORENZ = {"x": "s*(y - x)", "y": "r*x - y - x*z", "z": "x*y - b*z"}
+LOOP = 13.9265574075201275  # by series, 45 digits
+
+
+def lorenz(**values: float) -> pk.Problem:
+    return pk.Problem(LORENZ, parameters={"r": 13.9, "s": 10.0, "b": 8 / 3, **values})
+
+
+def test_lorenz_closes_at_the_value_of_the_series() -> None:
+    loop = pk.connection(lorenz(), ([0, 0, 0], [0, 0, 0]), free="r")
+    assert loop.kind == "connection"
+    assert float(loop.points.r[0]) == pytest.approx(LOOP, rel=1e-12)
+    assert float(loop.points.truncation_error[0]) < 1e-12
+    r = LOOP
+    leading = (-11 + np.sqrt(121 + 40 * (r - 1))) / 2
+    assert float(loop.points.saddle_value[0]) == pytest.approx(leading - 8 / 3, rel=1e-10)
+    orbit = loop.orbit(0)
+    assert abs(orbit.x.values[0]) < 1e-5
+    assert pickle.loads(pickle.dumps(loop)) == loop
+
+
+@pytest.mark.parametrize("ends", [1e-2, 1e-3, 1e-4])
+def test_error_of_truncation_is_what_a_longer_time_changes(ends: float) -> None:
+    """At twice the time the distance of the ends is squared, and the error its square again."""
+    near = {"ends": ends, "options": pk.ContinuationOptions(mesh_tolerance=1e-11)}
+    problem = pk.Problem(
+        {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}, parameters={"c": 0.28, "a": 0.3}
+    )
+    short = pk.connection(problem, ([0, 0], [1, 0]), free="c", **near)
+    error = abs(float(short.points.c[0]) - np.sqrt(2) * 0.2)
+    said = float(short.points.truncation_error[0])
+    assert error == pytest.approx(said, rel=0.2, abs=1e-13)
+    long = pk.connection(lorenz(), ([0, 0, 0], [0, 0, 0]), free="r", ends=ends / 10)
+    error = abs(float(long.points.r[0]) - LOOP)
+    assert error == pytest.approx(float(long.points.truncation_error[0]), rel=0.05, abs=1e-10)
+
+
+def test_family_of_cycles_goes_on_as_its_homoclinic_orbit() -> None:
+    problem = lorenz(r=20.0)
+    state = np.sqrt(8 / 3 * 19)
+    rest = pk.continuation(problem, "r", x0=[state, state, 19.0], span=(10, 30))
+    cycles = rest.special("H")[0].switch()
+    (end,) = [stop for stop in cycles.stops if stop.reason == "homoclinic"]
+    loop = end.connection()
+    assert float(loop.points.r[0]) == pytest.approx(LOOP, rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    ("problem", "ends", "free", "value"),
+    [
+        (
+            pk.Problem(
+                {"x": "y", "y": "x*(1 - z) - la*y", "z": "-al*z + x^2"},
+                parameters={"la": 1.2, "al": 0.4},
+            ),
+            ([0, 0, 0], [0, 0, 0]), "la", 1.205391102421,
+        ),
+        (
+            pk.Problem(
+                {
+                    "x": "(-(be + nu)*x + be*y - a3*x^3 + b3*(y - x)^3)/r",
+                    "y": "be*x - be*y - z - b3*(y - x)^3", "z": "y",
+                },
+                parameters={"nu": -0.7213, "be": 0.6, "r": 0.6, "a3": 0.328578, "b3": 0.933578},
+            ),
+            ([0, 0, 0], [0, 0, 0]), "nu", -0.721309250378,
+        ),
+        (
+            pk.Problem(
+                {
+                    "x": "a*x + b*y - a*x^2 + (mut - al*z)*x*(2 - 3*x)",
+                    "y": "b*x + a*y - 1.5*b*x^2 - 1.5*a*x*y - (mut - al*z)*2*y",
+                    "z": "-2*z + mu*x + al*be*(x^2*(1 - x) - y^2)",
+                },
+                parameters={"mut": 0.06, "a": 0.5, "b": 3.0, "al": 1.0, "be": 0.0, "mu": 0.25},
+            ),
+            ([0, 0, 0], [0, 0, 0]), "mut", 0.067326217055,
+        ),
+    ],
+    ids=["Shimizu-Morioka", "Freire", "Sandstede"],
+)  # fmt: skip
+def test_published_loops(problem, ends, free: str, value: float) -> None:
+    loop = pk.connection(problem, ends, free=free)
+    assert float(loop.points[free][0]) == pytest.approx(value, abs=1e-9)
+
+
+@pytest.mark.parametrize(("a", "b", "al"), [(0.0, 1.0, 0.3), (0.5, 3.0, 1.0), (-0.3, 1.5, -0.7)])
+def test_loops_of_sandstede_are_exact(a: float, b: float, al: float) -> None:
+    problem = pk.Problem(
+        {
+            "x": "a*x + b*y - a*x^2 + (mut - al*z)*x*(2 - 3*x)",
+            "y": "b*x + a*y - 1.5*b*x^2 - 1.5*a*x*y - (mut - al*z)*2*y",
+            "z": "-2*z + al*(x^2*(1 - x) - y^2)",
+        },
+        parameters={"mut": 0.001, "a": a, "b": b, "al": al},
+    )
+    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="mut")
+    assert float(loop.points.mut[0]) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_t_point_of_lorenz_takes_two_parameters() -> None:
+    problem = lorenz(s=10.2, r=30.9)
+    state = -np.sqrt(8 / 3 * 29.9)
+    ends = ([0, 0, 0], [state, state, 29.9])
+    point = pk.connection(problem, ends, free=("s", "r"))
+    assert float(point.points.s[0]) == pytest.approx(10.16728945482, abs=1e-10)
+    assert float(point.points.r[0]) == pytest.approx(30.86808746815, abs=1e-10)
+    with pytest.raises(pk.ParameterError, match="2 free parameters"):
+        pk.connection(problem, ends, free="s")
+
+
+def test_shearing_connects_in_five_dimensions() -> None:
+    problem = pk.Problem(
+        {
+            "a": "a*b + a*mu - c*d", "b": "-(a^2 + b)", "c": "c*mu + a*d - 9*s*c/(4*(s + 1))",
+            "d": "(-s*d + 3*a*c*(1 + 1/s))/4", "e": "z*(d - e)/4",
+        },
+        parameters={"mu": 0.1638, "s": 0.5, "z": 0.2},
+    )  # fmt: skip
+    first = [np.sqrt(0.1638), -0.1638, 0, 0, 0]
+    front = pk.connection(problem, (first, [0, 0, 0, 0, 0]), free="mu")
+    assert float(front.points.mu[0]) == pytest.approx(0.163874780850, abs=1e-10)
+
+
+def test_reversible_orbit_is_exact() -> None:
+    problem = pk.Problem(
+        {"u": "v", "v": "w", "w": "z", "z": "-P*w - u + u^3 + d*v"},
+        parameters={"P": -2.5, "d": 0.0},
+    )
+    t = np.linspace(-30, 30, 2001)
+    u = np.sqrt(15 / 8) / np.cosh(t / np.sqrt(8)) ** 2
+    v = np.gradient(u, t)
+    w = np.gradient(v, t)
+    states = {"u": u, "v": v, "w": w, "z": np.gradient(w, t)}
+    guess = xr.Dataset({name: ("time", x) for name, x in states.items()}, {"time": t})
+    loop = pk.connection(problem, guess, free="d")
+    assert float(loop.points.d[0]) == pytest.approx(0.0, abs=1e-12)
+    assert float(loop.points.u_max[0]) == pytest.approx(np.sqrt(15 / 8), abs=1e-11)
+
+
+@pytest.mark.parametrize("system", [pk.Coefficients(2.0, 1.0, 0.3), pk.Coefficients(3, 0.5, -0.2)])
+def test_lobes_and_turns_are_those_of_separatrices(system: pk.Coefficients) -> None:
+    exact = pk.separatrices(system)
+    for saddle in ("lower", "upper"):
+        phi = float(exact.saddle_phi.sel(saddle=saddle))
+        if int(exact.loop.sel(saddle=saddle)) == 1:
+            loop = pk.connection(system, ([phi, 0], [phi, 0]))
+            turning = exact.turning_phi.sel(saddle=saddle).values
+            extreme = [float(loop.points.phi_min[0]), float(loop.points.phi_max[0])]
+            assert min(abs(turning[0] - extreme[0]), abs(turning[1] - extreme[1])) < 1e-10
+        else:
+            loop = pk.connection(system, ([phi, 0], [phi + 2 * np.pi, 0]))
+            area = float(exact.winding_area.sel(saddle=saddle))
+            orbit = loop.orbit(0)
+            found = np.trapezoid(orbit.dphi.values, orbit.phi.values)
+            assert found == pytest.approx(area, rel=1e-3)
+        assert float(loop.points.unfolding[0]) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(("mu", "reach"), [(0.25, 3.0), (1.0, 4.0), (0.1, 1.0)])
+def test_ramp_tips_at_its_exact_rate(mu: float, reach: float) -> None:
+    exact = 4 * mu / (reach * (reach - 2 * np.sqrt(mu)))
+    ramp = pk.Problem(
+        {"x": "(x + l)^2 - mu", "l": "r*l*(L - l)"},
+        parameters={"mu": mu, "L": reach, "r": 1.2 * exact},
+    )
+    root = np.sqrt(mu)
+    front = pk.connection(ramp, ([-root, 0], [root - reach, reach]), free="r")
+    assert float(front.points.r[0]) == pytest.approx(exact, abs=1e-12)
+
+
+def test_curve_of_fronts_is_exact(tmp_path: Path) -> None:
+    problem = pk.Problem(
+        {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}, parameters={"c": 0.28, "a": 0.3}
+    )
+    curve = pk.connection(problem, ([0, 0], [1, 0]), free="c").curve("a", (0.1, 0.45))
+    assert [stop.reason for stop in curve.stops] == ["bound", "bound"]
+    np.testing.assert_allclose(curve.points.c, np.sqrt(2) * (0.5 - curve.points.a), atol=1e-11)
+    assert float(curve.points.truncation_error.max()) < 1e-12
+    assert pickle.loads(pickle.dumps(curve)) == curve
+    curve.save(tmp_path / "fronts.nc")
+    loaded = pk.Branch.load(tmp_path / "fronts.nc")
+    assert loaded == curve
+    assert isinstance(loaded, pk.ConnectionBranch)
+    longer = {"bounds": {"a": (0.1, 0.6)}}
+    assert loaded.extend(20, **longer) == curve.extend(20, **longer)
+
+
+def test_what_cannot_be_connected_is_refused() -> None:
+    forced = pk.Problem(
+        {"x": "y", "y": "x - x^3 + a*cos(t)"}, parameters={"a": 0.1}, time="t", period=2 * np.pi
+    )
+    with pytest.raises(pk.ParameterError, match="connections to cycles are not followed"):
+        pk.connection(forced, ([0, 0], [0, 0]), free="a")
+    with pytest.raises(pk.ParameterError, match="orbit: got"):
+        pk.connection(lorenz(), 3.0, free="r")
+    with pytest.raises(pk.ParameterError, match="free: got"):
+        pk.connection(lorenz(), ([0, 0, 0], [0, 0, 0]))
+    with pytest.raises(pk.ParameterError, match="ends: got"):
+        pk.connection(lorenz(), ([0, 0, 0], [0, 0, 0]), free="r", ends=1.0)
+    center = pk.Problem({"x": "y", "y": "-x + a*x^2"}, parameters={"a": 1.0})
+    with pytest.raises(pk.ParameterError, match="hyperbolic|no unstable"):
+        pk.connection(center, ([0, 0], [0, 0]), free="a")
