@@ -34,7 +34,7 @@ class Condition(Protocol):
     def count(self) -> int:
         """How many."""
 
-    def at(self, bounded: Any, orbit: Orbit) -> Rows:
+    def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Their derivatives by the values at all places and by y, and the numbers."""
 
 
@@ -94,7 +94,7 @@ class Bounded(Cycles):
             k = 1
         for one in self.conditions:
             here = slice(k, k + one.count)
-            rows[here], rows_y[here], values = one.at(self, orbit)
+            rows[here], rows_y[here], values = one.linear(self, orbit)
             linear = np.einsum("rkn,kn->r", rows[here], orbit.x) + rows_y[here] @ orbit.y
             target[here] = linear - values
             k = here.stop
@@ -142,7 +142,7 @@ class EndFormulas:
         """How many."""
         return len(self.formulas)
 
-    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+    def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the numbers."""
         u = np.concatenate([orbit.x[0], orbit.x[-1], orbit.y[1:]])
         given = _given(bounded, 2)
@@ -174,7 +174,7 @@ class EndFunction:
         found = self.function(u[:n].copy(), u[n : 2 * n].copy(), **values)
         return np.asarray(found, dtype=float).reshape(self.count)
 
-    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+    def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the numbers."""
         u = np.concatenate([orbit.x[0], orbit.x[-1], orbit.y[1:]])
         scale = _given(bounded, 2).scale
@@ -188,12 +188,12 @@ def differences_of(function: Callable[[Array], Array], u: Array, scale: Array) -
     for i in range(len(u)):
         h = STEP * max(abs(float(u[i])), float(scale[i]))
 
-        def at(k: float, i: int = i) -> Array:
-            moved = u.copy()
-            moved[i] += k
-            return function(moved)
+        def moved(k: float, i: int = i) -> Array:
+            place = u.copy()
+            place[i] += k
+            return function(place)
 
-        near, wide = ((at(k) - at(-k)) / (2.0 * k) for k in (h, 2.0 * h))
+        near, wide = ((moved(k) - moved(-k)) / (2.0 * k) for k in (h, 2.0 * h))
         columns.append((4.0 * near - wide) / 3.0)
     return np.stack(columns, axis=-1)
 
@@ -209,7 +209,7 @@ class IntegralFormulas:
         """How many."""
         return len(self.formulas)
 
-    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+    def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the integrals."""
         c = collocation.scheme(bounded.m)
         x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)
@@ -249,7 +249,7 @@ class IntegralFunction:
         each = [np.ravel(self.function(one.copy(), **values)) for one in x]
         return np.array(each, dtype=float).reshape(len(x), self.count).T
 
-    def at(self, bounded: Bounded, orbit: Orbit) -> Rows:
+    def linear(self, bounded: Bounded, orbit: Orbit) -> Rows:
         """Their derivatives, and the integrals."""
         c = collocation.scheme(bounded.m)
         x = collocation.at_gauss(orbit.x, bounded.m).reshape(-1, bounded.n)

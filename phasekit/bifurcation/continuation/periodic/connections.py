@@ -155,7 +155,7 @@ class Ends:
             planes(rests[1].A, self.stable, stable=True)[1],
         )
 
-    def at(self, bounded: Any, orbit: Orbit) -> Rows:
+    def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Derivatives of what vanishes, and its values.
 
         How the subspaces turn with the parameters is left out: at this distance that is rounding.
