@@ -171,12 +171,12 @@ def _found(
         walker = CycleWalk(bounded)
         return branch_of(ConnectionBranch, problem, walker, start, (None, None), {}, origin)
     raise ConvergenceError(
-        f"connection: no orbit was found near {', '.join(map(_said, names, values))}: {said}; "
+        f"connection: no orbit was found near {', '.join(map(_equation, names, values))}: {said}; "
         "give other parameters, or an orbit"
     )
 
 
-def _said(name: str, value: float) -> str:
+def _equation(name: str, value: float) -> str:
     return f"{name} = {value:.9g}"
 
 
