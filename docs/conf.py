@@ -71,12 +71,20 @@ sphinx_gallery_conf = {
     "plot_gallery": True,
 }
 
-# A page of the explorer, as `pk.explore(...).save(...)` writes it.
+# Pages of the explorer, as `pk.explore(...).save(...)` writes them.
 _disk = phasekit.GyroRotorDisk(
     beta=40 * phasekit.deg, e=0.05, a=0.024, r=0.2, omega1=300 * phasekit.rpm, m=2.0, half_span=0.15
 )
 (_here / "auto_explorer").mkdir(exist_ok=True)
 phasekit.explore(_disk).save(_here / "auto_explorer" / "explorer_page.html")
+_neuron = phasekit.Problem(
+    {"v": "v - v^3/3 - w + I", "w": "eps*(v + a - b*w)"},
+    parameters={"I": 0.5, "eps": 0.08, "a": 0.7, "b": 0.8},
+    window={"v": (-2.5, 2.5), "w": (-1.0, 2.0)},
+)
+phasekit.explore(_neuron, over=[("I", "eps"), ("I", "b")], ranges={"I": (0, 2)}).save(
+    _here / "auto_explorer" / "explorer_equations.html"
+)
 
 html_theme = "pydata_sphinx_theme"
 html_title = "phasekit"

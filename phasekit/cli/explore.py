@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from phasekit.cli import Parser, common
-from phasekit.cli.values import glue_negative_values, number
+from phasekit.cli.values import ends, glue_negative_values, number
 from phasekit.errors import ParameterError
 
 #: What is shown where no parameter is given: the rotor of the demo, with mass and bearings.
@@ -32,22 +32,40 @@ def run(argv: Sequence[str]) -> None:
     path = _target(options)
     from phasekit.explorer.explore import explore
 
-    page = explore(system)
+    page = explore(system, **_shown(options))
     path = page.save(path or Path(tempfile.mkdtemp(prefix="phasekit-")) / "explorer.html")
     common.say(f"{system}\nwrote {path}")
     if not options.no_open:
         _open(path.resolve())
 
 
+def _shown(options: Any) -> dict[str, Any]:
+    """What the page of equations is asked for."""
+    found: dict[str, Any] = {}
+    duration = getattr(options, "duration_of_file", None)
+    if duration is not None:
+        found["duration"] = duration
+    if getattr(options, "over", None):
+        found["over"] = [tuple(name.strip() for name in pair.split(",")) for pair in options.over]
+    if getattr(options, "range", None):
+        found["ranges"] = {}
+        for text in options.range:
+            name, equals, reach = text.partition("=")
+            if not equals or ":" not in reach:
+                raise ParameterError(f"--range: got {text!r}, wants NAME=FROM:TO, such as I=0:2")
+            found["ranges"][name.strip()] = ends(f"--range {name}", reach, "1")
+    return found
+
+
 def _model(argv: Sequence[str]) -> tuple[Any, Any]:
     options, model, given = common.read_model(
         "explore",
-        "Write a page with phase portrait, potential well, bifurcation diagram and parameter map "
-        "of one system, with a slider for every parameter, and open it in a browser. Without "
+        "Write a page with phase portrait, diagrams and a map over two parameters of one system, "
+        "with a slider for every parameter, and open it in a browser. Without "
         "parameters it shows a disk. --potential FORMULA shows any potential; see phasekit explore "
         "--potential x --help.",
         argv,
-        _options,
+        _model_options,
     )
     of_class = isinstance(model, type)
     if of_class and not given and EXAMPLE.keys() <= {p.name for p in model.declared}:
@@ -56,6 +74,23 @@ def _model(argv: Sequence[str]) -> tuple[Any, Any]:
     if swept:
         raise ParameterError(f"--{swept[0]}: got a range, wants one value; the page has sliders")
     return options, system
+
+
+def _model_options(parser: Parser) -> None:
+    _options(parser)
+    parser.add_argument(
+        "--over",
+        action="append",
+        metavar="NAME,NAME",
+        help="two parameters of a file of equations, over which curves of bifurcations are "
+        "computed; may be given several times",
+    )
+    parser.add_argument(
+        "--range",
+        action="append",
+        metavar="NAME=FROM:TO",
+        help="the range of a slider of a file of equations; may be given several times",
+    )
 
 
 def _options(parser: Parser) -> None:

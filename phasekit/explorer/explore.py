@@ -3,32 +3,65 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from phasekit.errors import StoreError
-from phasekit.explorer.page import page
-from phasekit.labels.arguments import bad
-from phasekit.laws.ladder import Conservative
+from phasekit.explorer.equations import equations_as_script
+from phasekit.explorer.explored import explored_facts
+from phasekit.explorer.facts import facts_of
+from phasekit.explorer.law import law_of
+from phasekit.explorer.page import EQUATIONS, page
+from phasekit.labels.arguments import bad, call_checked
+from phasekit.laws.ladder import Conservative, Law, Routhian
+from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.system import as_system, single
 
 #: Height of the page in a notebook, in pixels of the screen.
 HEIGHT = 900
 
 
-def explore(system: Any) -> Explorer:
+@call_checked
+def explore(
+    system: Any,
+    *,
+    over: Any = None,
+    ranges: Mapping[str, Sequence[float]] | None = None,
+    window: Mapping[str, Sequence[float]] | None = None,
+    plane: Sequence[str] | None = None,
+    duration: float | None = None,
+) -> Explorer:
     """Build an interactive page of a system.
 
-    Phase portrait, potential well, bifurcation diagram and parameter map with the fold curve, with
-    a slider for every parameter. A click in the portrait starts an orbit, a click in the map moves
-    the system there. The page is one static file that works without a server and asks for nothing
-    from outside.
+    Of a system in a potential: phase portrait, potential well, bifurcation diagram and parameter
+    map with the fold curve. Of any other equations: phase portrait with field, nullclines,
+    equilibria, manifolds of saddles and limit cycles, or a projection of more than two states;
+    motions in time; a diagram of where motions end up over a parameter; curves of bifurcations over
+    two parameters. There is a slider for every parameter. A click in the portrait starts a motion,
+    a click in a map moves the system there. The page is one static file that works without a server
+    and asks for nothing from outside.
 
     Parameters
     ----------
     system : system
-        A trigonometric system or a `Potential`; its parameters are scalars.
+        Its parameters are scalars. Equations are formulas; forced ones have a period.
+    over : (str, str) or sequence of such pairs, optional
+        Of equations: the two parameters over which curves of bifurcations of equilibria are
+        computed, or several pairs. The first two by default, none if there is one parameter or the
+        system is forced; ``()`` for none.
+    ranges : mapping of str to (float, float), optional
+        Of equations: ranges of sliders, by parameter. By default they reach from minus the value
+        to four times that.
+    window : mapping of str to (float, float), optional
+        Of equations: what the portrait shows, and where equilibria and cycles are looked for, by
+        state; by default the system's own window.
+    plane : (str, str), optional
+        Of equations of more than two states: those that are drawn at first; they can be chosen in
+        the page.
+    duration : float, optional
+        Of equations: the time, or the number of iterations, for which motions are shown at first.
 
     Returns
     -------
@@ -38,14 +71,18 @@ def explore(system: Any) -> Explorer:
     Raises
     ------
     ParameterError
-        If it is no such system, a parameter is an array, or its potential holds a function that
-        pages have not.
+        If it is no system, a parameter is an array, its equations are functions of Python or hold a
+        function that pages have not, a state has no window, or an argument does not belong to it.
 
     Notes
     -----
     The formulas of the page are printed from the law that phasekit computes with. The page computes
-    in doubles by itself: equilibria, turning points, periods and areas agree with phasekit to 1e-9
-    where the parameters decide them; next to folds and separatrices the library has more digits.
+    in doubles by itself. Of systems in a potential, equilibria, turning points, periods and areas
+    agree with phasekit to 1e-9 where the parameters decide them; next to folds and separatrices the
+    library has more digits. Of equations, equilibria, their eigenvalues and the periods and
+    multipliers of limit cycles agree to 1e-7; motions are drawn with a tolerance of 1e-8. A page
+    proves nothing: equilibria and cycles are looked for, and may be missed. The curves over two
+    parameters are followed by `diagram` and the points' ``curve`` when the page is built.
 
     Examples
     --------
@@ -55,11 +92,34 @@ def explore(system: Any) -> Explorer:
     Explorer of Pendulum(length=0.5, g=9.80665); .save("page.html") writes it, ... kB
     >>> page.html.startswith("<!doctype html>")
     True
+    >>> neuron = pk.Problem(
+    ...     {"v": "v - v^3/3 - w + I", "w": "eps*(v + a - b*w)"},
+    ...     parameters={"I": 0.5, "eps": 0.08, "a": 0.7, "b": 0.8},
+    ...     window={"v": (-2.5, 2.5), "w": (-1, 2)},
+    ... )
+    >>> pk.explore(neuron, over=("I", "b"), ranges={"I": (0, 2)})
+    Explorer of Problem(v' = I - v**3/3 + v - w, ...); .save("page.html") writes it, ... kB
     """
-    found = as_system(system, rung=Conservative, what="the explorer")
-    _, parameters = single(found)
-    found.law.check_searchable()  # type: ignore[attr-defined, unused-ignore]
-    return Explorer(found, page(found, parameters))
+    found = as_system(system, rung=Law, what="the explorer")
+    found = getattr(found, "system", None) or found if isinstance(found, Problem) else found
+    if found.standing.traits is None and issubclass(found.rung, Conservative):
+        given = {
+            "over": over, "ranges": ranges, "window": window, "plane": plane, "duration": duration
+        }  # fmt: skip
+        for name, value in given.items():
+            if value is not None:
+                raise bad(name, value, "nothing for a system in a potential")
+        _, parameters = single(found)
+        found.law.check_searchable()  # type: ignore[attr-defined, unused-ignore]
+        return Explorer(found, page(facts_of(found, parameters), law_of(found)))
+    if found.standing.traits is None and not issubclass(found.rung, Routhian):
+        single(found)
+    problem = as_problem(found)
+    facts = explored_facts(
+        found, problem, over=over, ranges=ranges, window=window, plane=plane, duration=duration
+    )
+    law = equations_as_script(problem)
+    return Explorer(found, page(facts, law, EQUATIONS, "flow.html"))
 
 
 @dataclass(frozen=True, repr=False)

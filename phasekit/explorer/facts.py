@@ -43,14 +43,20 @@ def _parameter(parameter: Parameter, values: dict[str, float], system: System) -
         abs(values[p.name]) for p in system.declared
         if p.units == parameter.units and values.get(p.name)
     ]  # fmt: skip
-    low, high = slider(parameter, value, max(like, default=1.0))
+    return parameter_facts(parameter, value, slider(parameter, value, max(like, default=1.0)))
+
+
+def parameter_facts(
+    parameter: Parameter, value: float | None, ends: tuple[float, float]
+) -> dict[str, Any]:
+    """Return what a slider needs: name, unit, meaning, value, the ends of its range, the domain."""
     return {
         "name": parameter.name,
         "units": "" if parameter.units == "1" else parameter.units,
         "meaning": parameter.long_name,
         "value": value,
-        "low": low,
-        "high": high,
+        "low": ends[0],
+        "high": ends[1],
         "least": parameter.low if math.isfinite(parameter.low) else None,
         "most": parameter.high if math.isfinite(parameter.high) else None,
         "positive": parameter.positive,

@@ -35,7 +35,9 @@ _COMPARISONS = {
 }
 
 
-def function(expressions: Sequence[Any], names: Mapping[Any, str], arguments: str) -> str:
+def function(
+    expressions: Sequence[Any], names: Mapping[Any, str], arguments: str, into: str = ""
+) -> str:
     """Write expressions of symbols as one JavaScript function, which returns one value or a list.
 
     Parameters
@@ -46,6 +48,8 @@ def function(expressions: Sequence[Any], names: Mapping[Any, str], arguments: st
         JavaScript for each symbol.
     arguments : str
         The function's arguments.
+    into : str, optional
+        The argument that takes the values; nothing is returned then.
 
     Raises
     ------
@@ -57,6 +61,8 @@ def function(expressions: Sequence[Any], names: Mapping[Any, str], arguments: st
     >>> from sympy.abc import x, y
     >>> function([x**2 + y, 2.5 * x], {x: "x", y: "p[0]"}, "x, p")
     '(x, p) => { return [p[0]+(x*x), 2.5*x]; }'
+    >>> function([x**2 + y, 2.5 * x], {x: "x", y: "p[0]"}, "x, p, out", "out")
+    '(x, p, out) => { out[0] = p[0]+(x*x); out[1] = 2.5*x; }'
     """
     import sympy as sp
 
@@ -67,6 +73,9 @@ def function(expressions: Sequence[Any], names: Mapping[Any, str], arguments: st
         lines.append(f"const t{i} = {write(part, known)}; ")
         known[symbol] = f"t{i}"
     values = [write(part, known) for part in rest]
+    if into:
+        lines += [f"{into}[{i}] = {value}; " for i, value in enumerate(values)]
+        return f"({arguments}) => {{ {''.join(lines)}}}"
     result = values[0] if len(values) == 1 else f"[{', '.join(values)}]"
     return f"({arguments}) => {{ {''.join(lines)}return {result}; }}"
 
@@ -85,7 +94,7 @@ def write(node: Any, names: Mapping[Any, str]) -> str:
         return names[node]
     if node.is_Number or node.is_NumberSymbol:
         return _number(node)
-    if node.is_Boolean:
+    if node.is_Boolean or node.is_Relational:
         return _condition(node, names)
     if node.is_Add:
         return "+".join(_bracketed(arg, names, sums=False) for arg in node.args)
@@ -100,14 +109,16 @@ def write(node: Any, names: Mapping[Any, str]) -> str:
         return _piecewise(node, names)
     if kind in ORDERED and not node.args[0].is_Integer:
         raise ParameterError(
-            f"system: got a potential with {kind} of the order {node.args[0]}, wants a whole order "
+            f"system: got a formula with {kind} of the order {node.args[0]}, wants a whole order "
             "for the page; the library itself takes any"
         )
+    if kind == "DiracDelta":  # the slope of a jump, beside it
+        return "0"
     if kind in FUNCTIONS:
         arguments = node.args[:1] if kind == "Heaviside" else node.args
         return f"{FUNCTIONS[kind]}({', '.join(write(arg, names) for arg in arguments)})"
     raise ParameterError(
-        f"system: got a potential with {kind}, wants one of the functions that a page has: "
+        f"system: got a formula with {kind}, wants one of the functions that a page has: "
         f"{', '.join(sorted(FUNCTIONS))}"
     )
 
@@ -184,6 +195,8 @@ def _piecewise(node: Any, names: Mapping[Any, str]) -> str:
 
 
 def _condition(node: Any, names: Mapping[Any, str]) -> str:
+    if node in names:
+        return names[node]
     kind = type(node).__name__
     if kind in ("BooleanTrue", "BooleanFalse"):
         return "true" if kind == "BooleanTrue" else "false"
@@ -195,4 +208,4 @@ def _condition(node: Any, names: Mapping[Any, str]) -> str:
         return f"({join.join(_condition(arg, names) for arg in node.args)})"
     if kind == "Not":
         return f"(!{_condition(node.args[0], names)})"
-    raise ParameterError(f"system: got a potential with the condition {kind}, wants comparisons")
+    raise ParameterError(f"system: got a formula with the condition {kind}, wants comparisons")

@@ -9,32 +9,44 @@ import json
 from importlib import resources
 from typing import Any
 
-from phasekit.explorer.facts import facts_of
-from phasekit.explorer.law import law_of
-from phasekit.systems.system import System
-
-#: In the order in which they stand in the one script.
-SCRIPTS = (
-    "numerics", "special", "dynamics", "orbits", "drawing", "panels", "exports", "state", "words",
-    "main",
+#: Scripts in the order in which they stand in the one script, before and after the law, of the page
+#: of a system in a potential and of that of equations.
+POTENTIAL = (
+    ("numerics", "special"),
+    (
+        "drawing", "dynamics", "orbits", "panels", "exports", "parameters", "state", "controls",
+        "taken", "words", "main",
+    ),
+)  # fmt: skip
+EQUATIONS = (
+    ("numerics", "special"),
+    (
+        "drawing", "flows", "cycles", "exports", "parameters", "flow_state", "controls",
+        "flow_pictures", "flow_words", "flow_main",
+    ),
 )  # fmt: skip
 
 
-def page(system: System, parameters: dict[str, float]) -> str:
+def page(
+    facts: dict[str, Any],
+    law: str,
+    scripts: tuple[tuple[str, ...], tuple[str, ...]] = POTENTIAL,
+    markup: str = "page.html",
+) -> str:
     """Return the page of one system as HTML.
 
     Nothing that a user wrote becomes markup or script: names, formulas and values stand in a
     block of JSON, which is shown as text; the law is printed by `phasekit.explorer.javascript`.
     The policy of the page allows this one script, by its hash, and no request.
     """
-    facts = facts_of(system, parameters)
     style = asset("style.css")
+    before_law, after_law = scripts
     script = "\n".join(
         (
             '"use strict";\n(() => {',
-            *(asset(f"{name}.js") for name in SCRIPTS[:2]),
-            f"const LAW = {law_of(system)};",
-            *(asset(f"{name}.js") for name in SCRIPTS[2:]),
+            *(asset(f"{name}.js") for name in before_law),
+            f"const LAW = {law};",
+            *(asset(f"{name}.js") for name in after_law),
             "})();",
         )
     )
@@ -49,7 +61,7 @@ def page(system: System, parameters: dict[str, float]) -> str:
         "facts": data(facts),
         "script": script,
     }
-    before, *pieces = asset("page.html").split("{{")
+    before, *pieces = asset(markup).split("{{")
     text = [before]
     for piece in pieces:
         name, _, after = piece.partition("}}")

@@ -145,7 +145,7 @@ def phase_portrait(
 
         problem = _flow(found)
         if loses:
-            window = _window(found, problem, window)
+            window = window_of_damped(found, problem, window)
         return flow_portrait(
             problem, window=window, plane=plane, orbits=orbits, duration=duration, cycles=cycles,
             shade=basins, legend=legend, ax=ax,
@@ -198,7 +198,7 @@ def _flow(system: Any) -> Problem:
     return problem
 
 
-def _window(system: Any, problem: Problem, window: Any) -> Any:
+def window_of_damped(system: Any, problem: Problem, window: Any) -> Any:
     """A window of a system with damping, where none is said: past its separatrices.
 
     Under a torque it reaches past the speed at which damping holds that.

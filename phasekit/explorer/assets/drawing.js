@@ -1,5 +1,10 @@
 // Plots on canvases: axes, curves and marks in the colors of the page.
 
+// Kinds of equilibria.
+const CENTER = "center";
+const SADDLE = "saddle";
+const DEGENERATE = "degenerate";
+
 const paints = new Map(); // cleared when the theme changes
 function paint(name) {
   if (!paints.has(name)) {

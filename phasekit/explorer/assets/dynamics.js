@@ -1,9 +1,6 @@
 // One degree of freedom, x'' = -V'(x), at one set of parameters: equilibria, separatrices, orbits.
 // A torque tilts the potential; then a circle is looked at unrolled.
 
-const CENTER = "center";
-const SADDLE = "saddle";
-const DEGENERATE = "degenerate";
 const SCAN = 256; // steps in which V' is looked at where nothing more is known of it
 
 // Stretches in which V' changes sign once: between the places where V'' does.

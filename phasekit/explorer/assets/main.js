@@ -1,6 +1,5 @@
 // The controls, and what follows from them: one scene, drawn at once.
 
-const $ = (id) => document.getElementById(id);
 const plots = Object.fromEntries(["portrait", "well", "diagram", "map", "force"].map((id) => [id, new Plot($(id))]));
 const LABELS = {
   lower_center: "lower center", upper_center: "upper center", lower_saddle: "lower saddle", upper_saddle: "upper saddle",
@@ -9,16 +8,8 @@ const LABELS = {
 const scene = { timing: 0, mapCells: null };
 let pending = 0;
 
-function element(tag, text, attributes = {}) {
-  const made = document.createElement(tag);
-  if (text !== "") made.textContent = text;
-  for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
-  return made;
-}
-
 const isAngle = (name) => FACTS.parameters.some((one) => one.name === name && one.units === "rad");
 const scaleOf = (name) => (isAngle(name) ? state.angles : "");
-const inDegrees = (yes) => (yes && state.angles === "deg" ? Math.PI / 180 : 1);
 const coordinate = () => (FACTS.coordinate === "phi" ? "φ" : FACTS.coordinate);
 const angleText = (x, n) => (FACTS.angle && state.angles === "deg" && Number.isFinite(x) ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
 
@@ -29,41 +20,7 @@ function axisWords(name) {
   return shown ? `${name}, ${unitWords(shown)}` : name;
 }
 
-const unitWords = (units) => units.replace(/-(\d)/g, (_, n) => `⁻${"⁰¹²³⁴⁵⁶⁷⁸⁹"[n]}`).replace(/([a-z])(\d)/g, (_, a, n) => a + "⁰¹²³⁴⁵⁶⁷⁸⁹"[n]);
-
 // ---------------------------------------------------------------- controls
-
-const STEPS = 1000;
-const controls = new Map();
-
-function addSlider(parent, name, words, units, read, write, range) {
-  const id = `value-${controls.size}`;
-  const box = element("div", "", { class: "slider" });
-  const line = element("div", "", { class: "name" });
-  const label = element("label", name, { for: id });
-  const unit = element("span", "", { class: "unit" });
-  label.append(" ", unit);
-  const number = element("input", "", { type: "text", inputmode: "decimal", id, "aria-describedby": `${id}-meaning` });
-  const slider = element("input", "", { type: "range", min: 0, max: STEPS, step: 1, "aria-label": `${name}, slider` });
-  line.append(label, number);
-  box.append(line, element("div", words, { class: "meaning", id: `${id}-meaning` }), slider);
-  parent.append(box);
-  const control = { name, number, slider, unit, units, read, write, range };
-  controls.set(name, control);
-  slider.addEventListener("input", () => {
-    const [low, high] = range();
-    const value = low + ((high - low) * slider.valueAsNumber) / STEPS;
-    if (control.write(value) === "") soon(control);
-  });
-  number.addEventListener("change", () => {
-    const factor = inDegrees(units === "rad");
-    const text = number.value.trim().replace("−", "-");
-    const why = control.write(text === "" ? NaN : Number(text) * factor);
-    number.setAttribute("aria-invalid", String(why !== ""));
-    complain(why ? [why] : []);
-    if (why === "") update(null);
-  });
-}
 
 function makeControls() {
   FACTS.parameters.forEach((one, i) => {
@@ -94,47 +51,14 @@ function makeControls() {
 }
 
 function showControls(moved) {
-  for (const control of controls.values()) {
-    const { number, slider, unit, units, read, range } = control;
-    const value = read();
-    const factor = inDegrees(units === "rad");
-    unit.textContent = units === "rad" ? state.angles : unitWords(units);
-    const [low, high] = range();
-    if (control !== moved) slider.value = value === null ? 0 : String(Math.round(((value - low) / (high - low)) * STEPS));
-    const text = value === null ? "not given" : digits(value / factor, 8);
-    slider.setAttribute("aria-valuetext", `${text} ${unit.textContent}`);
-    if (value === null) number.placeholder = "not given";
-    if (document.activeElement !== number || moved === null) {
-      number.value = value === null ? "" : text.replace("−", "-");
-      number.setAttribute("aria-invalid", "false");
-    }
-  }
+  showSliders(moved);
   $("diagram-x").value = state.diagram;
   $("map-x").value = state.x;
   $("map-y").value = state.y;
   $("angles").value = state.angles;
 }
 
-function complain(lines) {
-  $("alert").hidden = !lines.length;
-  $("alert").textContent = lines.join("; ");
-}
-
 // ---------------------------------------------------------------- drawing
-
-// Draws at once, and then once a frame, however many changes come.
-const frame = { open: true, due: null };
-function soon(moved) {
-  frame.due = moved;
-  if (!frame.open) return;
-  frame.open = false;
-  frame.due = null;
-  update(moved);
-  requestAnimationFrame(() => {
-    frame.open = true;
-    if (frame.due) soon(frame.due);
-  });
-}
 
 // Draws what a change needs; `moved` is the slider under the hand.
 function update(moved) {
@@ -234,42 +158,6 @@ function moveTo(pairs) {
   update(null);
 }
 
-function onPlot(plot, act, follow) {
-  const { canvas } = plot;
-  let held = false;
-  canvas.addEventListener("pointerdown", (event) => {
-    const at = plot.under(event);
-    if (!at.inside || event.button !== 0) return;
-    held = true;
-    act(at, false);
-  });
-  canvas.addEventListener("pointermove", (event) => {
-    const at = plot.under(event);
-    if (held && event.pointerType === "mouse") act(at, true);
-    else if (follow) follow(at.inside ? [at.x, at.y] : null);
-  });
-  for (const name of ["pointerup", "pointercancel", "pointerleave"]) {
-    canvas.addEventListener(name, () => {
-      held = false;
-      if (name === "pointerleave" && follow) follow(null);
-    });
-  }
-}
-
-function onKeys(plot, act) {
-  plot.canvas.addEventListener("keydown", (event) => {
-    const ways = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowDown: [0, -1], ArrowUp: [0, 1] };
-    const way = ways[event.key];
-    if (event.ctrlKey || event.metaKey || event.altKey) return;
-    if (!way && !["Enter", " ", "Delete", "Escape"].includes(event.key)) return;
-    const factor = event.shiftKey ? 10 : 1;
-    const step = way ? [(way[0] * factor * (plot.x[1] - plot.x[0])) / 100, (way[1] * factor * (plot.y[1] - plot.y[0])) / 100] : null;
-    if (act(event.key, step) !== false) event.preventDefault();
-  });
-}
-
-const within = (value, [low, high]) => Math.min(high, Math.max(low, value));
-
 function wire() {
   onPlot(plots.portrait, (at, dragged) => dragged || startOrbit(at.x, at.y), hover);
   onPlot(plots.map, (at) => moveTo([[state.x, at.x], [state.y, at.y]]));
@@ -318,26 +206,7 @@ function wireExports() {
   });
   $("save-data").addEventListener("click", () => download("phasekit.json", new Blob([toText(dataOf(scene))], { type: "application/json" })));
   $("save-python").addEventListener("click", () => download("phasekit.py", new Blob([pythonOf(scene)], { type: "text/x-python" })));
-  for (const id of ["link", "python"]) {
-    $(`copy-${id}`).addEventListener("click", async () => {
-      $(id).select();
-      let done = true;
-      try {
-        await navigator.clipboard.writeText($(id).value);
-      } catch {
-        done = document.execCommand("copy");
-      }
-      $("copied").textContent = done ? "Copied." : "Selected; copy it with Ctrl+C.";
-    });
-  }
-}
-
-function applyTheme() {
-  const dark = state.theme ? state.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches;
-  document.documentElement.dataset.theme = dark ? "dark" : "light";
-  $("theme").setAttribute("aria-pressed", String(dark));
-  paints.clear();
-  update(null);
+  wireCopies();
 }
 
 function load() {

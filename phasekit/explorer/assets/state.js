@@ -1,7 +1,5 @@
 // What the page shows, and how a link says it.
 
-const FACTS = JSON.parse(document.getElementById("facts").textContent);
-const NAMES = FACTS.parameters.map((one) => one.name);
 const TORQUE = "torque";
 
 // Axes of diagram and map: parameters that the law depends on, and the torque.
@@ -23,8 +21,7 @@ function startState() {
 
 const state = startState();
 
-// Ranges of the sliders: as they came, widened where a value lies outside.
-const ranges = FACTS.parameters.map((one) => [one.low, one.high]);
+// Ranges of the sliders beside those of the parameters.
 const torqueRange = [-1, 1];
 const dampingRange = [0, 1];
 
@@ -42,15 +39,6 @@ function setValue(name, value) {
   const range = rangeOf(name);
   if (value < range[0]) range[0] = value;
   if (value > range[1]) range[1] = value;
-}
-
-// Why a parameter cannot have a value, or "".
-function refused(index, value) {
-  const one = FACTS.parameters[index];
-  const low = one.least ?? -Infinity;
-  const high = one.most ?? Infinity;
-  const inside = Number.isFinite(value) && value >= low && value <= high && !(one.positive && !(value > 0));
-  return inside ? "" : `${one.name}: wants ${one.wants}`;
 }
 
 function writeLink() {

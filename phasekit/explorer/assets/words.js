@@ -1,26 +1,5 @@
 // Words and tables, the link and the lines of Python; they follow the pictures.
 
-
-let telling = 0;
-function later(task) {
-  clearTimeout(telling);
-  telling = setTimeout(task, 60);
-}
-
-function table(id, heads, rows) {
-  const head = element("tr", "");
-  heads.forEach((text) => head.append(element("th", text, { scope: "col" })));
-  const body = element("tbody", "");
-  for (const row of rows) {
-    const line = element("tr", "");
-    row.forEach((text, i) => line.append(i ? element("td", text) : element("th", text, { scope: "row" })));
-    body.append(line);
-  }
-  const top = element("thead", "");
-  top.append(head);
-  $(id).replaceChildren(top, body);
-}
-
 const familyWords = (orbit) => (orbit.kind === "libration" || orbit.kind === "rotation" ? `${orbit.kind}, ${LABELS[orbit.family] ?? orbit.family}` : orbit.kind);
 const unitOf = (text) => (LAW.kind === "trigonometric" ? `, ${text}` : "");
 

@@ -1,0 +1,431 @@
+// The page of equations: its controls, and what follows from them: one scene, drawn at once; searches follow in pieces.
+
+const plots = Object.fromEntries(["portrait", "series", "diagram", "map"].map((id) => [id, new Plot($(id))]));
+const scene = { timing: 0, rests: [], cycles: [], manifolds: [], motions: [], stale: [], diagram: null, searched: "", playing: null, cursor: null };
+const IDLE = 160; // ms without a move before searches begin
+const STARTS = 400; // of Newton's method, where equilibria are looked for
+
+const nameOf = (i) => FACTS.states[i].name;
+const scaleOfState = (i) => (FACTS.states[i].angle ? state.angles : "");
+const scaleOfParameter = (name) => (FACTS.parameters[NAMES.indexOf(name)]?.units === "rad" ? state.angles : "");
+function withUnit(name, units) {
+  const shown = units === "rad" ? state.angles : units;
+  return shown ? `${name}, ${unitWords(shown)}` : name;
+}
+const stateWords = (i) => withUnit(nameOf(i), FACTS.states[i].angle ? "rad" : FACTS.states[i].units);
+const parameterWords = (name) => withUnit(name, FACTS.parameters[NAMES.indexOf(name)].units);
+const stateText = (i, x, n) => (FACTS.states[i].angle && state.angles === "deg" && Number.isFinite(x) ? `${digits(x / (Math.PI / 180), n)}°` : digits(x, n));
+
+// ---------------------------------------------------------------- controls
+
+function makeControls() {
+  FACTS.parameters.forEach((one, i) => {
+    const write = (value) => {
+      const why = refused(i, value);
+      if (!why) setValue(one.name, value);
+      return why;
+    };
+    addSlider($("sliders"), one.name, one.meaning === `parameter ${one.name}` ? "" : one.meaning, one.units, () => state.values[i], write, () => ranges[i]);
+  });
+  $("parameters").hidden = !NAMES.length;
+  addSlider($("extras"), "duration", LAW.discrete ? "iterations that are shown" : "time for which motions are shown", "", () => state.duration,
+    (value) => {
+      const why = refusedTime(value);
+      if (!why) setDuration(value);
+      return why;
+    }, () => durationRange);
+  FACTS.states.forEach((one, i) => {
+    const id = `start-${i}`;
+    const line = element("p", "", { class: "start" });
+    const input = element("input", "", { type: "text", inputmode: "decimal", id });
+    line.append(element("label", one.name, { for: id }), input);
+    $("starts").append(line);
+    input.addEventListener("change", () => {
+      const value = readNumber(input.value, one.angle ? "rad" : one.units, inDegrees(one.angle));
+      const why = Number.isFinite(value) ? "" : `${one.name}: wants a number`;
+      input.setAttribute("aria-invalid", String(why !== ""));
+      complain(why ? [why] : []);
+      if (!why) state.next[i] = value;
+    });
+  });
+  for (const [id, key] of [["plane-x", "x"], ["plane-y", "y"], ["series-of", "series"]]) choice(id, key, STATES);
+  choice("diagram-x", "diagram", NAMES);
+  MAPS.forEach((one, i) => $("map-of").append(element("option", `${one.x} and ${one.y}`, { value: i })));
+  $("map-of").addEventListener("change", () => {
+    state.map = Number($("map-of").value);
+    update(null);
+  });
+  $("plane").hidden = LAW.n < 3;
+  $("diagram-part").hidden = !NAMES.length;
+  $("map-part").hidden = !MAPS.length;
+  $("cycles-part").hidden = !PLANAR;
+  $("equilibria-part").hidden = FORCED;
+  if (LAW.discrete) $("equilibria-title").textContent = "Fixed points";
+  if (LAW.n === 1) $("portrait-title").textContent = LAW.discrete ? "Graph of the map" : "Rate";
+  if (LAW.n > 2) $("portrait-title").textContent = "Projection";
+}
+
+function choice(id, key, names) {
+  names.forEach((name) => $(id).append(element("option", name, { value: name })));
+  $(id).addEventListener("change", () => {
+    state[key] = $(id).value;
+    update(null);
+  });
+}
+
+function showControls(moved) {
+  showSliders(moved);
+  for (const [id, key] of [["plane-x", "x"], ["plane-y", "y"], ["series-of", "series"], ["diagram-x", "diagram"], ["map-of", "map"], ["angles", "angles"]]) $(id).value = state[key];
+  FACTS.states.forEach((one, i) => {
+    const input = $(`start-${i}`);
+    if (document.activeElement === input) return;
+    input.value = digits(state.next[i] / inDegrees(one.angle), 8).replace("−", "-");
+    input.setAttribute("aria-invalid", "false");
+  });
+}
+
+// ---------------------------------------------------------------- drawing
+
+const INVALID = "With these parameters the equations have no finite value in the window";
+
+// Draws what a change needs; `moved` is the slider under the hand.
+function update(moved) {
+  const start = performance.now();
+  showControls(moved);
+  const system = make([...state.values]);
+  scene.plane = [STATES.indexOf(state.x), STATES.indexOf(state.y)];
+  if (scene.plane[0] === scene.plane[1] && LAW.n > 1) scene.plane[1] = scene.plane[0] ? 0 : 1;
+  const [i, k] = scene.plane;
+  scene.words = LAW.n > 1
+    ? { x: stateWords(i), y: stateWords(k), xScale: scaleOfState(i), yScale: scaleOfState(k) }
+    : { x: stateWords(0), y: LAW.discrete ? `next ${nameOf(0)}` : `d${nameOf(0)}/dt`, xScale: scaleOfState(0), yScale: LAW.discrete ? scaleOfState(0) : "" };
+  scene.system = system;
+  stopPlay();
+  const valid = isValid(system);
+  document.body.classList.toggle("invalid", !valid);
+  if (!valid) {
+    complain([INVALID]);
+    $("status").textContent = INVALID;
+    cancel();
+    for (const id of ["equilibria", "cycles", "motions"]) $(id).replaceChildren();
+    scene.searched = "";
+    scene.diagram = null;
+    return;
+  }
+  if ($("alert").textContent === INVALID) complain([]);
+  if (PLANAR) scene.grid = system.nullclineGrid(56);
+  scene.rests = system.equilibria(scene.rests.map((one) => one.x), LAW.n > 2 ? 12 : 40);
+  settleFlow(system);
+  scene.motions = state.motions.map((x0) => system.motion(x0, state.duration));
+  scene.stale = staleOf();
+  drawPortrait(plots.portrait, scene);
+  drawSeries(plots.series, scene);
+  startDiagram();
+  if (MAPS.length) drawMap(plots.map, scene);
+  scene.timing = performance.now() - start;
+  later(tell);
+  search();
+}
+
+// What belongs to the equilibria and cycles at hand.
+function settleFlow(system) {
+  const flows = !LAW.discrete && !FORCED && LAW.n > 1;
+  scene.manifolds = flows ? scene.rests.filter((one) => one.unstable && one.unstable < LAW.n && one.kind === SADDLE).flatMap((one) => system.manifolds(one, scene.rests)) : [];
+  if (PLANAR) scene.cycles = new Returns(system, scene.rests).again(scene.cycles);
+}
+
+function isValid(system) {
+  const out = new Float64Array(LAW.n);
+  for (let i = 0; i < 60; i++) {
+    LAW.rates(Float64Array.from(system.spread(i)), system.p, 0, out);
+    if (out.every(Number.isFinite)) return true;
+  }
+  return false;
+}
+
+// Parameters beside those of the map that have moved since its curves were computed.
+function staleOf() {
+  const map = MAPS[state.map];
+  if (!map) return [];
+  return FACTS.parameters.filter((one, i) => one.name !== map.x && one.name !== map.y && state.values[i] !== one.value);
+}
+
+// ---------------------------------------------------------------- searches, in pieces
+
+const searches = { due: 0, running: 0, tasks: [] };
+function cancel() {
+  clearTimeout(searches.due);
+  clearTimeout(searches.running);
+  searches.tasks = [];
+}
+
+function search() {
+  const key = JSON.stringify(state.values);
+  cancel();
+  if (key !== scene.searched && !FORCED && LAW.n > 1) searches.tasks.push(searchAll(key));
+  if (scene.diagram && !scene.diagram.done) searches.tasks.push(scene.diagram.work);
+  document.body.classList.toggle("searching", searches.tasks.length > 0);
+  if (searches.tasks.length) searches.due = setTimeout(pump, IDLE);
+}
+
+function pump() {
+  const end = performance.now() + 8;
+  while (searches.tasks.length && performance.now() < end) if (searches.tasks[0].next().done) searches.tasks.shift();
+  if (searches.tasks.length) searches.running = setTimeout(pump, 0);
+  else document.body.classList.remove("searching");
+}
+
+// Equilibria from more starts, and all cycles that the sections show.
+function* searchAll(key) {
+  const { system } = scene;
+  if (LAW.n > 2) {
+    const found = scene.rests.map((one) => Float64Array.from(one.x));
+    for (let i = 12; i < STARTS; i++) {
+      system.keep(found, system.spread(i));
+      if (i % 8 === 0) yield;
+    }
+    if (found.length !== scene.rests.length) scene.rests = found.sort((one, other) => one[0] - other[0]).map((x) => system.described(x));
+  }
+  if (PLANAR) {
+    const returns = new Returns(system, scene.rests);
+    scene.cycles = returns.apart([...(yield* returns.search()), ...scene.cycles]);
+    scene.family = returns.family;
+  }
+  if (LAW.n > 2) settleFlow(system);
+  scene.searched = key;
+  drawPortrait(plots.portrait, scene);
+  later(tell);
+}
+
+// Where motions end up, value by value of a parameter, beside the equilibria.
+function startDiagram() {
+  if (!NAMES.length) return;
+  const i = STATES.indexOf(state.series);
+  const range = rangeOf(state.diagram);
+  const fixed = state.values.filter((_, k) => NAMES[k] !== state.diagram);
+  const key = JSON.stringify([state.diagram, range, i, fixed, state.duration]);
+  if (!scene.diagram || key !== scene.diagram.key) {
+    const columns = LAW.discrete ? 300 : 120;
+    const diagram = { key, columns, found: [], done: false };
+    diagram.work = diagramWork(diagram, i, [...range], columns);
+    scene.diagram = diagram;
+  }
+  drawDiagram(plots.diagram, scene);
+}
+
+function* diagramWork(diagram, i, range, columns) {
+  const place = NAMES.indexOf(state.diagram);
+  const values = [...state.values];
+  const begin = () => Float64Array.from(state.motions.at(-1) ?? state.next);
+  let last = begin();
+  let rests = [];
+  for (let column = 0; column < columns; column++) {
+    const value = range[0] + ((range[1] - range[0]) * (column + 0.5)) / columns;
+    values[place] = value;
+    const system = make([...values]);
+    rests = system.equilibria(rests.map((one) => one.x), LAW.n === 1 ? 24 : LAW.n === 2 ? 20 : 10);
+    yield;
+    const { samples, x } = samplesOf(system, last, i);
+    yield;
+    // A motion that has come to rest where it is not stable any more would stay there.
+    last = x ? x.map((one, k) => one + 1e-4 * system.scales[k] * (k % 2 ? -1 : 1)) : begin();
+    diagram.found.push({ value, samples, rests });
+    if (column % 10 === 9) drawDiagram(plots.diagram, scene);
+  }
+  diagram.done = true;
+  drawDiagram(plots.diagram, scene);
+}
+
+// Of a map its iterates, of a forced flow the states once a period, else largest (of two states also least) values.
+function samplesOf(system, start, i) {
+  const samples = [];
+  if (LAW.discrete) {
+    const { rows, why, x } = system.iterates(start, 500);
+    if (why === "escaped") return { samples, x: null };
+    return { samples: rows.slice(380).map((row) => row[i + 1]), x };
+  }
+  const { scales, turns, low } = system;
+  const duration = FORCED ? 60 * system.period : state.duration;
+  const before = follow(system.rates, start, 0, duration, { scales, rtol: 1e-6, most: 6000 });
+  const away = before.why !== "end" || before.x.some((one, k) => !turns[k] && Math.abs(one - low[k]) > 100 * scales[k]);
+  if (away) return { samples, x: null };
+  if (LAW.n === 1) return { samples: [before.x[0]], x: before.x };
+  const seen = (value) => (turns[i] ? low[i] + (value - low[i] - turns[i] * Math.floor((value - low[i]) / turns[i])) : value);
+  let next = system.period;
+  const end = follow(system.rates, before.x, 0, FORCED ? 30 * system.period : duration, {
+    scales, rtol: 1e-6, most: 6000,
+    each: (t, x, was, from, h, stepper) => {
+      if (FORCED) {
+        while (t >= next * (1 - 1e-12)) {
+          samples.push(seen(between(was, x, stepper, (next - from) / h, h)[i]));
+          next += system.period;
+        }
+        return false;
+      }
+      const [a, b] = [stepper.k[0][i], stepper.k[6][i]];
+      if ((a > 0 && b <= 0) || (LAW.n === 2 && a < 0 && b >= 0)) samples.push(seen(between(was, x, stepper, a / (a - b), h)[i]));
+      return false;
+    },
+  });
+  // What goes round and round has no greatest value.
+  const f = new Float64Array(LAW.n);
+  system.rates(end.x, 0, f);
+  if (!samples.length && !(turns[i] && Math.abs(f[i]) * duration > turns[i])) samples.push(seen(end.x[i]));
+  return { samples, x: end.x };
+}
+
+// ---------------------------------------------------------------- a moving dot
+
+function stopPlay() {
+  scene.playing = null;
+  $("play").setAttribute("aria-pressed", "false");
+  $("play").textContent = "Play";
+  const dot = $("dot");
+  dot.getContext("2d").clearRect(0, 0, dot.width, dot.height);
+}
+
+function play() {
+  if (scene.playing) {
+    stopPlay();
+    drawSeries(plots.series, scene);
+    return;
+  }
+  if (!scene.motions.length) return;
+  scene.playing = { t: 0, from: performance.now() };
+  $("play").setAttribute("aria-pressed", "true");
+  $("play").textContent = "Pause";
+  const last = scene.playing;
+  const move = (now) => {
+    if (scene.playing !== last) return;
+    last.t = (state.duration * (now - last.from)) / 15000;
+    if (last.t >= state.duration) {
+      stopPlay();
+      drawSeries(plots.series, scene);
+      return;
+    }
+    drawSeries(plots.series, scene);
+    drawDot(last.t);
+    requestAnimationFrame(move);
+  };
+  requestAnimationFrame(move);
+}
+
+function drawDot(t) {
+  const dot = $("dot");
+  const { portrait } = plots;
+  [dot.width, dot.height] = [portrait.canvas.width, portrait.canvas.height];
+  const c = dot.getContext("2d");
+  const ratio = window.devicePixelRatio || 1;
+  c.setTransform(ratio, 0, 0, ratio, 0, 0);
+  scene.motions.forEach(({ rows }, n) => {
+    let [a, b] = [0, rows.length - 1];
+    while (b - a > 1) {
+      const m = (a + b) >> 1;
+      if (rows[m][0] <= t) a = m;
+      else b = m;
+    }
+    if (t > rows[b][0]) return;
+    const share = LAW.discrete ? 0 : (t - rows[a][0]) / (rows[b][0] - rows[a][0] || 1);
+    const x = rows[a].slice(1).map((one, k) => one + share * (rows[b][k + 1] - one));
+    const [at] = LAW.n > 1 ? folded([x], ...scene.plane, scene.system) : [[x[0], LAW.discrete ? x[0] : 0]];
+    c.fillStyle = paint(motionPaint(n));
+    c.strokeStyle = paint("card");
+    c.lineWidth = 2;
+    c.beginPath();
+    c.arc(portrait.px(at[0]), portrait.py(at[1]), 6, 0, TWO_PI);
+    c.fill();
+    c.stroke();
+  });
+}
+
+// ---------------------------------------------------------------- hands
+
+function startMotion(x0) {
+  state.next = x0;
+  state.motions = [...state.motions.slice(1 - MOST_MOTIONS), x0];
+  update(null);
+  $("status").textContent = `Motion started at ${x0.map((x, i) => `${nameOf(i)} = ${stateText(i, x, 5)}`).join(", ")}`;
+}
+
+// A start at a place of the portrait; states that are not seen stay as they are set.
+function stateAt(x, y) {
+  const made = [...state.next];
+  made[scene.plane[0]] = x;
+  if (LAW.n > 1) made[scene.plane[1]] = y;
+  return made;
+}
+
+function moveTo(pairs) {
+  for (const [name, value] of pairs) if (!refused(NAMES.indexOf(name), value)) setValue(name, value);
+  update(null);
+}
+
+function wire() {
+  onPlot(plots.portrait, (at, dragged) => dragged || startMotion(stateAt(at.x, at.y)), hover);
+  onPlot(plots.diagram, (at) => moveTo([[state.diagram, at.x]]));
+  onPlot(plots.map, (at) => moveTo([[MAPS[state.map].x, at.x], [MAPS[state.map].y, at.y]]));
+  onKeys(plots.portrait, (key, step) => {
+    const { portrait } = plots;
+    if (key === "Delete") state.motions = [];
+    else if (key === "Escape") scene.cursor = null;
+    else if (step) {
+      const [x, y] = scene.cursor ?? [0.5 * (portrait.x[0] + portrait.x[1]), 0.5 * (portrait.y[0] + portrait.y[1])];
+      scene.cursor = [within(x + step[0], portrait.x), within(y + step[1], portrait.y)];
+      hover(scene.cursor);
+      $("status").textContent = $("hover").textContent;
+      drawPortrait(portrait, scene);
+      return undefined;
+    } else if (scene.cursor) return startMotion(stateAt(...scene.cursor));
+    return update(null);
+  });
+  onKeys(plots.diagram, (key, step) => {
+    if (!step || step[1]) return false;
+    return moveTo([[state.diagram, within(valueOf(state.diagram) + step[0], plots.diagram.x)]]);
+  });
+  onKeys(plots.map, (key, step) => {
+    if (!step) return false;
+    const { x, y } = MAPS[state.map];
+    return moveTo([[x, within(valueOf(x) + step[0], plots.map.x)], [y, within(valueOf(y) + step[1], plots.map.y)]]);
+  });
+  $("start").addEventListener("click", () => startMotion([...state.next]));
+  $("clear").addEventListener("click", () => { state.motions = []; update(null); });
+  $("play").addEventListener("click", play);
+  $("controls").addEventListener("submit", (event) => event.preventDefault());
+  $("reset").addEventListener("click", () => {
+    Object.assign(state, startState(), { theme: state.theme, angles: state.angles });
+    complain([]);
+    update(null);
+  });
+  $("angles").addEventListener("change", () => { state.angles = $("angles").value; update(null); });
+  $("theme").addEventListener("click", () => {
+    state.theme = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    applyTheme();
+  });
+  $("save-picture").addEventListener("click", async () => {
+    const values = NAMES.map((name, i) => `${name} = ${digits(state.values[i])}`).join(", ");
+    download("phasekit.png", await picture(Object.values(plots).map((one) => one.canvas), `${FACTS.law.join(", ")}: ${values}`));
+  });
+  $("save-data").addEventListener("click", () => download("phasekit.json", new Blob([toText(dataOf())], { type: "application/json" })));
+  $("save-python").addEventListener("click", () => download("phasekit.py", new Blob([pythonOf()], { type: "text/x-python" })));
+  wireCopies();
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", applyTheme);
+  window.addEventListener("hashchange", () => { if (location.hash !== writeLink()) load(); });
+  new ResizeObserver(() => update(null)).observe($("portrait"));
+}
+
+function load() {
+  const { theme } = state;
+  Object.assign(state, startState(), { theme });
+  complain(location.hash ? readLink(location.hash) : []);
+  applyTheme();
+}
+
+$("model").textContent = FACTS.model;
+FACTS.law.forEach((line) => $("law").append(element("span", line), " "));
+$("angles-label").hidden = !FACTS.states.some((one) => one.angle) && !FACTS.parameters.some((one) => one.units === "rad");
+makeControls();
+wire();
+load();
+
+// For tests and for the console of the browser.
+window.phasekit = { state, scene, plots, law: LAW, make, Returns, System, follow, readNumber, searches, dataOf, update, special };
