@@ -103,11 +103,11 @@ def test_words_for_special_points_are_answered_by_their_kinds(word, name):
         branch.special(word)
 
 
-def test_explore_names_only_what_it_takes():
+def test_explore_names_what_it_takes():
     with pytest.raises(pk.ParameterError, match="wants one of ") as caught:
         pk.explore(3)
     assert "Potential" in str(caught.value)
-    assert "Perturbed" not in str(caught.value)
+    assert "Problem, Perturbed" in str(caught.value)
     assert "FreeGyroRotor" not in str(caught.value)
 
 

@@ -16,7 +16,7 @@ from phasekit.explorer.law import law_of
 from phasekit.explorer.page import EQUATIONS, page
 from phasekit.labels.arguments import bad, call_checked
 from phasekit.laws.ladder import Conservative, Law, Routhian
-from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.problem import as_problem
 from phasekit.systems.system import as_system, single
 
 #: Height of the page in a notebook, in pixels of the screen.
@@ -101,7 +101,6 @@ def explore(
     Explorer of Problem(v' = I - v**3/3 + v - w, ...); .save("page.html") writes it, ... kB
     """
     found = as_system(system, rung=Law, what="the explorer")
-    found = getattr(found, "system", None) or found if isinstance(found, Problem) else found
     if found.standing.traits is None and issubclass(found.rung, Conservative):
         given = {
             "over": over, "ranges": ranges, "window": window, "plane": plane, "duration": duration
@@ -115,6 +114,10 @@ def explore(
     if found.standing.traits is None and not issubclass(found.rung, Routhian):
         single(found)
     problem = as_problem(found)
+    if problem.system is not None:  # what stands behind x' = -V'(x)
+        return explore(
+            problem.system, over=over, ranges=ranges, window=window, plane=plane, duration=duration
+        )
     facts = explored_facts(
         found, problem, over=over, ranges=ranges, window=window, plane=plane, duration=duration
     )

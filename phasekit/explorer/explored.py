@@ -59,7 +59,7 @@ def explored_facts(
     if problem.time is None and len(problem.state) <= SEARCHED:
         rests = equilibria_of(problem, *box).x
     facts = facts_of_equations(problem, box, sliders)
-    if not isinstance(system, Problem):
+    if system is not problem:
         facts["model"] = type(system).__name__
     facts["plane"] = list(shown)
     facts["duration"] = float(time_shown(problem, box, rests) if duration is None else duration)

@@ -76,7 +76,7 @@ def test_a_window_that_is_not_said_is_where_the_motion_from_the_start_goes():
 
 
 def test_curves_over_two_parameters_are_those_of_theory():
-    """Of x' = m + l x - x^3 the folds are 27 m^2 = 4 l^3; of the Brusselator b = 1 + a^2 is Hopf's."""
+    """Of x' = m + l x - x^3 the folds are 27 m^2 = 4 l^3; the Brusselator's Hopf is b = 1 + a^2."""
     cusp = pk.Problem("m + l*x - x^3", "x", {"m": 0.0, "l": 1.0}, window={"x": (-2, 2)})
     (found,) = facts(pk.explore(cusp, ranges={"m": (-1, 1), "l": (-1, 2)}).html)["maps"]
     assert {one["kind"] for one in found["curves"]} == {"fold"}
@@ -180,3 +180,8 @@ def test_the_command_shows_files_of_equations(tmp_path, capsys):
     for words, says in ((["--over", "I"], "over"), (["--range", "I"], "NAME=FROM:TO")):
         assert main(["explore", str(tmp_path / "model.toml"), *words, *common]) == 2
         assert says in capsys.readouterr().err
+
+
+def test_a_problem_of_a_system_shows_that_system():
+    problem = pk.Problem.from_system(pk.Pendulum(length=0.5))
+    assert pk.explore(problem).html == pk.explore(pk.Pendulum(length=0.5)).html
