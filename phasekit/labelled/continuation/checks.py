@@ -42,3 +42,9 @@ def check_bounds(bounds: Any) -> Mapping[str, Any]:
     if not isinstance(bounds, Mapping):
         raise bad("bounds", bounds, "a mapping from names to (low, high)")
     return bounds
+
+
+def refuse_kind(point: str, kind: Any) -> None:
+    """Refuse a kind of curve where one branch begins, which needs no name."""
+    if kind is not None:
+        raise bad("kind", kind, f"None at a {point} point: there is nothing to choose")

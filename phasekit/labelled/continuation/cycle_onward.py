@@ -15,7 +15,12 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.extended import extended
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.labelled.continuation.branch import branch_of
-from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.checks import (
+    check_options,
+    check_parameter,
+    check_span,
+    refuse_kind,
+)
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.labelled.continuation.cycle_special import CyclePoint
@@ -27,8 +32,11 @@ from phasekit.numerics.waits import notice
 CURVES = ("fold_of_cycles", "period_doubling", "torus")
 
 
-def switched(point: CyclePoint[CycleBranch], direction: int, options: Any) -> CycleBranch:
+def switched(
+    point: CyclePoint[CycleBranch], direction: int, options: Any, kind: str | None = None
+) -> CycleBranch:
     """The other branch at a period doubling or a branch point of cycles."""
+    refuse_kind(point.kind, kind)
     with notice(f"following periodic orbits along {point.branch.parameter}"):
         return _switched(point, direction, options)
 

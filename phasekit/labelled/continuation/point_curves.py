@@ -25,7 +25,12 @@ from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import Branch, branch_of
-from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
+from phasekit.labelled.continuation.checks import (
+    check_options,
+    check_parameter,
+    check_span,
+    refuse_kind,
+)
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
@@ -204,9 +209,19 @@ def _free(curve: Curve) -> str:
 
 
 def leave(
-    point: SpecialPoint[Branch], direction: int, options: ContinuationOptions | None
-) -> Branch:
-    """What begins at a point: its other branch, a doubled orbit of a map, periodic orbits."""
+    point: SpecialPoint[Branch], direction: int, options: ContinuationOptions | None,
+    kind: str | None = None,
+) -> Branch:  # fmt: skip
+    """What begins at a point: its other branch, a doubled orbit of a map, periodic orbits.
+
+    At a point of codimension two a curve of a kind.
+    """
+    if KINDS[point.kind].curve is None and point.kind != "end":
+        from phasekit.labelled.continuation.codimension_two import begun
+
+        with notice(f"following what begins at a {point.kind} point"):
+            return begun(point, kind, direction, options)
+    refuse_kind(point.kind, kind)
     if point.kind == "period_doubling":
         return doubled(point, options)
     if point.kind != "hopf":

@@ -173,30 +173,36 @@ class SpecialPoint(Generic[Of]):
             return float(self.x[self.branch.problem_state.index(name)])
         return self.parameters[name]
 
-    def switch(self, *, direction: int = 0, options: Any = None) -> Of:
-        """The other branch through a branch point, or the periodic orbits that begin at a point.
+    def switch(self, kind: str | None = None, *, direction: int = 0, options: Any = None) -> Of:
+        """The other branch through a branch point, or what begins at a point.
 
         Of a Hopf point the periodic orbits; of a period doubling of a map the orbit of period 2,
-        as fixed points of the map applied twice.
+        as fixed points of the map applied twice. Of points of codimension two of flows curves in
+        both parameters: bogdanov_takens fold and hopf, generalized_hopf fold_of_cycles, zero_hopf
+        fold, hopf and torus, hopf_hopf hopf (that of the other pair) and torus.
 
         Parameters
         ----------
+        kind : str, optional
+            At a point of codimension two the kind of the curve; by default the first of these that
+            is not the one that the point was found on.
         direction : int, default 0
             Which one where there are several: a row of `directions`, or one of the families at a
             Hopf point of several pairs, of which ``stops[0].message`` of each tells how many there
-            are.
+            are; at a Hopf-Hopf point 1 is the torus curve of the other pair.
         options : ContinuationOptions, optional
             Default: those of the branch.
 
         Returns
         -------
         Branch
-            The other branch; from a Hopf point a `CycleBranch`.
+            The other branch; from a Hopf point, and of a kind of periodic orbits, a `CycleBranch`.
 
         Raises
         ------
         ParameterError
-            If it is no branch point or Hopf point, or the direction is not known.
+            If nothing begins at the point that can be followed, which the message says, or the
+            kind or direction is not known.
         ConvergenceError
             If no periodic orbit is found near a Hopf point, or which there are is not known.
 
@@ -224,7 +230,7 @@ class SpecialPoint(Generic[Of]):
         ('cycle', 6.28)
         >>> sides = [point.switch(direction=i) for i in range(3)]
         """
-        found: Of = onward(f"{self.way}.switch")(self, direction, options)
+        found: Of = onward(f"{self.way}.switch")(self, direction, options, kind)
         return announced(found)
 
     def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:

@@ -84,7 +84,8 @@ def _normal(f: Array, forced: bool) -> tuple[Array, Array]:
     if forced:
         return np.ones((len(f), 1)), np.ones(len(f))
     speed = np.sqrt(np.sum(f * f, axis=1))
-    return np.stack([-f[:, 1], f[:, 0]], axis=1) / speed[:, None], speed
+    with np.errstate(all="ignore"):  # where an orbit shrinks to an equilibrium there is none
+        return np.stack([-f[:, 1], f[:, 0]], axis=1) / speed[:, None], speed
 
 
 def _summed(orbit: Orbit, values: Array, m: int) -> tuple[Array, Array]:
@@ -111,7 +112,8 @@ def function(it: Across, weigh: Array) -> tuple[Array, Array, float]:
     f = np.concatenate([f, f[:1]])
     e, speed = _normal(f / scale, cycles.forced)
     v = it.size[:, None] * it.e * scale
-    wide = (np.exp(log - it.top) / speed)[:, None] * e * scale
+    with np.errstate(all="ignore"):
+        wide = (np.exp(log - it.top) / speed)[:, None] * e * scale
     rate = 0.0
     if not cycles.forced:
         shift = it.size * it.alpha * orbit.y[0]

@@ -157,15 +157,18 @@ def _refined(
     else:
         r = (vectors[:, j] / scale).real
         v = q.real / np.linalg.norm(q.real) + r / np.linalg.norm(r)
-    v = v / np.linalg.norm(v)
-    y = A @ (v * scale) / scale
-    aux = y - np.dot(v, y) * v
-    aux = aux / np.linalg.norm(aux) / scale
-    extra = np.append(v * scale, kappa)
+    extra, aux = plane_of(A, scale, v / np.linalg.norm(v), kappa)
     if not (np.isfinite(extra).all() and np.isfinite(aux).all()):
         return best.u, extra, aux, np.inf, "the two eigenvalues have one eigenvector"
     u, extra, residual, message = polish(curve, HOPF, best.u, extra, reach_of(curve, bracket), aux)
     return u, extra, aux, residual, message
+
+
+def plane_of(A: Array, scale: Array, v: Array, kappa: float) -> tuple[Array, Array]:
+    """What the defining system of a pair adds: a scaled unit vector of its plane, k; and its l."""
+    y = A @ (v * scale) / scale
+    aux = y - np.dot(v, y) * v
+    return np.append(v * scale, kappa), aux / np.linalg.norm(aux) / scale
 
 
 def _doubtful(curve: Curve, u: Array, kappa: float, tangent: Array) -> bool:
