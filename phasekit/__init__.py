@@ -88,6 +88,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.perturbed import quiet_frequencies as quiet_frequencies
     from phasekit.labelled.perturbed import resonances as resonances
     from phasekit.labelled.perturbed import retrapping_torque as retrapping_torque
+    from phasekit.labelled.phase_response import phase_response as phase_response
     from phasekit.labelled.phase_space import equilibria as equilibria
     from phasekit.labelled.phase_space import separatrices as separatrices
     from phasekit.labelled.quasi_static import quasi_static as quasi_static
@@ -196,6 +197,7 @@ _MODULES = {
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
     "phasekit.labelled.run_up": ("run_up",),
     "phasekit.labelled.section": ("poincare_section",),
+    "phasekit.labelled.phase_response": ("phase_response",),
     "phasekit.labelled.spectrum": ("spectrum",),
     "phasekit.labelled.warm": ("warm",),
     "phasekit.maps.whole": ("open_map",),
@@ -242,6 +244,7 @@ _ELSEWHERE = {
     **dict.fromkeys(("ODE", "Model", "Map"), "Problem"),
     **dict.fromkeys(("lyapunov_exponents", "lyapunovs", "lyapunov_spectrum"), "lyapunov"),
     **dict.fromkeys(("basins_of_attraction", "basin"), "basins"),
+    **dict.fromkeys(("prc", "iprc", "phase_response_curve"), "phase_response"),
     **dict.fromkeys(("fft", "power_spectrum", "psd", "periodogram", "welch"), "spectrum"),
     **dict.fromkeys(("poincare_map", "poincare", "section"), "poincare_section"),
 }

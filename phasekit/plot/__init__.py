@@ -29,6 +29,7 @@ if _TYPE_CHECKING:
     from phasekit.plot.periods import frequency_action as frequency_action
     from phasekit.plot.periods import period_energy as period_energy
     from phasekit.plot.phase_portrait import phase_portrait as phase_portrait
+    from phasekit.plot.phase_response import phase_response as phase_response
     from phasekit.plot.poincare_section import poincare_section as poincare_section
     from phasekit.plot.potential_well import potential_well as potential_well
     from phasekit.plot.run_up import run_up as run_up
@@ -59,6 +60,7 @@ __all__ = [
     "parameter_map",
     "period_energy",
     "phase_portrait",
+    "phase_response",
     "poincare_section",
     "potential_well",
     "run_up",

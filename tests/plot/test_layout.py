@@ -271,6 +271,10 @@ CASES = {
         "eight": lambda: P.frequency_action(EIGHT, 40),
         "cusp": lambda: P.frequency_action(CUSP, 40),
     },
+    "phase_response": {
+        "two": lambda: P.phase_response(pk.phase_response(turns().orbit(0))),
+        "one": lambda: P.phase_response(pk.phase_response(turns().orbit(0)), "x"),
+    },
     "spectrum": {
         "three": lambda: P.spectrum(pk.spectrum(motions()), "amplitude_phi"),
         "stems": lambda: P.spectrum(pk.spectrum(motions().isel(point=0), period=1.0), log=False),

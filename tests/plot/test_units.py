@@ -59,6 +59,13 @@ SWINGS = pk.Problem(
 
 
 @functools.cache
+def rotations():
+    oscillator = pk.Problem(["y", "(1 - x**2)*y - mu*x"], ("x", "y"), {"mu": 1.0})
+    few = pk.ContinuationOptions(intervals=12)
+    return pk.periodic_orbit(oscillator, [2.0, 0.0], 6.7, options=few)
+
+
+@functools.cache
 def the_cycles():
     return pk.continuation(
         SWINGS, "a", orbit=pk.periodic_orbit(SWINGS, [0.0, 0.0]), span=(0.2, 0.5)
@@ -229,6 +236,12 @@ CASES = {
         {"frequency": "rpm"},
         (1.0, RPM),
         ("(rad$^2$/s)", "(rpm)"),
+    ),
+    "phase_response": (
+        lambda **o: P.phase_response(pk.phase_response(rotations()), "x", **o),
+        {"time": "ms", "phase_response": "ms"},
+        (1e3, 1e3),
+        ("(ms)", "(ms)"),
     ),
     "spectrum": (
         lambda **o: P.spectrum(pk.spectrum(pendulums()).isel(length=0), "amplitude_phi", **o),

@@ -451,6 +451,8 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
         "problem": oscillator, "x0": lambda: [2.0, 0.0], "period": lambda: 6.4,
         "options": lambda: pk.ContinuationOptions(intervals=10),
     },
+    "phase_response": {"orbit": lambda: cycles().orbit(0)},
+    "plot.phase_response": {"dataset": lambda: pk.phase_response(cycles().orbit(0))},
     "stroboscopic": {"n": lambda: 2},
     "lyapunov": {"time": lambda: 5.0},
     "attractors": {"phi": lambda: [-1.0, 1.0], "dphi": lambda: [0.0], "period": lambda: None},

@@ -20,6 +20,7 @@ from phasekit.bifurcation.continuation.periodic.fourier import coefficients
 from phasekit.bifurcation.continuation.periodic.point import Point, vertical
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.cells.schema import dataset_attrs
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.systems.problem import Problem
@@ -250,7 +251,7 @@ def orbit_dataset(problem: Problem, cycles: Cycles, point: Point, label: str = "
     coords: dict[str, Any] = {k: ((), v, attrs_of(problem, k)) for k, v in held.items()}
     if problem.words:
         coords["time"] = ("time", at, {"long_name": "time", "units": "s"})
-    ds = xr.Dataset(data, {"time": at, **coords})
+    ds = xr.Dataset(data, {"time": at, **coords}, dataset_attrs(problem))
     if cycles.closes:
         ds = ds.assign({"multiplier": ("multiplier", point.multipliers.copy())})
     return ds
