@@ -137,3 +137,37 @@ def test_folds_of_cycles_are_those_of_the_family():
         found = [fold["q2"] for one in there.special("H") for fold in one.switch().special("LPC")]
         near.append(min(abs(np.array(found) - wanted)))
     assert max(near) < 1e-8
+
+
+@pytest.mark.parametrize("plain", [False, True])
+def test_branch_points_form_curves_in_three_parameters(plain, tmp_path):
+    """F = a + m x - x^3 + c m: f_m = 0 where x = -c, f_x = 0 where m = 3 c^2, so that a = -c^3."""
+    values = {"m": 1.5, "a": -0.125, "c": 0.5}
+    if plain:
+
+        def f(x, m, a, c):
+            return [a + m * x[0] - x[0] ** 3 + c * m, x[0] - x[1]]
+
+        imperfect = pk.Problem(f, ("x", "y"), values)
+    else:
+        imperfect = pk.Problem(["a + m*x - x**3 + c*m", "x - y"], ("x", "y"), values)
+    branch = pk.continuation(imperfect, "m", x0=[-0.5, -0.5], span=(-1.0, 2.0))
+    (point,) = branch.special("BP")
+    curve = point.curve(["a", "c"], [(-1.0, 1.0), (-0.9, 0.9)])
+    assert curve.free == ("m", "a", "c")
+    assert curve.kind == "branch_point"
+    at = curve.points
+    np.testing.assert_allclose(at.m, 3.0 * at.c**2, atol=1e-8 if plain else 1e-12)
+    np.testing.assert_allclose(at.a, -(at.c**3), atol=1e-8 if plain else 1e-12)
+    np.testing.assert_allclose(sorted(at.c.values[[0, -1]]), [-0.9, 0.9], atol=1e-12)
+    if not plain:
+        curve.save(tmp_path / "curve.nc")
+        assert pk.Branch.load(tmp_path / "curve.nc") == curve
+    with pytest.raises(pk.ConvergenceError, match=r"curve\(\[second, third\]"):
+        point.curve("a", (-1.0, 1.0))
+    with pytest.raises(pk.ParameterError, match="span: "):
+        point.curve(["a", "c"], (-1.0, 1.0))
+    with pytest.raises(pk.ParameterError, match="parameter: "):
+        point.curve(["a", "a"], [(-1.0, 1.0), (-1.0, 1.0)])
+    with pytest.raises(pk.ParameterError, match="one name, or of a branch point two"):
+        point.curve(["a", "c", "m"], [(-1.0, 1.0)] * 3)

@@ -160,7 +160,7 @@ class Curve:
     @functools.cached_property
     def rows(self) -> int:
         """Number of equations."""
-        return defining.equations(self.kind, self.n)
+        return defining.equations(self.kind, self.n, len(self.active))
 
     @functools.cached_property
     def keeps(self) -> bool:

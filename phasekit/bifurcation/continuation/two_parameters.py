@@ -31,18 +31,19 @@ GOLDEN = 18  # halvings, nearly, of a step in which a test function may touch ze
 def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curve, Sample] | None:
     """The curve through a special point with one more free parameter, and the point on it.
 
-    ``curve`` has both parameters free; None where the curve has no tangent there.
+    ``curve`` has both parameters free, or three of branch points; None where the curve has no
+    tangent there.
     """
     n, m = curve.n, curve.m
     extra, aux = np.zeros(0) if special.extra is None else special.extra, None
     if kind in (HOPF, TORUS):
         extra, aux = extra[: n + 1], extra[n + 1 :]
-    u = np.concatenate([special.u[: n + 1], [curve.par[curve.active[1]]], extra])
+    u = np.concatenate([special.u[: n + 1], curve.par[list(curve.active[1:])], extra])
     made = curve.replace(kind=kind) if kind == EVENT else extended(curve, kind, u, extra, aux)
     # One unknown is held: a parameter for which the square system is regular; a state if there is
     # none, as at an event that a parameter alone decides.
     best = None
-    for i in (n + 1, n, *(range(n) if kind == EVENT else ())):
+    for i in (*range(n + 1, m), n, *(range(n) if kind == EVENT else ())):
         row = np.zeros(made.size)
         row[i] = 1.0
         point = made.refine(u, row)
@@ -53,7 +54,7 @@ def two_parameter_curve(curve: Curve, special: Special, kind: int) -> tuple[Curv
     if best is None:
         return None
     point = best[1]
-    if kind == BRANCH:
+    if kind == BRANCH and m == n + 2:
         # Points of this curve are branch points only where f itself vanishes, not f + b w.
         sizes = force_sizes(curve, u)
         most = 1e-6 / float(np.max(np.abs(point.u[m : m + n]) / sizes))

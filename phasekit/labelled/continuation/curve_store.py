@@ -12,7 +12,13 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve, Stop, Track
 from phasekit.bifurcation.continuation.curve_walk import KINDS, CurveWalk
 from phasekit.bifurcation.continuation.kernels import trace
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, EVENT, HOPF, TORUS
+from phasekit.bifurcation.continuation.kernels.defining import (
+    BRANCH,
+    EQUILIBRIUM,
+    EVENT,
+    HOPF,
+    TORUS,
+)
 from phasekit.bifurcation.continuation.kernels.state import NUMBERS, VECTORS
 from phasekit.bifurcation.continuation.path import Sample
 from phasekit.labelled.continuation.branch import NO_START, Branch
@@ -81,7 +87,8 @@ def read(
 def _curve(stored: Stored, problem: Problem) -> Curve:
     with damaged(stored.name, "its curve"):
         kind = {name: number for number, name in KINDS.items()}[stored.kind]
-        active = stored.active(problem, (1,) if kind == EQUILIBRIUM else (2,))
+        counts = {EQUILIBRIUM: (1,), BRANCH: (2, 3)}
+        active = stored.active(problem, counts.get(kind, (2,)))
         empty = np.zeros(0)
         curve = Curve(
             problem.field, kind, empty, active, empty, empty, empty, empty, stored.options()

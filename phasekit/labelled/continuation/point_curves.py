@@ -46,11 +46,13 @@ _CURVES = {
 
 def point_curve(
     point: SpecialPoint[Branch],
-    parameter: str,
-    span: Sequence[float],
+    parameter: str | Sequence[str],
+    span: Sequence[Any],
     options: ContinuationOptions | None = None,
 ) -> Branch:
     """The curve of points of one kind through one, in two parameters.
+
+    Branch points that a second parameter destroys form one in three.
 
     Parameters
     ----------
@@ -59,8 +61,8 @@ def point_curve(
         fixed points of a map a period doubling or torus point, too.
     parameter : str
         The second parameter. The first, that of the branch, is free within ten times its span,
-        unless `options` bounds it.
-    span : (float, float)
+        unless `options` bounds it. Of a branch point two names are the second and the third.
+    span : (float, float), or a pair of these
         Lowest and highest value of the second parameter; it holds its value at the point.
     options : ContinuationOptions, optional
         Default: those of the branch.
@@ -94,14 +96,7 @@ def point_curve(
         raise bad("point", f"a branch point of corank {point.corank}", "one of corank 1")
     if (point.special.extra is None and along != "event") or point.status != "converged":
         raise bad("point", point.status, "a point that has converged", point.message)
-    check_parameter(problem, parameter)
-    if parameter == point.branch.parameter:
-        raise bad("parameter", parameter, "another one than that of the branch")
-    check_names((*problem.state, point.branch.parameter, parameter))
-    low, high = check_span(span)
-    value = problem.parameters[parameter]
-    if not low <= value <= high:
-        raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
+    more, spans = _others(point, parameter, span)
     options = curve.options if options is None else check_options(options)
     n = curve.n
     names = list(problem.parameters)
@@ -110,27 +105,53 @@ def point_curve(
     bounds = options.bounds.get(
         point.branch.parameter, (own_low - 10.0 * width, own_high + 10.0 * width)
     )
+    low, high = np.array([bounds, *spans]).T
     made = curve.replace(
-        active=(curve.active[0], names.index(parameter)),
-        scale=np.append(curve.scale[: n + 1], high - low),
-        period=np.append(curve.period[: n + 1], 0.0),
-        low=np.concatenate([curve.low[:n], [bounds[0], low]]),
-        high=np.concatenate([curve.high[:n], [bounds[1], high]]),
+        active=(curve.active[0], *(names.index(name) for name in more)),
+        scale=np.append(curve.scale[: n + 1], (high - low)[1:]),
+        period=np.append(curve.period[: n + 1], np.zeros(len(more))),
+        low=np.append(curve.low[:n], low),
+        high=np.append(curve.high[:n], high),
         options=options,
         **_holding(curve, point),
     )
     begun = two_parameter_curve(made, point.special, _CURVES[along])
     if begun is None:
-        why = "without a symmetry, a second parameter destroys a branch point"
+        why = (
+            "without a symmetry, a second parameter destroys a branch point; "
+            "curve([second, third], [span, span]) frees one more"
+        )
         if point.kind == "event":
             why = "its function touches zero there, with all derivatives zero, or its curves cross"
         raise ConvergenceError(
-            f"curve: no curve of {point.kind} points leads on from {point!r} when {parameter} "
-            f"moves; {why}"
+            f"curve: no curve of {point.kind} points leads on from {point!r} when "
+            f"{' and '.join(more)} moves; {why}"
         )
     made, start = begun
     walker = CurveWalk(made)
     return branch_of(Branch, problem, walker, start, run(walker, start, options.directions), {})
+
+
+def _others(
+    point: SpecialPoint[Branch], parameter: Any, span: Any
+) -> tuple[list[str], list[tuple[float, float]]]:
+    """The parameters that a curve frees beside that of the branch, one or two, and their spans."""
+    problem = point.branch.problem
+    several = isinstance(parameter, (list, tuple))
+    if several and (KINDS[point.kind].curve != "branch_point" or len(parameter) != 2):
+        raise bad("parameter", parameter, "one name, or of a branch point two")
+    more = [check_parameter(problem, name) for name in (parameter if several else [parameter])]
+    if several and not (isinstance(span, (list, tuple, np.ndarray)) and len(span) == 2):
+        raise bad("span", span, "two spans (low, high), one for each parameter")
+    spans = [check_span(one) for one in (span if several else [span])]
+    if point.branch.parameter in more or len(set(more)) < len(more):
+        raise bad("parameter", parameter, "another one than that of the branch")
+    check_names((*problem.state, point.branch.parameter, *more))
+    for name, (low, high) in zip(more, spans, strict=True):
+        value = problem.parameters[name]
+        if not low <= value <= high:
+            raise bad("span", (low, high), f"a span that holds {name} = {value:.9g}")
+    return more, spans
 
 
 def _holding(curve: Curve, point: SpecialPoint[Branch]) -> dict[str, Any]:

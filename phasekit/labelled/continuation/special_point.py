@@ -233,14 +233,19 @@ class SpecialPoint(Generic[Of]):
         found: Of = onward(f"{self.way}.switch")(self, direction, options, kind)
         return announced(found)
 
-    def curve(self, parameter: str, span: Sequence[float], *, options: Any = None) -> Of:
+    def curve(
+        self, parameter: str | Sequence[str], span: Sequence[Any], *, options: Any = None
+    ) -> Of:
         """The curve of such points in this branch's parameter and a second one.
+
+        A second parameter destroys branch points, unless a symmetry keeps them: they form curves in
+        three. The third may be one that only unfolds them, such as a constant in f.
 
         Parameters
         ----------
-        parameter : str
-            The second parameter.
-        span : (float, float)
+        parameter : str, or at branch points of equilibria two of these
+            The second parameter, and the third.
+        span : (float, float), or two of these
             Its range.
         options : ContinuationOptions, optional
             Default: those of the branch.
@@ -271,7 +276,8 @@ class SpecialPoint(Generic[Of]):
         >>> bool(abs(curve.points.mu + curve.points.l / 2 - 1 / 8).max() < 1e-14)
         True
         """
-        with notice(f"following {self.kind} points along {parameter}"):
+        names = parameter if isinstance(parameter, str) else " and ".join(map(str, parameter))
+        with notice(f"following {self.kind} points along {names}"):
             found: Of = onward(f"{self.way}.curve")(self, parameter, span, options)
         return announced(found)
 

@@ -7,7 +7,7 @@ The unknowns are u = (x, p, ...) with the state x, the free parameters p and wha
 - HOPF: f = 0, (f_x^2 + k) v = 0, v.v = 1, l.v = 0 with u = (x, p, v, k): eigenvalues +-sqrt(-k),
   so a Hopf point where k = omega^2 > 0 and a neutral saddle where k < 0; l is held fixed.
 - BRANCH: f + b w = 0, w f_x = 0, w f_q = 0, w.w = 1 with u = (x, p, w, b), q the first free
-  parameter: a branch point where b = 0.
+  parameter: a branch point where b = 0, which with three free parameters is one more equation.
 - EVENT: f = 0, g = 0 with u = (x, p), g a function of the user's, which comes with its derivatives
   as ``second``.
 
@@ -20,7 +20,7 @@ Of a map A the field is f = A - x, so that multipliers -1 and exp(+-i theta) are
 
 Norms of v and w are taken in units of their scales. With one free parameter all but
 EQUILIBRIUM are square and define a point; with two they define a curve ([Govaerts2000] chapters 4
-and 6, [Kuznetsov2004] chapters 9 and 10).
+and 6, [Kuznetsov2004] chapters 9 and 10), as with three those of branch points do.
 
 Everything lies in one flat work array: what `places` returns is where each piece begins.
 """
@@ -46,16 +46,16 @@ def unknowns(kind: int, n: int, free: int) -> int:
     return n + free + (0, n, n + 1, n + 1, n, n + 1, 0)[kind]
 
 
-def equations(kind: int, n: int) -> int:
+def equations(kind: int, n: int, free: int) -> int:
     """Number of equations of a defining system."""
     if kind in REGULAR:
         return n + (kind == EVENT)
-    return 2 * n + (1, 2)[kind not in (FOLD, FLIP)]
+    return 2 * n + (1, 2)[kind not in (FOLD, FLIP)] + (kind == BRANCH and free == 3)
 
 
 def work_size(kind: int, n: int, free: int) -> int:
     """Length of the work array."""
-    size, rows = unknowns(kind, n, free), equations(kind, n)
+    size, rows = unknowns(kind, n, free), equations(kind, n, free)
     m = n + free
     kept = VECTORS * size + NUMBERS + n
     return (
@@ -89,6 +89,8 @@ def places(kind: int, n: int, free: int) -> tuple[int, ...]:
     elif kind != EQUILIBRIUM:
         size = m + n + 1
         rows = 2 * n + 2
+        if kind == BRANCH and free == 3:
+            rows += 1
     aux = VECTORS * size + NUMBERS
     vectors = aux + n
     matrix = vectors + 6 * size
@@ -163,6 +165,9 @@ def evaluate(
                 w[row + m + i] = w[base + i * m + k]
                 for j in range(m):
                     w[row + j] += w[v + i] * w[bent + i * m + j]
+        if active.size == 3:
+            w[g + last - 1] = extra
+            w[jac + (last - 1) * size + size - 1] = 1.0
         return
     for i in range(n):  # f_x v
         w[z + i] = 0.0
