@@ -104,6 +104,7 @@ def test_words_for_special_points_are_answered_by_their_kinds(word, name):
 
 
 def test_explore_names_what_it_takes():
+    assert issubclass(pk.FreeGyroRotor, pk.System)  # classes are known once they are loaded
     with pytest.raises(pk.ParameterError, match="wants one of ") as caught:
         pk.explore(3)
     assert "Potential" in str(caught.value)
@@ -129,3 +130,34 @@ def test_functions_are_named_by_what_they_return_or_do():
             if isinstance(node, ast.FunctionDef) and node.name.strip("_") in VAGUE:
                 vague.append(f"{path.name}: {node.name}")
     assert vague == ["rotation.py: at"]  # public: `CoupledRotation.at`
+
+
+#: Most parameters of a function.
+MOST = 12
+#: Those that have more: public ones, passes of the table, which take a parameter an argument, and
+#: kernels, whose arrays stand side by side. No other may join them.
+WIDE = {
+    "phase_portrait", "Problem.__init__", "RotorMotions.poincare", "bearing_forces",
+    "fixed_bearing_forces", "separatrix_forces", "strobe",
+    *(f"kernels: {name}" for name in (
+        "advance", "correct", "crossings", "flow", "growth", "heun_until", "kernel_transforms",
+        "levels", "motions", "newton", "note", "paths", "shorter", "strobe",
+    )),
+}  # fmt: skip
+
+
+def test_functions_take_few_parameters():
+    wide = set()
+    for path in sorted(Path(pk.__file__).parent.rglob("*.py")):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        owners = {f: c for c in ast.walk(tree) if isinstance(c, ast.ClassDef) for f in c.body}
+        for node in ast.walk(tree):
+            if not isinstance(node, ast.FunctionDef):
+                continue
+            own = node.args
+            given = [one.arg for one in (*own.posonlyargs, *own.args, *own.kwonlyargs)]
+            if len(set(given) - {"self", "cls"}) > MOST:
+                compiled = {ast.unparse(one) for one in node.decorator_list} & {"kernel", "routine"}
+                name = f"{owners[node].name}.{node.name}" if node in owners else node.name
+                wide.add(f"kernels: {name}" if compiled else name)
+    assert wide == WIDE

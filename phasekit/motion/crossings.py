@@ -63,6 +63,26 @@ class Crossings(NamedTuple):
     steps: Index
 
 
+class Edges(NamedTuple):
+    """Where motions end."""
+
+    box: Array
+    """Least and greatest states, of shape (2, states), outside of which they end; or (2, 0)."""
+    rests: Array
+    """Rows: points, and last how near to them motions end."""
+
+    @classmethod
+    def none(cls, n: int) -> Edges:
+        """Nowhere, of so many states."""
+        return cls(np.empty((2, 0)), np.zeros((1, n)))
+
+    @classmethod
+    def around(cls, rests: Array, near: Array, box: tuple[Array, Array] | None = None) -> Edges:
+        """Near points, and outside of a box."""
+        ends = np.empty((2, 0)) if box is None else np.array(box, float)
+        return cls(ends, np.vstack([rests, near]))
+
+
 def crossings(
     law: Equations,
     values: Mapping[str, Array],
@@ -72,14 +92,11 @@ def crossings(
     *,
     more: Mapping[str, Array] | None = None,
     on: Index | None = None,
-    box: tuple[Array, Array] | None = None,
-    rests: Array | None = None,
-    near: Array | None = None,
+    edges: Edges | None = None,
     kept: bool = True,
     rtol: float = RTOL,
     atol: float = ATOL,
     most: int = MOST,
-    threads: int | None = None,
 ) -> Crossings:
     """Follow motions and find where functions vanish along them.
 
@@ -100,26 +117,19 @@ def crossings(
     on : array, shape (cells,)
         The function on whose zero a motion starts, which is no crossing; -1: on none; -2: zeros
         at the start are crossings.
-    box : (array, array)
-        Least and greatest states, outside of which motions end.
-    rests, near : array, shape (n, states) and (states,)
-        Points, and how near to them motions end.
+    edges : Edges
+        Where motions end.
     kept : bool
         Whether all crossings are kept, or those alone that end motions.
-    rtol, atol, most, threads
+    rtol, atol, most
         As of `flow`; `most` steps.
     """
     count, n = states.shape
     further = {} if more is None else {name: np.asarray(x, float) for name, x in more.items()}
     on = np.full(count, -1, np.int64) if on is None else on
-    ends = np.empty((2, 0)) if box is None else np.array(box, float)
-    points = np.zeros((1, n))
-    if rests is not None and near is not None:
-        points = np.vstack([rests, near])
-    job = _Job(law, dict(values), further, tuple(watched), ends, points, kept, rtol, atol, most)
-    follow: Callable[..., Crossings] = functools.partial(_in_lanes, threads=threads)
-    if law.kind == "python":
-        follow = _one_by_one
+    edges = Edges.none(n) if edges is None else edges
+    job = _Job(law, dict(values), further, tuple(watched), edges, kept, rtol, atol, most)
+    follow: Callable[..., Crossings] = _one_by_one if law.kind == "python" else _in_lanes
     room = ROOM if kept else 1
     already = np.zeros((count, len(watched)), np.int64)
     parts = [follow(job, np.array(states), np.array(times, float), np.array(on), already, room)]
@@ -146,8 +156,7 @@ class _Job:
     values: Mapping[str, Array]
     more: Mapping[str, Array]
     watched: tuple[Crossing, ...]
-    box: Array
-    rests: Array
+    edges: Edges
     kept: bool
     rtol: float
     atol: float
@@ -182,9 +191,8 @@ def _joined(parts: list[Crossings]) -> Crossings:
 
 
 def _in_lanes(
-    job: _Job, states: Array, times: Array, on: Index, already: Index, room: int,
-    threads: int | None = None,
-) -> Crossings:  # fmt: skip
+    job: _Job, states: Array, times: Array, on: Index, already: Index, room: int
+) -> Crossings:
     from phasekit.motion.kernels.crossings import crossings as kernel
     from phasekit.numerics.launch import launch
 
@@ -200,13 +208,13 @@ def _in_lanes(
     columns = [np.broadcast_to(values[name], (count,)) for name in names]
     parameters = np.array(columns or np.zeros((1, count)), float)
     limits = limits_of(law, job.rtol, job.atol, job.most, alone=True)
-    shared = np.zeros((0, 3)), limits, watch, rules, job.box, job.rests, job.kept
+    shared = np.zeros((0, 3)), limits, watch, rules, *job.edges, job.kept
     time, which = np.full((count, room), np.nan), np.full((count, room), -1)
     state, number = np.full((count, room, n), np.nan), np.zeros(count, np.int64)
     status, steps = np.zeros(count, np.int64), np.zeros(count, np.int64)
     groups: Any = (time, state, which, number, status, steps)
     cells = times, states, on, already, parameters
-    launch(kernel, (code.address, *shared, *cells), count, groups, threads, WEIGHT)
+    launch(kernel, (code.address, *shared, *cells), count, groups, None, WEIGHT)
     judged(status, parameters)
     return Crossings(time, state, which, status, steps)
 
@@ -321,10 +329,11 @@ def _followed(
                     found.append((t, x, i))
                 if ends:
                     return found, ARRIVED, number
-            if job.box.size and not np.all((step.after >= job.box[0]) & (step.after <= job.box[1])):
+            box = job.edges.box
+            if box.size and not np.all((step.after >= box[0]) & (step.after <= box[1])):
                 return found, LEFT, number
-            for row, rest in enumerate(job.rests[:-1]):
-                if np.all(np.abs(step.after - rest) <= job.rests[-1]):
+            for row, rest in enumerate(job.edges.rests[:-1]):
+                if np.all(np.abs(step.after - rest) <= job.edges.rests[-1]):
                     return found, RESTING + row, number
     except (ConvergenceError, ValueError):
         return found, FAILED, number

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.equations import Equations
+from phasekit.motion.crossings import Edges
 from phasekit.motion.equation_rates import rates_on
 from phasekit.motion.lost import ARRIVED, CROWDED, LEFT, RESTING
 from phasekit.motion.paths import Path, distances, paths
@@ -95,7 +96,7 @@ def strands(
         times.append([0.0, one.sense * np.inf])
     found = paths(
         law, values, np.array(begin), np.array(times), widths=widths, close=CLOSE, longest=length,
-        box=(low - room, high + room), rests=around, near=REACHED * widths, rtol=rtol,
+        edges=Edges.around(around, REACHED * widths, (low - room, high + room)), rtol=rtol,
         atol=1e-3 * rtol,
     )  # fmt: skip
     return [
@@ -176,8 +177,8 @@ def goals(
     states = np.array([state for state, _ in ends])
     times = np.array([[0.0, sense * span] for _, sense in ends])
     found = paths(
-        law, values, states, times, widths=widths, close=np.inf, rests=around,
-        near=REACHED * widths, rtol=rtol, atol=1e-3 * rtol,
+        law, values, states, times, widths=widths, close=np.inf,
+        edges=Edges.around(around, REACHED * widths), rtol=rtol, atol=1e-3 * rtol,
     )  # fmt: skip
     result = []
     for path in found:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from phasekit.errors import ConvergenceError
 from phasekit.laws.equations import Equations
+from phasekit.motion.crossings import Edges
 from phasekit.motion.equation_rates import parameters_of, pointwise, rates_of
 from phasekit.motion.lost import ARRIVED, CROWDED, EXHAUSTED, FAILED, LEFT, RESTING
 from phasekit.motion.method import WEIGHT, limits_of
@@ -41,12 +42,9 @@ def paths(
     widths: Array,
     close: float,
     longest: float = np.inf,
-    box: tuple[Array, Array] | None = None,
-    rests: Array | None = None,
-    near: Array | None = None,
+    edges: Edges | None = None,
     rtol: float,
     atol: float,
-    threads: int | None = None,
 ) -> list[Path]:
     """Follow motions of one system and keep states close together.
 
@@ -64,17 +62,12 @@ def paths(
         What distances are measured by.
     close, longest : float
         Distance between states, and length of a path, at most.
-    box : (array, array)
-        Least and greatest states, outside of which motions end.
-    rests, near : array, shape (n, states) and (states,)
-        Points, and how near to them motions end, unless they start there.
+    edges : Edges
+        Where motions end; near a point unless they start there.
     """
     count, n = states.shape
-    ends = np.empty((2, 0)) if box is None else np.array(box, float)
-    points = np.zeros((1, n))
-    if rests is not None and near is not None:
-        points = np.vstack([rests, near])
-    how = ends, points, np.array(widths, float), close, longest
+    edges = Edges.none(n) if edges is None else edges
+    how = *edges, np.array(widths, float), close, longest
     if law.kind == "python":
         return [
             _followed(law, values, states[k], times[k], *how, rtol=rtol, atol=atol)
@@ -89,7 +82,7 @@ def paths(
     shared = np.zeros((0, 3)), limits_of(law, rtol, atol, MOST, alone=True), *how
     cells = np.array(times, float), np.array(states, float), parameters
     groups: Any = (when, where, number, status, taken)
-    launch(kernel, (code.address, *shared, *cells), count, groups, threads, WEIGHT)
+    launch(kernel, (code.address, *shared, *cells), count, groups, None, WEIGHT)
     return [Path(when[k, : number[k]], where[k, : number[k]], int(status[k])) for k in range(count)]
 
 

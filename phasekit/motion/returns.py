@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.laws.equations import Equations
-from phasekit.motion.crossings import NEVER, Crossing, crossings, symbols_here
+from phasekit.motion.crossings import NEVER, Crossing, Edges, crossings, symbols_here
 from phasekit.motion.lost import ARRIVED
 
 Array = npt.NDArray[np.float64]
@@ -143,7 +143,7 @@ def first_returns(
     found = crossings(
         law, {name: np.array(value) for name, value in values.items()}, states, times, watched,
         more={name: np.array(value) for name, value in more.items()}, on=on,
-        box=(plane.low, plane.high), rests=plane.rests, near=NEAR * plane.widths,
+        edges=Edges.around(plane.rests, NEAR * plane.widths, (plane.low, plane.high)),
         kept=False, rtol=rtol, atol=rtol * ATOL, most=most,
     )  # fmt: skip
     came = found.status == ARRIVED

@@ -8,7 +8,7 @@ import sympy as sp
 
 import phasekit as pk
 from phasekit.laws.formulas import symbols_of
-from phasekit.motion.crossings import NEVER, Crossing, crossings
+from phasekit.motion.crossings import NEVER, Crossing, Edges, crossings
 from phasekit.motion.lost import ARRIVED, LEFT, RESTING
 from phasekit.motion.paths import paths
 
@@ -106,10 +106,8 @@ DAMPED = [
 @pytest.mark.parametrize("damped", DAMPED, ids=["formulas", "function"])
 def test_motions_end_at_rest_and_outside(damped):
     starts, times = np.array([[1.0, 0.0], [1.0, 5.0]]), np.array([[0.0, np.inf]] * 2)
-    how = {
-        "box": (np.array([-2.0, -9.0]), np.array([2.0, 9.0])), "rests": np.zeros((1, 2)),
-        "near": np.full(2, 1e-4),
-    }  # fmt: skip
+    box = np.array([-2.0, -9.0]), np.array([2.0, 9.0])
+    how = {"edges": Edges.around(np.zeros((1, 2)), np.full(2, 1e-4), box)}
     found = crossings(damped.law, {}, starts, times, [Crossing(x)], **how)
     assert found.status.tolist() == [RESTING, LEFT]
     rate = np.sqrt(1.0 - 0.01)
