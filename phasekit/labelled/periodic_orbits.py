@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -59,6 +60,11 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     ------
     ParameterError
         If the system is none of these, or an argument is unusable.
+
+    Warns
+    -----
+    RuntimeWarning
+        If multipliers leave the doubles.
 
     Notes
     -----
@@ -255,6 +261,14 @@ def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> 
             along[0, cell, k, : len(cycle.time)] = cycle.time
             along[1:, cell, k, : len(cycle.time)] = cycle.state.T
     number = np.array([-1 if one is None else len(one.cycles) for one in results], np.int64)
+    m = scalars["multiplier"]
+    if left := int(((m == 0.0) | np.isinf(m)).sum()):
+        warnings.warn(
+            f"multiplier: those of {left} of {int(np.isfinite(scalars['period']).sum())} cycles "
+            "leave the doubles, and are 0 or infinite; log_multiplier has their logarithms",
+            RuntimeWarning,
+            stacklevel=4,
+        )
     complete = np.array([one is not None and not one.reason for one in results], bool)
     words = {
         "period": "period of the cycle",

@@ -31,9 +31,41 @@ def rates_of(law: Equations, order: int = 0, longest: float = LONG, tangents: in
     if isinstance(law, Map):
         from phasekit.motion.kernels.iteration import compile_iterations
 
-        return Rates(address, law.names, -1, compile_iterations(address, entries), entries)
+        turns = _folds(law.states, law.names, law.f, tuple(law.periods.items()))
+        return Rates(address, law.names, -1, compile_iterations(address, entries, turns), entries)
     series = series_of(law, order, tangents, longest) if order else 0
     return Rates(address, law.names, -1, series, entries * (order + 1) if series else 0)
+
+
+@functools.lru_cache(maxsize=128)
+def _folds(
+    states: tuple[str, ...], names: tuple[str, ...], f: Any, periods: tuple[tuple[str, float], ...]
+) -> tuple[float, ...]:
+    """Periods of the angles of a map that winds turns up; none where they go on as they are.
+
+    Such a map makes many turns of one, by a matrix with a root beyond 1, and each iteration of
+    the unfolded angle loses digits, as 2 x does.
+    """
+    import sympy as sp
+
+    from phasekit.laws.formulas import symbols_of
+
+    if not (periods and isinstance(f, tuple)):
+        return ()
+    symbols, turns = symbols_of([*states, *names]), dict(periods)
+    angles = [i for i, name in enumerate(states) if name in turns]
+    function = sp.lambdify(list(symbols.values()), list(f), ["scipy", "numpy"])
+    place = np.random.default_rng(0).uniform(2.0, 3.0, len(symbols))
+    with np.errstate(all="ignore"):
+        before = np.array(function(*place), float)
+        winding = np.empty((len(angles), len(angles)))
+        for column, j in enumerate(angles):
+            turned = place + turns[states[j]] * (np.arange(len(place)) == j)
+            change = np.array(function(*turned), float) - before
+            winding[:, column] = [change[i] / turns[states[i]] for i in angles]
+    if not np.isfinite(winding).all() or np.abs(np.linalg.eigvals(winding)).max() <= 1.0 + 1e-3:
+        return ()
+    return tuple(turns.get(name, 0.0) for name in states)
 
 
 def derivatives_of(law: Equations) -> int:

@@ -98,3 +98,18 @@ def test_what_is_wrong_is_said(call, message):
     henon = pk.Problem({"x": "1 - 1.4*x^2 + y", "y": "0.3*x"}, map=True)
     with pytest.raises(pk.ParameterError, match=message):
         call(flow, henon)
+
+
+def test_maps_that_wind_angles_up_keep_their_digits():
+    """The unfolded angle of 2 x doubles its errors, and has no digit left after 53 steps."""
+    cat = pk.Problem({"x": "2*x + y", "y": "x + y"}, map=True, periods={"x": 1.0, "y": 1.0})
+    ds = pk.lyapunov(cat, [0.1, 0.2], n=5_000)
+    root = np.log((3.0 + np.sqrt(5.0)) / 2.0)
+    np.testing.assert_allclose(ds.lyapunov_exponent, [root, -root], atol=1e-10)
+    halves = pk.Problem({"x": "2*x"}, map=True, periods={"x": 64.0})
+    orbit = pk.flow(halves, [1.0], np.arange(9.0)).motion_x.values
+    assert orbit.tolist() == [1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 0.0, 0.0, 0.0]
+    # What winds no turns up goes on continuously.
+    turning = pk.Problem({"x": "x + 0.3 + 0.1*sin(2*pi*x)"}, map=True, periods={"x": 1.0})
+    orbit = pk.flow(turning, [0.0], np.arange(200.0)).motion_x.values
+    assert orbit[-1] > 50.0

@@ -20,7 +20,7 @@ from phasekit.numerics.machine_code import machine_code
 
 
 @functools.cache
-def compile_iterations(address: int, entries: int) -> int:
+def compile_iterations(address: int, entries: int, turns: tuple[float, ...] = ()) -> int:
     """Address of ``void (double *x, double *p, double *real, double *limits)``.
 
     It applies a map of eight lanes, of so many entries, until a lane ends, or once alone.
@@ -31,6 +31,8 @@ def compile_iterations(address: int, entries: int) -> int:
         Machine code of the map, ``void (double *x, double *p, double *z, double *out)``.
     entries : int
         Those of the state and of tangent vectors.
+    turns : tuple of float, optional
+        Periods of states that are brought back into half a turn about zero; 0 of others.
     """
     double = ir.DoubleType()
     pointer = double.as_pointer()
@@ -47,7 +49,7 @@ def compile_iterations(address: int, entries: int) -> int:
     builder.position_at_end(step)
     writer = IterationWriter(module, builder, function.args, {})
     code = builder.inttoptr(ir.Constant(ir.IntType(64), address), kind.as_pointer())
-    builder.cbranch(writer.step(code, clock, out, entries), step, end)
+    builder.cbranch(writer.step(code, clock, out, entries, turns), step, end)
     builder.position_at_end(end)
     builder.ret_void()
     return machine_code(str(module), host=True)
@@ -56,7 +58,7 @@ def compile_iterations(address: int, entries: int) -> int:
 class IterationWriter(LaneWriter):
     """Writes one step."""
 
-    def step(self, code: Any, clock: Any, out: Any, entries: int) -> Any:
+    def step(self, code: Any, clock: Any, out: Any, entries: int, turns: tuple[float, ...]) -> Any:
         """Apply the map to the lanes that run; return whether to go on with all of them."""
         b, (x, p, real, limits) = self.builder, self.arrays
         one, zero = self.constant(1.0), self.constant(0.0)
@@ -69,6 +71,8 @@ class IterationWriter(LaneWriter):
         whole = self.boolean(True)
         for i in range(entries):
             value = self.load(out, i)
+            if i < len(turns) and turns[i] > 0.0:
+                value = self.folded(value, turns[i])
             size = self._intrinsic("fabs", value)
             whole = b.and_(whole, b.fcmp_ordered("<", size, self.constant(np.inf)))
             b.store(b.select(running, value, self.load(x, i)), self.pointer(x, i), align=8)
@@ -88,3 +92,9 @@ class IterationWriter(LaneWriter):
         first = b.load(super(LaneWriter, self).pointer(limits, ALONE * LANES))
         alone = b.fcmp_ordered("!=", first, ir.Constant(ir.DoubleType(), 0.0))
         return b.and_(none, b.not_(alone))
+
+    def folded(self, value: Any, turn: float) -> Any:
+        """Bring an angle back by whole turns, to the nearest of which doubles round."""
+        b, big = self.builder, self.constant(1.5 * 2.0**52)
+        turned = b.fsub(b.fadd(b.fdiv(value, self.constant(turn)), big), big)
+        return b.fsub(value, b.fmul(turned, self.constant(turn)))
