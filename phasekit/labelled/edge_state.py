@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def edge_state(system: Any, a: Any, b: Any, *, rtol: float | None = None) -> xr.
 
     Parameters
     ----------
-    system : Problem, or system that states rates or a step
+    system : Problem, Perturbed, or system that states rates or a step
         One flow, forced or not, or one map.
     a, b : mapping, sequence or xarray.DataArray
         Two states that come to different attractors, or one of which runs to infinity.
@@ -82,8 +83,10 @@ def edge_state(system: Any, a: Any, b: Any, *, rtol: float | None = None) -> xr.
     """
     found = as_system(system)
     law = equations_of(found)
+    if law is None and found.standing.traits is not None:
+        law, a, b = found.equations(), *(_by_place(found, one) for one in (a, b))
     if law is None:
-        raise bad("system", found, "a flow or map with states of its own, such as a pk.Problem")
+        raise bad("system", found, "a map, or a flow with states of its own or with damping")
     _, parameters = single(found)
     refuse_force(found)
     rtol = checked_tolerances(rtol, None).get("rtol", RTOL)
@@ -115,6 +118,14 @@ def edge_state(system: Any, a: Any, b: Any, *, rtol: float | None = None) -> xr.
         )
     ds = laid_out(found, rows_of(law), attractor_rows(law, search.result()))
     return ds.assign(_rows(law, edge, codes))
+
+
+def _by_place(system: Any, given: Any) -> Any:
+    """A state with the coordinate and its rate by the names that results have for them."""
+    if not isinstance(given, Mapping):
+        return given
+    names = {system.coordinate: "phi", f"d{system.coordinate}": "dphi"}
+    return {names.get(name, name): value for name, value in given.items()}
 
 
 def _state(law: Equations, argument: str, given: Any) -> FloatArray:

@@ -15,7 +15,7 @@ from phasekit.labels.arguments import bad, whole
 from phasekit.labels.grid import LABEL_DTYPE, Grid, make_grid, variable
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import Equilibria, corners, equilibria_of
+from phasekit.systems.rests import Equilibria, corners, equilibria_of, window_of
 
 Array = npt.NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
     if n is not None:
         times = whole("n", n, "a number of iterations >= 1")
         problem = problem.iterated(times)
-    low, high = corners(problem, box)
+    low, high = corners(problem, window_of(system, box))
     dims, shape = tuple(grid.sizes), tuple(grid.sizes.values())
     values = {name: grid.aligned(name, dims) for name in grid.inputs}
     found, reasons = list[Equilibria | None](), list[str]()

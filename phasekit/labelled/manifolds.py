@@ -23,7 +23,7 @@ from phasekit.motion.limit_cycles import Cycle
 from phasekit.motion.manifold import Goal, Start, Strand, goals, strands
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import Equilibria, corners, equilibria_of, kind_of
+from phasekit.systems.rests import Equilibria, corners, equilibria_of, kind_of, window_of
 from phasekit.systems.system import as_system
 
 Array = npt.NDArray[np.float64]
@@ -100,7 +100,7 @@ def manifolds(
         given = number(name, value, wants)
         if not given > 0.0 or (name == "rtol" and not 1e-13 <= given <= 1e-3):
             raise bad(name, value, wants)
-    low, high = corners(problem, window, "window")
+    low, high = corners(problem, window_of(system, window), "window")
     with notice("following manifolds"):
         rests = equilibria_of(problem, low, high)
         if rests.why:

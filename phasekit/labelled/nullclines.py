@@ -17,7 +17,7 @@ from phasekit.motion.equation_rates import rates_on, slopes_on
 from phasekit.numerics.intervals.curves import Curves, zero_curves
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.systems.problem import as_problem
-from phasekit.systems.rests import corners
+from phasekit.systems.rests import corners, window_of
 from phasekit.systems.system import as_system
 
 
@@ -74,7 +74,7 @@ def nullclines(system: Any, window: Any = None, *, resolution: int = 400) -> xr.
         raise bad("system", found, "a flow of two states without forcing, such as a pk.Problem")
     count = whole("resolution", resolution, "a number of cells >= 10", 10)
     problem = as_problem(found)
-    low, high = corners(problem, window)
+    low, high = corners(problem, window_of(system, window))
     values = {name: float(problem.parameters[name]) for name in law.names}
     curves, reasons = [], list[str]()
     for name, (lines, why) in zip(law.states, _curves(law, values, low, high, count), strict=True):

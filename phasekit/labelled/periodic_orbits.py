@@ -22,7 +22,7 @@ from phasekit.numerics.intervals.curves import zero_curves
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.waits import notice, stage
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import Equilibria, corners, equilibria_of
+from phasekit.systems.rests import Equilibria, corners, equilibria_of, window_of
 from phasekit.systems.system import as_system
 
 Array = npt.NDArray[np.float64]
@@ -64,7 +64,7 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
     Warns
     -----
     RuntimeWarning
-        If multipliers leave the doubles.
+        If multipliers are greater than any double.
 
     Notes
     -----
@@ -99,7 +99,7 @@ def periodic_orbits(system: Any, window: Any = None, *, n: int | None = None) ->
         return _of_map(problem, window, times)
     if n is not None:
         raise bad("n", n, "None for a flow: all its limit cycles are looked for")
-    low, high = corners(problem, window, "window")
+    low, high = corners(problem, window_of(found, window), "window")
     grid = make_grid(problem.parameters)
     if grid.lazy:
         raise bad("parameters", "chunked arrays", "loaded ones: use .load()")
@@ -261,11 +261,10 @@ def _dataset(problem: Problem, grid: Grid, results: Sequence[Limits | None]) -> 
             along[0, cell, k, : len(cycle.time)] = cycle.time
             along[1:, cell, k, : len(cycle.time)] = cycle.state.T
     number = np.array([-1 if one is None else len(one.cycles) for one in results], np.int64)
-    m = scalars["multiplier"]
-    if left := int(((m == 0.0) | np.isinf(m)).sum()):
+    if left := int(np.isinf(scalars["multiplier"]).sum()):
         warnings.warn(
             f"multiplier: those of {left} of {int(np.isfinite(scalars['period']).sum())} cycles "
-            "leave the doubles, and are 0 or infinite; log_multiplier has their logarithms",
+            "are greater than any double; log_multiplier has their logarithms",
             RuntimeWarning,
             stacklevel=4,
         )

@@ -262,8 +262,8 @@ def state_arguments(function: Function) -> Function:
     its rates. The first argument is the system, or an accessor.
     """
     function = call_checked(function)
-    first = next(iter(inspect.signature(function).parameters))
-    own = {name.rstrip("0"): name for name in inspect.signature(function).parameters}
+    first, *_ = order = list(inspect.signature(function).parameters)
+    own = {name.rstrip("0"): name for name in order}
     own = {stem: name for stem, name in own.items() if stem in ("phi", "dphi", "ddphi")}
     other = {
         alias: name
@@ -285,6 +285,8 @@ def state_arguments(function: Function) -> Function:
             spelled = {stem.replace("phi", coordinate): name for stem, name in own.items()}
             for form in ("{}", "{}0", "state_{}"):
                 names |= {form.format(stem): name for stem, name in spelled.items()}
+        if not own_states and {"phi", "dphi"} <= own.keys() and "x0" in order:
+            args = _spread(order, args, kwargs, own)
         for name in [name for name in kwargs if name in names and name not in own.values()]:
             if names[name] in kwargs:
                 raise ParameterError(f"{name}: got it besides {names[name]}, wants it once")
@@ -292,6 +294,40 @@ def state_arguments(function: Function) -> Function:
         return function(*args, **kwargs)
 
     return cast(Function, called)
+
+
+def _spread(
+    order: list[str], args: tuple[Any, ...], kwargs: dict[str, Any], own: Mapping[str, str]
+) -> tuple[Any, ...]:
+    """Spread a state that is one argument, by name or in order, over those of its parts.
+
+    The arguments by position that are left; the others are added to those by keyword.
+    """
+    at = order.index(own["phi"])
+    whole: Any = args[at] if len(args) > at else kwargs.get("x0")
+    if not isinstance(whole, Mapping):
+        pair = isinstance(whole, (tuple, list)) and len(whole) == 2
+        if len(args) > at or not pair or "x0" not in kwargs or own["phi"] in kwargs:
+            return args
+        whole = dict(zip(("phi", "dphi"), whole, strict=True))
+    coordinate = getattr(args[0], "coordinate", None) if args else None
+    names: dict[Any, str] = {"phi": "phi", "dphi": "dphi"}
+    names |= {coordinate: "phi", f"d{coordinate}": "dphi"}
+    given: dict[str, Any] = {names.get(name, name): value for name, value in whole.items()}
+    if len(args) > at:  # what comes behind the state stands where its rate would
+        behind = [name for name in order[at + 1 :] if name != own["dphi"]]
+        kwargs.update(zip(behind, args[at + 1 :], strict=False))
+        args = args[:at]
+    else:
+        del kwargs["x0"]
+    if given.keys() <= {"phi", "dphi"}:
+        for name, value in given.items():
+            if own[name] in kwargs:
+                raise ParameterError(f"{own[name]}: got it besides x0, wants it once")
+            kwargs[own[name]] = value
+    else:
+        kwargs["x0"] = given
+    return args
 
 
 def named_arguments(title: str, function: Callable[..., Any]) -> Callable[..., Any]:

@@ -16,6 +16,7 @@ from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.zeros import zeros_in_box
 from phasekit.systems.problem import Problem
+from phasekit.systems.system import System
 
 Array = npt.NDArray[np.float64]
 
@@ -176,6 +177,11 @@ def natural_window(system: Any) -> dict[str, tuple[float, float]] | None:
         return None
     rate = {f"d{x}": (-1.5 * speed, 1.5 * speed)}
     return rate if turn is not None else {x: (low, high), **rate}
+
+
+def window_of(system: Any, window: Any) -> Any:
+    """The window that is given, or where the motions of a system in a potential are."""
+    return natural_window(system) if window is None and isinstance(system, System) else window
 
 
 def _corner_values(system: Any) -> list[dict[str, float]]:

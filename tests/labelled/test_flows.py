@@ -184,7 +184,6 @@ def test_motions_without_end_are_announced():
         (lambda p: pk.flow(p, v=0.0, u=1.0, t=1.0), "state 'u' is unknown"),
         (lambda p: pk.flow(p, [0.0, 0.0], 1.0, method="euler"), "method"),
         (lambda p: pk.flow(p, [0.0, 0.0], 1.0, events="q"), r"events\['event'\]"),
-        (lambda p: pk.flow(pk.Pendulum(length=1.0), x0=[0.0, 0.0], t=1.0), "x0: got"),
         (lambda p: pk.Problem(NEURON, parameters=VALUES, window={"u": (0, 1)}), "window: state"),
         (lambda p: pk.Problem(NEURON, parameters=VALUES, window={"v": (1, 0)}), r"window\['v'\]"),
         (
