@@ -236,7 +236,7 @@ def test_maps_are_saved_pickled_drawn_and_have_events(tmp_path):
         (lambda: pk.continuation(HENON, "a", orbit=1, span=(0, 1)), "orbit: got 1, wants None"),
         (lambda: pk.poincare_section(LOGISTIC, [0.1], duration=1.0, section="x"), "wants a flow"),
         (lambda: pk.continuation(LOGISTIC, "r", x0=[0.5], span=(1, 4), stop="H"), "stop: event"),
-        (lambda: LOGISTIC.iterated(0), "times: got 0"),
+        (lambda: LOGISTIC.iterated(0), "n: got 0"),
         (lambda: pk.Problem("x**2", "x", {"a": 1.0}).iterated(2), "wants a map"),
     ],
 )
