@@ -81,6 +81,7 @@ SLOW = (
     "motion/test_extreme_motions.py",
     "motion/test_series.py",
     "motion/test_strobe.py",
+    "numerics/test_same_bits.py",
     "perturbation/test_by_numbers.py",
     "perturbation/test_escape.py",
     "perturbation/test_free_rotor.py",
@@ -99,6 +100,19 @@ def pytest_configure(config):
     everything = config.args_source is config.ArgsSource.TESTPATHS
     if everything and not (config.option.markexpr or config.option.keyword):
         config.option.markexpr = FAST
+    if everything and config.option.markexpr == "slow":  # examples of docstrings are fast
+        config.args = ["tests"]
+
+
+def pytest_ignore_collect(collection_path, config):
+    """Leave files unread of which no test would run."""
+    return True if config.option.markexpr == FAST and is_slow(collection_path) else None
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collect_file():
+    """Look for examples in the package's docstrings alone, not in those of tests."""
+    return [one for one in (yield) if type(one).__name__ != "DoctestModule"]
 
 
 def pytest_itemcollected(item):

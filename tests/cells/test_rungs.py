@@ -217,7 +217,7 @@ def numbered_centers(torque):
     return {name: int(number) for name, number in zip(names, apart.argmin(axis=1), strict=True)}
 
 
-@pytest.mark.parametrize("torque", [0.0, 0.05])
+@pytest.mark.parametrize("torque", [pytest.param(0.0, marks=pytest.mark.slow), 0.05])
 def test_resonances_are_the_exact_ones(torque):
     """Actions and widths of all families; under a torque nothing rotates."""
     lower, upper = numbered_centers(torque).values()

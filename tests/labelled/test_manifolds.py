@@ -116,18 +116,29 @@ def test_manifolds_round_a_cylinder_come_to_a_rotation():
         assert ends.arclength[k].max().item() == pytest.approx(length, abs=2e-5)
 
 
-def test_a_cycle_is_where_a_manifold_comes():
+def round_both_foci():
     """A saddle whose unstable manifold winds onto a cycle round both foci."""
-    system = pk.Problem(
+    return pk.Problem(
         {"x": "y", "y": "x - x^3 + (a - x^2)*y"}, parameters={"a": 1.5},
         window={"x": (-3.0, 3.0), "y": (-5.0, 5.0)},
     )  # fmt: skip
+
+
+def test_a_cycle_is_where_a_manifold_comes():
+    system = round_both_foci()
     cycles = pk.periodic_orbits(system)
     assert cycles.n_unstable.values.tolist() == [0]
     ds = pk.manifolds(system)
     out = ~ds.manifold_stable.values
     assert ds.manifold_cycle.values[out].tolist() == [0, 0]
     assert (ds.manifold_to.values[out] == -1).all()
+
+
+@pytest.mark.slow  # integrates in Python
+def test_manifolds_of_a_python_function_are_those_of_formulas():
+    system = round_both_foci()
+    ds = pk.manifolds(system)
+    out = ~ds.manifold_stable.values
 
     def rates(x, a):
         return [x[1], x[0] - x[0] ** 3 + (a - x[0] ** 2) * x[1]]
