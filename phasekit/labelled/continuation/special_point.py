@@ -276,7 +276,8 @@ class SpecialPoint(Generic[Of]):
         >>> bool(abs(curve.points.mu + curve.points.l / 2 - 1 / 8).max() < 1e-14)
         True
         """
-        names = parameter if isinstance(parameter, str) else " and ".join(map(str, parameter))
+        several = isinstance(parameter, (list, tuple))
+        names = " and ".join(map(str, parameter)) if several else parameter
         with notice(f"following {self.kind} points along {names}"):
             found: Of = onward(f"{self.way}.curve")(self, parameter, span, options)
         return announced(found)
