@@ -1,6 +1,7 @@
 """Branches of many states: Hopf points by default, neutral saddles where they are asked for."""
 
 import itertools
+import warnings
 
 import numpy as np
 import pytest
@@ -79,3 +80,53 @@ def test_neutral_saddles_of_few_states_come_with_hopf_points():
     found = pk.continuation(problem, "mu", span=(-1.0, 2.0))
     assert [round(p["mu"], 9) for p in found.special("NS")] == [1.0]
     assert found.messages == ()
+
+
+def bratu(n, *, jac=False):
+    """Bratu's equation by differences, and how often f is called."""
+    h2, calls = (n + 1.0) ** 2, [0]
+    laplace = h2 * (np.diag(np.ones(n - 1), 1) + np.diag(np.ones(n - 1), -1) - 2.0 * np.eye(n))
+
+    def f(u, lam):
+        calls[0] += 1
+        return laplace @ u + lam * np.exp(u)
+
+    slopes = (lambda u, lam: laplace + np.diag(lam * np.exp(u))) if jac else None
+    return pk.Problem(f, [f"u{i}" for i in range(n)], {"lam": 0.0}, slopes), calls
+
+
+def test_a_point_of_many_states_takes_a_few_matrices_of_differences():
+    n, called, folds = 40, [], []
+    problem, calls = bratu(n)
+    options = {"directions": "forward"}
+    for most in (60, 80):
+        calls[0] = 0
+        branch = pk.continuation(
+            problem, "lam", x0=np.zeros(n), span=(0.0, 4.0),
+            options=pk.ContinuationOptions(max_points=most, **options),
+        )  # fmt: skip
+        called.append(calls[0])
+        folds.append(branch.special("LP")[0]["lam"])
+    # Central differences are 2 (n + 1) calls: two for a step, one for tests, one for sizes.
+    assert (called[1] - called[0]) / 20 < 5 * 2 * (n + 1)
+    exact = pk.continuation(bratu(n, jac=True)[0], "lam", x0=np.zeros(n), span=(0.0, 4.0),
+                            options=pk.ContinuationOptions(max_points=80, **options))  # fmt: skip
+    assert folds == pytest.approx([exact.special("LP")[0]["lam"]] * 2, rel=1e-10)
+
+
+def test_a_branch_to_the_ends_of_numbers_leaks_no_warnings():
+    n = 12
+    names = [f"u{i}" for i in range(n)]
+    beside = [0, *names, 0]
+    f = [
+        f"{(n + 1) ** 2}*({beside[i]} - 2*{x} + {beside[i + 2]}) + lam*exp({x})"
+        for i, x in enumerate(names)
+    ]
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".* encountered in ", RuntimeWarning)
+        warnings.filterwarnings("ignore", "the branch in", RuntimeWarning)
+        branch = pk.continuation(
+            pk.Problem(f, names, {"lam": 0.0}), "lam", x0=np.zeros(n), span=(0.0, 4.0)
+        )
+    assert float(branch.points.lam[-1]) < 1e-200
+    assert float(branch.points.residual.max()) < 1e-3

@@ -24,6 +24,7 @@ BIG = 1e100  # for the slope of a logarithm at zero
 STEPS = 8  # of Newton's method
 
 
+@np.errstate(all="ignore")
 def not_isolated(curve: Any, u: Array, where: str) -> str:
     """What is said where a curve ends because equilibria are not isolated; nothing if they are."""
     what, instead = "equilibria are", "write one of its equations as {} - total, with"
@@ -189,6 +190,7 @@ def _gradient(curve: Any, u: Array) -> str:
     return " and ".join(found)
 
 
+@np.errstate(all="ignore")
 def deficient(curve: Any, u: Array, slopes: Array | None = None) -> bool:
     """Whether f_u has no full rank at a point, in whatever units."""
     slopes = curve.evaluate(u)[1] if slopes is None else slopes
@@ -200,7 +202,10 @@ def deficient(curve: Any, u: Array, slopes: Array | None = None) -> bool:
     if sizes[-1] > DOUBT * sizes[0]:
         return False  # without second derivatives, which take long
     rows, columns = _units(curve, u, slopes)
-    sizes = np.linalg.svd(slopes * columns * rows[:, None], compute_uv=False)
+    scaled = slopes * columns * rows[:, None]
+    if not np.isfinite(scaled).all():
+        return False
+    sizes = np.linalg.svd(scaled, compute_uv=False)
     return bool(sizes[-1] <= _error(curve) * sizes[0])
 
 
@@ -215,8 +220,7 @@ def _units(curve: Any, u: Array, slopes: Array) -> tuple[Array, Array]:
     An entry, or an unknown, may vanish from all first derivatives.
     """
     scale = curve.scale[: curve.m]
-    with np.errstate(all="ignore"):
-        sizes = np.abs(slopes * scale) + np.nan_to_num(np.abs(curve.bend(u, scale) * scale))
+    sizes = np.abs(slopes * scale) + np.nan_to_num(np.abs(curve.bend(u, scale) * scale))
     rows, columns = np.ones(curve.n), np.ones(curve.m)
     for _ in range(ROUNDS):
         here = sizes * columns * rows[:, None]

@@ -10,8 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.kernels.defining import REGULAR
 from phasekit.bifurcation.continuation.neutral import is_neutral, said_of
-from phasekit.bifurcation.continuation.path import Path, Sample, between
+from phasekit.bifurcation.continuation.path import Path, Sample, Slopes, between, sharpened
 from phasekit.bifurcation.continuation.rows import largest
 from phasekit.bifurcation.continuation.spectrum import (
     Tests,
@@ -81,18 +82,17 @@ def _all_tests(curve: Curve, path: Path, *, pairs: bool, saddles: bool) -> Tests
             curve, path.tangent, path.slopes, path.eigenvalues,
             pairs=pairs, neutral=False, saddles=saddles,
         )  # fmt: skip
-    parts = [
-        test_functions(
-            curve,
-            path.tangent[some],
-            path.slopes[some],
-            None,
-            pairs=pairs,
-            neutral=False,
-            saddles=saddles,
-        )  # fmt: skip
-        for some in path.slopes.chunks()
-    ]
+    parts = []
+    for some in path.slopes.chunks():
+        # Differences of many states are sharp where a sign could hang on it.
+        rough = curve.kind in REGULAR and not curve.knows_slopes
+        slopes = Slopes(curve, path.u[some], sharp=not rough)[:]
+        values = None
+        if rough:
+            slopes, values = sharpened(curve, path.u[some], slopes)
+        parts.append(test_functions(
+            curve, path.tangent[some], slopes, values, pairs=pairs, neutral=False, saddles=saddles
+        ))  # fmt: skip
     return Tests(*(np.concatenate([getattr(one, f.name) for one in parts]) for f in fields(Tests)))
 
 

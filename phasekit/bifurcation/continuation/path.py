@@ -110,7 +110,7 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
             slopes[i] = where
     values = None
     if isinstance(slopes, np.ndarray):
-        slopes, values = _sharpened(curve, u, slopes)
+        slopes, values = sharpened(curve, u, slopes)
     return Path(
         u, tangent, slopes, table[:, -trace.RECORDED :], len(behind), stops, residual, values,
         (message,) if message else (),
@@ -148,7 +148,7 @@ class Slopes:
             yield slice(first, min(first + step, len(self.u)))
 
 
-def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArray[np.complex128]]:
+def sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArray[np.complex128]]:
     """Derivatives at the points themselves, where the sign of an eigenvalue could hang on it.
 
     And the eigenvalues.
@@ -169,7 +169,7 @@ def _sharpened(curve: Curve, u: Array, slopes: Array) -> tuple[Array, npt.NDArra
     if doubtful.any():
         for i in np.flatnonzero(doubtful):
             slopes[i] = curve.evaluate(u[i])[1]
-        values = eigenvalues_of(curve.linear(slopes), accuracy=accuracy)
+        values[doubtful] = eigenvalues_of(curve.linear(slopes[doubtful]), accuracy=accuracy)
     return slopes, values
 
 
