@@ -10,8 +10,6 @@ from dataclasses import dataclass
 from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import bad
 from phasekit.labels.coordinates import LABELS, STATES
@@ -28,8 +26,6 @@ if TYPE_CHECKING:
 TAKEN = {*LABELS, *STATES, "point"}
 TAKEN |= {row.name for rows in NUMERICAL_ROWS.values() for row in rows}
 
-#: Places at which an inertia is tried.
-TRIED = 64
 #: What a class may state of its law, and what belongs to it.
 LAWS = ("products", "potential", "rates", "step")
 #: Names that neither parameters nor states can have, because a class or a call has them.
@@ -198,14 +194,11 @@ class StatedRouthian(StatedPotential):
         values = [system.parameters[name] for name in self.inputs]
         check_period(self._law.mass, values)
         if all(isinstance(value, float) for value in values):
-            places = self._law.period * np.arange(TRIED) / TRIED
-            with np.errstate(all="ignore"):
-                found = np.asarray(self._law.mass.values(places, *values))
-            if not np.all(found > 0.0):
+            place, least = self._law.least(dict(zip(self.inputs, values, strict=True)))
+            if not least > 0.0:
                 raise ParameterError(
-                    f"inertia: got {self._law.mass.text} = {np.min(found):.6g} at "
-                    f"{self._law.coordinate} = {places[np.argmin(found)]:.6g}, wants one > 0 "
-                    "everywhere"
+                    f"inertia: got {self._law.mass.text} = {least:.6g} at "
+                    f"{self._law.coordinate} = {place:.6g}, wants one > 0 everywhere"
                 )
 
     def law(self) -> Law:

@@ -164,3 +164,6 @@ def test_an_inertia_is_positive_everywhere():
         Loose(k=2.0)
     periods = pk.orbits(Loose(k=[0.5, 2.0]), 1.0, 0.0).period.values
     assert np.isfinite(periods).tolist() == [True, False]
+    found = pk.equilibria(Loose(k=[0.5, 2.0]))
+    assert found.n_equilibria.values.tolist() == [2, -1]
+    assert np.isnan(found.phi.values[1]).all()

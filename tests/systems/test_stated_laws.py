@@ -145,7 +145,6 @@ def test_rates_may_be_a_function_and_a_step_is_a_map():
         lambda s: pk.Perturbed(s, damping=0.1),
         lambda s: pk.critical(s, s.declared[0].name),
         lambda s: pk.branches(s, s.declared[0].name, (0.0, 1.0)),
-        lambda s: pk.explore(s),
         lambda s: pk.rotators(s, *STATE),
         lambda s: s.coefficients(),
         lambda s: s.reduced(),

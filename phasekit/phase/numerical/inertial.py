@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.errors import EquilibriumKind
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Routhian, Routhians
 from phasekit.phase.numerical import functions
@@ -19,6 +20,8 @@ from phasekit.phase.numerical.turns import torqued
 
 Array = npt.NDArray[np.float64]
 
+#: Places at which an inertia is tried.
+TRIED = 64
 #: Equations of what an inertia is in.
 _EQUATIONS = {
     "natural_frequency": "sqrt(V''/M)",
@@ -121,9 +124,28 @@ class Inertial(Routhians):
         one = self.with_values({name: np.asarray(values[name])[..., None] for name in self.names})
         with np.errstate(all="ignore"):
             rate = 1.0 / np.sqrt(one.inertia(found.phi)[0])
-        return Rests(
-            *found[:4], found.natural_frequency * rate, found.exponent * rate, found.n_equilibria
-        )
+        usable = np.broadcast_to(self.least(values)[1] > 0.0, found.n_equilibria.shape)
+        there = usable[..., None]
+        phi, energy, curvature, frequency, exponent = (
+            np.where(there, column, np.nan)
+            for column in (
+                found.phi, found.energy, found.curvature, found.natural_frequency * rate,
+                found.exponent * rate,
+            )
+        )  # fmt: skip
+        kind = np.where(there, found.kind, np.int8(EquilibriumKind.NOT_COMPUTED))
+        count = np.where(usable, found.n_equilibria, np.int16(-1))
+        return Rests(phi, kind, energy, curvature, frequency, exponent, count)
+
+    def least(self, values: Mapping[str, Any]) -> tuple[Array, Array]:
+        """Where the inertia is least, among places spread over the circle, and its value there."""
+        places = self.period * np.arange(TRIED) / TRIED
+        own = [np.asarray(values[name], float)[..., None] for name in self.names]
+        with np.errstate(all="ignore"):
+            found = self.mass.values(places, *own)
+        shape = np.broadcast_shapes(places.shape, *(x.shape for x in own))
+        found = np.broadcast_to(found, shape)
+        return places[np.argmin(found, axis=-1)], np.min(found, axis=-1)
 
     def resting_formula(self, symbols: Mapping[str, Any]) -> Any:
         """V, of parameters as symbols: a function with the equilibria as its stationary points."""
