@@ -243,9 +243,9 @@ class EscapeRegime(IntEnum):
 class Validity(IntEnum):
     """Whether a result of first order in damping and drive holds, or else why it is NaN.
 
-    NOT_WEAK: a motion loses more in one round than the theory allows. NO_EQUILIBRIUM: the torque is
-    beyond the critical one. FORCED, NOISY: a drive or noise decides, too. ABSENT: there is no such
-    separatrix.
+    NOT_WEAK: a motion loses more in one round than the theory allows. NO_EQUILIBRIUM: the torque
+    leaves no equilibrium, or empties a well. FORCED, NOISY: a drive or noise decides, too. ABSENT:
+    there is no such separatrix.
 
     Examples
     --------

@@ -16,10 +16,9 @@ from phasekit.errors import Loop, Validity
 from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation import melnikov as closed
 from phasekit.perturbation import quadrature
-from phasekit.perturbation.validity import error, greatest, rates, validity
-from phasekit.phase.exact.inflections import extremes
+from phasekit.perturbation.validity import error, greatest, rates, tilting, tilts, validity
 from phasekit.phase.exact.separatrices import separatrices
-from phasekit.phase.numerical import functions, torqued
+from phasekit.phase.numerical import functions
 
 Array = npt.NDArray[np.float64]
 
@@ -56,22 +55,31 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
     push = winding[..., 0] - winding[..., 1]
     push = np.where(np.abs(push) > LEVEL * np.abs(winding).max(axis=-1), push, 0.0)
     found = regions(lobes, winding, np.isnan(loops.saddle_phi[..., 0]), push if rotation else None)
-    ends = extremes(*law.coefficients(values))
-    held = (values["torque"] >= ends[..., 0]) & (values["torque"] <= ends[..., 1])
+    count, still = closed.counts(*law.coefficients(values), values["torque"])
     rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
-    return weak(found, law, values, rate, held, greatest(loops.saddle_exponent, -1))
+    tilt = tilts(values["torque"], loops, 2.0 * np.pi)
+    return weak(found, law, values, rate, (count, still), loops.saddle_exponent, tilt, rotation)
 
 
 def weak(
     found: tuple[Array, Array], law: PerturbedLaw, values: dict[str, Any], rate: Array,
-    held: Any, exponent: Any,
+    counts: tuple[Any, Any], exponents: Any, tilt: tuple[Array, Array], rotation: bool,
 ) -> Capture:  # fmt: skip
-    """Odds where damping and drive are weak and nothing else decides; NaN elsewhere."""
+    """Odds where damping and drive are weak and nothing else decides; NaN elsewhere.
+
+    ``counts`` are the numbers of equilibria under the torque and without it, ``exponents`` those
+    of the saddles, ``tilt`` how the torque changes areas of lobes and of what winds.
+    """
+    count, still = counts
+    held, exponent = (count > 0) & (count >= still), greatest(exponents, -1)
+    if not rotation:
+        tilt = tilt[0], np.zeros_like(tilt[1])
     flux, probability = found
     rate = np.where(np.isnan(probability).any(axis=-1), np.nan, rate)
     code = validity(law, values, rate, held, exponent=exponent, forced=True, noisy=True)
     good = (code == Validity.HOLDS)[..., None]
-    doubt = np.where(good[..., 0], error(rate), np.nan)
+    doubt = np.minimum(error(rate) + tilting(probability, tilt), 1.0)
+    doubt = np.where(good[..., 0], doubt, np.nan)
     flux, probability = (np.where(good, x, np.nan) for x in (flux, probability))
     return Capture(flux, probability, doubt, code)
 
@@ -87,11 +95,10 @@ def capture_numerical(
     circle = formula.period is not None
     push = values["torque"] if rotation else None
     found = of_loops(loops, loss, energy_size(points), push, circle=circle)
-    held: Any = True
-    if np.any(values["torque"] != 0.0):
-        held = torqued.equilibria(law, *parameters).n_equilibria > 0
     rate = greatest(rates(loss, closed.side_areas(loops), loops.saddle_exponent), (-2, -1))
-    return weak(found, law, values, rate, held, greatest(loops.saddle_exponent, -1))
+    tilt = tilts(values["torque"], loops, formula.period or np.nan)
+    counts = quadrature.counts(law, values)
+    return weak(found, law, values, rate, counts, loops.saddle_exponent, tilt, rotation)
 
 
 def of_loops(

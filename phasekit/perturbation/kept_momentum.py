@@ -21,7 +21,7 @@ from phasekit.laws.perturbed import PerturbedLaw
 from phasekit.perturbation.capture import Capture, energy_size, of_loops, weak
 from phasekit.perturbation.melnikov import Melnikov, refuse_prescribed
 from phasekit.perturbation.quadrature import CELLS, POINTS, Paths, along, closed, times_of
-from phasekit.perturbation.validity import greatest
+from phasekit.perturbation.validity import greatest, saddles_held, tilts
 from phasekit.phase.numerical import motion
 from phasekit.phase.numerical.machines import NOTHING, Along, followed, widened
 from phasekit.phase.numerical.separatrices import SIDES, Separatrices, branch_of
@@ -35,6 +35,9 @@ class Loops(NamedTuple):
     saddle_energy: Array
     saddle_exponent: Array
     loop: npt.NDArray[np.int8]
+    turning_offset: Array
+    lobe_area: Array
+    winding_area: Array
 
 
 def equilibria(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Any:
@@ -59,7 +62,23 @@ def capture(law: PerturbedLaw, *parameters: npt.ArrayLike, rotation: bool = Fals
         rate = np.abs(values["damping"]) / exponent
     strong = (found.threshold_validity == Validity.NOT_WEAK).any(axis=(-2, -1))
     rate = np.where(strong, np.inf, rate)
-    return weak(led, law, values, rate, True, exponent)
+    base = _machines(law)
+    push = values["torque"] * base.with_values(values).own_inertia
+    tilt = tilts(push, loops, base.period)
+    counts = _counts(law, values)
+    return weak(led, law, values, rate, counts, loops.saddle_exponent, tilt, rotation)
+
+
+def _counts(law: PerturbedLaw, values: dict[str, Any]) -> tuple[Array, Array]:
+    """Numbers of equilibria under torques and without them; one everywhere if all is level."""
+    cells = dict(zip(values, np.broadcast_arrays(*values.values()), strict=True))
+    found, still = (np.ones(cells["torque"].shape, int) for _ in range(2))
+    turned = cells["torque"] != 0.0
+    if np.any(turned):
+        own = {name: x[turned] for name, x in cells.items()}
+        for count, torque in ((found, own["torque"]), (still, None)):
+            count[turned] = _machines(law).resting(own, torque).n_equilibria
+    return found, still
 
 
 # ------------------------------------------------------------------------- energies
@@ -130,6 +149,7 @@ def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Arra
         [np.broadcast_to(constants[n], flat["torque"].shape) for n in base.constants]
         or [np.zeros(flat["torque"].shape)]
     )
+    counts = _counts(law, flat)
     # Cells of one machine and momentum, under many drives, have the same motions.
     cells, which = np.unique(columns, axis=1, return_inverse=True)
     order = np.argsort(which.reshape(-1), kind="stable")
@@ -140,7 +160,8 @@ def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Arra
         known = [followed(base, cells[:, i], cells.shape[1] == 1) for i in machines]
         own_values = {name: x[rows] for name, x in flat.items()}
         weight = weights.reshape(-1)[rows, None, None]
-        parts.append(_part(law, known, own.reshape(-1), own_values, weight))
+        both = (counts[0][rows], counts[1][rows])
+        parts.append(_part(law, known, own.reshape(-1), own_values, weight, both))
     width = max((part[0].loop.shape[1] for part in parts), default=0)
     fields = zip(*((*loops, size, *found) for loops, size, found in parts), strict=True)
     back = np.argsort(order)
@@ -152,7 +173,7 @@ def _along_separatrices(law: PerturbedLaw, parameters: Any) -> tuple[Loops, Arra
 
 def _part(
     law: PerturbedLaw, known: Sequence[Along | None], which: Any, values: dict[str, Array],
-    weight: Array,
+    weight: Array, counts: tuple[Array, Array],
 ) -> tuple[Loops, Array, Melnikov]:  # fmt: skip
     """The same of some cells in a row, each the machine of a number."""
     width = max((len(_loops(one).loop) for one in known), default=0)
@@ -162,6 +183,7 @@ def _part(
     )  # fmt: skip
     sizes = [np.nan if one is None else float(energy_size(one.ground.points)[0]) for one in known]
     size = np.array(sizes)[which]
+    held = saddles_held(loops.loop, *counts)
     found: Melnikov | None = None
     for points in POINTS:
         moved = [motions_of(one, points) for one in known]
@@ -169,7 +191,7 @@ def _part(
             np.stack([widened("", part, width) for part in parts])[which]
             for parts in zip(*moved, strict=True)
         )
-        better, lost = along(law, Paths(time, phi, dphi, []), values, weight)
+        better, lost = along(law, Paths(time, phi, dphi, []), values, weight, held)
         if found is None:
             found, rows = better, np.flatnonzero(lost)
         else:

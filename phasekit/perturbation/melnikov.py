@@ -22,9 +22,10 @@ from phasekit.laws.perturbed import (
 from phasekit.numerics.contract import contract
 from phasekit.perturbation.harmonics import reach
 from phasekit.perturbation.transforms import area_rates, transforms
-from phasekit.perturbation.validity import OVERDAMPED, rates, validity
-from phasekit.phase.exact.inflections import extremes
+from phasekit.perturbation.validity import OVERDAMPED, rates, saddles_held, validity
+from phasekit.phase.exact.equilibria import equilibria
 from phasekit.phase.exact.separatrices import Separatrices, separatrices
+from phasekit.phase.exact.under_torque import equilibria_under
 
 Array = npt.NDArray[np.float64]
 #: One harmonic: its transform per unit of amplitude, amplitude, frequency and phase.
@@ -52,23 +53,31 @@ def melnikov(law: PerturbedLaw, *parameters: npt.ArrayLike) -> Melnikov:
     loops = separatrices(A, B, C)
     mean = means(law, values, loops)
     found = assembled(mean, oscillations(law, values, loops), undamped(law, values))
-    ends = extremes(A, B, C)
-    held = (values["torque"] >= ends[..., 0]) & (values["torque"] <= ends[..., 1])
+    held = saddles_held(loops.loop, *counts(A, B, C, values["torque"]))
     return weak(law, values, found, side_areas(loops), loops.saddle_exponent, held)
+
+
+def counts(A: Any, B: Any, C: Any, torque: Any) -> tuple[Any, Any]:
+    """Numbers of equilibria under torques and without them."""
+    cells = np.broadcast_arrays(A, B, C, torque)
+    flat = [np.asarray(x, float).reshape(-1) for x in cells]
+    still = equilibria(*flat[:3]).n_equilibria
+    found = still if not np.any(flat[3]) else equilibria_under(*flat).n_equilibria
+    return found.reshape(cells[0].shape), still.reshape(cells[0].shape)
 
 
 def weak(
     law: PerturbedLaw, values: dict[str, Any], found: Melnikov, area: Any, exponent: Any,
     held: Any,
 ) -> Melnikov:  # fmt: skip
-    """Thresholds where damping and drive are weak, as the theory has it; NaN elsewhere."""
+    """Thresholds where damping and drive are weak and saddles are held; NaN elsewhere."""
     each = {name: np.asarray(x)[..., None, None] for name, x in values.items()}
-    held = np.asarray(held)[..., None, None]
+    held = np.asarray(held)[..., None]
     k = np.asarray(exponent)[..., None]
     rate = rates(found.melnikov_mean, area, exponent)
     # Without a mean there is nothing that a threshold could be compared with.
     rate = np.where(np.isfinite(area * k), np.where(np.isnan(rate), 0.0, rate), np.nan)
-    code = validity(law, each, rate, held, exponent=k, most=OVERDAMPED)
+    code = validity(law, each, rate, held, exponent=k, noisy=True, most=OVERDAMPED)
     good = code == Validity.HOLDS
     return found._replace(
         chaos_threshold=np.where(good, found.chaos_threshold, np.nan),

@@ -25,6 +25,7 @@ from phasekit.perturbation.melnikov import (
     undamped,
     weak,
 )
+from phasekit.perturbation.validity import saddles_held
 from phasekit.phase.numerical import functions, torqued
 from phasekit.phase.numerical.formula import Formula, make_formula
 from phasekit.phase.numerical.separatrices import Separatrices
@@ -268,12 +269,21 @@ def _cells(
 ) -> tuple[Melnikov, Any]:  # fmt: skip
     """Melnikov's function by so many points in time, and in which cells they were too few."""
     paths = Paths.from_formula(formula, [values[name] for name in formula.names], loops, points)
-    held = np.ones(len(loops.saddle_phi), bool)
-    turned = np.flatnonzero(values["torque"] != 0.0)
-    if turned.size:
-        own = [values[name][turned] for name in law.names]
-        held[turned] = torqued.equilibria(law, *own).n_equilibria > 0
+    held = saddles_held(loops.loop, *counts(law, values))
     return along(law, paths, values, held=held)
+
+
+def counts(law: PerturbedLaw, values: dict[str, Array]) -> tuple[Array, Array]:
+    """Numbers of equilibria under torques and without them; one everywhere if all is level."""
+    cells = dict(zip(values, np.broadcast_arrays(*values.values()), strict=True))
+    found, still = (np.ones(cells["torque"].shape, int) for _ in range(2))
+    turned = cells["torque"] != 0.0
+    if np.any(turned):
+        own = [cells[name][turned] for name in law.names]
+        level = [0.0 * x if name == "torque" else x for name, x in zip(law.names, own, strict=True)]
+        for count, parameters in ((found, own), (still, level)):
+            count[turned] = torqued.equilibria(law, *parameters).n_equilibria
+    return found, still
 
 
 def along(

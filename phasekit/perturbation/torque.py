@@ -96,5 +96,6 @@ def _retrapping(
     # Where equilibria are gone at less, rotations do not end at a separatrix.
     held = np.abs(torque) < np.abs(ends)
     rate = np.where(np.isnan(torque), np.nan, 0.0)
-    code = validity(law, each, rate, held | (torque == 0.0), exponent=exponent[..., None])
+    held |= torque == 0.0
+    code = validity(law, each, rate, held, exponent=exponent[..., None], forced=True, noisy=True)
     return Retrapping(np.where(code == Validity.HOLDS, torque, np.nan), code)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.errors import Validity
+from phasekit.errors import Loop, Validity
 from phasekit.laws.perturbed import PerturbedLaw
 
 Array = npt.NDArray[np.float64]
@@ -24,12 +24,44 @@ WEAK = 1.0
 OVERDAMPED = 2.0
 #: Error of the odds of capture over ``rate (1 + log(1/rate))``, as simulated motions have it.
 SPREAD = 0.25
+#: Relative change of an area by a torque, over the work of the torque across it beside S k.
+TILT = 3.0
 
 
 def rates(loss: Array, area: Any, exponent: Any) -> Array:
     """Losses of a round beside S k; the last axes are saddle and side."""
     with np.errstate(all="ignore"):
         return np.asarray(np.abs(loss) / (area * np.asarray(exponent)[..., None]))
+
+
+def tilts(torque: Any, loops: Any, period: float) -> tuple[Array, Array]:
+    """Relative changes by a torque of the areas of lobes, and of what winds: each the greatest."""
+    k = np.asarray(loops.saddle_exponent)[..., None]
+    push = TILT * np.abs(np.asarray(torque))[..., None, None]
+    with np.errstate(all="ignore"):
+        lobes = push * np.abs(loops.turning_offset) / (loops.lobe_area * k)
+        winding = push * period / (loops.winding_area[..., None] * k)
+    return greatest(lobes, (-2, -1)), greatest(winding, (-2, -1))
+
+
+def tilting(probability: Array, tilt: tuple[Array, Array]) -> Array:
+    """Greatest change of odds (left, right, none) by such changes of areas."""
+    lobes, winding = (np.where(np.isnan(x), 0.0, x) for x in tilt)
+    left, right = probability[..., 0], probability[..., 1]
+    both = left + right
+    with np.errstate(all="ignore"):
+        parted = np.where(both > 0.0, 2.0 * left * right / both, 0.0) * lobes
+    return np.asarray(parted + both * winding)
+
+
+def saddles_held(loop: Any, count: Any, still: Any) -> npt.NDArray[np.bool_]:
+    """Which saddles a torque leaves, by the numbers of equilibria with it and without.
+
+    One that winds is there as long as equilibria are, one of lobes while no well is gone.
+    """
+    winds = np.isin(loop, (Loop.WINDING, Loop.HETEROCLINIC))
+    count, still = (np.asarray(x)[..., None] for x in (count, still))
+    return np.asarray(np.where(winds, count > 0, (count > 0) & (count >= still)))
 
 
 def greatest(values: Array, axis: Any) -> Array:
@@ -60,7 +92,7 @@ def validity(
     """Whether a result of first order holds, cell by cell.
 
     ``rate`` is the loss beside S k, NaN without a separatrix; ``held`` whether the torque leaves
-    equilibria; ``exponent`` that of the saddle, beside which damping is small; ``forced`` and
+    its equilibria; ``exponent`` that of the saddle, beside which damping is small; ``forced`` and
     ``noisy`` whether a drive and noise matter; ``most`` the greatest rate.
     """
     shape = np.broadcast_shapes(np.shape(rate), *(np.shape(x) for x in values.values()))

@@ -154,3 +154,92 @@ def test_high_frequencies_of_a_free_rotor_have_their_response_or_none():
     later = amplitude.isel(forcing_frequency=slice(30, None)).values
     assert np.isfinite(amplitude.isel(forcing_frequency=0)).any()
     assert np.nanmax(np.nan_to_num(later)) < 1e-6 * size
+
+
+def wells_of(A, B, C, torque):
+    """Number of equilibria under a torque, by the roots of a quartic in tan(phi/2)."""
+    quartic = [C - torque, 2.0 * (B + A), -2.0 * torque, 2.0 * (B - A), -C - torque]
+    roots = np.roots(quartic)
+    return int((np.abs(roots.imag) < 1e-7 * np.abs(roots)).sum())
+
+
+@pytest.mark.parametrize("exact", [True, False])
+@pytest.mark.parametrize(("A", "B", "C"), [(1.0, 0.35, 0.12), (2.0, -0.9, 0.2), (1.1, 0.1, -0.3)])
+def test_a_torque_that_empties_a_well_leaves_it_no_odds_and_no_threshold(exact, A, B, C):
+    system = pk.Coefficients(A, B, C)
+    if not exact:
+        text = "A/2*cos(x)^2 - B*cos(x) - C*sin(x)"
+        system = pk.Potential(text, "x", {"A": A, "B": B, "C": C}, period="2*pi")
+    torque = np.linspace(-1.9, 1.9, 24)
+    number = np.array([wells_of(A, B, C, one) for one in torque])
+    assert {0, 2, 4} == set(number.tolist())
+    pushed = pk.Perturbed(system, damping=0.01, torque=torque, forcing=FORCED)
+    ds = pk.melnikov(pushed)
+    loop = ds.loop if "loop" in ds else pk.separatrices(system).loop
+    lobes = loop.values == pk.Loop.LOBES
+    assert lobes.sum() == 1
+    codes = ds.threshold_validity.values[..., 0]
+    gone = codes == pk.Validity.NO_EQUILIBRIUM
+    np.testing.assert_array_equal(gone[:, lobes][:, 0], number < 4)
+    np.testing.assert_array_equal(gone[:, ~lobes][:, 0], number == 0)
+    assert np.isnan(ds.chaos_threshold.values[gone]).all()
+    for start in ("lobes", "rotation"):
+        options = {} if start == "lobes" else {"start": start}
+        odds = pk.capture(pushed.replace(forcing_amplitude=0.0), **options)
+        names = odds.capture_validity.values == pk.Validity.NO_EQUILIBRIUM
+        np.testing.assert_array_equal(names, number < 4)
+        assert np.isnan(odds.capture_probability.values[names]).all()
+
+
+def test_a_free_rotor_has_no_odds_beyond_its_critical_torque():
+    torque = np.array([0.0, 1.0, 300.0, 1e6])
+    steady = pk.equilibria(pk.Perturbed(FREE, torque=torque)).n_equilibria.values
+    assert steady[0] == 4
+    assert steady[-1] == 0
+    ds = pk.capture(pk.Perturbed(FREE, damping=0.02, torque=torque))
+    names = ds.capture_validity.values == pk.Validity.NO_EQUILIBRIUM
+    np.testing.assert_array_equal(names, steady < 4)
+    driven = pk.Perturbed(FREE, damping=0.02, torque=torque, forcing=FORCED)
+    threshold = pk.melnikov(driven).chaos_threshold.isel(torque=-1)
+    assert np.isnan(threshold).all()
+
+
+@pytest.mark.parametrize("system", [EIGHT, TILTABLE])
+@pytest.mark.parametrize(
+    ("terms", "reason"),
+    [({"forcing": FORCED}, "FORCED"), ({"kT": 0.01}, "NOISY")],
+    ids=["forced", "noisy"],
+)
+def test_a_drive_and_noise_decide_about_retrapping(system, terms, reason):
+    ds = pk.retrapping_torque(pk.Perturbed(system, damping=0.01, **terms))
+    assert np.isnan(ds.retrapping_torque).all()
+    assert code(ds, "retrapping_validity") == {reason}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("system", [EIGHT, PENDULUM], ids=["eight", "pendulum"])
+@pytest.mark.parametrize(
+    ("damping", "share"), [(0.02, -0.02), (0.02, 0.1), (0.1, 0.3), (0.2, 0.5), (0.2, 0.9)]
+)
+def test_the_error_of_odds_under_a_torque_covers_simulated_shares(system, damping, share):
+    critical = float(pk.critical_torque(system).critical_torque.sel(direction="plus"))
+    pushed = pk.Perturbed(system, damping=damping, torque=share * critical)
+    odds = pk.capture(pushed, start="rotation")
+    if system is EIGHT and share > 0.2:
+        assert code(odds, "capture_validity") == {"NO_EQUILIBRIUM"}
+        return
+    assert code(odds, "capture_validity") == {"HOLDS"}
+    rng = np.random.default_rng(7)
+    phi = rng.uniform(0.0, 2.0 * np.pi, 1500)
+    dphi = -np.sign(share) * rng.uniform(4.0, 7.0, phi.size)
+    last = 40.0 / damping + 50.0
+    ends = pk.flow(pushed, phi, dphi, last, rtol=1e-8)
+    angle, still = ends.motion_phi.values, np.abs(ends.motion_dphi.values) < 0.05
+    angle = np.mod(angle + np.pi, 2.0 * np.pi) - np.pi
+    border = float(pk.separatrices(system).saddle_phi.sel(saddle="lower")) if system is EIGHT else 9
+    left, right = np.mean(still & (angle < border)), np.mean(still & (angle >= border))
+    found = odds.capture_probability.values
+    if system is PENDULUM:
+        found = np.array([found[0] + found[1], 0.0, found[2]])
+    off = np.abs(found - [left, right, 1.0 - left - right]).max()
+    assert off <= odds.capture_error.item() + 3.0 * np.sqrt(0.25 / phi.size)
