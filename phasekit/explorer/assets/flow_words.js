@@ -1,5 +1,6 @@
 // Words and tables of equations, the data and the lines of Python; they follow the pictures.
 
+const narrow = matchMedia("(max-width: 720px)");
 const WHY = {
   end: "", escaped: "left for infinity", steps: "ended early: it takes too many steps here; phasekit follows it", undefined: "ended where the equations have no finite value",
 };
@@ -22,7 +23,7 @@ const complexText = ([re, im], n) => (im === 0 ? digits(re, n) : `${digits(re, n
 function tell() {
   const { rests, cycles, motions } = scene;
   const word = LAW.discrete ? "multipliers" : "eigenvalues";
-  table("equilibria", [...STATES, "kind", word], rests.map((one) => [...one.x.map((x, i) => stateText(i, x, 9)), one.kind, spectrumText(one.eigenvalues, 6)]));
+  table("equilibria", [...STATES, "kind", word], rests.map((one) => [...one.x.map((x, i) => stateText(i, x, narrow.matches ? 5 : 9)), one.kind, spectrumText(one.eigenvalues, narrow.matches ? 4 : 6)]));
   $("equilibria-note").textContent = rests.length
     ? "Found from many starts in the window; a page proves nothing. pk.equilibria proves that there are no others."
     : "None was found in the window.";
