@@ -2,9 +2,10 @@
 
 Run with ``pytest tests/benchmarks/bench_first.py``; the table is printed. Each line runs in a
 process of its own and counts its CPU seconds above those of a process that only imports NumPy and
-xarray (where something is drawn, matplotlib too, and one empty figure is saved), timed next to it.
-The seconds are split by what was done: importing, compiling (with kept kernels that are read),
-computing, drawing. What another process compiles in the background is a column of its own.
+xarray (where something is drawn, matplotlib too, and one empty figure is saved; of an njit
+function, numba), timed next to it. The seconds are split by what was done: importing, compiling
+(with kept kernels that are read), computing, drawing. What another process compiles in the
+background is a column of its own.
 ``pytest tests/benchmarks/bench_first.py -k basins`` runs some lines, and ``PHASEKIT_FIRST=3``
 takes the least of three runs.
 """
@@ -177,10 +178,11 @@ def process(code: list[str], cache: Path, background: str = "1") -> str:
     return done.stdout
 
 
-def bare(drawn: bool, cache: Path) -> float:
-    """CPU seconds of a process with the imports alone."""
-    used = "import os; print(sum(os.times()[:2]))"
-    code = f"out = {str(cache / 'bare.png')!r}\n" + (FIGURE if drawn else BARE) + used
+def bare(line: Line, cache: Path) -> float:
+    """CPU seconds of a process with the imports alone, numba's too where the line begins so."""
+    used = "\nimport os; print(sum(os.times()[:2]))"
+    own = line.compute.partition("\n")[0] if line.compute.startswith("from numba") else ""
+    code = f"out = {str(cache / 'bare.png')!r}\n" + (FIGURE if line.draw else BARE) + own + used
     return min(float(process([code], cache)) for _ in range(2))
 
 
@@ -203,7 +205,7 @@ def test_first_call(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
             columns = " ".join(f"{part:>9}" for part in PARTS)
             print(f"\n\n{'CPU s above the imports':28} {'kernels':7} {'above':>6} "
                   f"{'wanted':>6} {columns} {'behind':>7}")  # fmt: skip
-    base = bare(bool(line.draw), tmp_path)
+    base = bare(line, tmp_path)
     for state, wanted in (("empty", line.cold), ("kept", line.warm)):
         runs = []
         for i in range(RUNS):

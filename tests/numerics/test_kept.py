@@ -60,13 +60,14 @@ def tripled(x):
 
 
 def run(folder, temporary, *more):
-    """Run the program for a user who can write to temporary files at most."""
+    """Run the program for a user who can write to temporary files at most, without a compiler."""
     command = [sys.executable, "-c", PROGRAM, str(folder), *more]
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         # Root passes over the bits of permissions by capabilities, which it can give away.
-        command = ["setpriv", "--bounding-set=-all", "--inh-caps=-all", *command]
+        command = [shutil.which("setpriv"), "--bounding-set=-all", "--inh-caps=-all", *command]
     environment = {k: v for k, v in os.environ.items() if k not in (*kept.VARIABLES, "TMPDIR")}
     environment |= {
+        "PATH": str(folder),  # in which there are no programs
         "HOME": str(folder),
         "XDG_CACHE_HOME": str(folder / "cache"),
         "MPLCONFIGDIR": str(folder / "mpl"),
