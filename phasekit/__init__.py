@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.branch import Branch as Branch
     from phasekit.labelled.continuation.connection import connection as connection
     from phasekit.labelled.continuation.continuation import continuation as continuation
+    from phasekit.labelled.continuation.critical_rate import critical_rate as critical_rate
     from phasekit.labelled.continuation.cycle_branch import ConnectionBranch as ConnectionBranch
     from phasekit.labelled.continuation.cycle_branch import CycleBranch as CycleBranch
     from phasekit.labelled.continuation.diagram import diagram as diagram
@@ -147,6 +148,7 @@ _MODULES = {
     "phasekit.labelled.continuation.connection": ("connection",),
     "phasekit.labelled.continuation.continuation": ("continuation",),
     "phasekit.labelled.critical": ("critical",),
+    "phasekit.labelled.continuation.critical_rate": ("critical_rate",),
     "phasekit.labelled.continuation.cycle_branch": ("ConnectionBranch", "CycleBranch"),
     "phasekit.labelled.continuation.diagram": ("diagram",),
     "phasekit.labelled.continuation.harmonic_record": ("fourier",),

@@ -180,6 +180,65 @@ def test_ramp_tips_at_its_exact_rate(mu: float, reach: float) -> None:
     root = np.sqrt(mu)
     front = pk.connection(ramp, ([-root, 0], [root - reach, reach]), free="r")
     assert float(front.points.r[0]) == pytest.approx(exact, abs=1e-12)
+    still = pk.Problem({"x": "(x + l)^2 - mu"}, parameters={"l": 0.0, "mu": mu})
+    ends = {"x": -root, "l": 0.0}, {"x": root - reach, "l": reach}
+    more = {"rate": "r", "parameters": {"r": 1.2 * exact, "L": reach}}
+    tipping = pk.critical_rate(still, {"l": "r*l*(L - l)"}, *ends, **more)
+    assert float(tipping.points.r[0]) == pytest.approx(exact, abs=1e-12)
+    with pytest.raises(pk.ParameterError, match="edge: got"):
+        pk.critical_rate(still, {"l": "r*l*(L - l)"}, ends[0], ends[0], **more)
+    with pytest.raises(pk.ParameterError, match="at an end of the ramp"):
+        pk.critical_rate(still, {"l": "r*l*(L + 1 - l)"}, *ends, **more)
+
+
+@pytest.mark.parametrize(
+    ("damping", "ratio"), [(0.05, 1.272451724), (0.1, 1.270088598), (0.2, 1.260641222)]
+)
+def test_rotations_begin_at_the_critical_current(damping: float, ratio: float) -> None:
+    values = {"al": damping, "I": 1.27 * damping}
+    rotor = pk.Problem({"phi": "v", "v": "I - al*v - sin(phi)"}, parameters=values)
+    saddle = np.pi - np.arcsin(1.27 * damping)
+    loop = pk.connection(rotor, ([saddle - 2 * np.pi, 0], [saddle, 0]), free="I")
+    found = float(loop.points.I[0]) / damping
+    assert found == pytest.approx(ratio, abs=1e-8)
+    # Melnikov's 4/pi is the limit; the difference goes with the square of the damping.
+    assert (found - 4 / np.pi) / damping**2 == pytest.approx(-0.315, abs=5e-3)
+
+
+def test_curve_of_shimizu_and_morioka_is_neutral_at_one_point() -> None:
+    problem = pk.Problem(
+        {"x": "y", "y": "x*(1 - z) - la*y", "z": "-al*z + x^2"},
+        parameters={"la": 1.2, "al": 0.4},
+    )
+    curve = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="la").curve("al", (0.3, 0.8))
+    (point,) = curve.special("NSS")
+    assert point["al"] == pytest.approx(0.605857764842, abs=1e-10)
+    assert point["la"] == pytest.approx(1.044694655263, abs=1e-10)
+
+
+@pytest.mark.slow
+def test_curve_of_freire_ends_at_its_bogdanov_takens_point() -> None:
+    """AUTO prints six digits of its special points."""
+    problem = pk.Problem(
+        {
+            "x": "(-(be + nu)*x + be*y - a3*x^3 + b3*(y - x)^3)/r",
+            "y": "be*x - be*y - z - b3*(y - x)^3", "z": "y",
+        },
+        parameters={"nu": -0.7213, "be": 0.6, "r": 0.6, "a3": 0.328578, "b3": 0.933578},
+    )  # fmt: skip
+    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="nu")
+    forward = pk.ContinuationOptions(mesh_tolerance=1e-9, directions="forward")
+    curve = loop.curve("be", (0.5, 1.2), options=forward)
+    assert curve.stops[1].reason == "bogdanov_takens"
+    np.testing.assert_allclose(
+        [float(curve.points.nu[-1]), float(curve.points.be[-1])], [-0.77467, 0.77461], atol=5e-4
+    )
+    (double,) = curve.special("DRS")
+    assert [double["nu"], double["be"]] == pytest.approx([-0.7590583, 0.7428734], abs=1e-5)
+    backward = pk.ContinuationOptions(mesh_tolerance=1e-9, directions="backward", max_points=150)
+    curve = loop.curve("be", (0.45, 1.2), options=backward)
+    (focus,) = curve.special("NSF")
+    assert [focus["nu"], focus["be"]] == pytest.approx([-0.7204001, 0.5912315], abs=3e-5)
 
 
 def test_curve_of_fronts_is_exact(tmp_path: Path) -> None:

@@ -210,6 +210,10 @@ def front() -> pk.Problem:
     return pk.Problem(law, parameters={"c": 0.28, "a": 0.3})
 
 
+def tipping() -> pk.Problem:
+    return pk.Problem({"x": "(x + p)^2 - mu"}, parameters={"p": 0.0, "mu": 0.25})
+
+
 @functools.cache
 def connected() -> Any:
     return pk.connection(front(), ([0.0, 0.0], [1.0, 0.0]), free="c")
@@ -484,6 +488,11 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "plot.multipliers": {"branch": cycles},
     "connection": {
         "problem": front, "orbit": lambda: ([0.0, 0.0], [1.0, 0.0]), "free": lambda: "c",
+    },
+    "critical_rate": {
+        "problem": tipping, "ramp": lambda: {"p": "r*p*(3 - p)"},
+        "attractor": lambda: {"x": -0.5, "p": 0.0}, "edge": lambda: {"x": -2.5, "p": 3.0},
+        "rate": lambda: "r", "parameters": lambda: {"r": 0.17},
     },
     "ConnectionBranch.curve": {"parameter": lambda: "a", "span": lambda: (0.29, 0.31)},
     "ConnectionBranch.save": {"path": lambda: "branch.zarr"},

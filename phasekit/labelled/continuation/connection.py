@@ -43,9 +43,12 @@ FloatArray = npt.NDArray[np.float64]
 MESH = 1e-10  # mesh tolerance, unless options say otherwise
 HYPERBOLIC = 1e-9  # least real part of an eigenvalue, beside the largest size
 AWAY = 1e-3  # distance from an equilibrium at which a motion along its manifold begins
-AIMED, NEAR = 8, 1e-2  # shots at a target, and how near one is good enough
+AIMED, NEAR = 20, 1e-4  # shots at a target, and how near one is good enough
+AIMS, WORSE = (1e-3, 1e-5), 1.5  # first changes of the parameter, and by what a shot may be worse
 TRIES = 24  # directions in which a manifold of more than one dimension is left
 PASSES = 12.0  # times the slowest time of both ends, over which an orbit is looked for
+CURVES = 1e-6  # distance of ends along curves: nearer ones say less of the time between them
+ROUNDS, LOOSE = 4, 3.0  # times that an end is led on, and how far from where it is to be
 FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as parameters do
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
@@ -212,15 +215,23 @@ def _settled(
         )  # fmt: skip
     own = Ends(unstable, stable, (ends, ends), same, n, both=False)
     bounded = replace(made, conditions=(own,))
-    led = extended(guess, bounded, (first, last), own.distances)
-    found = starts.settled(bounded, led, held=0)
-    if not found.converged:
-        return None, found.message
+    near: tuple[Rest, Rest] = (first, last)
+    for _ in range(ROUNDS):
+        led = extended(guess, bounded, near, own.distances)
+        found = starts.settled(bounded, led, held=0)
+        if not found.converged:
+            return None, found.message
+        there = own.rests(bounded, found.orbit)
+        if there is None:
+            return None, "the equilibria were lost"
+        guess, near = found.orbit, there
+        end = (guess.x[-1] - there[1].x) / bounded.scale
+        if np.linalg.norm(end) <= LOOSE * ends:
+            break
     size = float(np.max(np.abs((found.orbit.x - found.orbit.x[0]) / bounded.scale)))
     if size < SMALL * ends:
         return None, "it led to the equilibrium itself"
-    there = own.rests(bounded, found.orbit)
-    if there is None or float(np.max(np.abs(there[1].x - last.x) / bounded.scale)) > FAR:
+    if float(np.max(np.abs(near[1].x - last.x) / bounded.scale)) > FAR:
         return None, "it led to another equilibrium"
     return (bounded, found), ""
 
@@ -326,8 +337,11 @@ def _along_manifold(
         yield _through(trial, shot[2], shot[3], y), same, places
     if min(unstable, stable) == 1 and len(y) == 2 and unstable + stable == n:
         for way, shot in near:
-            aimed = _aimed(problem, trial, rests, y, way, shot)
-            for one in sorted(aimed, key=lambda one: float(one[0]))[:2]:
+            for step in AIMS:
+                aimed = _aimed(problem, trial, rests, y, way, shot, step)
+                if not aimed:
+                    continue
+                one = min(aimed, key=lambda one: float(one[0]))
                 yield _through(trial, one[1][0], one[1][1], one[2]), same, places
 
 
@@ -374,32 +388,32 @@ def _shot(
 
 def _aimed(
     problem: Problem, trial: Bounded, rests: tuple[Any, Any], y: FloatArray, way: FloatArray,
-    shot: Any,
+    shot: Any, step: float,
 ) -> list[Any]:  # fmt: skip
     """Motions at other values of the one free parameter, which pass the target by less."""
     made = []
-    p, passes = float(y[1]), shot[1]
-    step = 1e-3 * max(abs(p), 1e-2)
+    p, best = float(y[1]), shot
+    size = max(abs(p), 1e-2)
+    step *= size
     for _ in range(AIMED):
-        if not abs(step) > 1e-12 * max(abs(p), 1e-2):
+        if best[0] < NEAR or not abs(step) > 1e-12 * size:
             break
         at = np.array([y[0], p + step])
         moved = tuple(rest_near(trial, rest.x, at) for rest in rests)
-        if any(
+        other = None
+        if not any(
             now is None or now.unstable() != was.unstable()
             for now, was in zip(moved, rests, strict=True)
         ):
-            break
-        other = _shot(problem, trial, (moved[0], moved[1]), at, way)
-        if other is None:
-            break
+            other = _shot(problem, trial, (moved[0], moved[1]), at, way)
+        if other is None or other[0] > WORSE * best[0]:
+            step *= -0.5  # it passes on the other side, or goes elsewhere
+            continue
         made.append((other[0], other[2:], at))
-        rate = (other[1] - passes) / step
-        p, passes = p + step, other[1]
-        if other[0] < NEAR or rate == 0.0:
-            break
+        rate = (other[1] - best[1]) / step
+        p, best = p + step, other
         most = 0.3 * max(abs(p), 0.1)
-        step = float(np.clip(-passes / rate, -most, most))
+        step = float(np.clip(-best[1] / rate, -most, most)) if rate else 0.0
     return made
 
 
@@ -447,11 +461,9 @@ def curve(branch: ConnectionBranch, parameter: str, span: Any, options: Any) -> 
              for k, name in enumerate(branch.free)]  # fmt: skip
     rests = own.rests(bounded, here)
     assert rests is not None
-    first, last = (
-        float(np.linalg.norm((x - rest.x) / bounded.scale))
-        for x, rest in zip((here.x[0], here.x[-1]), rests, strict=True)
-    )
-    ends = replace(own, distances=(first, last), both=True)
+    near = max(own.distances[0], CURVES)
+    ends = replace(own, distances=(near, near), both=True)
+    here = extended(here, bounded, rests, ends.distances)
     made = bounded_of(
         problem, names, [*spans, (low, high)], bounded.scale, options, (ends,), kind="connection",
         duration=None,

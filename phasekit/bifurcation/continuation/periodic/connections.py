@@ -176,10 +176,10 @@ class Ends:
             z = (x - rest.x) / scale
             far = float(np.sqrt(z @ z)) or 1e-300
             held = side == SOURCE or self.both
-            rows = np.vstack([L, z[None] / far**2]) if held else L
+            rows = np.vstack([L, z[None] / (far * self.distances[side])]) if held else L
             here = slice(row, row + len(rows))
             columns = slice(side * n, (side + 1) * n)
-            gap = [math.log(far / self.distances[side])] if held else []
+            gap = [far / self.distances[side] - 1.0] if held else []
             values[here] = np.append(L @ z, gap)
             slopes[here, columns] = rows / scale
             slopes[here, 2 * n :] = -rows @ rest.moves

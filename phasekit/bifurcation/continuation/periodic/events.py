@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.normal_form import zero_along
+from phasekit.bifurcation.continuation.periodic import on_connections as on_connections
 from phasekit.bifurcation.continuation.periodic.between import (
     Stretch,
     Value,
