@@ -87,6 +87,7 @@ _CURVES: dict[str, style.Look] = {
         "label": "period doubling",
     },
     "torus": {"color": style.SKY, "linestyle": "-", "linewidth": 2.0, "label": "torus"},
+    "connection": {"color": style.BLACK, "linestyle": "-", "linewidth": 2.0, "label": "connection"},
     "boundary": {"color": style.BLUE, "linestyle": "-", "linewidth": 1.8, "label": "solution"},
     "branch_point": {
         "color": style.PURPLE,
