@@ -163,7 +163,7 @@ def test_ten_thousand_steps():
     wanted = [[float(power.real), -float(power.imag)], [float(power.imag), float(power.real)]]
     np.testing.assert_allclose(slopes, wanted, atol=1e-11)
     np.testing.assert_allclose(value, np.array(wanted)[:, 0], atol=1e-11)
-    with pytest.raises(pk.ParameterError, match="times: got 2, wants a whole number from 1 to 1"):
+    with pytest.raises(pk.ParameterError, match="n: got 2, wants a whole number from 1 to 1"):
         turn.iterated(2)
 
 
