@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 
 import phasekit as pk
 
@@ -273,3 +275,44 @@ def test_what_cannot_be_connected_is_refused() -> None:
     center = pk.Problem({"x": "y", "y": "-x + a*x^2"}, parameters={"a": 1.0})
     with pytest.raises(pk.ParameterError, match="hyperbolic|no unstable"):
         pk.connection(center, ([0, 0], [0, 0]), free="a")
+
+
+@pytest.mark.parametrize("formula", ["x^4/4 - x^2/2", "x^3/3 - x^2/2", "x^4/8 + x^3/3 - x^2/2"])
+def test_loops_of_potentials_move_as_their_separatrices(formula: str) -> None:
+    system = pk.Potential(formula, "x")
+    fine = pk.ContinuationOptions(mesh_tolerance=1e-12)
+    loop = pk.connection(system, ([0, 0], [0, 0]), options=fine)
+    orbit, (place, rate) = loop.orbit(0), loop.problem.state
+    ends = slice(None, None, 4)  # of the mesh intervals, where collocation is the most accurate
+    t, x, v = (orbit[name].values[ends] for name in ("time", place, rate))
+    force = np.array([loop.problem.derivatives(state)[0][1] for state in np.stack([x, v], 1)])
+    far = int(np.argmax(np.abs(x)))
+    speed = CubicHermiteSpline(t, v, force)
+    turning = brentq(speed, t[far - 1], t[far + 1], xtol=1e-15)
+    side = "right" if x[far] > 0.0 else "left"
+    exact = pk.separatrix_motion(system, t - turning, side=side)
+    np.testing.assert_allclose(v, exact.motion_dphi, atol=1e-10)
+    np.testing.assert_allclose(x, exact.motion_phi, atol=1e-10)
+
+
+def test_loop_beside_a_fold_is_where_its_manifold_changes_sides() -> None:
+    """Koper's model at k = -.15, by bisection of the unstable manifold (DOP853, rtol 1e-13)."""
+    problem = pk.Problem(
+        {"x": "10*(k*y - x^3 + 3*x - l)", "y": "x - 2*y + z", "z": "y - z"},
+        parameters={"k": -0.15, "l": -1.851185},
+    )
+    loop = pk.connection(problem, ([-0.959] * 3, [-0.959] * 3), free="l")
+    assert float(loop.points.l[0]) == pytest.approx(-1.85118512329866, abs=1e-12)
+
+
+def test_predator_and_prey_with_a_weak_eigenvalue() -> None:
+    problem = pk.Problem(
+        {
+            "x": "x*(1 - x/K)/2 - 0.4*x*y/(0.6 + x) + 0.01*K",
+            "y": "0.24*x*y/(0.6 + x) - 0.15*y - Z*y^2/(y^2 + 0.25)",
+        },
+        parameters={"K": 9.17683, "Z": 0.0768},
+    )
+    loop = pk.connection(problem, ([8.879, 0.6294], [8.879, 0.6294]), free="Z")
+    assert float(loop.points.Z[0]) == pytest.approx(0.0767873656086, abs=1e-11)
+    assert float(loop.points.leading_unstable[0]) < 0.02
