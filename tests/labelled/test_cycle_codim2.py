@@ -139,3 +139,69 @@ def test_two_multipliers_pass_minus_one_together(tmp_path):
     assert strong["s"] == pytest.approx(0.0, abs=1e-8)
     curve.save(tmp_path / "curve.nc")
     assert pk.Branch.load(tmp_path / "curve.nc").points.identical(curve.points)
+
+
+def half_turned(dx, dy):
+    """Rates of (a, b), which is (xi, eta) turned by t/2; dx, dy are odd in XI and ETA."""
+    cos, sin = "cos(t/2)", "sin(t/2)"
+    xi, eta = f"({cos}*a + {sin}*b)", f"({cos}*b - {sin}*a)"
+    dx, dy = (f"({one.replace('XI', xi).replace('ETA', eta)})" for one in (dx, dy))
+    return f"{cos}*{dx} - {sin}*{dy} - b/2", f"{sin}*{dx} + {cos}*{dy} + a/2"
+
+
+@pytest.mark.slow
+def test_doubled_cycles_fold_from_generalized_flips():
+    """Xi' = (mu - p^2/2) xi + (p - 0.3) xi^3 - xi^5: folds where mu - p^2/2 = -(p - 0.3)^2/4."""
+    da, db = twisted("mu - p**2/2 + (p - 3/10)*SQUARE - SQUARE**2", "0.4", True)
+    system = pk.Problem(
+        [da, db], ("a", "b"), {"mu": -0.1, "p": 0.1}, time="t", period="2*pi"
+    )  # fmt: skip
+    branch = pk.continuation(
+        system, "mu", orbit=pk.periodic_orbit(system, [0.0, 0.0]), span=(-0.2, 0.2)
+    )
+    (point,) = branch.special("PD")[0].curve("p", (-0.5, 0.8)).special("GPD")
+    curve = point.switch()
+    assert curve.kind == "fold_of_cycles"
+    p = curve.points.p
+    np.testing.assert_allclose(curve.points.mu - p**2 / 2, -((p - 0.3) ** 2) / 4, atol=1e-10)
+    np.testing.assert_allclose(curve.points.period, 4.0 * np.pi, rtol=1e-12)
+    assert sorted(stop.reason for stop in curve.stops) == ["bound", "period_doubling"]
+    with pytest.raises(pk.ParameterError, match="kind: got 'torus', wants 'fold_of_cycles'"):
+        point.switch("torus")
+
+
+@pytest.mark.slow
+def test_doubled_cycles_have_tori_from_second_resonances():
+    """Xi' = eta, eta' = m xi + n eta - xi^3 - xi^2 eta: tori of xi^2 = m where n = m."""
+    da, db = half_turned("ETA", "m*XI + n*ETA - XI**3 - XI**2*ETA")
+    system = pk.Problem(
+        [da, db], ("a", "b"), {"m": -0.3, "n": -0.2}, time="t", period="2*pi"
+    )  # fmt: skip
+    branch = pk.continuation(
+        system, "m", orbit=pk.periodic_orbit(system, [0.0, 0.0]), span=(-0.4, 0.5)
+    )
+    (point,) = branch.special("PD")[0].curve("n", (-0.5, 0.5)).special("R2")
+    curve = point.switch("torus")
+    assert curve.kind == "torus"
+    np.testing.assert_allclose(curve.points.m, curve.points.n, atol=1e-9)
+    np.testing.assert_allclose(curve.points.period, 4.0 * np.pi, rtol=1e-12)
+
+
+@pytest.mark.slow
+def test_doubled_cycles_have_tori_from_fold_flips():
+    """X' = m + x^2 - xi^2, xi' = (n + 4/5 x + x^2) xi: tori where n = 0 and m > 0."""
+    da, db = half_turned("(n + 4/5*x + x**2)*XI", "-ETA/2")
+    square = "((a**2 + b**2)/2 + (a**2 - b**2)/2*cos(t) + a*b*sin(t))"
+    system = pk.Problem(
+        [f"m + x**2 - {square}", da, db], ("x", "a", "b"), {"m": -0.25, "n": 0.1},
+        time="t", period="2*pi",
+    )  # fmt: skip
+    branch = pk.continuation(
+        system, "m", orbit=pk.periodic_orbit(system, [-0.5, 0.0, 0.0]), span=(-0.4, 0.3)
+    )
+    for kind in ("LPC", "PD"):
+        (point,) = branch.special(kind)[0].curve("n", (-0.3, 0.3)).special("LPPD")
+        curve = point.switch()
+        assert curve.kind == "torus"
+        np.testing.assert_allclose(curve.points.n, 0.0, atol=1e-9)
+        assert float(curve.points.m.min()) > 0.0

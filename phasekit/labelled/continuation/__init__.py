@@ -8,7 +8,7 @@ lead(
         "branch.load": "phasekit.labelled.continuation.branch_store:load",
         "point.switch": "phasekit.labelled.continuation.point_curves:leave",
         "point.curve": "phasekit.labelled.continuation.point_curves:point_curve",
-        "orbit.switch": "phasekit.labelled.continuation.cycle_onward:switched",
+        "orbit.switch": "phasekit.labelled.continuation.cycle_codimension_two:leave",
         "connection": "phasekit.labelled.continuation.connection:connection",
         "connection.curve": "phasekit.labelled.continuation.connection:curve",
         "orbit.curve": "phasekit.labelled.continuation.cycle_onward:point_curve",

@@ -59,7 +59,12 @@ NONE = {
     "curves are not followed",
     "resonance_3": "a saddle of period 3 that shrinks to the point on both sides, no curve; and "
     "homoclinic tangles, which are not followed",
+    "resonance_4": "orbits of period 4, as fixed points of problem.iterated(4)",
     "chenciner": "a curve on which two closed curves merge: closed curves are not followed",
+    **dict.fromkeys(
+        ("generalized_flip", "resonance_2", "fold_flip"),
+        "curves of orbits of period 2, as fixed points of problem.iterated(2): follow those",
+    ),
 }
 
 SIZES = (0.1, 0.03, 0.3)  # of cycles that fold beside the point, in scales of the states

@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles
 from phasekit.bifurcation.continuation.periodic.extended import extended
+from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
@@ -27,6 +28,7 @@ from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.orbit_guess import first_point
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
+from phasekit.systems.problem import Problem
 
 #: Special points that have curves in two parameters.
 CURVES = ("fold_of_cycles", "period_doubling", "torus")
@@ -94,24 +96,35 @@ def point_curve(
     value = problem.parameters[parameter]
     if not low <= value <= high:
         raise bad("span", (low, high), f"a span that holds {parameter} = {value:.9g}")
-    options = _options(cycles, options)
+    cycles = cycles.replace(options=_options(cycles, options))
+    here = point.special.point
+    return curve_from(
+        problem, cycles, here, point.kind, parameter, (low, high), point.branch.record
+    )
+
+
+def curve_from(
+    problem: Problem, cycles: Cycles, here: Point, kind: str, parameter: str,
+    span: tuple[float, float], record: Any,
+) -> CycleBranch:  # fmt: skip
+    """The curve of critical orbits of a kind through one of a family, over a second parameter."""
+    value = problem.parameters[parameter]
+    options = cycles.options
     first = float(cycles.low[0]), float(cycles.high[0])
     reach = 10.0 * (first[1] - first[0])
-    first = options.bounds.get(point.branch.parameter, (first[0] - reach, first[1] + reach))
+    name = cycles.field.parameters[cycles.active[0]]
+    first = options.bounds.get(name, (first[0] - reach, first[1] + reach))
     place = list(problem.parameters).index(parameter)
     clock = clock_code(problem, (cycles.active[0], place))
-    made = extended(cycles.replace(options=options), point.kind, place, (low, high), clock, first)
-    here = point.special.point
+    made = extended(cycles, kind, place, span, clock, first)
     guess = starts.with_function(made, cycles, here, value)
     found = starts.settled(made, guess, held=2)
-    start = first_point(
-        made, found, f"of the curve of {point.kind} points at {parameter} = {value:.9g}"
-    )
+    start = first_point(made, found, f"of the curve of {kind} points at {parameter} = {value:.9g}")
     if start.dy[2] < 0.0:
         start = start.flipped()
     walker = CycleWalk(made)
     tracks = run(walker, start, options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, point.branch.record)
+    return branch_of(CycleBranch, problem, walker, start, tracks, record)
 
 
 def _options(cycles: Cycles, options: Any) -> ContinuationOptions:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -40,7 +41,7 @@ def end_of(
         and _through_hopf(cycles, before.orbit, made.orbit)
     ):
         return _at_hopf(cycles, before, made)
-    if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit):
+    if _near_doubling(cycles, made) and _through_doubling(cycles, before.orbit, made.orbit, small):
         name = cycles.field.parameters[cycles.active[0]]
         return None, Stop(
             "period_doubling",
@@ -251,10 +252,14 @@ def _near_doubling(cycles: Cycles, made: Point) -> bool:
     return bool(near > (0 if cycles.forced else 1))
 
 
-def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
-    """Whether both halves of the orbit changed places, as they do where they become the same."""
-    if len(cycles.active) > 1:
+def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit, shrunk: bool) -> bool:
+    """Whether both halves of the orbit changed places, as they do where they become the same.
+
+    Those of one that has ``shrunk`` may do so where the orbit that is doubled rests.
+    """
+    if len(cycles.active) > 1 and not isinstance(cycles, Extended):
         return False
+    n = cycles.own
     at = np.linspace(0.0, 0.5, 65)[:-1]
 
     def halves(orbit: Orbit) -> Array:
@@ -262,15 +267,16 @@ def _through_doubling(cycles: Cycles, a: Orbit, b: Orbit) -> bool:
             collocation.interpolate(orbit.mesh, orbit.x, cycles.m, at + shift)
             for shift in (0.0, 0.5)
         )
-        return np.asarray((two - one - 0.5 * cycles.turns) / cycles.scale)
+        return np.asarray((two - one - 0.5 * cycles.turns)[:, :n] / cycles.scale[:n])
 
     one, two = halves(a), halves(b)
     small = np.sum((one - two) ** 2) < 9.0 * max(np.sum(one**2), np.sum(two**2))
     if float(np.sum(one * two)) >= 0.0 or not small:
         return False
     # Orbits with the symmetry x(s + 1/2) = -x(s) keep halves that are far apart.
-    size = float(np.mean(cycles.amplitudes(b) / cycles.scale))
-    return bool(min(np.sqrt(np.mean(one**2)), np.sqrt(np.mean(two**2))) < 0.2 * size)
+    size = float(np.mean((cycles.amplitudes(b) / cycles.scale)[:n]))
+    close: Any = min(np.sqrt(np.mean(one**2)), np.sqrt(np.mean(two**2))) < 0.2 * size
+    return bool(close or (shrunk and isinstance(cycles, Extended)))
 
 
 def at_value(cycles: Cycles, before: State, made: Point, k: int, value: float) -> Point | None:
