@@ -142,7 +142,7 @@ class _Whole:
     def slopes_along(self, par: Array, active: tuple[int, ...], u: Array, z: Array) -> None:
         """Nothing is known without differences of f."""
 
-    def values_and_slopes(self, u: Array) -> tuple[Array, Any]:
+    def evaluate(self, u: Array) -> tuple[Array, Any]:
         """Values and derivatives, those of each point by its own unknowns alone."""
         from scipy.sparse import bsr_array
 
