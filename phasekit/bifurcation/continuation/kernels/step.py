@@ -8,6 +8,7 @@ by columns and rows, so that units do not matter.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -53,7 +54,7 @@ def attempt(
         return steps, 0, 0.0, 0.0, False
     gather(w, scale, b, new, 0, v, chord, guess, size)
     divide(w, new, np.sqrt(inner(w, weight, new, new, size)), size)
-    angle = np.arccos(min(1.0, max(-1.0, inner(w, weight, new, t, size))))
+    angle = math.acos(min(1.0, max(-1.0, inner(w, weight, new, t, size))))
     drift = np.sqrt(inner(w, weight, guess, guess, size)) / h
     smooth = angle <= fixed[LARGEST_TURN] and drift <= 0.25
     # A bend that is shorter than any step is passed: the point is next to the last one.

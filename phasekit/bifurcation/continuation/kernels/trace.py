@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -135,8 +136,8 @@ def turn_phase(kind: int, w: Array, n: int, m: int, size: int, aux: int, base: i
     turned = root < 0.5 * (abs(even) + amplitude)
     if not turned and abs(product) >= 0.5 * root:
         return
-    angle = 0.5 * np.arctan2(-sign * along, sign * odd) if turned else 0.0
-    c, s = np.cos(angle), np.sin(angle)
+    angle = 0.5 * math.atan2(-sign * along, sign * odd) if turned else 0.0
+    c, s = math.cos(angle), math.sin(angle)
     for i in range(n):
         v, across = w[m + i] / w[scale + i], w[y + i] / root
         w[m + i] = (c * v + s * across) * w[scale + i]

@@ -73,7 +73,7 @@ def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Arr
             # D_new U_new D U = (D_new D) (D^-1 U_new D) U with unit triangles U.
             for i in range(n):
                 for k in range(i + 1, n):
-                    step[i, k] *= np.exp(log[k] - log[i]) / step[i, i]
+                    step[i, k] *= math.exp(log[k] - log[i]) / step[i, i]
             for i in range(n):
                 for k in range(i + 1, n):
                     total = R[i, k] + step[i, k]
@@ -84,7 +84,7 @@ def triangular(G: Array, passes: int, Q: Array, R: Array, log: Array, turn_: Arr
             for i in range(n):
                 for k in range(i + 1, n):
                     R[i, k] = Z[i, k]
-                log[i] += np.log(step[i, i])
+                log[i] += math.log(step[i, i])
     for i in range(n):
         for k in range(n):
             turn_[i, k] = 0.0
