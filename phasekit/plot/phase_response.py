@@ -57,7 +57,7 @@ def phase_response(
     >>> response = pk.phase_response(pk.periodic_orbit(oscillator, [2.0, 0.0]))
     >>> ax = pk.plot.phase_response(response, "x")
     >>> ax.get_ylabel()
-    'phase response to x'
+    'phase response to x (s)'
     """
     if not isinstance(dataset, xr.Dataset) or "phase_response" not in dataset:
         raise bad("dataset", dataset, "what pk.phase_response returns")
