@@ -7,9 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from docutils import nodes
+
 import phasekit
 
 sys.path.insert(0, str(Path(__file__).parent))
+import doors  # noqa: E402
 import study_run  # noqa: E402
 import tables  # noqa: E402
 
@@ -71,11 +74,12 @@ sphinx_gallery_conf = {
     "plot_gallery": True,
 }
 
-# Pages of the explorer, as `pk.explore(...).save(...)` writes them.
+# Pictures of the start page, and pages of the explorer as `pk.explore(...).save(...)` writes them.
 _disk = phasekit.GyroRotorDisk(
     beta=40 * phasekit.deg, e=0.05, a=0.024, r=0.2, omega1=300 * phasekit.rpm, m=2.0, half_span=0.15
 )
 (_here / "auto_explorer").mkdir(exist_ok=True)
+doors.write(_here / "auto_explorer")
 phasekit.explore(_disk).save(_here / "auto_explorer" / "explorer_page.html")
 _neuron = phasekit.Problem(
     {"v": "v - v^3/3 - w + I", "w": "eps*(v + a - b*w)"},
@@ -119,11 +123,26 @@ def _skip(app: Any, what: str, name: str, thing: Any, skip: bool, options: Any) 
     return True if name in _TABLES or type(thing).__name__ == "_tuplegetter" else None
 
 
+def _leave_out_waits(app: Any, page: nodes.document) -> None:
+    """Leave out what cells print to somebody who waits, which depends on the machine."""
+    for block in list(page.findall(nodes.literal_block)):
+        if "stream" not in block["classes"]:
+            continue
+        lines = block.astext().splitlines()
+        kept = [line for line in lines if not line.startswith("phasekit: ")]
+        if not kept:
+            block.parent.remove(block)
+        elif kept != lines:
+            block.rawsource = "\n".join(kept)
+            block[:] = [nodes.Text(block.rawsource)]
+
+
 def setup(app: Any) -> None:
-    """Look at docstrings before numpydoc does, at members, and at the words of studies."""
+    """Look at docstrings before numpydoc does, at members, at outputs, and at studies' words."""
     app.connect("autodoc-process-docstring", _link_papers, priority=400)
     app.connect("autodoc-skip-member", _skip)
     app.connect("source-read", study_run.named)
+    app.connect("doctree-read", _leave_out_waits)
 
 
 # Quantities, systems, special points and codes have pages that are made of the code.
