@@ -23,8 +23,8 @@ Array = npt.NDArray[np.float64]
 
 #: Distance of the neighbour by which it is measured how errors grow, in units of the states.
 BESIDE = 1e-7
-#: Steps of a leg.
-MOST = 100_000
+#: Steps of a leg, and of one of a motion that is gone.
+MOST, FEW = 100_000, 100
 
 
 def strobe_called(
@@ -39,7 +39,7 @@ def strobe_called(
     measured = states.shape[1] > n
     for cell, start in enumerate(states):
         one = {name: float(np.reshape(x, ())) for name, x in cells_of(values, cell).items()}
-        step = _step(law, one, float(legs[cell]), rtol, atol)
+        step = _step(law, one, float(legs[cell]), rtol, atol, targets.reach)
         x, error = start[:n], start[n:]
         sizes = _grown(1.0, 0.0, error, targets.units) if measured else (0.0, 0.0)
         at_entry, last, same, done = 0.0, 0, 0, 0
@@ -80,8 +80,13 @@ def strobe_called(
         stage(f"{cell + 1:,} of {len(states):,} motions")
 
 
-def _step(law: Equations, values: Mapping[str, float], leg: float, rtol: float, atol: float) -> Any:
-    """The state after a leg, or after a step of a map, as a function of its number and a state."""
+def _step(
+    law: Equations, values: Mapping[str, float], leg: float, rtol: float, atol: float, reach: Array
+) -> Any:
+    """The state after a leg, or after a step of a map, as a function of its number and a state.
+
+    NaN where a flow fails, or after many steps is out of reach.
+    """
     f = pointwise(law, values)
     if isinstance(law, Map):
 
@@ -99,8 +104,10 @@ def _step(law: Equations, values: Mapping[str, float], leg: float, rtol: float, 
         )
         state = np.full(x.size, np.nan)
         try:
-            for one in steps(problem, start + leg):
+            for taken, one in enumerate(steps(problem, start + leg)):
                 state = one.after
+                if taken >= FEW and not ((reach[0] <= state) & (state <= reach[1])).all():
+                    return np.full(x.size, np.nan)
         except (ConvergenceError, ValueError):
             return np.full(x.size, np.nan)
         return state

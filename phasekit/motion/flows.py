@@ -296,7 +296,7 @@ def _followed(
         own, done = times[ahead], 0
         problem = InitialValue(
             rates, list(state), rtol=max(how["rtol"], 1e-13), atol=how["atol"], unit=np.inf,
-            most=MOST_IMPLICIT if stiff else 1_000_000, method=kind,
+            most=int(how.get("most", MOST_IMPLICIT if stiff else 1_000_000)), method=kind,
         )  # fmt: skip
         try:
             for step in steps(problem, float(own[-1])):

@@ -25,6 +25,8 @@ QUARTER, WAY = 0.25, 0.05
 LONGER = 100.0
 #: States at which rates are asked for, and legs for which motions from them are followed.
 SOME, FIRST = 32, 20
+#: Steps at most of these motions, and of those of Python functions.
+MOST, MOST_CALLED = 100_000, 1_000
 #: Part of the greatest speed that counts as rest.
 SLOW = 1e-3
 #: How often as fast as all else what decays is where a flow is stiff, part of the states at which
@@ -72,10 +74,11 @@ def pace_of(law: Equations, values: Mapping[str, Any], states: Array, units: Arr
         warnings.simplefilter("ignore", RuntimeWarning)
         if law.kind == "python":
             found, _ = flows.one_by_one(
-                law, values, few(starts, 4), times[:4], None, {"rtol": 1e-6, "atol": 1e-8}
-            )
+                law, values, few(starts, 4), times[:4], None,
+                {"rtol": 1e-6, "atol": 1e-8, "most": MOST_CALLED},
+            )  # fmt: skip
         else:
-            found, _ = flows.motions(law, values, starts, times, 1e-8, 1e-10)
+            found, _ = flows.motions(law, values, starts, times, 1e-8, 1e-10, most=MOST)
     seen = found.reshape(-1, len(units))
     seen = few(seen[np.isfinite(seen).all(axis=1)], 2 * SOME)
     if not len(seen):

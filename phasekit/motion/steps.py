@@ -22,6 +22,8 @@ Rates: TypeAlias = Callable[[float, Any], Any]
 
 #: Steps after which the pace of a motion tells: the first step may be shorter by any factor.
 TRIAL = 1000
+#: First steps, and how often as great as in them a motion is that is under way to infinity.
+EARLY, BEYOND = 16, 1e6
 
 
 @dataclass(frozen=True)
@@ -69,18 +71,26 @@ class Pace:
     taken: int = 0
     longest: float = 0.0
     """Time between two of them."""
+    first: float = 0.0
+    """Greatest size of the state in the first of them."""
 
-    def is_too_slow(self, start: float, t: float) -> bool:
+    def is_too_slow(self, start: float, t: float, size: float = 0.0) -> bool:
         """Count the one from `start` to `t`; whether the motion is to be given up.
 
         That is where it needs too many, or will: the rest takes too many even of the longest so
-        far. The more were counted, the sooner that is believed.
+        far, where the more were counted, the sooner that is believed; or of the last, far from
+        where the motion began, as on the way to infinity in finite time.
         """
         self.taken += 1
         self.longest = max(self.longest, abs(t - start))
+        if self.taken <= EARLY:
+            self.first = max(self.first, size)
         rest = abs(self.stop - t)
-        foreseen = self.taken >= TRIAL and self.taken * rest > self.longest * self.most**2
-        foreseen = foreseen and rest < np.inf
+        foreseen = self.taken >= TRIAL and rest < np.inf
+        if foreseen and not size > BEYOND * self.first:
+            foreseen = self.taken * rest > self.longest * self.most**2
+        elif foreseen:
+            foreseen = rest > abs(t - start) * self.most
         return rest > 0.0 and (self.taken >= self.most or foreseen)
 
 
@@ -149,7 +159,7 @@ def steps(problem: InitialValue, stop: float) -> Iterator[Step]:
         if solver.status == "failed":
             raise _stopped(problem, solver.t, stop, message)
         yield Step(solver.t_old, solver.t, before, solver.y, rates_before, solver.f, solver)
-        if pace.is_too_slow(solver.t_old, solver.t):
+        if pace.is_too_slow(solver.t_old, solver.t, float(np.abs(solver.y).max())):
             raise _too_long(problem, solver.t, pace)
 
 

@@ -7,7 +7,7 @@ import warnings
 import numba
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 import phasekit as pk
 
@@ -222,3 +222,50 @@ def test_van_der_pols_multiplier_is_the_mean_divergence():
     x = pk.flow(oscillator, start, t).motion_x.values
     total, _ = quad(lambda s: 1.0 - np.interp(s, t, x) ** 2, 0.0, period, limit=400, epsrel=1e-5)
     assert ds.attractor_multiplier.item() == pytest.approx(np.exp(total), rel=1e-3)
+
+
+def prey(x, m, A):
+    n, p = x
+    return np.array([n * (n - A) * (1.0 - n) - n * p, p * (n - m)])
+
+
+PREY = {"n": "n*(n - A)*(1 - n) - n*p", "p": "p*(n - m)"}
+
+
+@pytest.mark.parametrize(
+    ("f", "number"), [(PREY, 7), pytest.param(prey, 4, marks=pytest.mark.slow)]
+)
+def test_stiff_motions_to_infinity_in_finite_time(f, number):
+    # With p < 0 < n - m: n follows sqrt(-p) at the rate -p, and p' is about -(-p)^1.5.
+    law = pk.Problem(
+        f, ("n", "p"), {"m": 0.6, "A": 0.1}, window={"n": (-0.1, 1.1), "p": (-0.1, 0.4)}
+    )
+    axes = {"n": np.linspace(-0.1, 1.1, number), "p": np.linspace(-0.1, 0.4, number)}
+    found = quietly(law, axes)
+    want = np.zeros((number, number), int)
+
+    def far(t, x):
+        return 1e5 - np.abs(x).max()
+
+    far.terminal = True
+    for i, j in np.ndindex(want.shape):
+        start = axes["n"][i], axes["p"][j]
+        how = {"method": "LSODA", "rtol": 1e-8, "atol": 1e-30, "events": far}
+        way = solve_ivp(lambda t, x: prey(x, 0.6, 0.1), (0.0, 400.0), start, **how)
+        ends = 0 if np.hypot(*way.y[:, -1]) < 1e-2 else 1
+        want[i, j] = ends if way.status == 0 else -2
+    assert (want == -2).any()
+    np.testing.assert_array_equal(found.basin, want)
+
+
+@pytest.mark.parametrize(
+    "f", [["x^2 - x^3*y", "-y"], lambda x: [x[0] ** 2 - x[0] ** 3 * x[1], -x[1]]]
+)
+def test_motions_to_infinity_at_a_time_in_closed_form(f):
+    # On y = 0, which stays, x = 1/(1/x0 - t); for x0 < 0 all come to 0.
+    law = pk.Problem(f, ("x", "y"), window={"x": (-1.0, 1.0), "y": (-1.0, 1.0)})
+    times = np.array([1.0, 1.999, 2.0, 2.001])
+    with pytest.warns(RuntimeWarning, match="run to infinity"):
+        ds = pk.flow(law, {"x": 0.5, "y": 0.0}, t=times)
+    np.testing.assert_allclose(ds.motion_x[:2], 1.0 / (2.0 - times[:2]), rtol=1e-7)
+    assert np.isnan(ds.motion_x[3])

@@ -33,10 +33,11 @@ Whole = npt.NDArray[np.int64]
 
 #: Rows of `real`: time, next step, the step that is tried, where the lane stops, error of the
 #: step over what is allowed, step that is tried to end at a turn. Of steps by series their number,
-#: the state, and whether the last was rejected; the greatest coordinate or rate so far; of one
-#: step alone what was gone, 0 where it was rejected, when it began, the unit of its time, and
-#: further rows with its coefficients.
-T, H, TRY, END, ERROR, AIM, COUNT, OUTCOME, REFUSED, SIZE, GONE, START, SCALE, TERMS = range(14)
+#: the state, and whether the last was rejected; the greatest coordinate or rate so far, and that
+#: of the first steps; of one step alone what was gone, 0 where it was rejected, when it began, the
+#: unit of its time, and further rows with its coefficients.
+T, H, TRY, END, ERROR, AIM, COUNT, OUTCOME, REFUSED, SIZE, FIRST, GONE, START, SCALE = range(14)
+TERMS = 14
 REALS, KEPT = TERMS, GONE
 #: Rows of `whole`: cell, state, whether the step was accepted, steps so far, whether the last was
 #: rejected, tries to end at a turn.
@@ -45,6 +46,10 @@ WHOLES = 6
 
 #: In place of `ACCEPTED`: its state was changed between steps.
 CHANGED = 2
+
+#: First steps, steps after which it is foreseen that too many would be needed, and how often as
+#: great as in the first ones, and as its window, a motion is then.
+EARLY, TRIAL, BEYOND = 16, 4096, 1e6
 
 _EPS = float(np.finfo(float).eps)
 _MOST_AIMS = 12
@@ -73,7 +78,7 @@ def load(
     if kink >= 0:
         p[kink * LANES + lane] = np.sign(states[cell, 1])
     real[T, lane] = real[H, lane] = real[AIM, lane] = 0.0
-    real[COUNT, lane] = real[REFUSED, lane] = real[SIZE, lane] = 0.0
+    real[COUNT, lane] = real[REFUSED, lane] = real[SIZE, lane] = real[FIRST, lane] = 0.0
     whole[ACCEPTED, lane] = CHANGED
 
 
@@ -145,10 +150,32 @@ def ends_well(
     return False
 
 
+@routine
+def is_beyond(lane: int, limits: Array, y: Array, real: Array) -> bool:
+    """Whether a motion far from where it began needs too many steps as short as this one.
+
+    On the way to infinity in finite time steps become the shorter the farther it is: the time is
+    never over.
+    """
+    rest = abs(real[END, lane] - real[T, lane])
+    if not rest > limits[MOST, 0] * abs(real[TRY, lane]):
+        return False
+    size, scale, states = 0.0, real[FIRST, lane], 2
+    if limits.shape[0] > OWN:
+        states = (limits.shape[0] - OWN) // 2
+        for c in range(states):
+            own = limits[OWN + 2 * c + 1, 0]
+            if own < np.inf:
+                scale = max(scale, own)
+    for c in range(states):
+        size = max(size, abs(y[c * LANES + lane]))
+    return size > BEYOND * scale
+
+
 @inline
 def judge(
     lane: int,
-    most: int,
+    limits: Array,
     x: Array,
     k: Array,
     y: Array,
@@ -175,7 +202,15 @@ def judge(
         # A step that was cut short says little of the next one.
         if abs(tried * change) > abs(real[H, lane]) or abs(tried) >= abs(real[H, lane]):
             real[H, lane] = tried * change
-    if whole[STATE, lane] == RUNNING and whole[STEPS, lane] >= most:
+    taken = whole[STEPS, lane]
+    if taken <= EARLY:
+        real[FIRST, lane] = real[SIZE, lane]
+    if whole[STATE, lane] == RUNNING and (
+        taken >= int(limits[MOST, 0])
+        or taken >= TRIAL
+        and taken % EARLY == 0
+        and is_beyond(lane, limits, y, real)
+    ):
         whole[STATE, lane] = EXHAUSTED
 
 
@@ -209,14 +244,14 @@ def advance(
     for m in range(x.size):
         h[m] = real[TRY, m % LANES]
     attempt(address, table, real[T], h, x, k, y, p, z)
-    rtol, atol, unit, most = limits[RTOL, 0], limits[ATOL, 0], limits[UNIT, 0], limits[MOST, 0]
+    rtol, atol, unit = limits[RTOL, 0], limits[ATOL, 0], limits[UNIT, 0]
     if limits.shape[0] > OWN:
         errors_of_flow(h, x, y, k, limits, k[13:], real[ERROR], real[SIZE])
     else:
         errors(h, x, y, k, unit, rtol, atol, limits[BESIDE, 0], k[13:], real[ERROR], real[SIZE])
     for lane in range(LANES):
         if whole[STATE, lane] == RUNNING:
-            judge(lane, int(most), x, k, y, p, kink, real, whole)
+            judge(lane, limits, x, k, y, p, kink, real, whole)
 
 
 @routine

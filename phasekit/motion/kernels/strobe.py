@@ -23,7 +23,7 @@ from phasekit.motion.kernels.stepping import (
     load,
     renew,
 )
-from phasekit.motion.lost import ARRIVED, FAILED, IDLE, RUNNING
+from phasekit.motion.lost import ARRIVED, EXHAUSTED, FAILED, IDLE, RUNNING
 from phasekit.numerics.compile import Array, inline, kernel, routine
 from phasekit.numerics.lanes import LANES
 
@@ -197,11 +197,11 @@ def strobe(
 
     Where the law repeats itself after each leg (`again`), time begins anew. A motion ends early
     near a point of an attractor, in whose number `code` is then, within its borders, or after so
-    many visits in succession to cells of the same attractor; and it fails out of `reach`. `taken`
-    is the number of legs. Where a tangent vector moves along, as long as the error at first,
-    `growth` is by how much it and an error of every leg have grown at most before the motion came
-    to where it ends. Where that is `enough`, the motion ends as well, and its state is the first
-    of `out`.
+    many visits in succession to cells of the same attractor; and it fails out of `reach`, at the
+    end of a leg or where it would never come to that. `taken` is the number of legs. Where a
+    tangent vector moves along, as long as the error at first, `growth` is by how much it and an
+    error of every leg have grown at most before the motion came to where it ends. Where that is
+    `enough`, the motion ends as well, and its state is the first of `out`.
     """
     size = states.shape[1] * LANES
     x, y, h = np.zeros(size), np.zeros(size), np.zeros(size)
@@ -224,6 +224,8 @@ def strobe(
                 continue
             own = whole[CELL, lane]
             ended, grown = state != IDLE and state != ARRIVED, False
+            if state == EXHAUSTED and is_far(lane, x, reach):
+                state = FAILED
             if state == ARRIVED:
                 done[lane] += 1
                 if measured:

@@ -38,6 +38,7 @@ from phasekit.motion.kernels.stepping import (
     OUTCOME,
     REFUSED,
     SIZE,
+    TRIAL,
     H,
     T,
 )
@@ -51,9 +52,6 @@ if TYPE_CHECKING:
     import sympy as sp
 else:
     sp = later("sympy")
-
-#: Steps after which it is foreseen that too many would be needed.
-TRIAL = 4096
 
 _EPS = float(np.finfo(float).eps)
 _LONG = ir.VectorType(ir.IntType(64), LANES)
