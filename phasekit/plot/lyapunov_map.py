@@ -86,7 +86,7 @@ def lyapunov_map(
     ...               of="lyapunov", x=0.1, y=0.1, n=500)
     >>> ax = pk.plot.lyapunov_map(ds)
     >>> ax.get_xlabel()
-    '$a$, parameter a'
+    '$a$'
     """
     ds = labels.dataset(dataset, "dataset", (EXPONENT,), "pk.sweep(..., of='lyapunov')")
     flag("legend", legend)

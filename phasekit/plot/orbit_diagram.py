@@ -66,7 +66,7 @@ def orbit_diagram(
     >>> ds = pk.orbit_diagram(logistic, "r", np.linspace(2.8, 4.0, 200), n=64)
     >>> ax = pk.plot.orbit_diagram(ds)
     >>> ax.get_xlabel(), ax.get_ylabel()
-    ('$r$, parameter r', 'x after transients')
+    ('$r$', 'x after transients')
     """
     ds = labels.dataset(dataset, "dataset", ("sample",), "pk.orbit_diagram")
     flag("legend", legend)

@@ -169,7 +169,7 @@ def waterfall(
     >>> motion = pk.flow(driven, t=np.arange(100.0, 300.0, 0.1))
     >>> ax = pk.plot.waterfall(pk.spectrum(motion, "x"), highest=8.0)
     >>> ax.get_ylabel()
-    'parameter w'
+    'w'
     """
     ds, name, along = _chosen(dataset, variable)
     dims = [str(dim) for dim in ds[name].dims if dim != along]

@@ -37,6 +37,8 @@ def label(values: xr.DataArray, units: Angles | Units, width: int, extra: str = 
     """
     name = str(values.name)
     meaning = str(values.attrs.get("long_name", ""))
+    if meaning == f"parameter {name}":  # says no more than its name
+        meaning = ""
     symbol = SYMBOLS.get(name, "" if meaning else name)
     unit = as_units(units).text(name, str(values.attrs.get("units", "")))
     brief = SYMBOLS.get(name) or BRIEF.get(name, name.replace("_", " "))
