@@ -243,6 +243,37 @@ def test_curve_of_freire_ends_at_its_bogdanov_takens_point() -> None:
     assert [focus["nu"], focus["be"]] == pytest.approx([-0.7204001, 0.5912315], abs=3e-5)
 
 
+@pytest.mark.slow
+def test_curve_of_freire_does_not_go_back_on_itself() -> None:
+    """Along it both ends stay foci, whose spirals come by the same plain distance several times."""
+    problem = pk.Problem(
+        {
+            "x": "(-(be + nu)*x + be*y - a3*x^3 + b3*(y - x)^3)/r",
+            "y": "be*x - be*y - z - b3*(y - x)^3", "z": "y",
+        },
+        parameters={"nu": -0.7213, "be": 0.6, "r": 0.6, "a3": 0.328578, "b3": 0.933578},
+    )  # fmt: skip
+    loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="nu")
+    backward = pk.ContinuationOptions(directions="backward", max_points=900)
+    curve = loop.curve("be", (0.2, 1.2), options=backward)
+    assert np.all(np.diff(curve.points.be) > 0.0)
+    assert curve.stops[0].reason == "bound"
+    (neutral,) = curve.special("NDS")
+
+    # There twice the real part of the pair is minus the other eigenvalue.
+    def divergence(nu: float, be: float) -> float:
+        A = [[-(be + nu) / 0.6, be / 0.6, 0.0], [be, -be, -1.0], [0.0, 1.0, 0.0]]
+        values = sorted(np.linalg.eigvals(A), key=lambda one: one.real)
+        return float(2 * values[0].real + values[-1].real)
+
+    assert divergence(neutral["nu"], neutral["be"]) == pytest.approx(0.0, abs=1e-8)
+    at = pk.Problem(dict(zip("xyz", problem.f, strict=True)), parameters={
+        **problem.parameters, "be": neutral["be"], "nu": neutral["nu"],
+    })  # fmt: skip
+    again = pk.connection(at, ([0, 0, 0], [0, 0, 0]), free="nu")
+    assert float(again.points.nu[0]) == pytest.approx(neutral["nu"], abs=1e-9)
+
+
 def test_curve_of_fronts_is_exact(tmp_path: Path) -> None:
     problem = pk.Problem(
         {"u": "v", "v": "c*v - u*(1 - u)*(u - a)"}, parameters={"c": 0.28, "a": 0.3}

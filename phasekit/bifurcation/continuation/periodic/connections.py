@@ -119,7 +119,7 @@ class Ends:
     stable : int
         Dimension of the stable manifold that it arrives in.
     distances : tuple of float
-        From the equilibria, on scaled axes.
+        From the equilibria, on scaled axes (see `measure`).
     same : bool
         Whether it leaves and arrives at the same equilibrium.
     n : int
@@ -155,6 +155,26 @@ class Ends:
             planes(rests[1].A, self.stable, stable=True)[1],
         )
 
+    def measure(self, rest: Rest, side: int) -> Array:
+        """Square of the distance from an equilibrium, as a form.
+
+        Along the linear flow in the plane it only grows, or only decays: B^T M + M B = +-1. A pair
+        of complex eigenvalues would bring an orbit to the same plain distance several times, and a
+        curve of orbits would go back on itself through them.
+        """
+        from scipy.linalg import solve_continuous_lyapunov
+
+        count = self.unstable if side == SOURCE else self.stable
+        n = len(rest.A)
+        if count < 2:
+            return np.eye(n)
+        plane, across = planes(rest.A, count, stable=side == TARGET)
+        B = plane.T @ rest.A @ plane
+        M = solve_continuous_lyapunov(B.T, np.eye(count) * (1.0 if side == SOURCE else -1.0))
+        if not np.isfinite(M).all() or np.min(np.linalg.eigvalsh(M)) <= 0.0:
+            return np.eye(n)
+        return np.asarray(plane @ M @ plane.T * (count / np.trace(M)) + across @ across.T)
+
     def linear(self, bounded: Any, orbit: Orbit) -> Rows:
         """Derivatives of what vanishes, and its values.
 
@@ -174,9 +194,10 @@ class Ends:
         for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
             rest, L = rests[side], frames[side].T
             z = (x - rest.x) / scale
-            far = float(np.sqrt(z @ z)) or 1e-300
+            along = self.measure(rest, side) @ z
+            far = math.sqrt(max(float(z @ along), 0.0)) or 1e-300
             held = side == SOURCE or self.both
-            rows = np.vstack([L, z[None] / (far * self.distances[side])]) if held else L
+            rows = np.vstack([L, along[None] / (far * self.distances[side])]) if held else L
             here = slice(row, row + len(rows))
             columns = slice(side * n, (side + 1) * n)
             gap = [far / self.distances[side] - 1.0] if held else []
@@ -321,7 +342,8 @@ def extended(
         parts = np.linalg.solve(vectors, z.astype(complex))
         sign = -1.0 if side == SOURCE else 1.0
         slowest = float(np.min(np.abs(values.real)))
-        far = float(np.linalg.norm(z))
+        form = plane.T @ ends.measure(rest, side) @ plane
+        far = float(np.sqrt(z @ form @ z))
         if not far > distances[side] or slowest == 0.0:
             continue
 
@@ -333,7 +355,7 @@ def extended(
         low = 0.0
         for _ in range(60):
             middle = 0.5 * (low + high)
-            if np.linalg.norm(state(middle)) > distances[side]:
+            if np.sqrt(state(middle) @ form @ state(middle)) > distances[side]:
                 low = middle
             else:
                 high = middle
