@@ -2,6 +2,7 @@
 
 import math
 
+import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -133,3 +134,48 @@ def test_a_vertical_family_ends_at_its_hopf_point_and_has_no_folds(force):
     assert {one.kind for one in whole.special_points} == {"end"}
     assert "hopf" in [stop.reason for stop in whole.stops]
     assert len(vertical(whole)) == 1
+
+
+def volterra(largest):
+    """Period of x' = x (1 - y), y' = y (x - 1) by x - ln x + y - ln y, in u = ln x."""
+    with mpmath.workdps(50):
+        top = mpmath.log(mpmath.mpf(largest))
+        energy = mpmath.e**top - top
+
+        def rates(u):  # e^w - w = c: both w = ln y
+            c = max(1 + energy - mpmath.e**u + u, 1 + mpmath.mpf(10) ** -45)
+            both = (-mpmath.lambertw(-mpmath.exp(-c), k).real - c for k in (0, -1))
+            return sum(1 / abs(1 - mpmath.exp(w)) for w in both)
+
+        low = mpmath.findroot(lambda u: energy - mpmath.e**u + u, -energy)
+        # u = low + (top - low) sin^2(s) takes the roots at both ends away.
+        span = top - low
+
+        def part(s):
+            u = low + span * mpmath.sin(s) ** 2
+            return rates(u) * span * 2 * mpmath.sin(s) * mpmath.cos(s)
+
+        ends = [0, 0.05, 0.3, 0.8, 1.2, 1.4, 1.5, mpmath.pi / 2]
+        return float(mpmath.quad(part, ends, maxdegree=7))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "f", [["x*(1 - y) + p*x*(x - 1)", "y*(x - 1)"], ["x*(1 - y + p)", "y*(x - 1) + p*(y - 1)"]]
+)
+def test_periods_are_right_where_states_pass_far_below_their_largest_values(f):
+    """X and y fall to 1e-60 of their amplitudes, where they decide how long an orbit takes."""
+    problem = pk.Problem(f, ("x", "y"), {"p": -0.25})
+    (hopf,) = pk.continuation(problem, "p", x0=[1.0, 1.0], span=(-0.3, 0.3)).special("H")
+    family = hopf.switch(options=pk.ContinuationOptions(max_points=300))
+    points = family.points
+    np.testing.assert_allclose(points.p, 0.0, atol=1e-10)
+    assert len(vertical(family)) == 1
+    assert {one.kind for one in family.special_points} == {"end"}
+    a = points.x_max.values
+    assert a[-1] > 100.0
+    few = [int(np.argmin(np.abs(a - one))) for one in (10.0, 30.0, 55.0, 65.0, 100.0)]
+    exact = [volterra(a[k]) for k in few]
+    np.testing.assert_allclose(points.period[few], exact, rtol=1e-8)
+    assert family.stops[1].reason == "stuck"
+    assert "more than max_intervals = 1000" in family.stops[1].message

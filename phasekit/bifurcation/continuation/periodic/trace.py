@@ -10,8 +10,14 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.periodic import collocation, ends
-from phasekit.bifurcation.continuation.periodic.adapt import count_for, fitted
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution, where
+from phasekit.bifurcation.continuation.periodic.adapt import (
+    LOOSE,
+    REACH,
+    count_for,
+    fitted,
+    passages,
+)
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution, where
 from phasekit.bifurcation.continuation.periodic.point import Point, State, point_of
 from phasekit.numerics.waits import stage
 
@@ -20,6 +26,7 @@ Complex = npt.NDArray[np.complex128]
 
 REMESH = 3  # points after which the mesh follows the orbit
 WORSE = 10.0  # times the mesh error, which a new mesh that does not fit exceeds
+SAME = 0.1  # mesh tolerances by which y changes at most where passages do not matter
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,10 +161,10 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
         if not found.converged:
             return found.message
         if cycles.options.intervals is not None:
-            break
+            return found, 1.0 / found.length
         error = cycles.mesh_error(found.orbit)
         if error <= cycles.options.mesh_tolerance:
-            break
+            return _through(cycles, state, step, (orbit, dx), found)
         count = max(count_for(cycles, found.orbit), int(1.1 * found.orbit.intervals) + 1)
         if count > cycles.options.max_intervals:
             return (
@@ -174,8 +181,32 @@ def attempt(cycles: Cycles, state: State, step: float) -> tuple[Solution, float]
         )
         orbit, (dx,) = cycles.on(mesh, orbit, dx)
         guess, _ = cycles.on(mesh, found.orbit)
-    else:
-        return f"no mesh brings the mesh error {error:.2g} under its tolerance"
+    return f"no mesh brings the mesh error {error:.2g} under its tolerance"
+
+
+def _through(
+    cycles: Cycles, state: State, step: float, last: tuple[Orbit, Array], found: Solution
+) -> tuple[Solution, float] | str:
+    """What Newton's method found, on a mesh that resolves passages where these change it."""
+    for most in (2, None):
+        mesh = passages(cycles, found.orbit, LOOSE, REACH, most)
+        if mesh is None:
+            break
+        orbit, (dx,) = cycles.on(mesh, *last)
+        rows, rows_y, target = cycles.rows(orbit, dx, state.dy)
+        target[-1] += step
+        finer = cycles.correct(cycles.on(mesh, found.orbit)[0], rows, rows_y, target)
+        if not finer.converged:
+            return finer.message
+        moved = np.abs(finer.orbit.y - found.orbit.y) / np.append(found.orbit.y[0], cycles.width)
+        if most is not None and np.max(moved) <= SAME * cycles.options.mesh_tolerance:
+            break
+        if len(mesh) - 1 > cycles.options.max_intervals:
+            return (
+                f"a state that passes far below its amplitude asks for {len(mesh) - 1} intervals, "
+                f"more than max_intervals = {cycles.options.max_intervals}"
+            )
+        found = finer
     # The tangent's part along the last one, which is its whole length but for the turn.
     return found, 1.0 / found.length
 
