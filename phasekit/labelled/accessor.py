@@ -127,7 +127,8 @@ class PhasekitAccessor:
         -------
         pandas.DataFrame
             A row for each cell of the dims that most variables have; variables with others are
-            left out, and rows of what is absent. ``.to_csv(path)`` writes it.
+            left out, and rows of what is absent. States of equilibria have a column each.
+            ``.to_csv(path)`` writes it.
 
         Raises
         ------

@@ -18,7 +18,8 @@ _NOTHING = ("absent", "not_computed")
 def table_of(ds: xr.Dataset) -> pd.DataFrame:
     """Return the variables of a Dataset that share the dims which most of them have.
 
-    Of dims that as many have, the more count. Rows of what is absent are left out.
+    Of dims that as many have, the more count. What has the states beside has a column for each:
+    the states themselves by their names. Rows of what is absent are left out.
     """
     import pandas as pd
 
@@ -41,6 +42,11 @@ def table_of(ds: xr.Dataset) -> pd.DataFrame:
     columns = {
         _head(name, ds[name]): _spread(_words(ds[name]), sizes) for name in [*beside, *names]
     }
+    for name in ds.data_vars:
+        if "state" in ds.coords and frozenset(ds[name].dims) == dims | {"state"} != dims:
+            for state in ds.coords["state"].values:
+                head = str(state) if name == "x" else f"{name} {state}"
+                columns.setdefault(head, _spread(_words(ds[name].sel(state=state)), sizes))
     there = np.zeros(int(np.prod(list(sizes.values()), dtype=int)), bool)
     for name in names:
         there |= _there(columns[_head(name, ds[name])])

@@ -49,3 +49,17 @@ def test_scalars_are_one_row_and_other_datasets_are_taken():
     assert len(pk.equilibria(SYSTEM)[[]].phasekit.table()) == 0
     with pytest.raises(pk.ParameterError, match="did you mean 'phi'"):
         pk.equilibria(SYSTEM).phasekit.table(phy="deg")
+
+
+def test_states_of_equilibria_have_columns_by_their_names():
+    prey = pk.Problem(
+        {"n": "n*(n - A)*(1 - n) - n*p", "p": "p*(n - m)"},
+        parameters={"m": [0.5, 0.6], "A": 0.1},
+        window={"n": (-0.05, 1.1), "p": (-0.05, 0.4)},
+    )
+    table = pk.equilibria(prey).phasekit.table()
+    assert table.index.names == ["m", "equilibrium"]
+    for m in (0.5, 0.6):  # n = 0, A, 1 without the predator, and n = m with it
+        n, p = table.loc[m][["n", "p"]].to_numpy().T
+        np.testing.assert_allclose(n, [0.0, 0.1, m, 1.0], atol=1e-12)
+        np.testing.assert_allclose(p, [0.0, 0.0, (m - 0.1) * (1 - m), 0.0], atol=1e-12)
