@@ -18,7 +18,7 @@ from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Flow, Law, Map
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import corners, equilibria_of, natural_window
+from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
 from phasekit.table.attractors import SLOTS
 from phasekit.table.equations import rows_of
 from phasekit.table.quantities import TABLE
@@ -176,10 +176,8 @@ def equilibria(problem: Problem, window: Any, *arrays: Any) -> dict[str, Any]:
     low, high = corners(problem, window)
     shape, cells = _cells(len(arrays), arrays)
     names, size = tuple(problem.parameters), int(np.prod(shape, dtype=int))
-    ones = {
-        k: equilibria_of(problem.replace(**dict(zip(names, own, strict=True))), low, high)
-        for k, own, _ in cells
-    }
+    own = {k: problem.replace(**dict(zip(names, values, strict=True))) for k, values, _ in cells}
+    ones = dict(zip(own, equilibria_of_cells(list(own.values()), low, high), strict=True))
     n, most = len(problem.state), max((len(one.x) for one in ones.values()), default=0)
     found: dict[str, Any] = {
         "x": np.full((size, most, n), np.nan),

@@ -13,9 +13,9 @@ from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import FlowEquilibriumKind
 from phasekit.labels.arguments import bad, whole
 from phasekit.labels.grid import LABEL_DTYPE, Grid, make_grid, variable
-from phasekit.numerics.waits import notice, stage
+from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
-from phasekit.systems.rests import Equilibria, corners, equilibria_of, window_of
+from phasekit.systems.rests import Equilibria, corners, equilibria_of_cells, window_of
 
 Array = npt.NDArray[np.float64]
 
@@ -37,21 +37,18 @@ def equilibria_in_box(system: Any, box: Any, n: Any = None) -> xr.Dataset:
     low, high = corners(problem, window_of(system, box))
     dims, shape = tuple(grid.sizes), tuple(grid.sizes.values())
     values = {name: grid.aligned(name, dims) for name in grid.inputs}
-    found, reasons = list[Equilibria | None](), list[str]()
+    singles = dict[int, Problem]()
+    for k, cell in enumerate(np.ndindex(shape)):
+        own = {name: float(np.broadcast_to(array, shape)[cell]) for name, array in values.items()}
+        if not dims:
+            singles[k] = problem
+        elif all(map(np.isfinite, own.values())):
+            singles[k] = problem.replace(**own)
     with notice("looking for equilibria"):
-        for k, cell in enumerate(np.ndindex(shape)):
-            single: Problem | None = problem
-            if dims:
-                own = {
-                    name: float(np.broadcast_to(array, shape)[cell])
-                    for name, array in values.items()
-                }
-                valid = all(map(np.isfinite, own.values()))
-                single = problem.replace(**own) if valid else None
-                stage(f"{k + 1:,} of {int(np.prod(shape)):,} systems")
-            one = None if single is None else equilibria_of(single, low, high)
-            found.append(one)
-            reasons += [one.why] if one is not None and one.why else []
+        ones = equilibria_of_cells(list(singles.values()), low, high)
+    of_cells = dict(zip(singles, ones, strict=True))
+    found = [of_cells.get(k) for k in range(int(np.prod(shape, dtype=int)))]
+    reasons = [one.why for one in ones if one.why]
     if reasons:
         of = f" in {len(reasons)} of {len(found)} systems" if dims else ""
         warnings.warn(f"equilibria: there may be others than these{of}: {reasons[0]}", stacklevel=3)

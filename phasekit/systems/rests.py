@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,7 @@ from phasekit.labels.arguments import bad, reals, unknown
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Routhian
 from phasekit.numerics.intervals.program import NoRule
-from phasekit.numerics.intervals.zeros import zeros_in_box
+from phasekit.numerics.intervals.zeros import Zeros, zeros_of_cells
 from phasekit.systems.problem import Problem
 from phasekit.systems.system import System
 
@@ -44,7 +44,17 @@ class Equilibria(NamedTuple):
 
 def equilibria_of(problem: Problem, low: Array, high: Array) -> Equilibria:
     """Equilibria of a flow, or fixed points of a map, between corners of a box."""
-    zeros, why = _enclosed(problem, low, high)
+    return equilibria_of_cells([problem], low, high)[0]
+
+
+def equilibria_of_cells(problems: Sequence[Problem], low: Array, high: Array) -> list[Equilibria]:
+    """The same of problems that differ in the values of their parameters alone."""
+    found = _enclosed(problems, low, high) if problems else []
+    return [_sorted_out(one, *rest) for one, rest in zip(problems, found, strict=True)]
+
+
+def _sorted_out(problem: Problem, zeros: Array, why: str) -> Equilibria:
+    """Eigenvalues and kinds of zeros."""
     zeros = _folded(problem, zeros)
     eigenvalues = np.empty((len(zeros), len(problem.state)), complex)
     number = np.zeros(len(zeros), np.int64)
@@ -205,42 +215,58 @@ def _force_on(law: Any, system: Any, values: Mapping[str, float], places: Array)
     return np.array(np.broadcast_to(found, places.shape), float)
 
 
-def _enclosed(problem: Problem, low: Array, high: Array) -> tuple[Array, str]:
-    """Zeros in the box, and why there may be others, if that is not excluded."""
+def _enclosed(problems: Sequence[Problem], low: Array, high: Array) -> list[tuple[Array, str]]:
+    """Zeros in the box of each, and why there may be others, if that is not excluded."""
     import sympy as sp
 
-    if problem.kind != "symbolic":
-        why = f"f is code, so {STARTS} starts of Newton's method were tried, and nothing else"
-        return _searched(problem, low, high), why
-    symbols = symbols_of([*problem.state, *problem.parameters])
-    states = [symbols[name] for name in problem.state]
-    values = {symbols[name]: value for name, value in problem.parameters.items()}
-    formulas = problem.f
-    if problem.map:
-        for _ in range(problem.times - 1):
+    def searched(why: str) -> list[tuple[Array, str]]:
+        more = f"{STARTS} starts of Newton's method were tried"
+        return [(_searched(one, low, high), f"{why}{more}") for one in problems]
+
+    first = problems[0]
+    if first.kind != "symbolic":
+        return [(x, f"{why}, and nothing else") for x, why in searched("f is code, so ")]
+    symbols = symbols_of([*first.state, *first.parameters])
+    states = [symbols[name] for name in first.state]
+    formulas = first.f
+    if first.map:
+        for _ in range(first.times - 1):
             step = dict(zip(states, formulas, strict=True))
-            formulas = tuple(f.subs(step, simultaneous=True) for f in problem.f)
+            formulas = tuple(f.subs(step, simultaneous=True) for f in first.f)
             if sum(f.count_ops() for f in formulas) > LONG:
-                why = f"the iterate is long; {STARTS} starts of Newton's method were tried"
-                return _searched(problem, low, high), why
+                return searched("the iterate is long; ")
         formulas = tuple(f - x for f, x in zip(formulas, states, strict=True))
     # What is multiplied by zero need not be bounded.
-    absent = {symbol: 0 for symbol, value in values.items() if value == 0.0}
-    if absent and any(f.has(sp.Abs, sp.sign) for f in formulas):
-        formulas = tuple(f.subs(absent) for f in formulas)
-    try:
-        found = zeros_in_box(formulas, states, values, low, high)
-    except NoRule as rule:
-        why = f"no bounds are known for {rule}; {STARTS} starts of Newton's method were tried"
-        return _searched(problem, low, high), why
+    kinked = any(f.has(sp.Abs, sp.sign) for f in formulas)
+    groups: dict[tuple[str, ...], list[int]] = {}
+    for place, one in enumerate(problems):
+        zero = tuple(name for name, value in one.parameters.items() if kinked and value == 0.0)
+        groups.setdefault(zero, []).append(place)
+    boxes = dict[int, Zeros]()
+    for absent, places in groups.items():
+        own = tuple(f.subs({symbols[name]: 0 for name in absent}) for f in formulas)
+        values = {
+            symbols[name]: np.array([float(problems[place].parameters[name]) for place in places])
+            for name in first.parameters
+        }
+        try:
+            found = zeros_of_cells(own, states, values, low, high)
+        except NoRule as rule:
+            return searched(f"no bounds are known for {rule}; ")
+        found = found * len(places) if len(found) < len(places) else found  # without parameters
+        boxes.update(zip(places, found, strict=True))
+    return [(boxes[k].zeros, _doubt(one, boxes[k])) for k, one in enumerate(problems)]
+
+
+def _doubt(problem: Problem, found: Zeros) -> str:
+    """Why there may be other zeros than these; empty where that is excluded."""
     if found.complete:
-        return found.zeros, ""
+        return ""
     a, b = found.undecided[0].min(axis=0), found.undecided[1].max(axis=0)
     where = ", ".join(
         f"{name} in ({p:.6g}, {q:.6g})" for name, p, q in zip(problem.state, a, b, strict=True)
     )
-    why = f"a multiple equilibrium, a pole or rounding leaves it undecided within {where}"
-    return found.zeros, why
+    return f"a multiple equilibrium, a pole or rounding leaves it undecided within {where}"
 
 
 def _folded(problem: Problem, zeros: Array) -> Array:

@@ -185,3 +185,44 @@ def test_a_forced_system_has_no_equilibria():
     forced = pk.Problem("-x + cos(t)", "x", {}, time="t", period="2*pi", window={"x": (-2, 2)})
     with pytest.raises(pk.ParameterError, match="without forcing"):
         pk.equilibria(forced)
+
+
+def test_many_cells_at_once_have_the_equilibria_of_a_closed_form():
+    # Equilibria (0, 0), (A, 0), (1, 0) on the edge of the window, and (m, (m - A)(1 - m)) in it.
+    m, A = np.linspace(0.3, 0.95, 27), np.linspace(0.02, 0.3, 19)
+    prey = pk.Problem(
+        {"n": "n*(n - A)*(1 - n) - n*p", "p": "p*(n - m)"},
+        parameters={"m": 0.6, "A": 0.1},
+        window={"n": (0.0, 1.1), "p": (0.0, 0.4)},
+    )
+    with pytest.warns(RuntimeWarning, match="in 1 of 513 systems"):
+        found = pk.sweep(prey, m=m, A=A, of=["equilibria"])
+    stable = 1 + (m[:, None] > 0.5 * (1.0 + A)).astype(int)
+    np.testing.assert_array_equal(found.n_stable, stable)
+    # Where m = A two of them are one, of which nothing is proved.
+    double = m[:, None] == A
+    assert double.sum() == 1
+    np.testing.assert_array_equal(found.complete, ~double)
+    np.testing.assert_array_equal(found.n_equilibria.values[~double], 4)
+    x = found.x.transpose("m", "A", "equilibrium", "state").values
+    live = np.argmax(np.where(np.isnan(x[..., 1]), -1.0, x[..., 1]), axis=-1)
+    top = np.take_along_axis(x, live[..., None, None], axis=2)[:, :, 0]
+    want = np.stack(np.broadcast_arrays(m[:, None], (m[:, None] - A) * (1.0 - m[:, None])), axis=-1)
+    np.testing.assert_allclose(top[~double], want[~double], atol=1e-14)
+
+
+def test_a_cell_full_of_equilibria_leaves_those_of_other_cells_proved():
+    # At mu = 0 all of the line x = y is at rest.
+    law = pk.Problem({"x": "y - x + mu*x", "y": "x - y + mu*(y - 1)"}, parameters={"mu": 0.0})
+    box = {"x": (-1.0, 1.2), "y": (-1.0, 1.3)}
+    mu = np.array([-0.5, 0.0, 0.5, 1.0])
+    with pytest.warns(UserWarning, match="in 1 of 4 systems"):
+        found = pk.equilibria(law.replace(mu=mu), box=box)
+    assert found.complete.values.tolist() == [True, False, True, True]
+    for place in (0, 2, 3):
+        k = mu[place]
+        want = np.linalg.solve([[k - 1.0, 1.0], [1.0, k - 1.0]], [0.0, k])
+        inside = bool(np.all((want >= -1.0) & (want <= [1.2, 1.3])))
+        assert found.n_equilibria.values[place] == inside
+        if inside:
+            np.testing.assert_allclose(found.x.values[place, 0], want, atol=1e-14)

@@ -21,10 +21,13 @@ from phasekit.numerics.intervals.krawczyk import UNIT, Image, inverses, krawczyk
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
+Index = npt.NDArray[np.int64]
 Boxes = tuple[Array, Array]
 
 #: Boxes of a generation beyond which the search stops, and says so.
 MOST_BOXES = 1 << 16
+#: Cells whose boxes are bisected side by side.
+CELLS = 256
 #: Relative width at which a box that nothing decides is given up: a multiple zero, or a pole.
 NARROW = 1e-9
 #: The same where parameters are intervals, which blur zeros anyway.
@@ -63,8 +66,8 @@ class System:
     Parameters
     ----------
     f, states : sequence of sympy expressions and symbols
-    values : mapping of symbol to float or (float, float)
-        Parameters, or intervals of them.
+    values : mapping of symbol to float or (float, float), or to array, shape (cells,)
+        Parameters, or intervals of them, or numbers of several cells.
 
     Raises
     ------
@@ -75,9 +78,12 @@ class System:
     def __init__(self, f: Sequence[Any], states: Sequence[Any], values: Mapping[Any, Any]) -> None:
         self.m, self.n = len(f), len(states)
         self._bounds = _bounds(tuple(f), tuple(states), tuple(values))
-        ends = [np.broadcast_to(np.asarray(v, dtype=float), 2) for v in values.values()]
-        self.parameters: list[Interval] = [(float(a), float(b)) for a, b in ends]
-        self.exact = all(a == b for a, b in self.parameters)
+        self.parameters: list[Interval] = []
+        for value in values.values():
+            ends = value if isinstance(value, tuple) else (value, value)
+            low, high = (np.atleast_1d(np.asarray(end, dtype=float)) for end in ends)
+            self.parameters.append((low, high))
+        self.exact = all(np.array_equal(a, b) for a, b in self.parameters)
 
     def at_middle(self) -> System:
         """The same for the middles of the parameters."""
@@ -86,10 +92,11 @@ class System:
         found.parameters = [(0.5 * (a + b), 0.5 * (a + b)) for a, b in self.parameters]
         return found
 
-    def __call__(self, low: Array, high: Array) -> tuple[Boxes, Boxes, Flags]:
-        """Bounds of f, of its derivatives, and where either may be undefined."""
+    def __call__(self, low: Array, high: Array, own: Index | int = 0) -> tuple[Boxes, Boxes, Flags]:
+        """Bounds of f, of its derivatives, and where either may be undefined, in cells."""
         columns = [(low[:, i], high[:, i]) for i in range(self.n)]
-        found, undefined = self._bounds(*columns, *self.parameters)
+        numbers = [(a[own], b[own]) for a, b in self.parameters]
+        found, undefined = self._bounds(*columns, *numbers)
         lows, highs = (np.stack([one[i] for one in found], axis=1) for i in (0, 1))
         shape = (-1, self.m, self.n)
         f = lows[:, : self.m], highs[:, : self.m]
@@ -139,50 +146,76 @@ def zeros_in_box(
     system = System(f, states, values)
     whole = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     if system.exact:
-        return _search(system, whole, [])
-    middle = _search(system.at_middle(), whole, [])
+        return _search(system, whole, [])[0]
+    middle = _search(system.at_middle(), whole, [])[0]
     known = [box for x in middle.zeros for box in _inflated(system, x, whole[1] - whole[0])]
-    found = _search(system, whole, known)
+    found = _search(system, whole, known)[0]
     return found._replace(visited=middle.visited + found.visited)
 
 
-def _search(system: System, whole: Boxes, known: list[_Known]) -> Zeros:
-    """All zeros in a box, some of which are the only ones in boxes of their own."""
+def zeros_of_cells(
+    f: Sequence[Any], states: Sequence[Any], values: Mapping[Any, Array], low: Array, high: Array
+) -> list[Zeros]:
+    """The same of cells, whose numbers `values` are, each of shape (cells,); all at once."""
+    count = max((len(value) for value in values.values()), default=1)
+    found: list[Zeros] = []
+    for first in range(0, count, CELLS):
+        part = {symbol: value[first : first + CELLS] for symbol, value in values.items()}
+        cells = np.arange(min(CELLS, count - first))
+        found += _search(System(f, states, part), (low, high), [], cells)
+    return found
+
+
+def _search(
+    system: System, whole: Boxes, known: list[_Known], cells: Index | None = None
+) -> list[Zeros]:
+    """All zeros in a box, some of which are the only ones in boxes of their own; of each cell."""
+    cells = np.zeros(1, np.int64) if cells is None else cells
     width = whole[1] - whole[0]
     # Nothing is cut that is only a few doubles wide.
     part = NARROW if system.exact else COARSE
     narrowest = np.maximum(part * width, 8.0 * UNIT * np.max(np.abs(whole), axis=0))
-    lows, highs = whole[0][None, :], whole[1][None, :]
-    sure = [(0.5 * (a + b), a, b) for (a, b), _ in known]
-    lost: list[Boxes] = []
-    visited = 0
+    lows, highs = (np.repeat(end[None, :], len(cells), axis=0) for end in whole)
+    own = cells.copy()
+    sure = [(0.5 * (a + b), a, b, cells[0]) for (a, b), _ in known]
+    lost: list[tuple[Array, Array, Index]] = []
+    visited = np.zeros(int(cells.max()) + 1, np.int64)
     while len(lows):
         if len(lows) > MOST_BOXES:
-            lost.append((lows, highs))
+            if len(cells) > 1:
+                half = len(cells) // 2
+                halves = cells[:half], cells[half:]
+                return [one for part in halves for one in _search(system, whole, known, part)]
+            lost.append((lows, highs, own))
             break
-        visited += len(lows)
+        visited += np.bincount(own, minlength=len(visited))
         for _, (a, b) in known:
             out = np.any((lows < a) | (highs > b), axis=1)
-            lows, highs = lows[out], highs[out]
-        one, centers, lows, highs = _judge(system, lows, highs, width)
-        sure += zip(centers[one], lows[one], highs[one], strict=True)
+            lows, highs, own = lows[out], highs[out], own[out]
+        one, centers, lows, highs, own = _judge(system, lows, highs, own, width)
+        sure += zip(centers[one], lows[one], highs[one], own[one], strict=True)
         narrow = np.all(highs - lows <= narrowest, axis=1) & ~one
         if narrow.any():
-            lost.append((lows[narrow], highs[narrow]))
-        lows, highs = _halved(lows[~one & ~narrow], highs[~one & ~narrow], width)
-    zeros, boxes = _once(system, sure, whole, lost)
-    empty = np.empty((0, system.n))
-    rest = [np.concatenate([part[i] for part in lost]) if lost else empty for i in (0, 1)]
-    return Zeros(zeros, boxes, (rest[0], rest[1]), visited)
+            lost.append((lows[narrow], highs[narrow], own[narrow]))
+        rest = ~one & ~narrow
+        lows, highs = _halved(lows[rest], highs[rest], width)
+        own = np.tile(own[rest], 2)
+    parts = _once(system, sure, whole, cells, lost)
+    empty = np.empty((0, system.n)), np.empty((0, system.n)), np.empty(0, np.int64)
+    low, high, of = (np.concatenate(part) for part in zip(empty, *lost, strict=True))
+    return [
+        Zeros(zeros, boxes, (low[of == cell], high[of == cell]), int(visited[cell]))
+        for cell, (zeros, boxes) in zip(cells, parts, strict=True)
+    ]
 
 
 def _inflated(system: System, x: Array, width: Array) -> list[_Known]:
     """Boxes about a zero of middle parameters that hold one zero for all of them, if there are."""
-    low, high = x[None], x[None]
+    low, high, own = x[None], x[None], np.zeros(1, np.int64)
     least: Boxes | None = None
     most, grown = (low, high), 1.0
     for _ in range(80):
-        image, defined = _image(system, low, high, 0.5 * (low + high))
+        image, defined = _image(system, low, high, own)
         usable = bool((image.usable & defined).all()) and not np.any(high - low > 2.0 * width)
         if usable and np.all((image.low > low) & (image.high < high)):
             least, most = least or (low[0], high[0]), (low, high)
@@ -198,15 +231,16 @@ def _inflated(system: System, x: Array, width: Array) -> list[_Known]:
 
 
 def _judge(
-    system: System, low: Array, high: Array, width: Array
-) -> tuple[Flags, Array, Array, Array]:
+    system: System, low: Array, high: Array, own: Index, width: Array
+) -> tuple[Flags, Array, Array, Array, Index]:
     """Boxes that may hold a zero, contracted; which hold exactly one, and about where."""
-    f, _, undefined = system(low, high)
+    f, _, undefined = system(low, high, own)
     possible = np.all((f[0] <= 0.0) & (f[1] >= 0.0), axis=1) | undefined
-    low, high, undefined = low[possible], high[possible], undefined[possible]
+    low, high, own = low[possible], high[possible], own[possible]
+    undefined = undefined[possible]
     around = INFLATED * (high - low) + 1e-15 * width
     wide_low, wide_high = low - around, high + around
-    image, defined = _image(system, wide_low, wide_high, 0.5 * (low + high))
+    image, defined = _image(system, wide_low, wide_high, own, 0.5 * (low + high))
     usable = image.usable & defined & ~undefined
     one = usable & np.all((image.low > wide_low) & (image.high < wide_high), axis=1)
     apart = usable & np.any((image.low > high) | (image.high < low), axis=1)
@@ -215,13 +249,16 @@ def _judge(
     new_high = np.where(tight, np.minimum(high, image.high), high)
     new_low = np.where(one[:, None], wide_low, new_low)[~apart]
     new_high = np.where(one[:, None], wide_high, new_high)[~apart]
-    return one[~apart], image.middle[~apart], new_low, new_high
+    return one[~apart], image.middle[~apart], new_low, new_high, own[~apart]
 
 
-def _image(system: System, low: Array, high: Array, middle: Array) -> tuple[Image, Flags]:
+def _image(
+    system: System, low: Array, high: Array, own: Index, middle: Array | None = None
+) -> tuple[Image, Flags]:
     """Krawczyk's images of boxes, and where f is defined on them."""
-    at, _, away = system(middle, middle)
-    _, slopes, beyond = system(low, high)
+    middle = 0.5 * (low + high) if middle is None else middle
+    at, _, away = system(middle, middle, own)
+    _, slopes, beyond = system(low, high, own)
     reach = np.maximum(high - middle, middle - low)
     return krawczyk(middle, reach, at, slopes), ~(away | beyond)
 
@@ -239,45 +276,55 @@ def _halved(low: Array, high: Array, width: Array) -> Boxes:
 
 
 def _once(
-    system: System, sure: list[tuple[Array, Array, Array]], whole: Boxes, lost: list[Boxes]
-) -> tuple[Array, Boxes]:
-    """Each zero once, to rounding, and inside the whole box."""
+    system: System,
+    sure: list[tuple[Array, Array, Array, int]],
+    whole: Boxes,
+    cells: Index,
+    lost: list[tuple[Array, Array, Index]],
+) -> list[tuple[Array, Boxes]]:
+    """Each zero of each cell once, to rounding, and inside the whole box."""
     empty = np.empty((0, system.n))
     if not sure:
-        return empty, (empty, empty)
-    start, low, high = (np.array(part) for part in zip(*sure, strict=True))
-    x = _refined(system.at_middle(), start, low, high)
-    a, b = _contracted(system, low, high)
+        return [(empty, (empty, empty))] * len(cells)
+    start, low, high, own = (np.array(part) for part in zip(*sure, strict=True))
+    x = _refined(system.at_middle(), start, low, high, own)
+    a, b = _contracted(system, low, high, own)
     slack = 4e-16 * np.maximum(np.abs(whole[0]), np.abs(whole[1]))
-    # A box in which a zero is the only one tells whether another's is the same: of interval
-    # parameters for one value of them, and so for all.
-    inside = np.all((x[:, None] >= low) & (x[:, None] <= high), axis=2)
-    inside |= inside.T
-    kept: list[int] = []
-    for k in range(len(x)):
-        if not inside[k, kept].any():
-            kept.append(k)
-    rows = []
-    for k in kept:
-        if system.exact:
-            if np.all((x[k] >= whole[0] - slack) & (x[k] <= whole[1] + slack)):
-                rows.append((np.clip(x[k], *whole), np.minimum(a[k], x[k]), np.maximum(b[k], x[k])))
-        elif np.all((a[k] >= whole[0]) & (b[k] <= whole[1])):
-            rows.append((x[k], a[k], b[k]))
-        elif np.all((b[k] >= whole[0]) & (a[k] <= whole[1])):  # for some values it is outside
-            lost.append((a[k][None], b[k][None]))
-    rows.sort(key=lambda row: tuple(row[0]))
-    x, a, b = np.array(rows).reshape(-1, 3, system.n).transpose(1, 0, 2)
-    return x, (a, b)
+    found = []
+    for cell in cells:
+        places = np.flatnonzero(own == cell)
+        # A box in which a zero is the only one tells whether another's is the same: of interval
+        # parameters for one value of them, and so for all.
+        at = x[places, None]
+        inside = np.all((at >= low[places]) & (at <= high[places]), axis=2)
+        inside |= inside.T
+        kept: list[int] = []
+        for k in range(len(places)):
+            if not inside[k, kept].any():
+                kept.append(k)
+        rows = []
+        for k in places[kept]:
+            if system.exact:
+                if np.all((x[k] >= whole[0] - slack) & (x[k] <= whole[1] + slack)):
+                    ends = np.minimum(a[k], x[k]), np.maximum(b[k], x[k])
+                    rows.append((np.clip(x[k], *whole), *ends))
+            elif np.all((a[k] >= whole[0]) & (b[k] <= whole[1])):
+                rows.append((x[k], a[k], b[k]))
+            elif np.all((b[k] >= whole[0]) & (a[k] <= whole[1])):  # for some values it is outside
+                lost.append((a[k][None], b[k][None], np.array([cell])))
+        rows.sort(key=lambda row: tuple(row[0]))
+        zeros, *boxes = np.array(rows).reshape(-1, 3, system.n).transpose(1, 0, 2)
+        found.append((zeros, (boxes[0], boxes[1])))
+    return found
 
 
-def _contracted(system: System, low: Array, high: Array) -> Boxes:
+def _contracted(system: System, low: Array, high: Array, own: Index) -> Boxes:
     """Boxes that hold one zero each as narrow as steps make them."""
     low, high = low.copy(), high.copy()
     rows = np.arange(len(low))
     for _ in range(100):
         a, b = low[rows], high[rows]
-        image, defined = _image(system, a, b, 0.5 * (a + b))
+        image, defined = _image(system, a, b, own[rows])
         usable = (image.usable & defined)[:, None]
         low[rows] = np.where(usable, np.maximum(a, image.low), a)
         high[rows] = np.where(usable, np.minimum(b, image.high), b)
@@ -287,12 +334,12 @@ def _contracted(system: System, low: Array, high: Array) -> Boxes:
     return low, high
 
 
-def _refined(system: System, x: Array, low: Array, high: Array) -> Array:
+def _refined(system: System, x: Array, low: Array, high: Array, own: Index) -> Array:
     """Newton's method inside boxes in which a zero is the only one."""
     best, least = x.copy(), np.full(len(x), np.inf)
     rows, x = np.arange(len(x)), x.copy()
     for _ in range(60):
-        f, slopes, _ = system(x, x)
+        f, slopes, _ = system(x, x, own[rows])
         inverse, _ = inverses(0.5 * (slopes[0] + slopes[1]))
         step = np.einsum("kij,kj->ki", inverse, 0.5 * (f[0] + f[1]))
         size = np.max(np.abs(step) / (high - low)[rows], axis=1)
