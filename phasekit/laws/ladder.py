@@ -64,7 +64,7 @@ class Map(Law):
 class Routhian(Flow):
     """One degree of freedom left by constant momenta, with an inertia M: M(x) x'^2/2 + V(x)."""
 
-    called: ClassVar[str] = "a system at constant momenta"
+    called: ClassVar[str] = "a system whose inertia changes with its coordinate"
     #: Name of the coordinate, and its period.
     coordinate: str
     period: float

@@ -407,7 +407,8 @@ def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
     except TypeError as error:
         raise ParameterError(
             f"{argument}: got a function with the arguments {signature}, wants one to be called "
-            f"as {argument}(x, {', '.join(f'{n}=...' for n in names)}): {error}"
+            f"as {argument}({', '.join(['x', *(f'{n}=...' for n in names)])}) with all states in x: "
+            f"{error}"
         ) from None
 
 
