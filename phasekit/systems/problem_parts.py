@@ -405,10 +405,10 @@ def check_call(argument: str, function: Any, names: Sequence[str]) -> None:
     try:
         signature.bind(np.zeros(1), **dict.fromkeys(names, 0.0))
     except TypeError as error:
+        call = ", ".join(["x", *(f"{name}=..." for name in names)])
         raise ParameterError(
             f"{argument}: got a function with the arguments {signature}, wants one to be called "
-            f"as {argument}({', '.join(['x', *(f'{n}=...' for n in names)])}) with all states in x: "
-            f"{error}"
+            f"as {argument}({call}) with all states in x: {error}"
         ) from None
 
 
