@@ -256,6 +256,7 @@ def test_curve_of_freire_does_not_go_back_on_itself() -> None:
     loop = pk.connection(problem, ([0, 0, 0], [0, 0, 0]), free="nu")
     backward = pk.ContinuationOptions(directions="backward", max_points=900)
     curve = loop.curve("be", (0.2, 1.2), options=backward)
+    assert curve.points.sizes["point"] > 100
     assert np.all(np.diff(curve.points.be) > 0.0)
     assert curve.stops[0].reason == "bound"
     (neutral,) = curve.special("NDS")
