@@ -17,13 +17,14 @@ import importlib
 import sys
 from typing import TYPE_CHECKING, Any
 
-from phasekit.constants import deg as deg
-from phasekit.constants import rpm as rpm
+from phasekit.units import deg as deg
+from phasekit.units import rpm as rpm
 from phasekit.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from phasekit import extend as extend
     from phasekit import plot as plot
+    from phasekit import units as units
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.cells.offered import quantities as quantities
     from phasekit.errors import AttractorKind as AttractorKind
@@ -213,11 +214,11 @@ _MODULES = {
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names}
 
-__all__ = ["__version__", "deg", "extend", "plot", "rpm", *_HOME]  # noqa: PLE0604
+__all__ = ["__version__", "deg", "extend", "plot", "rpm", "units", *_HOME]  # noqa: PLE0604
 
 
 def __getattr__(name: str) -> Any:
-    if name in ("extend", "plot"):
+    if name in ("extend", "plot", "units"):
         return importlib.import_module(f"phasekit.{name}")
     if name not in _HOME:
         raise AttributeError(_unknown(name), name=name)
@@ -228,46 +229,35 @@ def __getattr__(name: str) -> Any:
     return value
 
 
-#: What other programs, and the field, call a function of phasekit.
-_ELSEWHERE = {
-    **dict.fromkeys(
-        ("bifurcation_diagram", "hodograph", "parameter_map", "phase_portrait", "time_history"),
-        "plot.{}",
-    ),
-    **dict.fromkeys(("portrait", "phase_plane"), "plot.phase_portrait"),
-    **dict.fromkeys(
-        ("simulate", "simulation", "integrate", "solve_ivp", "odeint", "trajectory", "motion"),
-        "flow",
-    ),
-    **dict.fromkeys(("limit_cycle", "cycle"), "periodic_orbit"),
-    **dict.fromkeys(("limit_cycles", "cycles"), "periodic_orbits"),
-    **dict.fromkeys(("fixed_points", "fixedpoints", "steady_states", "roots"), "equilibria"),
-    **dict.fromkeys(("continue_", "continuate", "equilibrium_curve", "branch"), "continuation"),
-    **dict.fromkeys(("ODE", "Model", "Map"), "Problem"),
-    **dict.fromkeys(("lyapunov_exponents", "lyapunovs", "lyapunov_spectrum"), "lyapunov"),
-    **dict.fromkeys(("basins_of_attraction", "basin"), "basins"),
-    **dict.fromkeys(("prc", "iprc", "phase_response_curve"), "phase_response"),
-    **dict.fromkeys(("fft", "power_spectrum", "psd", "periodogram", "welch"), "spectrum"),
-    **dict.fromkeys(("poincare_map", "poincare", "section"), "poincare_section"),
-}
-
-
 def _unknown(name: str) -> str:
     text = f"module 'phasekit' has no attribute {name!r}"
     if name.startswith("__"):  # asked for by machines
         return text
-    if name in _ELSEWHERE:
-        return f"{text}; use 'pk.{_ELSEWHERE[name].format(name)}'"
-    import difflib
+    from phasekit.spellings import name_meant
 
-    same = {known.lower().replace("_", ""): known for known in __all__}
-    plain = name.lower().replace("_", "")
-    near = difflib.get_close_matches(plain, same, n=1)
-    return f"{text}; did you mean {same[near[0]]!r}?" if near else text
+    return "; ".join(filter(None, (text, name_meant(name, __all__))))
+
+
+#: What is listed: what most questions need. The rest is reached in the same way, and listed by
+#: `phasekit.extend`.
+_SHOWN = (
+    # modules and units
+    "deg", "extend", "plot", "rpm", "units",
+    # systems
+    "BoundaryProblem", "Coefficients", "Event", "FreeGyroRotor", "GyroRotorDisk", "Harmonic",
+    "Pendulum", "Perturbed", "Potential", "Problem", "System", "Term", "angle", "coordinate",
+    "parameter",
+    # what they do
+    "attractors", "basins", "bearing_forces", "bifurcation_set", "branches", "capture",
+    "connection", "continuation", "critical", "diagram", "equilibria", "escape_rate", "explore",
+    "first_passage", "flow", "lyapunov", "melnikov", "open_map", "orbit_diagram", "orbits",
+    "periodic_orbit", "periodic_orbits", "phase_response", "poincare_section", "quantities",
+    "quasi_static", "run_up", "separatrices", "spectrum", "sweep",
+)  # fmt: skip
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted(_SHOWN)
 
 
 if "xarray" in sys.modules:  # then the accessor costs nothing, and maps opened by xarray have it

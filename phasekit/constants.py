@@ -1,9 +1,7 @@
-"""Units to multiply by, ``30 * pk.deg``, ``24 * pk.rpm``, and the standard gravity."""
+"""Units that the house multiplies by, and the standard gravity."""
 
-#: One degree in radians.
-deg: float = 0.017453292519943295
-#: One revolution a minute in s^-1.
-rpm: float = 0.10471975511965977
+from phasekit.units import deg as deg
+from phasekit.units import rpm as rpm
 
 #: Acceleration of gravity, m s^-2.
 STANDARD_GRAVITY = 9.80665

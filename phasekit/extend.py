@@ -1,4 +1,4 @@
-"""What extensions are made of: quantities, torques of a frame, special points, pictures.
+"""What extensions are made of, and the names of phasekit that ``dir(pk)`` does not list.
 
 Systems need none of it: a class with `phasekit.System`, `phasekit.parameter` and a law is one, and
 a class with `phasekit.Term` and a force is a term. The contributing guide has an example of each.
@@ -16,13 +16,21 @@ a kind of special point   `PointKind`, `add_point_kind`; where its function is z
 a picture                 `axes_for`, `label`, `shown`
 ========================  ==========================================================================
 
+``pk.extend.NAME`` is ``pk.NAME`` too for what is asked for more rarely: classes of results, codes,
+errors, systems of single fields, and functions beside the main ones.
+
 Examples
 --------
 >>> import phasekit as pk
+>>> pk.extend.RigidBody is pk.RigidBody
+True
 >>> pk.extend.Quantity.__name__, pk.extend.Pass.__name__
 ('Quantity', 'Pass')
 """
 
+from typing import Any as _Any
+
+import phasekit as _phasekit
 from phasekit.bifurcation.continuation.kernels.defining import (
     BRANCH,
     EQUILIBRIUM,
@@ -71,3 +79,17 @@ __all__ = [
     "label",
     "shown",
 ]
+
+
+def __getattr__(name: str) -> _Any:
+    if name in _phasekit.__all__ and not name.startswith("_"):
+        return getattr(_phasekit, name)
+    from phasekit.labels.arguments import unknown
+
+    text = f"module 'phasekit.extend' has no attribute {name!r}"
+    raise AttributeError(text if name.startswith("__") else str(unknown("name", name, __dir__())))
+
+
+def __dir__() -> list[str]:
+    rest = set(_phasekit.__all__) - set(dir(_phasekit)) - {"__version__"}
+    return sorted({*__all__, *rest})

@@ -6,7 +6,6 @@ Every message says which argument, what it got, what it wants, and what to do ne
 from __future__ import annotations
 
 import decimal
-import difflib
 import functools
 import inspect
 import math
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import ArgumentError, ParameterError
-from phasekit.spellings import respelled
+from phasekit.spellings import argument_meant, respelled
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
@@ -245,8 +244,8 @@ def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = 
     kinds = (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
     expected = [n for n, one in signature.parameters.items() if one.kind not in kinds]
     for name in strange:
-        near = difflib.get_close_matches(name, expected, n=1)
-        hint = f" did you mean {near[0]!r}?" if near else ""
+        meant = argument_meant(name, expected)
+        hint = f" did you mean {meant!r}?" if meant else ""
         raise ArgumentError(
             f"{function.__name__}() got an unexpected keyword argument {name!r};{hint} its "
             f"arguments are {', '.join(expected)}"
@@ -272,17 +271,22 @@ def call_checked(function: Function, name: str = "") -> Function:
     def called(*args: Any, **kwargs: Any) -> Any:
         kwargs = respelled(function.__name__, kwargs)
         try:
-            signature.bind(*args, **kwargs)
-        except TypeError as error:
+            return function(*args, **kwargs)
+        except TypeError as raised:
+            try:
+                signature.bind(*args, **kwargs)
+            except TypeError as unfit:
+                error = unfit
+            else:  # of what the function does
+                raise raised from raised.__cause__
             strange = [name for name in kwargs if name not in expected and not takes_all]
             text, hint = str(error), ""
             if strange:  # rather than what is missing in its place
                 text = f"got an unexpected keyword argument {strange[0]!r}"
-                near = difflib.get_close_matches(strange[0], expected, n=1)
-                hint = f" did you mean {near[0]!r}?" if near else ""
+                meant = argument_meant(strange[0], expected)
+                hint = f" did you mean {meant!r}?" if meant else ""
             listed = ", ".join(expected)
             message = f"{name or function.__name__}() {text};{hint} its arguments are {listed}"
             raise ArgumentError(message) from None
-        return function(*args, **kwargs)
 
     return cast(Function, called)

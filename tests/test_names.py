@@ -1,13 +1,17 @@
 """Wrong guesses are answered with the right name."""
 
 import ast
+import contextlib
 import dataclasses
+import enum
+import inspect
 import re
 from pathlib import Path
 
 import pytest
 
 import phasekit as pk
+from phasekit.spellings import ARGUMENTS, NAMES, argument_meant
 
 DISK = pk.GyroRotorDisk(beta=0.7, e=0.05, a=0.02, r=0.2, omega1=30.0)
 PROBLEM = pk.Problem("mu - x**2", state="x", parameters={"mu": 1.0})
@@ -29,12 +33,75 @@ def test_names_of_other_programs_lead_to_those_of_phasekit(guess, name):
 
 
 def test_every_name_that_is_recommended_exists():
-    assert len(pk._ELSEWHERE) > 20
-    for guess, target in pk._ELSEWHERE.items():
+    guesses = [guess for _, others in NAMES for guess in others.split()]
+    assert len(guesses) > 250
+    assert len(guesses) == len(set(guesses))
+    assert not set(guesses) & set(pk.__all__)
+    for target, _ in NAMES:
         place = pk
-        for part in target.format(guess).split("."):
+        for part in target.split("(")[0].split("."):
             place = getattr(place, part)
-        assert callable(place)
+        assert callable(place) or target in ("deg", "rpm", "units")
+    rights = {
+        right
+        for right, _ in re.findall(
+            r"\.(special\w*)(\(|$)", "\n".join(target for target, _ in NAMES)
+        )
+    }
+    assert all(hasattr(pk.Branch, right) for right in rights)
+    assert hasattr(pk.SpecialPoint, "curve")
+
+
+@pytest.mark.parametrize(
+    ("function", "guess", "name"),
+    [
+        (pk.continuation, "range", "span"),
+        (pk.continuation, "bounds", "span"),
+        (pk.continuation, "u0", "x0"),
+        (pk.continuation, "ds", "options"),
+        (pk.Problem, "params", "parameters"),
+        (pk.Problem, "states", "state"),
+        (pk.equilibria, "bounds", "box"),
+        (pk.sweep, "n_jobs", "workers"),
+        (pk.flow, "tspan", "t"),
+        (pk.lyapunov, "T", "duration"),
+        (pk.plot.phase_portrait, "xlim", "window"),
+        (pk.orbit_diagram, "range", "values"),
+        (pk.SpecialPoint.curve, "range", "span"),
+        (pk.ContinuationOptions, "max_pionts", "max_points"),
+        (pk.plot.branch, "axis", "ax"),
+    ],
+)
+def test_arguments_of_other_programs_lead_to_those_of_phasekit(function, guess, name):
+    expected = list(inspect.signature(function).parameters)
+    assert argument_meant(guess, expected) == name
+
+
+def test_every_argument_that_is_recommended_exists():
+    functions = [getattr(pk, name) for name in pk.__all__ if name not in ("plot", "extend")]
+    functions += [getattr(pk.plot, name) for name in pk.plot.__all__]
+    functions = [one for one in functions if callable(one)]
+    taken = set()
+    for function in functions:
+        with contextlib.suppress(ValueError):  # of exceptions
+            taken |= set(inspect.signature(function).parameters)
+    assert set(ARGUMENTS) <= taken
+    for right, others in ARGUMENTS.items():
+        assert right not in others
+        assert len(others) == len(set(others))
+
+
+def test_every_call_says_what_its_arguments_are():
+    """Of functions, pictures and classes alike."""
+    wrong = {name: getattr(pk, name) for name in pk.__all__}
+    wrong |= {f"plot.{name}": getattr(pk.plot, name) for name in pk.plot.__all__}
+    for name, thing in wrong.items():
+        made = inspect.isclass(thing) and not issubclass(thing, (enum.Enum, Exception))
+        results = (pk.SpecialPoint, pk.Branch, pk.System)
+        if inspect.isfunction(thing) or (made and not issubclass(thing, results)):
+            with pytest.raises(pk.ParameterError) as error:
+                thing(nonsense_=1)
+            assert "nonsense_" in str(error.value) or "missing" in str(error.value), name
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from phasekit.table.quantities import ROWS, TABLE
 
 DOCS = Path(__file__).parents[1] / "docs"
 #: What has no docstring of its own: numbers, a string, a module.
-PLAIN = {"__version__", "deg", "extend", "plot", "rpm"}
+PLAIN = {"__version__", "deg", "extend", "plot", "rpm", "units"}
 
 
 @pytest.fixture(scope="module")

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+from phasekit.inputs import call_checked
 from phasekit.laws.equations import equations_of
 from phasekit.systems.system import as_system
 from phasekit.table.quantities import TABLE, Quantities
 
 
+@call_checked
 def quantities(system: Any = None) -> Quantities:
     """List what `sweep(of=...)` takes: quantities and groups of them, with units and meaning.
 

@@ -15,6 +15,7 @@ from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import EquilibriumKind
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.labels.coordinates import LABELS
 from phasekit.labels.grid import LABEL_DTYPE, variable
@@ -37,6 +38,7 @@ COMPLETE = (
 )
 
 
+@call_checked
 def branches(system: Any, parameter: str, span: tuple[float, float]) -> xr.Dataset:
     """The complete atlas of equilibria along one parameter: all branches, all special points.
 
@@ -150,7 +152,7 @@ def tell_missing(what: str, parameter: str, missing: str, where: str = "") -> No
             f"{what}: there may be others than these{where}, because {missing} along {parameter}; "
             "`complete` is False",
             RuntimeWarning,
-            stacklevel=4,
+            stacklevel=5,
         )
 
 

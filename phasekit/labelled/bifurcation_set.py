@@ -12,6 +12,7 @@ from phasekit.bifurcation.curves import Cusp
 from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.atlas import limits, resting, tell_missing
 from phasekit.labels.arguments import unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
@@ -35,6 +36,7 @@ CURVES = {
 }
 
 
+@call_checked
 def bifurcation_set(
     system: Any,
     x: str,

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.errors import Loop, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad, pair, unknown, whole
 from phasekit.labels.grid import LABEL_DTYPE, refuse_too_large, variable
@@ -26,6 +27,7 @@ _PARTS, _FEW = 33, 9
 _ONE, _ROUNDING = 1e-8, 1e-14
 
 
+@call_checked
 def figure_eights(
     system: Any,
     path: Mapping[str, Sequence[float] | Callable[[FloatArray], Any]],

@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.adjoint import adjoint
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.orbit_guess import (
     cycles_of,
@@ -36,6 +37,7 @@ SAME = 1e-12  # part of the period by which times differ by rounding
 NEUTRAL = 1e-6  # distance of a multiplier from the unit circle within which nothing decays
 
 
+@call_checked
 def phase_response(orbit: xr.Dataset, direct: bool = False, *, system: Any = None) -> xr.Dataset:
     """Response of the phase of a stable periodic orbit to small kicks of its states.
 

@@ -25,6 +25,7 @@ from phasekit.bifurcation.numerical.steady import steady_line
 from phasekit.cells.request import with_words
 from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.atlas import resting, single, tell_missing
 from phasekit.labelled.slow_path import slow_path
 from phasekit.labels.arguments import FloatArray, bad, number, numeric, unknown
@@ -37,6 +38,7 @@ from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import ROWS
 
 
+@call_checked
 def quasi_static(
     system: Any,
     path: Mapping[str, Any] | None = None,
@@ -172,7 +174,7 @@ def quasi_static(
         warnings.warn(
             f"path: there is no force before step {there}, where the center disappears",
             RuntimeWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
     return _dataset(system, steps, track, np.array(sheets), jumps)
 
@@ -203,7 +205,7 @@ def _of_any(system: System, values: Mapping[str, Any], phi0: Any) -> xr.Dataset:
         warnings.warn(
             f"path: {track.gone or 'the center disappears'} before step {int(np.argmin(there))}",
             RuntimeWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     rows = np.flatnonzero(there)
     columns = {}

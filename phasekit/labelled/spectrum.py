@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, number, one_of, unknown, whole
 from phasekit.labels.grid import variable
 from phasekit.motion import spectra
@@ -24,6 +25,7 @@ SOURCE = "[Harris1978]"
 MOST = 50
 
 
+@call_checked
 def spectrum(
     motion: xr.Dataset,
     variables: str | Sequence[str] | None = None,
@@ -288,6 +290,6 @@ def _dataset(
             f"motion: {lost} of {int(np.prod(first.shape[:-1], dtype=int))} motions have NaN among "
             "their values; so has their spectrum",
             RuntimeWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     return ds

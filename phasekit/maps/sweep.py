@@ -13,6 +13,7 @@ import xarray as xr
 from phasekit.cells.evaluate import compute
 from phasekit.cells.request import Request, ask, needs_of, passes_of
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
 from phasekit.labels.grid import refuse_too_large
@@ -30,6 +31,7 @@ from phasekit.table.row import Quantity, Table
 OFFERED = ("equilibria", "separatrices")
 
 
+@call_checked
 def sweep(
     system: Any,
     axes: Mapping[str, Any] | None = None,

@@ -15,6 +15,7 @@ import xarray as xr
 
 from phasekit.cells.schema import restore
 from phasekit.errors import ParameterError, StoreError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag
 from phasekit.labels.grid import tiles
 from phasekit.maps import netcdf, replacing
@@ -87,6 +88,7 @@ def target_of(store: Any) -> Place:
     return place
 
 
+@call_checked
 def open_map(
     store: str | PathLike[str] | Any, *, chunks: Any = None, verify: bool = False
 ) -> xr.Dataset:

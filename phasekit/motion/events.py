@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from phasekit.inputs import call_checked
 from phasekit.motion.steps import Step
 
 #: Ends of the pieces in which a step is looked at.
@@ -48,6 +49,9 @@ class Event:
     function: Any
     terminal: int = 0
     direction: float = 0
+
+
+Event.__init__ = call_checked(Event.__init__, "Event")  # type: ignore[method-assign]
 
 
 def passes(event: Event, before: float, after: float) -> bool:

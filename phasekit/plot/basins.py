@@ -17,6 +17,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from phasekit.errors import AttractorKind, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, number, unknown
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import TURN
@@ -62,6 +63,7 @@ class StateAxis:
         return np.asarray(values * self.scale)
 
 
+@call_checked
 def basins(
     dataset: xr.Dataset,
     *,

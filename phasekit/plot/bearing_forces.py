@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.errors import OrbitKind, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.loads import FRAMES
 from phasekit.labelled.loads import bearing_forces as forces_of
 from phasekit.labelled.motion import flow
@@ -40,6 +41,7 @@ PARTS = {
 STATE = ("state_phi", "state_dphi")
 
 
+@call_checked
 def bearing_forces(
     disk: Any,
     *,

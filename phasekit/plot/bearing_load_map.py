@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.loads import is_disk, on_map
 from phasekit.labelled.phase_space import equilibria
 from phasekit.labels.arguments import one_of
@@ -27,6 +28,7 @@ LOADS = ("peak_force", "mean_force", "rms_force")
 DECADES = 30.0
 
 
+@call_checked
 def bearing_load_map(
     dataset: xr.Dataset,
     variable: str = "peak_force",

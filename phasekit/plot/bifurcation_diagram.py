@@ -13,6 +13,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from phasekit.errors import EquilibriumKind, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import named
 from phasekit.plot.branch import branch, holds_branches
 from phasekit.plot.parts import atlas, labels, strands, style
@@ -25,6 +26,7 @@ FloatArray = NDArray[np.float64]
 VANISHING = ("natural_frequency", "exponent")
 
 
+@call_checked
 def bifurcation_diagram(
     dataset: Any,
     x: str | None = None,

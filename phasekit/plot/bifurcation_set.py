@@ -11,6 +11,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import flag
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.points import label_points
@@ -20,6 +21,7 @@ from phasekit.plot.parts.units import Units
 READABLE = 0.035
 
 
+@call_checked
 def bifurcation_set(
     dataset: xr.Dataset,
     *,

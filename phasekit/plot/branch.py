@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.errors import EquilibriumKind
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labels.arguments import bad, flag, named, unknown
 from phasekit.plot.parts import labels as words
@@ -98,6 +99,7 @@ _CURVES: dict[str, style.Look] = {
 }
 
 
+@call_checked
 def branch(
     branches: Any,
     x: str | None = None,

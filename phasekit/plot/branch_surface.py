@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from phasekit.bifurcation.along import view_of
 from phasekit.bifurcation.surface import equilibrium_surface
 from phasekit.errors import EquilibriumKind
+from phasekit.inputs import call_checked
 from phasekit.labelled.atlas import resting
 from phasekit.labelled.bifurcation_set import bifurcation_set
 from phasekit.labels.arguments import bad, flag, pair, whole
@@ -37,6 +38,7 @@ FACES = {
 }
 
 
+@call_checked
 def branch_surface(
     system: Any,
     x: str,

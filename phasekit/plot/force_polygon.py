@@ -14,6 +14,7 @@ from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.loads import bearing_forces
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import labels, style
@@ -38,6 +39,7 @@ AXES: dict[Literal["x", "y"], tuple[str, str]] = {
 SHORT = 0.4
 
 
+@call_checked
 def force_polygon(
     disk: Any,
     phi: float,

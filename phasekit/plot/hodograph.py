@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike, NDArray
 
 from phasekit.errors import Loop, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.energy import gradient
 from phasekit.labelled.loads import is_disk, rotators
 from phasekit.labels.arguments import bad, flag, unknown
@@ -40,6 +41,7 @@ PLANES: dict[str, Plane | None] = {
 }
 
 
+@call_checked
 def hodograph(
     system: Any,
     rotator: str = "R022",

@@ -10,6 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, describe, unknown
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.units import Angles, Units
@@ -17,6 +18,7 @@ from phasekit.plot.parts.units import Angles, Units
 STEP = "step"
 
 
+@call_checked
 def hysteresis_loop(
     dataset: xr.Dataset,
     x: str | xr.DataArray | None = None,

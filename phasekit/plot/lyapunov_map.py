@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, whole
 from phasekit.plot.parameter_map import axes_of, parameter_map, selected_in
 from phasekit.plot.parts import labels, style
@@ -30,6 +31,7 @@ BOTH = ListedColormap(
 HATCH = "xxxx"
 
 
+@call_checked
 def lyapunov_map(
     dataset: xr.Dataset,
     exponent: int = 1,

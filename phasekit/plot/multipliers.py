@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.units import Units
 
 
+@call_checked
 def multipliers(
     branch: Any,
     *,

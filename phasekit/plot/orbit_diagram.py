@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import flag, unknown
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.units import SYMBOLS, Units
@@ -24,6 +25,7 @@ GREATEST, LEAST = 3.5, 0.8
 SAMPLE = "sample_"
 
 
+@call_checked
 def orbit_diagram(
     dataset: xr.Dataset,
     variable: str | None = None,

@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, number, unknown
 from phasekit.plot.parts import color_bar, labels, style
 from phasekit.plot.parts.strands import relative_gap
@@ -30,6 +31,7 @@ Grid = tuple[NDArray[Any], NDArray[Any]]
 COUNT_NAMES = {-1: "not valid", 0: "none", 2: "2", 3: "3, on a fold", 4: "4"}
 
 
+@call_checked
 def parameter_map(
     dataset: xr.Dataset,
     variable: str = "topology",

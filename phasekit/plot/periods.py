@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from phasekit.errors import EquilibriumKind
+from phasekit.inputs import call_checked
 from phasekit.labelled.families import orbit_families, with_families
 from phasekit.labelled.phase_space import equilibria, separatrices
 from phasekit.labels.arguments import FloatArray, bad
@@ -27,6 +28,7 @@ Walls: TypeAlias = list[tuple[str, float]]
 CENTERS = {"lower_well": 0, "upper_well": 2}
 
 
+@call_checked
 def period_energy(
     system: Any,
     n: int = 200,
@@ -110,6 +112,7 @@ def period_energy(
     return axes
 
 
+@call_checked
 def frequency_action(
     system: Any,
     n: int = 200,

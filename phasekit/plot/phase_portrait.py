@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from numpy.typing import ArrayLike, NDArray
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, one_of
 from phasekit.laws.equations import equations_of
 from phasekit.laws.ladder import Lawful, Trait
@@ -32,6 +33,7 @@ COLORED = {
 }
 
 
+@call_checked
 def phase_portrait(
     system: Any,
     *,

@@ -8,11 +8,13 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, unknown
 from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.parts.units import Units
 
 
+@call_checked
 def phase_response(
     dataset: xr.Dataset,
     states: str | list[str] | None = None,

@@ -8,12 +8,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
+from phasekit.inputs import call_checked
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.circle import TURN
 from phasekit.plot.parts.plane import StatePlane
 from phasekit.plot.parts.units import Units
 
 
+@call_checked
 def poincare_section(
     dataset: xr.Dataset,
     *,

@@ -10,11 +10,13 @@ from matplotlib.axes import Axes
 from numpy.typing import ArrayLike
 
 from phasekit.errors import Loop
+from phasekit.inputs import call_checked
 from phasekit.phase.level_curves import Arc
 from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.phase_portrait import Picture, Shown, phase_portrait
 
 
+@call_checked
 def potential_well(
     system: Any,
     *,

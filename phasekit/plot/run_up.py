@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad
 from phasekit.plot.parts import labels, style
 from phasekit.plot.parts.units import Units
@@ -21,6 +22,7 @@ BEARINGS: tuple[style.Look, ...] = (
 SPEEDS_UNIT = "rad/s"
 
 
+@call_checked
 def run_up(
     dataset: xr.Dataset,
     *,

@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, flag, number, unknown
 from phasekit.plot.parameter_map import parameter_map
 from phasekit.plot.parts import labels, strokes, style
@@ -22,6 +23,7 @@ DEPTH = 1e-5
 KINDS = ("amplitude_", "density_")
 
 
+@call_checked
 def spectrum(
     dataset: xr.Dataset,
     variable: str | None = None,
@@ -119,6 +121,7 @@ def spectrum(
     return axes
 
 
+@call_checked
 def waterfall(
     dataset: xr.Dataset,
     variable: str | None = None,

@@ -10,6 +10,7 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import flag, named
 from phasekit.plot.parts import labels, strokes, style
 from phasekit.plot.parts.units import Units, coordinate_symbol
@@ -20,6 +21,7 @@ SYMBOLS = {"motion_phi": r"$\varphi$", "motion_dphi": r"$\dot\varphi$"}
 MOST = len(style.ORBIT_COLORS) * len(style.ORBIT_DASHES)
 
 
+@call_checked
 def time_history(
     dataset: xr.Dataset,
     variable: str | None = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NoReturn, Self
@@ -17,7 +18,7 @@ from phasekit.bifurcation.continuation.periodic.bounded import (
     IntegralFunction,
 )
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import bad
+from phasekit.labels.arguments import bad, call_checked
 from phasekit.labels.equality import equal
 from phasekit.laws.formulas import write_formula
 from phasekit.systems.problem import Problem
@@ -100,6 +101,7 @@ class BoundaryProblem(Problem):
     ends: Condition
     means: Condition
 
+    @functools.partial(call_checked, name="BoundaryProblem")
     def __init__(
         self,
         f: Any,

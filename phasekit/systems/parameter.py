@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import InvalidCellsWarning
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import FloatArray, Value, bad, describe, flag, numeric
 
 if TYPE_CHECKING:
@@ -111,6 +112,7 @@ class Parameter:
         return array
 
 
+@call_checked
 def parameter(
     units: str = "1",
     long_name: str = "",

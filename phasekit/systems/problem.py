@@ -163,6 +163,7 @@ class Problem(ProblemSources, System):
     _field: Field
     _own: Field  # f itself, where that of a map is f(x) - x
 
+    @functools.partial(call_checked, name="Problem")
     def __init__(
         self,
         f: Any,

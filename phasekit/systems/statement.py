@@ -11,6 +11,7 @@ from types import FunctionType
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
@@ -41,6 +42,7 @@ class Coordinate:
     interval: tuple[float, float] | None = None
 
 
+@call_checked
 def angle(name: str = "phi") -> Coordinate:
     """Declare the coordinate of a system's potential: an angle in rad.
 
@@ -72,6 +74,7 @@ def angle(name: str = "phi") -> Coordinate:
     return coordinate(name, period="2*pi")
 
 
+@call_checked
 def coordinate(
     name: str = "x",
     *,

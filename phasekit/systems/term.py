@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import math
 import random
@@ -13,7 +14,7 @@ import numpy as np
 
 from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import NumberLike, bad, brief, number, numeric
+from phasekit.labels.arguments import NumberLike, bad, brief, call_checked, number, numeric
 from phasekit.labels.equality import equal
 from phasekit.laws.formulas import symbols_of, take_formula, write_formula
 from phasekit.laws.ladder import Trait
@@ -115,6 +116,7 @@ class Term(Declared):
         cls.__init__ = Declared.__init__  # type: ignore[method-assign]
         TERMS[title] = cls
 
+    @functools.partial(call_checked, name="Term")
     def __init__(
         self,
         force: Any,

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from phasekit.errors import ParameterError
-from phasekit.inputs import bad, one_of, reals, whole
+from phasekit.inputs import bad, call_checked, one_of, reals, whole
 
 DIRECTIONS = ("both", "forward", "backward")
 DETECTED = ("fold", "branch_point", "hopf")
@@ -189,6 +189,10 @@ class ContinuationOptions:
     def __hash__(self) -> int:
         """Hash of the values."""
         return hash(repr(self.as_dict()))
+
+
+_init = ContinuationOptions.__init__
+ContinuationOptions.__init__ = call_checked(_init, "ContinuationOptions")  # type: ignore[method-assign]
 
 
 def _number(name: str, value: Any) -> float:

@@ -27,6 +27,7 @@ from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.periodic.cycles import Orbit, Solution
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ConvergenceError
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.bounded_start import bounded_of
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
@@ -53,6 +54,7 @@ FAR = 0.5  # how far an equilibrium moves, beside the size of the orbit, as para
 SMALL = 100.0  # times the distance of the ends, below which an orbit is its equilibrium
 
 
+@call_checked
 def connection(
     problem: Any,
     orbit: Any,

@@ -17,6 +17,7 @@ from phasekit.bifurcation.continuation.scales import guessed, scaled
 from phasekit.bifurcation.continuation.start import settle, tangent_of
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
@@ -33,6 +34,7 @@ FloatArray = npt.NDArray[np.float64]
 TURNED = 1e-3  # what is left of f(x) - x next to a point that f takes to itself on another turn
 
 
+@call_checked
 def continuation(
     problem: Any,
     parameter: str,

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.connection import connection
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
 from phasekit.labels.arguments import bad, number, unknown
 from phasekit.systems.problem import Problem, as_problem
 
 
+@call_checked
 def critical_rate(
     problem: Any,
     ramp: Mapping[str, str],

@@ -14,6 +14,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Path, join
 from phasekit.bifurcation.continuation.same_path import lies_on, turned
 from phasekit.errors import ConvergenceError
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.continuation import continuation
@@ -26,6 +27,7 @@ from phasekit.systems.problem import Problem, as_problem, system_of
 FloatArray = npt.NDArray[np.float64]
 
 
+@call_checked
 def diagram(
     problem: Any,
     parameter: str,
@@ -115,7 +117,7 @@ def diagram(
             f"branch{'es'[: 2 * (len(branches) != 1)]}: others are missing; point.switch() of its "
             "branch points follows more, diagram() again follows all",
             RuntimeWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
     if not branches:
         if failures:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from phasekit.inputs import call_checked
 from phasekit.labels.arguments import bad, whole
 from phasekit.laws.formulas import symbols_of, take_formula
 
@@ -48,6 +49,7 @@ class Fourier:
         return Fourier(self.formula, self.order, function)
 
 
+@call_checked
 def fourier(formula: Any, order: int) -> Fourier:
     """A harmonic of a formula, to be recorded along branches of periodic orbits.
 

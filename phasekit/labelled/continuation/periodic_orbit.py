@@ -16,6 +16,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_options
 from phasekit.labelled.continuation.orbit_guess import (
     cycles_of,
@@ -45,6 +46,7 @@ ALIKE = 1e-3  # part by which the period of an orbit differs from that of its gu
 PARTS = 4  # of each step of a simulation, between which an orbit is interpolated
 
 
+@call_checked
 def periodic_orbit(
     problem: Any,
     x0: Any,

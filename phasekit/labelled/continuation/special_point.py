@@ -13,6 +13,7 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import wrap
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.unfinished import announced
@@ -173,6 +174,7 @@ class SpecialPoint(Generic[Of]):
             return float(self.x[self.branch.problem_state.index(name)])
         return self.parameters[name]
 
+    @call_checked
     def switch(self, kind: str | None = None, *, direction: int = 0, options: Any = None) -> Of:
         """The other branch through a branch point, or what begins at a point.
 
@@ -235,6 +237,7 @@ class SpecialPoint(Generic[Of]):
         found: Of = onward(f"{self.way}.switch")(self, direction, options, kind)
         return announced(found)
 
+    @call_checked
     def curve(
         self, parameter: str | Sequence[str], span: Sequence[Any], *, options: Any = None
     ) -> Of:

@@ -32,6 +32,6 @@ def announced(branch: Of) -> Of:
             f"the branch in {branch.parameter} is not complete, {'; '.join(ends)}; extend() "
             f"continues it{more}",
             RuntimeWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
     return branch

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.errors import ParameterError
-from phasekit.inputs import bad
+from phasekit.inputs import bad, call_checked
 from phasekit.mechanics.general.body import RigidBody
 from phasekit.mechanics.general.state import CoupledRotationState
 from phasekit.mechanics.vectors import (
@@ -167,3 +167,7 @@ class CoupledRotation(Frozen):
             return f"CoupledRotation({self.body!r}, <batch of shape {self.shape}>)"
         n1, n2 = ("[" + ", ".join(f"{x + 0.0:.6g}" for x in n) + "]" for n in (self.n1, self.n2))
         return f"CoupledRotation({self.body!r}, n1={n1}, n2={n2}, a={self.a:.6g})"
+
+
+_init = CoupledRotation.__init__
+CoupledRotation.__init__ = call_checked(_init, "CoupledRotation")  # type: ignore[method-assign]
