@@ -272,13 +272,13 @@ def call_checked(function: Function, name: str = "") -> Function:
         kwargs = respelled(function.__name__, kwargs)
         try:
             return function(*args, **kwargs)
-        except TypeError as raised:
+        except TypeError:
             try:
                 signature.bind(*args, **kwargs)
             except TypeError as unfit:
                 error = unfit
             else:  # of what the function does
-                raise raised from raised.__cause__
+                raise
             strange = [name for name in kwargs if name not in expected and not takes_all]
             text, hint = str(error), ""
             if strange:  # rather than what is missing in its place

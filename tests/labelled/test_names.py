@@ -81,7 +81,10 @@ DRIVEN = pk.Perturbed(SYSTEM, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: pk.flow(SYSTEM, 0.1, 0.0, times=[1.0]), r"flow\(\) got .* 'times'; its arguments"),
+        (
+            lambda: pk.flow(SYSTEM, 0.1, 0.0, times=[1.0]),
+            r"flow\(\) got .* 'times'; did you mean 't'",
+        ),
         (lambda: pk.flow(SYSTEM, 0.1, 0.0), "flow.*missing a required argument: 't'; its arg"),
         (lambda: pk.flow(SYSTEM, 0.1, 0.0, 1.0, 2.0), "too many positional arguments"),
         (lambda: pk.orbits(SYSTEM, energi=1.0), "did you mean 'energy'"),
@@ -91,7 +94,7 @@ DRIVEN = pk.Perturbed(SYSTEM, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
         (lambda: pk.melnikov(DRIVEN, saddle="lower"), "'saddle'; its arguments are system$"),
         (lambda: pk.resonances(DRIVEN), "resonances.*missing a required.* argument: 'n'"),
         (lambda: pk.stroboscopic(DRIVEN, 0.1, 0.0), "stroboscopic.*'n'"),
-        (lambda: pk.lyapunov(DRIVEN, 0.1, 0.0, t=3.0), "lyapunov.*'t'; its arguments"),
+        (lambda: pk.lyapunov(DRIVEN, 0.1, 0.0, t=3.0), "lyapunov.*'t'; did you mean 'duration'"),
         (lambda: pk.basins(DRIVEN, phis=[0.1], dphi=[0.0]), "did you mean 'phi'"),
         (lambda: pk.run_up(SYSTEM), "run_up.*missing"),
         (lambda: pk.equilibria(), "equilibria.*'system'"),
