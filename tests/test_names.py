@@ -182,7 +182,7 @@ def test_explore_names_what_it_takes():
 
 
 def test_a_problem_is_answered_by_what_takes_it():
-    with pytest.raises(pk.ParameterError, match="pk.periodic_orbit .* take a Problem"):
+    with pytest.raises(pk.ParameterError, match="pk.periodic_orbit, .* take a Problem"):
         pk.orbits(PROBLEM, 1.0, 1.0)
 
 

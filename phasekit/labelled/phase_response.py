@@ -23,6 +23,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     scale_of,
     units_of,
 )
+from phasekit.labelled.continuation.unfolding import NO_PARAMETER, unfolded
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag
 from phasekit.systems.problem import Problem, as_problem
@@ -156,8 +157,9 @@ def _problem_of(orbit: Any, system: Any) -> Problem:
 
 def _solved(problem: Problem, orbit: xr.Dataset) -> tuple[Cycles, Any]:
     """The family and the point of an orbit that is given, on its own mesh if it has one."""
-    name = next(iter(problem.parameters))
-    value = problem.parameters[name]
+    if not problem.parameters:
+        problem = unfolded(problem, NO_PARAMETER)
+    name, value = next(iter(problem.parameters.items()))
     options = ContinuationOptions()
     guess, turns, multiple = given_orbit(problem, orbit, value, options.degree)
     count = int(orbit["n_intervals"]) if "n_intervals" in orbit else 0

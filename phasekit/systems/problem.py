@@ -187,6 +187,8 @@ class Problem(ProblemSources, System):
             if not isinstance(f, Mapping):
                 raise bad("state", None, "the names of the states, beside an f that has no names")
             state = tuple(f)
+        if isinstance(state, Mapping):
+            raise bad("state", state, "names", "values of parameters are given as parameters={...}")
         states = names_of("state", (state,) if isinstance(state, str) else state)
         values = arrays_of("parameters", {} if parameters is None else parameters)
         for name in values:
@@ -236,8 +238,8 @@ class Problem(ProblemSources, System):
 
     #: What messages say where a Problem cannot be taken.
     answered_by: ClassVar[str] = (
-        "pk.continuation, pk.diagram, pk.equilibria, pk.flow, pk.lyapunov, pk.periodic_orbit and "
-        "pk.poincare_section take a Problem"
+        "pk.continuation, pk.diagram, pk.equilibria, pk.flow, pk.sweep, pk.basins, pk.lyapunov, "
+        "pk.periodic_orbit, pk.plot.phase_portrait and others take a Problem"
     )
 
     def _set(self, name: str, value: Any) -> None:

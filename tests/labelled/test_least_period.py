@@ -96,3 +96,24 @@ def test_orbits_beside_a_doubling_keep_their_two_turns(beyond):
     again = pk.periodic_orbit(problem, two)
     assert again.period == pytest.approx(float(two.period), rel=1e-9)
     assert again.period == pytest.approx(2 * doubling["period"], rel=0.02)
+
+
+def test_an_orbit_of_equations_without_parameters():
+    """It is that of the same equations with one, and knows nothing of a parameter."""
+    without = pk.Problem(["y", "(1 - x**2)*y - x"], ("x", "y"))
+    called = pk.Problem(lambda x: [x[1], (1.0 - x[0] ** 2) * x[1] - x[0]], ("x", "y"))
+    expected = pk.periodic_orbit(VAN_DER_POL, [2.0, 0.0])
+    orbits = [pk.periodic_orbit(problem, [2.0, 0.0]) for problem in (without, called)]
+    for orbit in orbits:
+        assert abs(float(orbit.period - expected.period)) < 1e-11
+        assert set(orbit.coords) == {"time", "multiplier"}
+    assert pk.Problem.from_dataset(orbits[0]) == without
+    response = pk.phase_response(orbits[0])
+    assert set(response.coords) == {"time", "state"}
+    wanted = pk.phase_response(expected).interp(time=response.time)
+    assert abs(response.phase_response - wanted.phase_response).max() < 1e-5
+    driven = pk.Problem(["y", "-0.2*y - x - x**3 + cos(1.2*t)"], ("x", "y"), time="t",
+                        period="2*pi/1.2")  # fmt: skip
+    orbit = pk.periodic_orbit(driven, [0.1, 0.0])
+    ends = pk.flow(driven, x0=[float(orbit.x[0]), float(orbit.y[0])], t=[0.0, float(orbit.period)])
+    assert abs(float(ends.motion_x[-1] - orbit.x[0])) < 1e-8

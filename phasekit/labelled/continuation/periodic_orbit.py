@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import along, collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Orbit
+from phasekit.cells.schema import dataset_attrs
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_options
@@ -26,7 +27,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     scale_of,
     units_of,
 )
-from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
+from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, number, reals
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
@@ -126,9 +127,11 @@ def periodic_orbit(
             raise bad("settle", settle, "a number >= 0")
     if problem.conservative and n > 1:
         problem = unfolded(problem)
-    value = problem.parameters.get(UNFOLDING, next(iter(problem.parameters.values()), 0.0))
     if not problem.parameters:
-        raise bad("problem", problem, "a problem with at least one parameter")
+        with_one = unfolded(problem, NO_PARAMETER)
+        ds = periodic_orbit(with_one, x0, period=period, settle=settle, options=options)
+        return ds.drop_vars(NO_PARAMETER).assign_attrs(dataset_attrs(problem))
+    value = problem.parameters.get(UNFOLDING, next(iter(problem.parameters.values())))
     if isinstance(x0, xr.Dataset):
         if settle is not None:
             raise bad("settle", settle, "None with samples")

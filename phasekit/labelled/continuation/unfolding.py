@@ -14,8 +14,8 @@ from phasekit.labels.arguments import bad
 from phasekit.laws.formulas import symbols_of
 from phasekit.systems.problem import Problem
 
-#: The parameter that unfolds conservative families, and stays zero.
-UNFOLDING = "unfolding"
+#: The parameter that unfolds conservative families, and stays zero; that of a law without any.
+UNFOLDING, NO_PARAMETER = "unfolding", "no_parameter"
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -37,8 +37,8 @@ def beside_unfolding(problem: Problem, parameter: Any) -> list[str]:
     return [check_parameter(problem, parameter), UNFOLDING]
 
 
-def unfolded(problem: Problem) -> Problem:
-    """A conservative problem with a term that takes energy, times a parameter that stays zero.
+def unfolded(problem: Problem, name: str = UNFOLDING) -> Problem:
+    """A problem with a term that takes energy, times a parameter that stays zero.
 
     The term is that of a damping: each velocity, in its own equation.
     """
@@ -49,18 +49,18 @@ def unfolded(problem: Problem) -> Problem:
     moving = sorted({j for j, v in zip(velocity, f, strict=True) if x[j] == v}) or list(range(n))
     mask = np.zeros(n)
     mask[moving] = 1.0
-    values = {**problem.parameters, UNFOLDING: 0.0}
-    periods = dict(problem.periods)
+    values = {**problem.parameters, name: 0.0}
+    kept = {"periods": dict(problem.periods), "time": problem.time, "period": problem.period}
     if problem.kind == "symbolic":
-        names = symbols_of([*problem.state, UNFOLDING])
+        symbols = symbols_of([*problem.state, name])
         formulas = [
-            e + names[UNFOLDING] * names[name] if mask[i] else e
-            for i, (e, name) in enumerate(zip(problem.f, problem.state, strict=True))
+            e + symbols[name] * symbols[state] if mask[i] else e
+            for i, (e, state) in enumerate(zip(problem.f, problem.state, strict=True))
         ]
-        return Problem(formulas, problem.state, values, periods=periods).described(problem.words)
+        return Problem(formulas, problem.state, values, **kept).described(problem.words)
 
     def with_damping(x: FloatArray, **parameters: float) -> FloatArray:
-        part = parameters.pop(UNFOLDING)
+        part = parameters.pop(name)
         return np.asarray(problem.f(x, **parameters), dtype=float) + part * (mask * x.T).T
 
-    return Problem(with_damping, problem.state, values, periods=periods).described(problem.words)
+    return Problem(with_damping, problem.state, values, **kept).described(problem.words)
