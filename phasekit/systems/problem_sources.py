@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Self
 
 from phasekit.labels.arguments import bad, flag
@@ -67,6 +67,89 @@ class ProblemSources:
         made: Self = make(
             [symbols[states[1]], force], states, values, periods=periods, conservative=True
         )
+        return made
+
+    @classmethod
+    def mechanical(
+        cls, M: Any, C: Any, K: Any, force: Any = None, forcing: Any = None, *,
+        parameters: Mapping[str, Any] | None = None, coordinates: Any = None, time: str = "t",
+        period: Any = None, jac: Callable[..., Any] | None = None,
+        conservative: bool | None = None,
+    ) -> Self:  # fmt: skip
+        """The problem of masses or finite elements, ``M x'' + C x' + K x + f(x) = F(t)``.
+
+        Its states are the coordinates and their rates. M is solved with, and not inverted.
+
+        Parameters
+        ----------
+        M, C, K : array_like or sparse array, shape (n, n)
+            Masses, damping and stiffness. M may couple accelerations, and is not singular.
+        force : mapping or sequence of formulas, or callable, optional
+            f: formulas by coordinate, or one for each, of the coordinates, their rates and the
+            parameters; or a function ``force(x, **parameters)`` that returns n numbers.
+        forcing : mapping or sequence of formulas, or callable, optional
+            F: formulas of the time and the parameters; or a function ``forcing(t, **parameters)``.
+        parameters : mapping of str to float, optional
+            The parameters and their values.
+        coordinates : str or sequence of str, optional
+            Their names, by default ``x1, x2, ...`` and of one ``x``. Rates have a d before it.
+        time : str, default "t"
+            What the forcing calls the time.
+        period : str, sympy.Expr or float, optional
+            The period of the forcing. That of sines and cosines is found.
+        jac : callable, optional
+            ``jac(x, **parameters)``: of a function the derivatives of f by x, dense or sparse.
+        conservative : bool, optional
+            Whether energy is conserved. By default it is where there is neither damping nor forcing
+            and the forces, as formulas, are those of a potential.
+
+        Returns
+        -------
+        Problem
+
+        Raises
+        ------
+        ParameterError
+            If an argument is unusable.
+
+        Notes
+        -----
+        ``x' = v, M v' = F - C v - K x - f(x)`` ([Kerschen2009]). Where forces are functions, or
+        terms are more than 4,000, the rates are a function as well; otherwise they are formulas.
+        Motions along one normal mode start at an eigenvector of ``K a = w^2 M a``.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import phasekit as pk
+        >>> K = np.array([[2.0, -1.0], [-1.0, 2.0]])
+        >>> chain = pk.Problem.mechanical(
+        ...     np.eye(2), 0.1 * np.eye(2), K, {"x1": "x1**3"}, {"x1": "F*cos(w*t)"},
+        ...     parameters={"F": 0.1, "w": 1.0},
+        ... )
+        >>> chain.state, chain.period
+        (('x1', 'x2', 'dx1', 'dx2'), 2*pi/w)
+        >>> chain([1.0, 0.0, 0.0, 0.0], t=0.0).tolist()
+        [0.0, 0.0, -2.9, 1.0]
+        >>> pk.Problem.mechanical(1.0, 0.0, 1.0, "x**3", parameters={"m": 1.0})
+        Problem(x' = dx, dx' = -x**3 - x; m=1.0, conservative)
+        """
+        from phasekit.systems.mechanical import equations_of_motion
+
+        matrices = {"M": M, "C": C, "K": K}
+        places, named = equations_of_motion(
+            matrices,
+            force,
+            forcing,
+            parameters,
+            coordinates,
+            time,
+            period,
+            jac,
+            conservative,
+        )
+        make: Any = cls
+        made: Self = make(*places, **named)
         return made
 
     @classmethod

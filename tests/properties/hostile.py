@@ -512,6 +512,12 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Potential": {"parameters": dict},
     "Term": {"force": lambda: "-0.1*dphi", "parameters": dict},
     "Problem.from_potential": {"parameters": dict},
+    "Problem.mechanical": {
+        "M": lambda: np.eye(2), "C": lambda: np.zeros((2, 2)), "K": lambda: [[2, -1], [-1, 2]],
+        "force": lambda: {"x1": "x1^3"}, "forcing": lambda: {"x2": "F*cos(w*t)"},
+        "parameters": lambda: {"F": 0.1, "w": 1.0}, "coordinates": lambda: ("x1", "x2"),
+        "period": lambda: "2*pi/w",
+    },
     "BoundaryProblem": {
         "f": lambda: ["v", "-r*exp(u)"], "conditions": lambda: ["u(0)", "u(1)"],
         "parameters": lambda: {"r": 0.5}, "state": lambda: ("u", "v"),
