@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from published import compare, reference
 from published.compare import kind_of
-from published.systems import HOPF, SYSTEMS
+from published.systems import FOLD, HOPF, NEUTRAL, SYSTEMS
 
 ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 SOME = (
@@ -41,6 +41,37 @@ def test_special_points(name):
     """The text wants 1e-8; exact derivatives give 1e-11."""
     system = SYSTEMS[name]
     compare.compare(branch(name).special_points, wanted(name), system.parameter, 1e-11)
+
+
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_every_fold_and_hopf_point_is_proved(name):
+    """The values in 60 digits, of decimals as doubles, lie inside the bounds."""
+    system = SYSTEMS[name]
+    found = compare.follow(system, certify=True)
+    inexact = any(float(v) != round(v * 2**40) / 2**40 for v in system.parameters.values())
+    wanted_ = wanted(name)
+    assert found.points.certified_onward.values[:-1].mean() > 0.3
+    for point in found.special_points:
+        if kind_of(point) not in (FOLD, HOPF, NEUTRAL):
+            continue
+        assert point.certified, point
+        assert point.doubt == "", point
+        at = [point[key] for key in (*system.state, system.parameter)]
+        nearest = min(
+            (one for one in wanted_ if one.kind == kind_of(point)),
+            key=lambda one, at=at: max(
+                abs(float(x) - y) for x, y in zip((*one.state, one.parameter), at, strict=True)
+            ),
+        )
+        values = {system.parameter: nearest.parameter}
+        values |= zip(system.state, nearest.state, strict=True)
+        if kind_of(point) == HOPF:
+            values["omega"] = nearest.omega
+        for key, value in values.items():
+            low, high = point.enclosure[key]
+            assert high - low <= 1e-9 * max(abs(low), abs(high), 1e-3), (key, low, high)
+            room = 1e-11 * max(abs(low), abs(high)) if inexact else 0.0
+            assert low - room <= value <= high + room, (key, low, value, high)
 
 
 @pytest.mark.parametrize("form", ["compiled", "python"])

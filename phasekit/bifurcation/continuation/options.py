@@ -59,6 +59,9 @@ class ContinuationOptions:
         Limits of states by name (and of other free parameters): the branch ends on them.
     scales : mapping of str to float, optional
         Sizes of states by name, where those found along the branch mislead.
+    certify : bool, default False
+        Of equilibria and fixed points of formulas: whether branches are proved (see
+        `continuation`), those that are switched to as well.
     degree : int, default 4
         Of periodic orbits: degree of the polynomials between the ends of mesh intervals, 2 to 7.
     intervals : int, optional
@@ -102,6 +105,7 @@ class ContinuationOptions:
     detect: tuple[str, ...] = DETECTED
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     scales: Mapping[str, float] = field(default_factory=dict)
+    certify: bool = False
     degree: int = 4
     intervals: int | None = None
     max_intervals: int = 1000
@@ -147,6 +151,9 @@ class ContinuationOptions:
                 "< 1.5 rad"
             )
         one_of("directions", self.directions, DIRECTIONS)
+        if not isinstance(self.certify, (bool, np.bool_)):
+            raise bad("certify", self.certify, "True or False")
+        object.__setattr__(self, "certify", bool(self.certify))
         given: Any = self.detect
         if not isinstance(given, (str, Sequence, Set)):
             raise bad("detect", given, f"names out of {', '.join(DETECTABLE)}")

@@ -27,6 +27,12 @@ from phasekit.bifurcation.continuation.walk import (
 from phasekit.bifurcation.special_points import KINDS as SPECIAL
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.branch_points import points_of
+from phasekit.labelled.continuation.certified import (
+    certificate_of,
+    columns_of,
+    is_provable,
+    note,
+)
 from phasekit.labelled.continuation.checks import check_bounds, check_span
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.special_point import NOT_COMPARED, SpecialPoint, special_point
@@ -99,7 +105,12 @@ class Branch:
         conservative problem, ``kind`` (`EquilibriumKind`),
         ``tangent`` on (``point``, ``unknown``), ``special`` (the label of a special point, or an
         empty string), ``step``, ``newton_steps``, ``residual`` (the largest size of an entry of f
-        beside that of the terms that cancel in it), and what was recorded.
+        beside that of the terms that cancel in it), and what was recorded. Where proofs were asked
+        for: ``certified`` (whether the point is proved to lie next to the branch),
+        ``certified_error`` on (``point``, ``unknown``) (a bound of how far it is from it, across
+        the chord), ``certified_onward`` (whether one branch is proved to go from the point to the
+        next, with no other in the tube about it), ``certified_radius`` on (``point``, ``unknown``)
+        (a bound of how far that is from the chord), ``certified_doubt`` (why it is not proved).
     special_points : tuple of SpecialPoint
         In order along the curve.
     stops : tuple of Stop
@@ -174,7 +185,27 @@ class Branch:
     @functools.cached_property
     def _points(self) -> xr.Dataset:
         """The points, made when they are first asked for."""
-        return self._table()
+        ds = self._table()
+        found = self._certificate
+        if found is None:
+            return ds
+        proofs = columns_of(found)
+        for _, array, _ in proofs.values():
+            array.flags.writeable = False
+        return ds.assign(proofs)
+
+    @functools.cached_property
+    def _certificate(self) -> Any:
+        """What is proved of it, None unless that was asked for."""
+        return certificate_of(self, self._table()) if is_provable(self) else None
+
+    @property
+    def certified(self) -> bool:
+        """Whether all of it is proved: each stretch between points, and each special point."""
+        found = self._certificate
+        return found is not None and bool(
+            found.stretches.all() and all(one.certified for one in found.specials)
+        )
 
     @property
     def curve(self) -> Any:
@@ -247,6 +278,12 @@ class Branch:
             (dim, "end"),
             np.array([s.interval for s in specials]).reshape(-1, 2),
         )
+        if self._certificate is not None:
+            ds["special_certified"] = (dim, np.array([s.certified for s in specials], dtype=bool))
+            ds["special_doubt"] = strings([s.doubt for s in specials])
+            for name in (*self.free, *self.problem_state):
+                ends = [s.enclosure.get(name, (np.nan, np.nan)) for s in specials]
+                ds[f"special_{name}_enclosure"] = ((dim, "end"), np.array(ends).reshape(-1, 2))
         return ds
 
     def table(self) -> pd.DataFrame:
@@ -275,6 +312,8 @@ class Branch:
         for name in (*self.free, *self._numbers, *self.problem_state):
             columns[name] = [s[name] for s in specials]
         columns["residual"] = [s.residual for s in specials]
+        if self._certificate is not None:
+            columns["certified"] = [s.certified for s in specials]
         columns["status"] = [s.status for s in specials]
         columns["message"] = ["; ".join(filter(None, (s.name, s.message))) for s in specials]
         return pd.DataFrame(columns)
@@ -520,7 +559,8 @@ class Branch:
                 f"{name}: {stop.reason}, {stop.message}"
                 for name, stop in zip(("first", "last"), self.stops, strict=True)
             ]
-        return [*ends, *self.messages]
+        proofs = [] if self._certificate is None else [note(self)]
+        return [*ends, *self.messages, *proofs]
 
     def __repr__(self) -> str:
         """Write what it is, its range, its special points and why it ends."""

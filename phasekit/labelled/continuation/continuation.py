@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -19,11 +20,12 @@ from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
+from phasekit.labelled.continuation.certified import check_certify, refuse_certify
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.continuation.user_events import events_of, stop_of
-from phasekit.labels.arguments import bad, numeric, unknown
+from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.problem_parts import refuse_aperiodic
@@ -47,6 +49,7 @@ def continuation(
     events: Mapping[str, Any] | None = None,
     stop: Any = None,
     options: ContinuationOptions | None = None,
+    certify: bool = False,
 ) -> Branch:
     """Follow equilibria, fixed points of a map, periodic orbits or solutions along a parameter.
 
@@ -94,6 +97,12 @@ def continuation(
         start itself does not count. Of periodic orbits x is a whole orbit, as for events.
     options : ContinuationOptions, optional
         Steps, tolerances, bounds, directions.
+    certify : bool, default False
+        Whether the branch is proved in interval arithmetic, of equilibria and fixed points of
+        formulas: that there is one branch from each point to the next and no other close by, and
+        that folds, Hopf points, neutral saddles, period doublings and torus points are there, one
+        each, within bounds. What is proved is said of points (``certified``, ``certified_onward``,
+        see `Branch`) and of special points (``certified``, ``enclosure``).
 
     Returns
     -------
@@ -115,6 +124,11 @@ def continuation(
     functions, also of several in one step, and refined on the systems that define them
     ([Govaerts2000], [Kuznetsov2004] chapter 10). Whatever stops it is said in ``stops``.
 
+    Proofs take parameters and numbers in f for exactly the doubles that they are, and bound each
+    rounding. About the chord between neighbouring points, or halves of it, a tube holds exactly one
+    curve by Krawczyk's operator ([MooreKearfottCloud2009] 8.2), and special points are boxes with
+    exactly one solution of their equations.
+
     Examples
     --------
     >>> from phasekit.systems.problem import Problem
@@ -128,15 +142,23 @@ def continuation(
     >>> (point,) = branch.special("half")
     >>> point.label, point.x.item(), round(point["mu"], 12), branch.stops[1].reason
     ('UZ', -0.5, 0.375, 'half')
+    >>> branch = continuation(cusp, "mu", x0=[-1.3], span=(-1.0, 1.0), certify=True)
+    >>> low, high = branch.special("fold")[0].enclosure["mu"]
+    >>> branch.certified, low < 2 / 27**0.5 < high, high - low < 1e-14
+    (True, True, True)
     """
     given, problem = problem, as_problem(problem, moving=orbit is not None)
     options = check_options(options)
+    flag("certify", certify)
+    if certify:
+        options = replace(options, certify=True)
     if problem.bounded:
         from phasekit.labelled.continuation.bounded_start import continue_solution
 
         for name, value in (("orbit", orbit), ("fix", fix)):
             if value is not None:
                 raise bad(name, value, "None of a BoundaryProblem", "x0= takes a solution")
+        refuse_certify(options.certify, "solutions of a BoundaryProblem")
         with notice(f"following solutions along {parameter}"):
             return announced(continue_solution(
                 problem, parameter, x0, span, _record(problem, record), options, events, stop
@@ -146,6 +168,7 @@ def continuation(
 
         if x0 is not None:
             raise bad("x0", x0, "None with an orbit")
+        refuse_certify(options.certify, "periodic orbits")
         refuse_aperiodic(problem)
         if problem.map:
             raise bad(
@@ -160,6 +183,7 @@ def continuation(
     if fix is not None:
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
+    check_certify(problem, parameter, options.certify)
     guess = _start(problem, x0, given)
     curve = equilibrium_curve(problem, parameter, (low, high), options)
     if events is not None or stop is not None:
@@ -184,6 +208,9 @@ def continuation(
         walker = CurveWalk(curve)
         tracks = run(walker, start, options.directions)
         branch = branch_of(Branch, problem, walker, start, tracks, _record(problem, record))
+    if options.certify:
+        with notice(f"proving the branch along {parameter}"):
+            _ = branch.points
     return announced(branch)
 
 

@@ -37,6 +37,7 @@ def diagram(
     depth: int = 3,
     record: Any = None,
     options: ContinuationOptions | None = None,
+    certify: bool = False,
 ) -> tuple[Branch, ...]:
     """Follow all connected branches of equilibria, each once.
 
@@ -58,6 +59,8 @@ def diagram(
         As in `continuation`.
     options : ContinuationOptions, optional
         As in `continuation`.
+    certify : bool, default False
+        Whether each branch is proved, as in `continuation`.
 
     Returns
     -------
@@ -98,8 +101,9 @@ def diagram(
                 continue
             try:
                 branch = continuation(
-                    start, parameter, x0=guess, span=(low, high), record=record, options=options
-                )
+                    start, parameter, x0=guess, span=(low, high), record=record, options=options,
+                    certify=certify,
+                )  # fmt: skip
             except ConvergenceError as error:
                 failures.append(error)
                 continue

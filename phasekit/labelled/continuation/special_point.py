@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import wrap
+from phasekit.labelled.continuation.certified import enclosure_of
 from phasekit.labelled.continuation.onward import Of, onward
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.equality import same_fields
@@ -71,6 +72,15 @@ class SpecialPoint(Generic[Of]):
     corank : int
         Dimension of the null space of f_x: 1 at folds and simple branch points, more at multiple
         branch points, 0 at Hopf points and ends.
+    certified : bool
+        Where proofs were asked for: whether exactly one point of its kind is proved to be within
+        `enclosure`; of ends, whether the branch is proved to be there.
+    enclosure : mapping of str to (float, float)
+        Bounds of states and parameter, of a Hopf point of omega, of a neutral saddle of sigma (the
+        eigenvalues are sigma and -sigma), of a torus point of sine and cosine of the angle; empty
+        where nothing is proved.
+    doubt : str
+        What of it is not proved, and why.
     directions : ndarray, shape (branch, unknown)
         At a branch point the unit tangents (on scaled axes, unscaled; states, then the parameter)
         of the other branches through it, which `switch` follows: all real solutions of the reduced
@@ -150,6 +160,35 @@ class SpecialPoint(Generic[Of]):
         """Dimension of the null space of f_x."""
         corank: int = self.special.corank
         return corank
+
+    @property
+    def certified(self) -> bool:
+        """Whether it is proved."""
+        found = self._proof
+        return found is not None and bool(found.certified)
+
+    @property
+    def enclosure(self) -> Mapping[str, tuple[float, float]]:
+        """Bounds of states and parameter, where it is proved."""
+        if self._proof is None:
+            return MappingProxyType({})
+        return enclosure_of(self.branch, self._place)
+
+    @property
+    def doubt(self) -> str:
+        """What of it is not proved, and why."""
+        if self._proof is None:
+            return "proofs were not asked for: pk.continuation(..., certify=True)"
+        return str(self._proof.reason)
+
+    @property
+    def _place(self) -> int:
+        return next(i for i, one in enumerate(self.branch.special_points) if one is self)
+
+    @property
+    def _proof(self) -> Any:
+        found = getattr(self.branch, "_certificate", None)
+        return None if found is None else found.specials[self._place]
 
     @property
     def directions(self) -> FloatArray:
@@ -299,8 +338,7 @@ class SpecialPoint(Generic[Of]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold their branch, of which they are the same point."""
-        places = (i for i, one in enumerate(self.branch.special_points) if one is self)
-        return _point_of, (self.branch, next(places))
+        return _point_of, (self.branch, self._place)
 
     def __repr__(self) -> str:
         """Write kind, place and how well it is known."""

@@ -9,13 +9,13 @@ inverse of F'(c) T and J the derivatives over the whole tube, the operator
 holds all zeros w of each s with |w| <= W: where it lies inside W there is exactly one for each s,
 so one smooth curve through the tube: [MooreKearfottCloud2009] 8.2, with s as a parameter. Two
 tubes hold one curve if the zero of the first next to their common point lies in the second, where a
-zero is alone.
+zero is alone. Unknowns may be measured in units of their own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -26,14 +26,16 @@ from phasekit.numerics.intervals.zeros import System
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-#: How much further than its chord a tube goes at either end, in parts of the chord.
+#: How much further than its chord a tube goes at either end at least, in parts of the chord.
 BEYOND = 1e-3
 #: How often a tube is widened until it holds its image, and once it does, by how much.
 TRIES, WIDER = 12, 4.0
+#: What frames of chords are off by, beside one.
+FRAME = 1e-14
 
 
 class Tubes(NamedTuple):
-    """Tubes about the chords of some points, the next after each."""
+    """Tubes about chords, each of its own."""
 
     middle: Array
     """c, of shape (chords, N)."""
@@ -41,28 +43,78 @@ class Tubes(NamedTuple):
     """d, of shape (chords, N)."""
     across: Array
     """T, of shape (chords, N, N - 1)."""
+    beyond: Array
+    """How much further the tube goes at either end, in parts of the chord, of shape (chords,)."""
+    end: Array
+    """Where the chords end, of shape (chords, N)."""
+    tip: Array
+    """How far the curve may be from there across, of shape (chords, N - 1)."""
     radius: Array
     """How far the curve may be from the chord across, of shape (chords, N - 1)."""
     alone: Array
     """How far across there is no other zero."""
     proved: Flags
     """Whether each tube holds one curve."""
-    joined: Flags
-    """Whether it is the same in each tube and the next, of shape (chords - 1,)."""
+    defined: Flags
+    """Whether formulas and derivatives are known to be defined all over it."""
+
+    @property
+    def joined(self) -> Flags:
+        """Whether it is the same curve in each tube and the next, of shape (chords - 1,)."""
+        return joined(self.rows(slice(None, -1)), self.rows(slice(1, None)))
 
     @property
     def complete(self) -> bool:
         """Whether one curve passes all tubes."""
         return bool(self.proved.all() and self.joined.all())
 
+    def rows(self, which: Any) -> Tubes:
+        """Some of them."""
+        return Tubes(*(array[which] for array in self))
+
+    @property
+    def reach(self) -> Array:
+        """How far from its middle each tube goes, of shape (chords, N)."""
+        size = np.einsum("kij,kj->ki", np.abs(self.across), self.radius)
+        whole = (0.5 + self.beyond)[:, None] * np.abs(self.chord) + size
+        return whole * (1.0 + FRAME) + 4.0 * UNIT * np.abs(self.middle)
+
+    def hold(self, center: Array, axes: Array, radius: Array) -> Flags:
+        """Whether what lies so far from centers along axes is in the tube of the same row.
+
+        Zeros there are on the curve. Axes are of shape (chords, N, m), lengths (chords, m).
+        """
+        with np.errstate(all="ignore"):
+            return self._hold(center, axes, radius)
+
+    def _hold(self, center: Array, axes: Array, radius: Array) -> Flags:
+        size = np.linalg.norm(self.chord, axis=1)
+        u = center - self.middle
+        lengths = np.einsum("kij,kj->ki", np.abs(axes), radius)
+        blur = FRAME * np.linalg.norm(np.abs(u) + lengths, axis=1) + 4.0 * UNIT * np.linalg.norm(
+            np.abs(center) + np.abs(self.middle), axis=1
+        )
+        turned = np.einsum("kij,kil->kjl", self.across, axes)
+        w = np.abs(np.einsum("ki,kij->kj", u, self.across)) + blur[:, None]
+        w += np.einsum("kjl,kl->kj", np.abs(turned), radius)
+        d = self.chord / size[:, None]
+        s = np.abs(np.sum(u * d, axis=1)) + blur
+        s += np.einsum("kl,kl->k", np.abs(np.einsum("ki,kil->kl", d, axes)), radius)
+        inside: Flags = s <= (0.5 + 0.999 * self.beyond) * size
+        return inside & np.all(w <= self.alone, axis=1) & self.proved
+
     def holds(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """The first tube in which a zero at each point is on the curve; -1 where there is none."""
-        u = np.asarray(points, dtype=float)[:, None] - self.middle
-        size = np.sum(self.chord * self.chord, axis=1)
-        s = np.abs(np.sum(u * self.chord, axis=2) / size)
-        w = np.abs(np.einsum("pki,kij->pkj", u, self.across))
-        inside = (s <= 0.5) & np.all(w <= self.alone, axis=2) & self.proved
-        return np.where(inside.any(axis=1), np.argmax(inside, axis=1), -1)
+        found, nothing = [], np.zeros((len(self.middle), self.middle.shape[1], 0))
+        for u in np.asarray(points, dtype=float):
+            inside = self.hold(np.broadcast_to(u, self.middle.shape), nothing, nothing[:, 0])
+            found.append(int(np.argmax(inside)) if inside.any() else -1)
+        return np.array(found, dtype=np.int64)
+
+
+def joined(first: Tubes, then: Tubes) -> Flags:
+    """Whether tubes hold the same curve as those of the same rows that begin where they end."""
+    return then.hold(first.end, first.across, first.tip) & first.proved
 
 
 def tubes(system: System, points: npt.ArrayLike) -> Tubes:
@@ -85,18 +137,29 @@ def tubes(system: System, points: npt.ArrayLike) -> Tubes:
     (True, True)
     """
     u = np.asarray(points, dtype=float)
-    chord, middle = np.diff(u, axis=0), 0.5 * (u[:-1] + u[1:])
+    return tubes_about(system, u[:-1], u[1:])
+
+
+def tubes_about(system: System, start: Array, end: Array) -> Tubes:
+    """Tubes about chords, each of its own."""
+    with np.errstate(all="ignore"):  # what is not finite is not proved
+        return _tubes_about(system, start, end)
+
+
+def _tubes_about(system: System, start: Array, end: Array) -> Tubes:
+    chord, middle = end - start, 0.5 * start + 0.5 * end
     across = _complements(chord)
     slopes, undefined = system(middle, middle)[1:]
     inverse, usable = inverses((0.5 * (slopes[0] + slopes[1])) @ across)
     usable &= ~undefined
     operator = _Operator(system, chord, across, inverse, usable)
     # Where the curve is at the end of a chord is found by itself: that is known far better.
-    nowhere = np.zeros(len(chord))
-    tip, held = _held(operator.about(u[1:], nowhere), 0.0, _floors(u[1:], chord))
-    beyond, beside = _passed(chord, across, tip)
+    tip, held = _held(operator.about(end, np.zeros(len(chord))), 0.0, _floors(end, chord))
+    floors = _floors(middle, chord)
+    beyond = np.fmax(BEYOND, np.linalg.norm(tip, axis=1) / np.linalg.norm(chord, axis=1))
+    beyond = np.where(beyond < 1.0, beyond, BEYOND)
     whole = operator.about(middle, 0.5 + beyond)
-    radius, proved = _held(whole, tip, _floors(middle, chord))
+    radius, proved = _held(whole, tip + floors, floors)
     proved &= held
     alone = radius.copy()
     for _ in range(TRIES):
@@ -105,8 +168,11 @@ def tubes(system: System, points: npt.ArrayLike) -> Tubes:
         alone = np.where(holds[:, None], wider, alone)
         if not holds.any():
             break
-    joined = np.all(beside <= alone[1:], axis=1) & proved[:-1] & proved[1:]
-    return Tubes(middle, chord, across, radius, alone, proved, joined)
+    half = (0.5 + beyond)[:, None] * np.abs(chord)
+    _, _, away = system(middle - half, middle + half)
+    return Tubes(
+        middle, chord, across, beyond, end, tip, radius, alone, proved, ~(away | undefined),
+    )  # fmt: skip
 
 
 class _Operator(NamedTuple):
@@ -184,17 +250,3 @@ def _complements(chord: Array) -> Array:
         column = np.where(k >= largest, k + 1, k)
         matrices[:, :, k + 1] = np.eye(n)[column]
     return np.asarray(np.linalg.qr(matrices)[0][:, :, 1:])
-
-
-def _passed(chord: Array, across: Array, tip: Array) -> tuple[Array, Array]:
-    """How far beyond its chord each tube must go, in parts of it, to take over the curve.
-
-    And how far from the next chord the curve is where that begins.
-    """
-    size = np.linalg.norm(chord, axis=1)
-    along = np.einsum("ki,kij->kj", chord[1:] / size[1:, None], across[:-1])
-    turned = np.einsum("kij,kil->kjl", across[1:], across[:-1])
-    room = 1.0 + 1e-12
-    needed = np.einsum("kj,kj->k", np.abs(along), tip[:-1]) * room / size[1:]
-    beside = np.einsum("kjl,kl->kj", np.abs(turned), tip[:-1]) * room
-    return np.maximum(BEYOND, np.append(0.0, needed)), beside

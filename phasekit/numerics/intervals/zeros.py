@@ -32,6 +32,8 @@ CELLS = 256
 NARROW = 1e-9
 #: The same where parameters are intervals, which blur zeros anyway.
 COARSE = 2.0**-14
+#: Steps by which approximate zeros are refined, and boxes about them that are tried.
+NEWTON, INFLATIONS = 6, 16
 #: A box is tested a little larger than it is, so that zeros on its faces lie inside.
 INFLATED = 0.05
 
@@ -68,6 +70,8 @@ class System:
     f, states : sequence of sympy expressions and symbols
     values : mapping of symbol to float or (float, float), or to array, shape (cells,)
         Parameters, or intervals of them, or numbers of several cells.
+    units : array_like, optional
+        Powers of two in which the states are measured.
 
     Raises
     ------
@@ -75,7 +79,14 @@ class System:
         If f holds a function of which no bounds are known.
     """
 
-    def __init__(self, f: Sequence[Any], states: Sequence[Any], values: Mapping[Any, Any]) -> None:
+    def __init__(
+        self,
+        f: Sequence[Any],
+        states: Sequence[Any],
+        values: Mapping[Any, Any],
+        units: npt.ArrayLike | None = None,
+    ) -> None:
+        self.units = None if units is None else np.asarray(units, dtype=float)
         self.m, self.n = len(f), len(states)
         self._bounds = _bounds(tuple(f), tuple(states), tuple(values))
         self.parameters: list[Interval] = []
@@ -94,13 +105,18 @@ class System:
 
     def __call__(self, low: Array, high: Array, own: Index | int = 0) -> tuple[Boxes, Boxes, Flags]:
         """Bounds of f, of its derivatives, and where either may be undefined, in cells."""
+        if self.units is not None:
+            low, high = low * self.units, high * self.units
         columns = [(low[:, i], high[:, i]) for i in range(self.n)]
         numbers = [(a[own], b[own]) for a, b in self.parameters]
         found, undefined = self._bounds(*columns, *numbers)
         lows, highs = (np.stack([one[i] for one in found], axis=1) for i in (0, 1))
         shape = (-1, self.m, self.n)
         f = lows[:, : self.m], highs[:, : self.m]
-        return f, (lows[:, self.m :].reshape(shape), highs[:, self.m :].reshape(shape)), undefined
+        slopes = lows[:, self.m :].reshape(shape), highs[:, self.m :].reshape(shape)
+        if self.units is not None:
+            slopes = slopes[0] * self.units, slopes[1] * self.units
+        return f, slopes, undefined
 
 
 @functools.lru_cache(maxsize=64)
@@ -164,6 +180,47 @@ def zeros_of_cells(
         cells = np.arange(min(CELLS, count - first))
         found += _search(System(f, states, part), (low, high), [], cells)
     return found
+
+
+def enclosures(system: System, start: Array) -> tuple[Boxes, Flags]:
+    """Boxes next to approximate zeros, one of each cell, that hold exactly one zero, and which do.
+
+    Others are infinite.
+    """
+    x, own = start.copy(), np.arange(len(start))
+    step = np.zeros_like(x)
+    with np.errstate(all="ignore"):
+        for _ in range(NEWTON):
+            f, slopes, _ = system(x, x, own)
+            inverse, _ = inverses(0.5 * slopes[0] + 0.5 * slopes[1])
+            step = np.einsum("kij,kj->ki", inverse, 0.5 * f[0] + 0.5 * f[1])
+            x = np.where(np.isfinite(x - step), x - step, x)
+        size = np.abs(x) + 1e-6 * np.max(np.abs(x), axis=1, keepdims=True)
+        reach = 4.0 * np.where(np.isfinite(step), np.abs(step), 0.0) + 8.0 * UNIT * size
+        reach += np.finfo(float).tiny
+        low, high = np.full_like(x, -np.inf), np.full_like(x, np.inf)
+        found, left = np.zeros(len(x), dtype=bool), own
+        for turn in range(INFLATIONS):
+            if not left.size:
+                break
+            a, b = x[left] - reach[left], x[left] + reach[left]
+            image, defined = _image(system, a, b, left, x[left])
+            inside = np.all((image.low > a) & (image.high < b), axis=1) & image.usable & defined
+            better = inside & np.any(image.high - image.low < 0.9 * (b - a), axis=1)
+            at = left[inside]
+            found[at] = True
+            low[at], high[at] = (
+                np.nextafter(image.low, -np.inf)[inside],
+                np.nextafter(image.high, np.inf)[inside],
+            )
+            # A box that holds its image is narrowed to it, another one is widened.
+            away = np.abs(image.middle - x[left]) + image.radius
+            lost = ~(np.isfinite(away).all(axis=1) & image.usable & defined)
+            wider = np.maximum(reach[left], 1.5 * away)
+            narrower = 1.1 * away + 4.0 * UNIT * size[left]
+            reach[left] = np.where(inside[:, None], narrower, wider)
+            left = left[~lost & np.where(found[left], better & (turn < INFLATIONS - 1), True)]
+    return (low, high), found
 
 
 def _search(

@@ -1,0 +1,315 @@
+"""Proved branches, against exact elimination that shares no code with them."""
+
+from __future__ import annotations
+
+import pickle
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import sympy as sp
+
+import phasekit as pk
+from phasekit import ParameterError
+from phasekit.bifurcation.continuation import certificates
+from phasekit.labelled.continuation import certified
+
+X, MU, W = sp.symbols("x mu w", real=True)
+DEGREES = [(i, j) for i in range(5) for j in range(3) if i + j <= 4]
+NAMES = [f"c{i}{j}" for i, j in DEGREES]
+#: A plane curve whose coefficients are parameters, so that it is compiled once.
+QUARTIC = pk.Problem(
+    " + ".join(f"{name}*x**{i}*mu**{j}" for name, (i, j) in zip(NAMES, DEGREES, strict=True)),
+    "x", {"mu": 0.0, **dict.fromkeys(NAMES, 0.0)},
+)  # fmt: skip
+
+
+def polynomial(coefficients):
+    """The same, exactly."""
+    return sp.Poly(
+        {key: sp.Rational(value) for key, value in zip(DEGREES, coefficients, strict=True)},
+        X, MU, domain="QQ",
+    )  # fmt: skip
+
+
+def follow(coefficients, x0, mu, **options):
+    problem = QUARTIC.replace(mu=mu, **dict(zip(NAMES, coefficients, strict=True)))
+    return pk.continuation(
+        problem, "mu", x0=[x0], span=(-1.0, 1.0), certify=True,
+        options=pk.ContinuationOptions(bounds={"x": (-3.0, 3.0)}, **options),
+    )  # fmt: skip
+
+
+def random_curve(rng):
+    """Coefficients of a curve through a point, made of doubles."""
+    coefficients = np.round(rng.normal(size=len(DEGREES)) * 64) / 64
+    x0, mu = np.round(rng.uniform(-0.9, 0.9, 2) * 64) / 64
+    value = sum(c * x0**i * mu**j for c, (i, j) in zip(coefficients, DEGREES, strict=True))
+    coefficients[0] -= value
+    return coefficients, x0, mu
+
+
+def crossed(rng, separation):
+    """Two lines that cross, moved apart by a little: (x - a)(x - b) = separation."""
+    (x0, mu0), first, last = (np.round(rng.uniform(-0.8, 0.8, 2) * 32) / 32 for _ in range(3))
+    lines = [
+        X - sp.Rational(x0) - sp.Rational(s) * (MU - sp.Rational(mu0)) for s in (first[0], last[1])
+    ]
+    whole = sp.Poly(lines[0] * lines[1], X, MU)
+    found = {key: float(value) for key, value in whole.as_dict().items()}
+    found[0, 0] = found.get((0, 0), 0.0) - separation
+    coefficients = np.array([found.pop(key, 0.0) for key in DEGREES])
+    assert not found
+    return coefficients, float(x0 + first[0] * (-0.875 - mu0)), -0.875
+
+
+def tubes_of(branch):
+    """The tubes that a branch is proved by, and the units they are measured in."""
+    kept = []
+    own = certificates._chain
+
+    def chain(system, u):
+        kept.append((own(system, u), system.units))
+        return kept[-1][0]
+
+    certificates._chain = chain
+    try:
+        certified.certificate_of(branch, branch.points)
+    finally:
+        certificates._chain = own
+    return kept[0]
+
+
+def check_sections(branch, exact, rng, count):
+    """On cuts across proved tubes there is exactly one zero: counted by Sturm's theorem."""
+    chain, units = tubes_of(branch)
+    tubes = chain.tubes
+    for k in rng.permutation(np.flatnonzero(tubes.proved))[:count]:
+        s = Fraction(float(rng.uniform(-0.5, 0.5)))
+        base = [
+            Fraction(float(c)) + s * Fraction(float(d))
+            for c, d in zip(tubes.middle[k], tubes.chord[k], strict=True)
+        ]
+        (x, mu) = (
+            sp.Rational(b * Fraction(float(u))) + sp.Rational(Fraction(float(t[0] * u))) * W
+            for b, t, u in zip(base, tubes.across[k], units, strict=True)
+        )
+        cut = sp.Poly(exact.as_expr().subs({X: x, MU: mu}, simultaneous=True), W, domain="QQ")
+        for reach in (tubes.radius[k, 0], tubes.alone[k, 0]):
+            end = sp.Rational(float(reach))
+            assert cut.count_roots(-end, end) == 1, (k, float(s))
+
+
+def root_index(exact, x, mu):
+    """How many real roots lie below the one next to x; None where that is not clear."""
+    roots = sp.Poly(exact.as_expr().subs(MU, sp.Rational(mu)), X).real_roots()
+    gaps = [abs(float(root) - x) for root in roots]
+    near = int(np.argmin(gaps))
+    return near if gaps[near] < 1e-7 else None
+
+
+def check_stretches(branch, exact, rng, count):
+    """Where no roots meet, proved stretches stay on the root that they begin on."""
+    met = sp.Poly(sp.discriminant(exact.as_expr(), X), MU)
+    x, mu = branch.points.x.values, branch.points.mu.values
+    proved = np.flatnonzero(branch.points.certified_onward.values)
+    for k in rng.permutation(proved)[:count]:
+        low, high = sorted((sp.Rational(float(mu[k])), sp.Rational(float(mu[k + 1]))))
+        if low == high or met.is_zero or met.count_roots(low, high):
+            continue
+        first, last = (root_index(exact, x[i], float(mu[i])) for i in (k, k + 1))
+        assert first == last or None in (first, last), (k, x[k], mu[k])
+
+
+def check_folds(branch, exact):
+    """Each box of a fold holds exactly one common zero of f and f_x, and it is a simple one."""
+    met = sp.Poly(sp.discriminant(exact.as_expr(), X), MU)
+    for fold in branch.special("fold"):
+        if fold.certified:
+            low, high = (sp.Rational(end) for end in fold.enclosure["mu"])
+            assert met.count_roots(low, high) >= 1
+            assert fold.enclosure["x"][0] <= fold.x[0] <= fold.enclosure["x"][1]
+
+
+def check(branch, exact, rng, sections=4, stretches=2):
+    check_sections(branch, exact, rng, sections)
+    check_stretches(branch, exact, rng, stretches)
+    check_folds(branch, exact)
+
+
+def try_random(count, seed):
+    rng = np.random.default_rng(seed)
+    proved = total = 0
+    for _ in range(count):
+        coefficients, x0, mu = random_curve(rng)
+        try:
+            branch = follow(coefficients, x0, mu)
+        except pk.ConvergenceError:
+            continue
+        onward = branch.points.certified_onward.values[:-1]
+        proved, total = proved + onward.sum(), total + onward.size
+        check(branch, polynomial(coefficients), rng)
+    assert proved > 0.97 * total > 0
+    return total
+
+
+def test_random_curves_are_proved_and_no_certificate_is_wrong():
+    assert try_random(15, 1) > 300
+
+
+@pytest.mark.slow
+def test_a_thousand_random_curves_are_proved_and_no_certificate_is_wrong():
+    assert try_random(1000, 2) > 20_000
+
+
+def try_apart(count, seed):
+    rng = np.random.default_rng(seed)
+    proved = 0
+    for _ in range(count):
+        separation = float(rng.choice([-1.0, 1.0]) * 10.0 ** rng.uniform(-12.0, -3.0))
+        coefficients, x0, mu = crossed(rng, separation)
+        try:
+            branch = follow(coefficients, x0, mu)
+        except pk.ConvergenceError:
+            continue
+        for point in branch.special("BP"):
+            assert not point.certified
+            assert "branches meet" in point.doubt
+        proved += branch.points.certified_onward.values.sum()
+        check(branch, polynomial(coefficients), rng)
+    return proved
+
+
+def test_curves_that_nearly_cross_are_never_proved_to_be_others():
+    assert try_apart(8, 3) > 100
+
+
+@pytest.mark.slow
+def test_many_curves_that_nearly_cross_are_never_proved_to_be_others():
+    assert try_apart(300, 4) > 5_000
+
+
+@pytest.mark.parametrize("formula", ["l*x - x^3 + e", "l*x - x^2 + e", "l*x - x^2 - e"])
+@pytest.mark.parametrize("size", [1e-3, 1e-6, 1e-9, 1e-12])
+def test_what_is_nearly_a_branch_point_is_not_proved_to_be_one(formula, size):
+    problem = pk.Problem(formula, "x", {"l": -1.0, "e": size})
+    for branch in pk.diagram(problem, "l", span=(-1.0, 1.0), certify=True):
+        for point in branch.special("BP"):
+            assert not point.certified
+            assert point.enclosure == {}
+        for fold in branch.special("fold"):
+            if fold.certified:  # 27 e^2 = 4 l^3, or l^2 = -4 e and the like
+                load, x = sp.symbols("l x", real=True)
+                f = sp.sympify(formula.replace("^", "**"), {"l": load, "x": x})
+                f = f.subs("e", sp.Rational(size))
+                met = sp.Poly(sp.discriminant(f, x), load)
+                assert met.count_roots(*map(sp.Rational, fold.enclosure["l"])) == 1
+
+
+def test_a_jump_to_another_branch_is_not_proved():
+    """Steps too long for curves 1e-5 apart, which cross in the eyes of Newton's method."""
+    problem = pk.Problem("(x - l)*(x + l) - e", "x", {"l": -1.0, "e": 1e-10})
+    branch = pk.continuation(problem, "l", x0=[1.0], span=(-1.0, 1.0), certify=True)
+    x, onward = branch.points.x.values, branch.points.certified_onward.values
+    changed = np.flatnonzero(x[1:] * x[:-1] < 0.0)
+    assert not onward[changed].any()
+
+
+def test_a_hopf_point_is_enclosed_with_its_frequency():
+    brusselator = pk.Problem(["1 - (b + 1)*x + x**2*y", "b*x - x**2*y"], ("x", "y"), {"b": 1.5})
+    branch = pk.continuation(brusselator, "b", x0=[1.0, 1.5], span=(1.0, 3.0), certify=True)
+    (hopf,) = branch.special("H")
+    assert branch.certified
+    assert hopf.doubt == ""
+    for name, value in {"b": 2.0, "x": 1.0, "y": 2.0, "omega": 1.0}.items():
+        low, high = hopf.enclosure[name]
+        assert low < value < high
+        assert high - low < 1e-13
+    assert "proved: " in repr(branch)
+    assert branch.table().certified.all()
+
+
+def test_points_of_maps_are_enclosed():
+    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
+    (doubling,) = pk.continuation(logistic, "r", x0=[0.5], span=(1.5, 3.5), certify=True).special(
+        "PD"
+    )
+    assert doubling.enclosure["r"][0] <= 3.0 <= doubling.enclosure["r"][1]
+    delayed = pk.Problem(["r*x*(1 - y)", "x"], ("x", "y"), {"r": 1.5}, map=True)
+    (torus,) = pk.continuation(delayed, "r", x0=[0.3, 0.3], span=(1.3, 2.4), certify=True).special(
+        "TR"
+    )
+    low, high = torus.enclosure["sine"]
+    assert torus.enclosure["r"][0] <= 2.0 <= torus.enclosure["r"][1]
+    assert low <= np.sin(np.pi / 3) <= high
+
+
+def test_an_angle_is_enclosed_on_the_turn_that_it_is_shown_on():
+    problem = pk.Problem("l - sin(a)", "a", {"l": 0.0}, periods={"a": 2 * np.pi})
+    branch = pk.continuation(problem, "l", x0=[2 * np.pi], span=(-2.0, 2.0), certify=True)
+    assert branch.special("fold")
+    for fold in branch.special("fold"):
+        low, high = fold.enclosure["a"]
+        assert low <= fold.x[0] <= high
+        assert high - low < 1e-10
+        assert fold.enclosure["l"][0] <= np.round(fold["l"]) <= fold.enclosure["l"][1]
+
+
+def test_poles_are_not_proved_and_no_error():
+    problem = pk.Problem("l - x + 1e-6/(l - 0.3)", "x", {"l": 0.0})
+    options = pk.ContinuationOptions(bounds={"x": (-9.0, 9.0)})
+    branch = pk.continuation(
+        problem, "l", x0=[0.0], span=(-1.0, 1.0), options=options, certify=True
+    )
+    onward = branch.points.certified_onward.values[:-1]
+    assert onward.mean() > 0.5
+    hole = pk.Problem("l - x*sin(x)/x", "x", {"l": 0.5})
+    branch = pk.continuation(hole, "l", x0=[0.5], span=(-0.5, 0.9), certify=True)
+    doubts = [text for text in branch.points.certified_doubt.values if text]
+    assert doubts == [] or any("pole" in text for text in doubts)
+
+
+def test_certificates_are_kept_by_copies_stores_and_longer_branches(tmp_path):
+    cusp = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
+    branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1), stop="fold", certify=True)
+    branch.save(tmp_path / "branch.nc")
+    for again in (pk.Branch.load(tmp_path / "branch.nc"), pickle.loads(pickle.dumps(branch))):
+        assert again == branch
+        assert again.certified
+        assert [p.enclosure for p in again.special_points] == [
+            p.enclosure for p in branch.special_points
+        ]
+    longer = branch.extend()
+    assert longer.certified
+    assert len(longer.special("fold")) == 2
+    part = branch.points.isel(point=slice(3, 9))
+    assert part.certified_onward.sizes == {"point": 6}
+    ds = branch.to_dataset()
+    assert ds.special_certified.all()
+    assert ds.special_mu_enclosure.shape == (3, 2) or len(ds.special_mu_enclosure) >= 2
+
+
+def test_nothing_is_said_without_being_asked_for():
+    branch = pk.continuation(
+        pk.Problem("mu - x**2", "x", {"mu": 1.0}), "mu", x0=[1.0], span=(-1, 1)
+    )
+    assert not branch.certified
+    assert "certified" not in branch.points
+    (fold,) = branch.special("fold")
+    assert (fold.certified, dict(fold.enclosure)) == (False, {})
+    assert "certify=True" in fold.doubt
+
+
+def test_what_cannot_be_proved_is_refused_by_name():
+    function = pk.Problem(lambda x, mu: mu - x**2, "x", {"mu": 1.0})
+    with pytest.raises(ParameterError, match="certify.*Python function"):
+        pk.continuation(function, "mu", x0=[1.0], span=(-1, 1), certify=True)
+    largest = pk.Problem(X - sp.Max(X, MU) ** 2, "x", {"mu": 0.5})
+    with pytest.raises(ParameterError, match="certify.*Max"):
+        pk.continuation(largest, "mu", x0=[0.5], span=(-1, 1), certify=True)
+    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 2.0}, map=True)
+    with pytest.raises(ParameterError, match=r"certify.*several times"):
+        pk.continuation(logistic.iterated(2), "r", x0=[0.5], span=(1, 3), certify=True)
+    cusp = pk.Problem("mu + x - x**3", "x", {"mu": -1.0})
+    with pytest.raises(ParameterError, match="certify"):
+        pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1), certify="yes")
