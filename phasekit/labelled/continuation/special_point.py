@@ -172,7 +172,7 @@ class SpecialPoint(Generic[Of]):
         """Bounds of states and parameter, where it is proved."""
         if self._proof is None:
             return MappingProxyType({})
-        return enclosure_of(self.branch, self._place)
+        return enclosure_of(self.branch, self._rank)
 
     @property
     def doubt(self) -> str:
@@ -182,13 +182,13 @@ class SpecialPoint(Generic[Of]):
         return str(self._proof.reason)
 
     @property
-    def _place(self) -> int:
+    def _rank(self) -> int:
         return next(i for i, one in enumerate(self.branch.special_points) if one is self)
 
     @property
     def _proof(self) -> Any:
         found = getattr(self.branch, "_certificate", None)
-        return None if found is None else found.specials[self._place]
+        return None if found is None else found.specials[self._rank]
 
     @property
     def directions(self) -> FloatArray:
@@ -338,7 +338,7 @@ class SpecialPoint(Generic[Of]):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold their branch, of which they are the same point."""
-        return _point_of, (self.branch, self._place)
+        return _point_of, (self.branch, self._rank)
 
     def __repr__(self) -> str:
         """Write kind, place and how well it is known."""
