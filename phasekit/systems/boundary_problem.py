@@ -218,6 +218,7 @@ class BoundaryProblem(Problem):
         ).described(plain.words)  # fmt: skip
 
     from_potential = from_system = from_ode = from_sbml = from_antimony = _Elsewhere()
+    mechanical = _Elsewhere()
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made from the arguments; functions must allow it."""
