@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from phasekit.systems.field_analogues import JosephsonJunction as JosephsonJunction
     from phasekit.systems.field_analogues import SpinOrbit as SpinOrbit
     from phasekit.systems.free_rotor import FreeGyroRotor as FreeGyroRotor
+    from phasekit.systems.grid import grid as grid
     from phasekit.systems.harmonic import Harmonic as Harmonic
     from phasekit.systems.parameter import parameter as parameter
     from phasekit.systems.perturbed import Perturbed as Perturbed
@@ -195,6 +196,7 @@ _MODULES = {
     "phasekit.labelled.quasi_static": ("quasi_static",),
     "phasekit.systems.potential": ("Potential",),
     "phasekit.systems.boundary_problem": ("BoundaryProblem",),
+    "phasekit.systems.grid": ("grid",),
     "phasekit.systems.problem": ("Problem",),
     "phasekit.cells.offered": ("quantities",),
     "phasekit.labelled.continuation.special_point": ("SpecialPoint",),
@@ -246,7 +248,7 @@ _SHOWN = (
     # systems
     "BoundaryProblem", "Coefficients", "Event", "FreeGyroRotor", "GyroRotorDisk", "Harmonic",
     "Pendulum", "Perturbed", "Potential", "Problem", "System", "Term", "angle", "coordinate",
-    "parameter",
+    "grid", "parameter",
     # what they do
     "attractors", "basins", "bearing_forces", "bifurcation_set", "branches", "capture",
     "connection", "continuation", "critical", "diagram", "equilibria", "escape_rate", "explore",

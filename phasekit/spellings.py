@@ -142,7 +142,7 @@ NAMES: tuple[tuple[str, str], ...] = (
     ("separatrices", "separatrix"),
     ("spectrum", "fft periodogram power_spectrum psd welch"),
     ("stroboscopic", "strobe stroboscopic_map"),
-    ("sweep", "grid param_sweep parameter_scan parameter_study parameter_sweep scan sweep_map"),
+    ("sweep", "param_sweep parameter_scan parameter_study parameter_sweep scan sweep_map"),
     ("units", "Hz Unit cm convert kg mm rad radians unit ureg"),
 )
 

@@ -19,6 +19,8 @@ from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
+from phasekit.systems.grid import axes_of
+from phasekit.systems.grid_rates import GridSlopes, rates_on_grid
 from phasekit.systems.moving_problem import moving_formulas, moving_words
 from phasekit.systems.perturbed_problem import formulas_of, words_of
 from phasekit.systems.problem_parts import (
@@ -98,6 +100,10 @@ class Problem(ProblemSources, System):
         White noise of states: its amplitude s, a number or a formula of the parameters, in
         ``dx = f dt + s dW``. `flow` with ``paths=`` and `first_passage` follow it; all else is
         answered without noise.
+    grid : axis or sequence of axes, optional
+        What `pk.grid` made: f then maps fields to formulas that may hold the coordinates and the
+        derivatives ``lap(u)``, ``dx(u)`` and ``dxx(u)`` along an axis x, of fields, of formulas and
+        of derivatives. Beyond an end where fields have a value inner derivatives are 0.
 
     Raises
     ------
@@ -182,7 +188,17 @@ class Problem(ProblemSources, System):
         start: Mapping[str, float] | None = None,
         observables: Mapping[str, Any] | None = None,
         noise: Mapping[str, Any] | None = None,
+        grid: Any = None,
     ) -> None:
+        if grid is not None:
+            axes = axes_of(grid)
+            for argument, value in (("state", state), ("jac", jac)):
+                if value is not None:
+                    raise bad(argument, value, "None with a grid, on which formulas name fields")
+            names = tuple({} if parameters is None else parameters)
+            f = rates_on_grid(f, axes, names, definitions, functions)
+            state, jac = f.states, GridSlopes(f)
+            definitions = functions = None
         if state is None:
             if not isinstance(f, Mapping):
                 raise bad("state", None, "the names of the states, beside an f that has no names")

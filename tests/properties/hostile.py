@@ -512,6 +512,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "Potential": {"parameters": dict},
     "Term": {"force": lambda: "-0.1*dphi", "parameters": dict},
     "Problem.from_potential": {"parameters": dict},
+    "grid": {"name": lambda: "x", "low": lambda: 0.0, "high": lambda: 1.0, "n": lambda: 5},
     "Problem.mechanical": {
         "M": lambda: np.eye(2), "C": lambda: np.zeros((2, 2)), "K": lambda: [[2, -1], [-1, 2]],
         "force": lambda: {"x1": "x1^3"}, "forcing": lambda: {"x2": "F*cos(w*t)"},

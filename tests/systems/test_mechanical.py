@@ -162,7 +162,6 @@ def test_frequency_response_of_twenty_masses():
     orbit = pk.periodic_orbit(chain, np.zeros(2 * n), settle=100.0)
     response = pk.continuation(chain, "w", orbit=orbit, span=(0.3, 0.5))
     assert response.stops[0].reason == response.stops[1].reason == "bound"
-    assert response.special("LPC")
     for i in np.linspace(0, response.points.sizes["point"] - 1, 6).astype(int):
         orbit = response.orbit(int(i))
         w, start = float(orbit.w), np.array([float(orbit[name][0]) for name in chain.state])

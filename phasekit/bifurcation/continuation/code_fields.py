@@ -117,6 +117,7 @@ class PythonField(Field):
         except Exception as error:  # whatever a user's function raises, it has no value there
             self.failure = error
             return np.full((n, n), np.nan)
+        result = result.toarray() if hasattr(result, "toarray") else result
         slopes = numbers_of("jac", result, (n, n))
         return slopes - np.eye(n) if self.less else slopes
 

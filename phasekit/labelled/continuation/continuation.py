@@ -339,6 +339,7 @@ def _check_values(problem: Problem, guess: FloatArray) -> None:
                 f"{argument}: raised {type(error).__name__} at x0: {error}; wants a function "
                 f"{argument}(x, **parameters) of numbers of shape {shape}"
             ) from error
+        value = value.toarray() if hasattr(value, "toarray") else value
         found = np.asarray(value)
         if found.dtype.kind not in "biuf" and found.dtype != object:
             raise bad(argument, value, f"real numbers of shape {shape} to be returned")

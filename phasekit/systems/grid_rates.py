@@ -1,0 +1,426 @@
+"""Rates of fields on a grid by formulas with derivatives, compiled once for all places."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.fields import refuse_uncompiled
+from phasekit.errors import ParameterError
+from phasekit.labels.arguments import bad, unknown
+from phasekit.laws.formulas import read_formula, symbols_of, take_formula
+from phasekit.laws.grammar import FormulaError, parse
+from phasekit.numerics.pointwise import Pointwise, pointwise
+from phasekit.systems.grid import NEUMANN, Axis, derivative, operators
+from phasekit.systems.problem_parts import shorthands
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Derivative:
+    """A derivative in formulas: which, of what, and the name of its values."""
+
+    word: str
+    argument: Any
+    name: str
+
+
+class _Reading:
+    """Nodes of formulas in which derivatives of formulas stand."""
+
+    def __init__(self, nodes: Any, reader: Reader) -> None:
+        self.nodes, self.reader = nodes, reader
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.nodes, name)
+
+    def call(self, name: str, arguments: Sequence[Any]) -> Any:
+        """A derivative as a symbol, any other function as it is."""
+        if name not in self.reader.words:
+            return self.nodes.call(name, arguments)
+        if len(arguments) != 1:
+            raise FormulaError(f"{name} with {len(arguments)} arguments; it takes 1")
+        return self.reader.derivative(name, arguments[0])
+
+
+class Reader:
+    """Reads formulas of fields on a grid; keeps the derivatives in them, inner ones first."""
+
+    def __init__(self, axes: tuple[Axis, ...], known: Mapping[str, Any]) -> None:
+        self.words, self.known = operators(axes), dict(known)
+        self.found: dict[tuple[str, Any], Derivative] = {}
+
+    def derivative(self, word: str, argument: Any) -> Any:
+        """The symbol of a derivative of a formula."""
+        key = (word, argument)
+        if key not in self.found:
+            name = f"{word}({argument})"
+            self.found[key] = Derivative(word, argument, name)
+            self.known.update(symbols_of([name]))  # a formula may hold it from now on
+        return self.known[self.found[key].name]
+
+    def __call__(self, formula: Any, argument: str) -> Any:
+        """A formula as an expression of the fields, coordinates, derivatives and parameters."""
+        declare = "declare it in parameters"
+        if not isinstance(formula, str):
+            return take_formula(formula, self.known, argument, declare)
+        return read_formula(
+            formula, self.known, argument, declare,
+            read=lambda text, nodes: parse(text, _Reading(nodes, self)),
+        )  # fmt: skip
+
+
+def rates_on_grid(
+    f: Any, axes: tuple[Axis, ...], parameters: Sequence[str], definitions: Any, functions: Any
+) -> GridRates:
+    """The rates of fields by formulas.
+
+    Raises
+    ------
+    ParameterError
+        If a formula cannot be read, or a name is taken twice.
+    """
+    if not isinstance(f, Mapping) or not f:
+        raise bad("f", f, "a mapping from fields to formulas, with a grid")
+    fields = tuple(f)
+    coordinates = tuple(axis.name for axis in axes)
+    words = operators(axes)
+    for name in (*coordinates, *parameters, *fields):
+        if name in words:
+            raise bad("f", name, f"other names than the derivatives {', '.join(words)}")
+    for name in coordinates:
+        if name in fields or name in parameters:
+            raise bad("grid", name, "axes with names that are neither fields nor parameters")
+    symbols = symbols_of([*fields, *coordinates, *parameters])
+    known = symbols | shorthands(definitions, functions, symbols, "declare it in parameters")
+    reader = Reader(axes, known)
+    formulas = tuple(reader(f[name], f"f[{name!r}]") for name in fields)
+    moving = set(symbols_of([*fields, *(one.name for one in reader.found.values())]).values())
+    for formula in (*formulas, *(one.argument for one in reader.found.values())):
+        refuse_uncompiled(formula, moving, "f")
+    derivatives = tuple(reader.found.values())
+    edges = _edges(axes, fields, parameters)
+    _check_slopes(derivatives, axes, fields, edges)
+    return GridRates(fields, formulas, derivatives, axes, tuple(parameters), edges)
+
+
+def _edges(
+    axes: Sequence[Axis], fields: Sequence[str], parameters: Sequence[str]
+) -> tuple[Any, ...]:
+    """What fields are at each end, or their slopes: formulas, end by end, in the fields' order."""
+    symbols = symbols_of(parameters)
+    found = []
+    for axis in axes:
+        for name in axis.values:
+            if name not in fields:
+                raise unknown(f"values of the axis {axis.name}: field", name, fields)
+        for side in range(len(axis.ends)):
+            found += [
+                take_formula(
+                    axis.values.get(name, (0, 0))[side], symbols, f"values[{name!r}]",
+                    "declare it in parameters",
+                )
+                for name in fields
+            ]  # fmt: skip
+    return tuple(found)
+
+
+def _check_slopes(
+    derivatives: Sequence[Derivative], axes: Sequence[Axis], fields: Sequence[str],
+    edges: Sequence[Any],
+) -> None:  # fmt: skip
+    """Refuse derivatives of formulas whose slope at an end follows from one of fields not 0.
+
+    Raises
+    ------
+    ParameterError
+    """
+    kinds = [kind for axis in axes if not axis.periodic for kind in axis.boundary]
+    sloped = {
+        fields[k % len(fields)]: formula
+        for k, formula in enumerate(edges)
+        if kinds[k // len(fields)] == NEUMANN and formula != 0
+    }
+    for one in derivatives:
+        for symbol in one.argument.free_symbols:
+            if symbol.name in sloped and one.argument != symbol:
+                raise ParameterError(
+                    f"f: got {one.name}, wants derivatives of {symbol.name} alone, whose slope at "
+                    f"an end is {sloped[symbol.name]}"
+                )
+
+
+@dataclass(frozen=True)
+class GridRates:
+    """The rates of all fields at all places: called as f(x, **parameters).
+
+    Attributes
+    ----------
+    fields : tuple of str
+        Names of the fields, each of which has a state at each place.
+    formulas : tuple of sympy.Expr
+        Their rates, of the fields, the coordinates, the names of derivatives and the parameters.
+    derivatives : tuple of Derivative
+        The derivatives, inner ones first.
+    axes : tuple of Axis
+        The grid.
+    parameters : tuple of str
+        Names of the parameters.
+    edges : tuple of sympy.Expr
+        Values, or slopes, of the fields at each end of the axes.
+    """
+
+    fields: tuple[str, ...]
+    formulas: tuple[Any, ...]
+    derivatives: tuple[Derivative, ...]
+    axes: tuple[Axis, ...]
+    parameters: tuple[str, ...]
+    edges: tuple[Any, ...]
+
+    @property
+    def __name__(self) -> str:
+        """The formulas, where a problem is written."""
+        return ", ".join(
+            f"{name}' = {formula}" for name, formula in zip(self.fields, self.formulas, strict=True)
+        )
+
+    @property
+    def count(self) -> int:
+        """How many places there are."""
+        return int(np.prod([axis.n for axis in self.axes]))
+
+    @property
+    def coordinates(self) -> dict[str, Array]:
+        """The coordinates of the places, axis by axis."""
+        return {axis.name: axis.coordinates for axis in self.axes}
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of all states."""
+        return tuple(f"{name}_{i}" for name in self.fields for i in range(self.count))
+
+    def __call__(self, x: Array, **values: float) -> Array:
+        """The rates, field by field."""
+        work = workings(self)
+        points, par = work.points(x, values)
+        return work.formulas(points[: self.count], par).T.ravel()
+
+
+@dataclass(frozen=True)
+class GridSlopes:
+    """The derivatives of rates on a grid by all states, a sparse matrix."""
+
+    rates: GridRates
+
+    def __call__(self, x: Array, **values: float) -> Any:
+        """The derivatives at a state."""
+        return workings(self.rates).slopes(x, values)
+
+
+@functools.lru_cache(maxsize=16)
+def workings(rates: GridRates) -> Workings:
+    """What rates on a grid are computed with: made once, as it takes no part in copies."""
+    return Workings(rates)
+
+
+class Workings:
+    """Compiled formulas and matrices of rates on a grid."""
+
+    def __init__(self, rates: GridRates) -> None:
+        self.rates, axes, fields = rates, rates.axes, rates.fields
+        self.local = (*fields, *(axis.name for axis in axes))
+        names = (*self.local, *(one.name for one in rates.derivatives))
+        self.formulas = pointwise(rates.formulas, names, rates.parameters)
+        self.edges = pointwise(rates.edges, (), rates.parameters)
+        self.matrices = [derivative(axes, one.word) for one in rates.derivatives]
+        self.sources: list[Pointwise] = [
+            pointwise((one.argument,), names[: len(self.local) + k], rates.parameters)
+            for k, one in enumerate(rates.derivatives)
+        ]
+        self.place, self.end, self.sloped = self._places()
+        self.flat = [self._flat(one.argument) for one in rates.derivatives]
+        self._structure()
+
+    def _places(self) -> tuple[Array, Any, Any]:
+        """Coordinates of all places and of those beyond ends; the ends of these, and their kind."""
+        axes, parts = self.rates.axes, []
+        mesh = np.meshgrid(*(axis.coordinates for axis in axes), indexing="ij")
+        parts.append(np.stack([one.ravel() for one in mesh], axis=1))
+        end, sloped, number = [], [], 0
+        for k, axis in enumerate(axes):
+            for side, at in enumerate(axis.ends):
+                given = [one.coordinates if j != k else [at] for j, one in enumerate(axes)]
+                mesh = np.meshgrid(*given, indexing="ij")
+                parts.append(np.stack([one.ravel() for one in mesh], axis=1))
+                end.append(np.full(len(parts[-1]), number))
+                sloped.append(np.full(len(parts[-1]), axis.boundary[side] == NEUMANN))
+                number += 1
+        whole = [np.zeros(0, int)], [np.zeros(0, bool)]
+        return (
+            np.concatenate(parts), np.concatenate([*whole[0], *end]).astype(int),
+            np.concatenate([*whole[1], *sloped]).astype(bool),
+        )  # fmt: skip
+
+    def _flat(self, argument: Any) -> int:
+        """Which field an argument is; -1 if it is none."""
+        fields = self.rates.fields
+        own = argument.is_Symbol and argument.name in fields
+        return fields.index(argument.name) if own else -1
+
+    def points(self, x: Array, values: Mapping[str, float]) -> tuple[Array, Array]:
+        """Fields, coordinates and derivatives at all places and, as far as known, beyond ends."""
+        rates = self.rates
+        par = np.array([values[name] for name in rates.parameters], float)
+        count, wide, first = rates.count, len(self.place), len(self.local)
+        out = np.zeros((wide, first + len(rates.derivatives)))
+        fields = len(rates.fields)
+        out[:count, :fields] = np.reshape(x, (fields, count)).T
+        out[:, fields:first] = self.place
+        if wide > count:
+            edges = self.edges(np.zeros((1, 0)), par).reshape(-1, fields)
+            out[count:, :fields] = edges[self.end]
+        for k, (matrix, source, flat) in enumerate(
+            zip(self.matrices, self.sources, self.flat, strict=True)
+        ):
+            if flat >= 0:
+                given = out[:, flat]
+            else:
+                given = source(out[:, : first + k], par)[:, 0]
+                given[count:][self.sloped] = 0.0
+            out[:count, first + k] = matrix @ given
+        return out, par
+
+    def _structure(self) -> None:
+        """Where the slopes of formulas enter the matrix of derivatives.
+
+        A derivative that is linear in the fields is a constant matrix; others are multiplied anew.
+        """
+        from scipy.sparse import csr_array
+
+        rates = self.rates
+        fields, count, first = len(rates.fields), rates.count, len(self.local)
+        self.constant: list[Any] = []  # of derivatives by all states
+        for k, one in enumerate(rates.derivatives):
+            source = self.sources[k]
+            matrix = self.matrices[k][:, :count]
+            by = [j for j in source.columns if j < fields or first <= j < first + k]
+            linear = _linear(one.argument, rates, k)
+            inner = all(j < fields or self.constant[j - first] is not None for j in by)
+            if not (linear and inner):
+                self.constant.append(None)
+                continue
+            slopes = source.slopes(np.zeros((1, source.width)), np.zeros(len(rates.parameters)))[0]
+            total = csr_array((count, fields * count))
+            for slope, j in zip(slopes, source.columns, strict=True):
+                if j < fields:
+                    total = total + slope * self._of_field(matrix, j)
+                elif first <= j < first + k:
+                    total = total + slope * (matrix @ self.constant[j - first])
+            self.constant.append(total.tocsr())
+        rows, columns, factors, slope, cell = [], [], [], [], []
+        self.rest: list[tuple[int, int, int]] = []  # slopes by derivatives that are not linear
+        for s, (i, j) in enumerate(zip(self.formulas.rows, self.formulas.columns, strict=True)):
+            if fields <= j < first or j >= first + len(rates.derivatives):
+                continue
+            if j < fields:
+                own = np.arange(count)
+                rows.append(i * count + own)
+                columns.append(j * count + own)
+                factors.append(np.ones(count))
+            elif self.constant[j - first] is None:
+                self.rest.append((s, i, j - first))
+                continue
+            else:
+                entries = self.constant[j - first].tocoo()
+                own = entries.row
+                rows.append(i * count + own)
+                columns.append(entries.col)
+                factors.append(entries.data)
+            cell.append(own)
+            slope.append(np.full(len(own), s))
+        states = fields * count
+        row, column, self.factors, self.slope, self.cell = (
+            np.concatenate(one) if one else np.zeros(0, int)
+            for one in (rows, columns, factors, slope, cell)
+        )
+        order = np.lexsort((row, column))
+        row, column = row[order], column[order]
+        self.factors, self.slope, self.cell = (
+            one[order] for one in (self.factors, self.slope, self.cell)
+        )
+        new = np.ones(len(row), bool)
+        new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
+        self.begin = np.flatnonzero(new)
+        self.indices = row[self.begin].astype(np.int32)
+        self.indptr = np.searchsorted(column[self.begin], np.arange(states + 1)).astype(np.int32)
+
+    def _of_field(self, matrix: Any, field: int) -> Any:
+        """A matrix of one field's states as one of all states."""
+        from scipy.sparse import csr_array
+
+        count = self.rates.count
+        return csr_array(
+            (matrix.data, matrix.indices + field * count, matrix.indptr),
+            shape=(count, len(self.rates.fields) * count),
+        )
+
+    def slopes(self, x: Array, values: Mapping[str, float]) -> Any:
+        """The derivatives of the rates by the states, by columns."""
+        from scipy.sparse import csc_array, diags_array, vstack
+
+        rates = self.rates
+        fields, count = len(rates.fields), rates.count
+        points, par = self.points(x, values)
+        slopes = self.formulas.slopes(points[:count], par)
+        data = self.factors * slopes[self.cell, self.slope]
+        summed = np.add.reduceat(data, self.begin) if len(data) else data
+        found = csc_array(
+            (summed, self.indices, self.indptr), shape=(fields * count, fields * count)
+        )
+        if not self.rest:
+            return found
+        moved = self._moved(points, par)
+        more = []
+        for i in range(fields):
+            total = csc_array((count, fields * count))
+            for s, row, k in self.rest:
+                if row == i:
+                    total = total + diags_array(slopes[:, s]) @ moved[k]
+            more.append(total)
+        return (found + vstack(more)).tocsc()
+
+    def _moved(self, points: Array, par: Array) -> list[Any]:
+        """The derivatives of all derivatives by the states, at a point."""
+        from scipy.sparse import csr_array, diags_array
+
+        rates = self.rates
+        fields, count, first = len(rates.fields), rates.count, len(self.local)
+        found: list[Any] = []
+        for k, source in enumerate(self.sources):
+            if self.constant[k] is not None:
+                found.append(self.constant[k])
+                continue
+            matrix = self.matrices[k][:, :count]
+            slopes = source.slopes(points[:count, : first + k], par)
+            total = csr_array((count, fields * count))
+            for s, j in enumerate(source.columns):
+                part = matrix @ diags_array(slopes[:, s])
+                if j < fields:
+                    total = total + self._of_field(part.tocsr(), j)
+                elif first <= j < first + k:
+                    total = total + part @ found[j - first]
+            found.append(total)
+        return found
+
+
+def _linear(argument: Any, rates: GridRates, k: int) -> bool:
+    """Whether the slopes of a formula by fields and earlier derivatives are numbers."""
+    names = {*rates.fields, *(one.name for one in rates.derivatives[:k])}
+    moving = [symbol for symbol in argument.free_symbols if symbol.name in names]
+    return all(argument.diff(symbol).is_number for symbol in moving)
