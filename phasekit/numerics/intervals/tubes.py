@@ -154,14 +154,15 @@ def _tubes_about(system: System, start: Array, end: Array) -> Tubes:
     usable &= ~undefined
     operator = _Operator(system, chord, across, inverse, usable)
     # Where the curve is at the end of a chord is found by itself: that is known far better.
-    tip, held = _held(operator.about(end, np.zeros(len(chord))), 0.0, _floors(end, chord))
+    floors = _floors(end, chord)
+    _, tip, held = _held(operator.about(end, np.zeros(len(chord))), floors, floors)
     floors = _floors(middle, chord)
     beyond = np.fmax(BEYOND, np.linalg.norm(tip, axis=1) / np.linalg.norm(chord, axis=1))
     beyond = np.where(beyond < 1.0, beyond, BEYOND)
     whole = operator.about(middle, 0.5 + beyond)
-    radius, proved = _held(whole, tip + floors, floors)
+    # Zeros of a tube lie in its image: the tube may be wider than where the curve can be.
+    alone, radius, proved = _held(whole, WIDER**3 * (tip + floors), floors)
     proved &= held
-    alone = radius.copy()
     for _ in range(TRIES):
         wider = alone * WIDER
         holds = np.all(whole(wider) < wider, axis=1) & proved
@@ -224,10 +225,11 @@ def _floors(base: Array, chord: Array) -> Array:
 
 
 def _held(
-    image: Callable[[Array], Array], least: Array | float, floor: Array
-) -> tuple[Array, Flags]:
-    """Radii that hold their images, and whether these were found."""
-    radius, proved = np.maximum(least, 0.0 * floor), np.zeros(len(floor), dtype=bool)
+    image: Callable[[Array], Array], least: Array, floor: Array
+) -> tuple[Array, Array, Flags]:
+    """Radii that hold their images, the images, and whether these were found."""
+    radius, proved = least.copy(), np.zeros(len(floor), dtype=bool)
+    found = np.full_like(radius, np.inf)
     for _ in range(TRIES):
         found = image(radius)
         proved = np.all(found < radius, axis=1)
@@ -236,7 +238,7 @@ def _held(
             break
         grows = (finite & ~proved)[:, None]
         radius = np.where(grows, np.maximum(radius, 1.2 * found + floor), radius)
-    return radius, proved
+    return radius, found, proved
 
 
 def _complements(chord: Array) -> Array:

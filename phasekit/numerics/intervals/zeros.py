@@ -223,6 +223,14 @@ def enclosures(system: System, start: Array) -> tuple[Boxes, Flags]:
     return (low, high), found
 
 
+def holds_one(system: System, low: Array, high: Array, middle: Array) -> bool:
+    """Whether a box about a point is proved to hold exactly one zero."""
+    low, high = low[None], high[None]
+    image, defined = _image(system, low, high, np.zeros(1, np.int64), middle[None])
+    inside = np.all((image.low > low) & (image.high < high), axis=1)
+    return bool((inside & image.usable & defined)[0])
+
+
 def _search(
     system: System, whole: Boxes, known: list[_Known], cells: Index | None = None
 ) -> list[Zeros]:
