@@ -243,13 +243,8 @@ class Curve:
     ) -> Point:
         """Newton's method from u, in the plane row.u = target (default: through u)."""
         size, rows, n, m = self.size, self.rows, self.n, self.m
-        w = np.zeros(defining.work_size(self.kind, n, len(self.active)))
-        w[3 * size : 4 * size] = self.scale
-        head = VECTORS * size + NUMBERS
-        if self.aux is not None:
-            w[head : head + n] = self.aux
-        place = head + n
-        w[place : place + size] = u
+        w = self._work(u)
+        place = VECTORS * size + NUMBERS + n
         row = np.zeros(size) if row is None else row
         w[place + size : place + 2 * size] = row
         aim = float(np.dot(row, u)) if target is None else target
@@ -273,6 +268,29 @@ class Curve:
             point, tangent, w[g : g + rows].copy(), w[base + n : base + n + n * m].reshape(n, m),
             int(steps),
         )  # fmt: skip
+
+    def equations_at(self, u: Array) -> tuple[Array, Array]:
+        """The defining system at its unknowns: G and its Jacobian."""
+        size, rows, n, free = self.size, self.rows, self.n, len(self.active)
+        w = self._work(u)
+        with np.errstate(all="ignore"):
+            self._kernel(newton.refine, self.compiled)(
+                *self._functions(sharp=True), self.kind, n, self.par.copy(), self._places, w, 0.0,
+                TIGHT, 0,
+            )  # fmt: skip
+        g, jacobian = defining.places(self.kind, n, free)[7:9]
+        return w[g : g + rows], w[jacobian : jacobian + rows * size].reshape(rows, size)
+
+    def _work(self, u: Array) -> Array:
+        """The work array with scales, l and unknowns in their places."""
+        size, n = self.size, self.n
+        w = np.zeros(defining.work_size(self.kind, n, len(self.active)))
+        w[3 * size : 4 * size] = self.scale
+        head = VECTORS * size + NUMBERS
+        if self.aux is not None:
+            w[head : head + n] = self.aux
+        w[head + n : head + n + size] = u
+        return w
 
     @functools.cached_property
     def _memory(self) -> dict[tuple[Any, ...], Any]:

@@ -207,6 +207,40 @@ class SpecialPoint(Generic[Of]):
         name: str = self.special.name
         return name
 
+    @property
+    def sensitivity(self) -> Any:
+        """Derivatives of the point by all other parameters of the problem.
+
+        The point moves with them: along a fold's curve, say, which `curve` follows. They come of
+        one linear solve with the equations that define the point (see Notes).
+
+        Returns
+        -------
+        xarray.Dataset
+            Over `parameter`, the others: ``d_free`` of the parameters of the branch (`free`),
+            ``d_state`` (`state`), ``d_coefficient`` of those of the normal form (`coefficient`),
+            of periodic orbits ``d_period``; ``reason`` says why a column is NaN.
+            Units are those of coordinates ``free_units``, ``state_units`` over
+            ``parameter_units``; empty where the problem has none.
+
+        Notes
+        -----
+        With G(u, q) = 0 the equations of the point ([Kuznetsov2004] chapter 10), u its unknowns,
+        ``du/dq = -G_u^-1 G_q``. Where G_u is singular, as of points in a family in more parameters,
+        and of branch points that a parameter destroys, there is no derivative, and none is given.
+        Derivatives of formulas are exact; those of coefficients, and the conditions of points of
+        codimension two, are differences of fourth order along that line.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 0.75})
+        >>> fold = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1)).special("LP")[0]
+        >>> round(fold.sensitivity.d_free.sel(parameter="l").item(), 9)  # -x
+        0.5
+        """
+        return onward(f"{self.way}.sensitivity")(self)
+
     def __getitem__(self, name: str) -> float:
         """A state or parameter by name."""
         if name in self.branch.problem_state:

@@ -1,0 +1,244 @@
+"""How special points of equilibria move with all other parameters.
+
+At a point its defining system G(u, q) = 0 is square in its own unknowns u and regular. So
+du/dq = -G_u^-1 G_q: the system of curves in two parameters, with all other parameters free at
+once, gives both parts in one evaluation. Of points of codimension two G has one row more, the
+derivatives of the function of the curve that vanishes there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.derivatives import Derivatives
+from phasekit.bifurcation.continuation.kernels import defining
+from phasekit.bifurcation.continuation.points import fold, pair, period_doubling, torus
+from phasekit.bifurcation.continuation.points.curve_test import CurveTest
+from phasekit.bifurcation.continuation.points.curve_tests import looked_for_on
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special, extended
+from phasekit.bifurcation.continuation.units import force_sizes
+from phasekit.bifurcation.special_points import KINDS
+
+Array = npt.NDArray[np.float64]
+Form = Callable[[Derivatives, Array], Mapping[str, float]]
+
+SINGULAR = 1e-10  # least singular value of a scaled system that is no rounding
+STAYS = 1e-8  # part of its scale by which a branch point that a parameter keeps may be lost
+STEP = 1e-3  # of the scales, in differences along a line
+#: Weights of f(x - 2h), f(x - h), f(x + h), f(x + 2h) in h f'(x), to the fourth order.
+STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Derivatives of a special point by other parameters, one a column.
+
+    Attributes
+    ----------
+    others : tuple of int
+        Places of these parameters.
+    x : ndarray, shape (state, parameter)
+    free : ndarray, shape (free parameter, parameter)
+    form : mapping of str to ndarray
+        Those of the coefficients of the normal form.
+    period : ndarray, optional
+        That of the period of an orbit.
+    reasons : tuple of str
+        Why a column is not known; empty where it is.
+    """
+
+    others: tuple[int, ...]
+    x: Array
+    free: Array
+    form: Mapping[str, Array]
+    reasons: tuple[str, ...]
+    period: Array | None = None
+
+
+def unknown(
+    others: tuple[int, ...], states: int, free: int, form: Mapping[str, float], why: str
+) -> Sensitivity:
+    """Nothing is known."""
+    k = len(others)
+    lost = {name: np.full(k, np.nan) for name in form}
+    return Sensitivity(
+        others, np.full((states, k), np.nan), np.full((free, k), np.nan), lost, (why,) * k
+    )
+
+
+#: Defining systems by the name of the curve of a kind.
+SYSTEMS = {
+    "fold": defining.FOLD, "hopf": defining.HOPF, "branch_point": defining.BRANCH,
+    "period_doubling": defining.FLIP, "torus": defining.TORUS, "event": defining.EVENT,
+}  # fmt: skip
+
+
+def sensitivity(curve: Curve, special: Special) -> Sensitivity:
+    """How a special point of a branch, or of a curve in two parameters, moves."""
+    free = len(curve.active)
+    others = tuple(i for i in range(len(curve.par)) if i not in curve.active)
+    if why := _hindered(curve, special):
+        return unknown(others, curve.n, free, special.normal_form, why)
+    if not others:
+        return unknown(others, curve.n, free, special.normal_form, "")
+    point = _Point(curve, special, others)
+    with np.errstate(all="ignore"):
+        return point.solved()
+
+
+def _hindered(curve: Curve, special: Special) -> str:
+    """Why there is no defining system that is square at a point."""
+    if special.status != CONVERGED:
+        return "the point has not converged"
+    if special.kind == "end":
+        return "an end of a branch has no equation of its own"
+    if len(curve.active) > 2:
+        return "a point of a curve in three parameters"
+    if special.corank > 1:
+        return f"{special.corank} eigenvalues vanish together: a family in more parameters"
+    if curve.kind == defining.EQUILIBRIUM:
+        if KINDS[special.kind].curve not in SYSTEMS:
+            return "two conditions at once on a branch with one parameter"
+        if special.extra is None and special.kind != "event":
+            return f"its equations were not solved: {special.message}"
+    elif curve.kind != defining.EVENT and special.kind == "event":
+        return "events on curves in two parameters have no equations of their own"
+    return ""
+
+
+class _Point:
+    """A point with the equations that define it, in which all parameters are free."""
+
+    def __init__(self, curve: Curve, special: Special, others: tuple[int, ...]) -> None:
+        self.curve, self.special, self.others = curve, special, others
+        self.two = len(curve.active) == 2
+        kind = curve.kind if self.two else SYSTEMS[KINDS[special.kind].curve or ""]
+        extra, aux = (np.zeros(0) if special.extra is None else special.extra), curve.aux
+        if not self.two and kind in (defining.HOPF, defining.TORUS):
+            extra, aux = extra[: curve.n + 1], extra[curve.n + 1 :]
+        values = curve.par[list(others)]
+        size = np.where(values != 0.0, np.abs(values), 1.0)
+        m = curve.m
+        changes = {
+            "active": (*curve.active, *others),
+            "scale": np.concatenate([curve.scale[:m], size]),
+            "period": np.append(curve.period[:m], np.zeros(len(others))),
+            "low": np.append(curve.low[:m], np.full(len(others), -np.inf)),
+            "high": np.append(curve.high[:m], np.full(len(others), np.inf)),
+        }
+        self.u = np.concatenate([special.u[:m], values, extra])
+        made = curve.replace(**changes)
+        if kind in defining.REGULAR:
+            held = curve.held if self.two else self._event()
+            self.made = made.replace(kind=defining.EVENT, held=held)
+        else:
+            self.made = extended(made, kind, self.u, extra, aux)
+        #: Places of the other parameters, and of the unknowns.
+        self.given = np.arange(m, m + len(others))
+        self.own = np.delete(np.arange(self.made.size), self.given)
+
+    def _event(self) -> object:
+        (event,) = (one for one in self.curve.events if one.name == self.special.name)
+        return event
+
+    @property
+    def test(self) -> CurveTest | None:
+        """What vanishes at a point of codimension two."""
+        if not self.two:
+            return None
+        kinds = [one for one in looked_for_on(self.curve) if one.kind == self.special.kind]
+        return kinds[0]
+
+    def solved(self) -> Sensitivity:
+        """One linear solve."""
+        made, special, k = self.made, self.special, len(self.others)
+        _, G = made.equations_at(self.u)
+        if made.kind == defining.BRANCH and len(made.active) == 3:
+            G = np.delete(G, -2, axis=0)  # that the branches meet is no equation here
+        if (test := self.test) is not None:
+            G = np.vstack([G, self._gradient(test)])
+        A, B = G[:, self.own] * made.scale[self.own], G[:, self.given] * made.scale[self.given]
+        rows = np.max(np.abs(A), axis=1, initial=0.0)
+        rows[rows == 0.0] = 1.0
+        A, B = A / rows[:, None], B / rows[:, None]
+        names = [made.field.parameters[i] for i in self.others]
+        values = np.linalg.svd(A, compute_uv=False) if np.isfinite(A).all() else np.zeros(1)
+        if not values[-1] > SINGULAR * values[0]:
+            why = "its defining system is singular there"
+            return unknown(self.others, made.n, len(self.curve.active), special.normal_form, why)
+        slope = np.zeros((made.size, k))
+        slope[self.own] = -np.linalg.solve(A, B) * made.scale[self.own][:, None]
+        slope[self.given] = np.diag(made.scale[self.given])
+        reasons = [self._lost(slope[:, i], name) for i, name in enumerate(names)]
+        form = {name: np.full(k, np.nan) for name in special.normal_form}
+        for i in range(k):
+            if not reasons[i]:
+                for name, value in self._form(slope[:, i]).items():
+                    form[name][i] = value / made.scale[self.given[i]]
+        slope = slope / made.scale[self.given]
+        known = np.array([not why for why in reasons])
+        slope = np.where(known, slope, np.nan)
+        m, n = self.curve.m, made.n
+        return Sensitivity(self.others, slope[:n], slope[n:m], form, tuple(reasons))
+
+    def _lost(self, slope: Array, name: str) -> str:
+        """Why a point does not move with a parameter, which destroys it."""
+        if not np.isfinite(slope).all():
+            return f"f has no derivative by {name} there"
+        if self.made.kind == defining.BRANCH:
+            w = self.u[self.made.m : self.made.m + self.made.n]
+            sizes = force_sizes(self.curve, self.special.u)
+            # b of f + b w = 0, in units of f.
+            if abs(slope[-1]) * float(np.max(np.abs(w) / sizes)) > STAYS:
+                return f"{name} destroys the branch point: without a symmetry the branches part"
+        return ""
+
+    def _gradient(self, test: CurveTest) -> Array:
+        """Derivatives of a function of the curve by all unknowns, by differences."""
+        made, u = self.made, self.u
+        steps = STEP * np.maximum(made.scale, np.abs(u))
+
+        def value(at: Array) -> float:
+            return float(test.values(made, at[None], made.evaluate(at)[1][None])[0])
+
+        out = np.zeros(made.size)
+        for j in range(made.size):
+            step = np.zeros(made.size)
+            step[j] = steps[j]
+            out[j] = sum(c * value(u + s * step) for s, c in STENCIL) / steps[j]
+        return out
+
+    def _form(self, slope: Array) -> dict[str, float]:
+        """Derivatives of the coefficients of the normal form along a line, by differences."""
+        form = self._form_at()
+        if form is None:
+            return {}
+        made = self.made
+        length = float(np.max(np.abs(slope[: made.m]) / made.scale[: made.m]))
+        step = STEP / length
+        out = dict.fromkeys(self.special.normal_form, 0.0)
+        for s, weight in STENCIL:
+            at = self.u + s * step * slope
+            found = form(Derivatives(made, at), at)
+            for name in out:
+                out[name] += weight * found.get(name, np.nan) / step
+        return out
+
+    def _form_at(self) -> Form | None:
+        """The normal form at a point beside."""
+        if (test := self.test) is not None:
+            return lambda d, u: test.form(d)[0]
+        return _FORMS.get(self.special.kind)
+
+
+_FORMS: dict[str, Form] = {
+    "fold": lambda d, u: fold.normal_form(d),
+    "hopf": lambda d, u: pair.normal_form(d, float(np.sqrt(u[-1]))),
+    "period_doubling": lambda d, u: period_doubling.normal_form(d),
+    "torus": lambda d, u: torus.normal_form(d, float(np.arccos(1.0 - 0.5 * u[-1]))),
+}

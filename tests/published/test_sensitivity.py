@@ -1,0 +1,170 @@
+"""Derivatives of special points against differences of solutions in 50 digits."""
+
+from __future__ import annotations
+
+import mpmath as mp
+import numpy as np
+import pytest
+import sympy as sp
+from published import compare, reference
+from published.systems import SYSTEMS
+
+import phasekit as pk
+
+AB = pk.Problem(
+    ["-x + p1*(1 - x)*exp(y)", "-y + p1*p2*(1 - x)*exp(y) - p3*y"],
+    ("x", "y"), {"p1": 0.0, "p2": 14.0, "p3": 2.0},
+)  # fmt: skip
+CO = pk.Problem(
+    [
+        "2*q1*(1 - x - y - s)^2 - 2*q5*x^2 - q3*x*y",
+        "q2*(1 - x - y - s) - q6*y - q3*x*y",
+        "q4*(1 - x - y - s) - k*q4*s",
+    ],
+    ("x", "y", "s"),
+    {"q1": 2.5, "q2": 1.0, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4},
+)
+
+
+def moved(f, states, values, kind, u, free, name):
+    """Differences of (x, free parameter, frequency) by a parameter, solved for in 50 digits."""
+    symbols = {one: sp.Symbol(one) for one in (*states, *values)}
+    x = [symbols[one] for one in states]
+    rates = sp.Matrix(
+        [sp.sympify(one.replace("^", "**"), locals=symbols, rational=True) for one in f]
+    )
+    J = rates.jacobian(x)
+    given = [symbols[one] for one in values if one != free]
+    both = sp.lambdify([*x, symbols[free], *given], [list(rates), J], "mpmath")
+
+    def solution(value):
+        par = [mp.mpf(values[one]) if one != name else value for one in values if one != free]
+
+        def system(*u):
+            rate, matrix = both(*u, *par)
+            c = reference.coefficients(mp.matrix(matrix))
+            return [*rate, c[-1] if kind == "fold" else reference.hurwitz(c)]
+
+        root = mp.findroot(system, [mp.mpf(one) for one in u], tol=1e-80)
+        found = list(root)
+        if kind == "hopf":
+            lam = mp.eig(mp.matrix(both(*found, *par)[1]), left=False, right=False)
+            found.append(max((mp.im(one) for one in lam), key=abs))
+            found[-1] = abs(found[-1])
+        return found
+
+    with mp.workdps(50):
+        at, h = mp.mpf(values[name]), mp.mpf(10) ** -15
+        pair = zip(solution(at + h), solution(at - h), strict=True)
+        return np.array([float((a - b) / (2 * h)) for a, b in pair])
+
+
+def compared(problem, f, point):
+    """Largest difference of the derivatives of a point from those in 50 digits."""
+    found, worst = point.sensitivity, 0.0
+    free = point.branch.parameter
+    for name in found.parameter.values:
+        assert found.reason.sel(parameter=name).item() == ""
+        wanted = moved(
+            f,
+            problem.state,
+            dict(point.parameters),
+            point.kind,
+            [*point.x, point[free]],
+            free,
+            name,
+        )
+        got = found.sel(parameter=name)
+        have = [*got.d_state.values, got.d_free.item()]
+        if point.kind == "hopf":
+            have.append(got.d_coefficient.sel(coefficient="omega").item())
+        worst = max(worst, float(np.max(np.abs(have - wanted) / np.maximum(1.0, np.abs(wanted)))))
+    return worst
+
+
+NAMES = ("FitzHugh-Nagumo", "Lorenz-84", "Bazykin", "Selkov", "Roessler")
+
+
+@pytest.mark.parametrize("name", [*NAMES, pytest.param("Morris-Lecar", marks=pytest.mark.slow)])
+def test_published_points(name):
+    system = SYSTEMS[name]
+    branch = compare.follow(system)
+    points = [*branch.special("fold"), *branch.special("hopf")]
+    assert points
+    assert max(compared(branch.problem, system.equations, one) for one in points) < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("problem", "free", "x0", "span"),
+    [(AB, "p1", [0.0, 0.0], (0.0, 0.4)), (CO, "q2", [0.001, 0.001, 0.7], (0.5, 2.0))],
+)
+def test_published_problems(problem, free, x0, span):
+    branch = pk.continuation(problem, free, x0=x0, span=span)
+    points = [*branch.special("fold"), *branch.special("hopf")]
+    assert points
+    f = [str(one) for one in problem.f]
+    assert max(compared(problem, f, one) for one in points) < 1e-8
+
+
+def test_cusp_and_its_folds_in_closed_form():
+    """Folds of mu + l x - x^3 at mu = -2 x^3, l = 3 x^2; a = -3 x, b = 1."""
+    cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 0.75})
+    for fold in pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1)).special("LP"):
+        found, x = fold.sensitivity.sel(parameter="l"), fold["x"]
+        np.testing.assert_allclose(found.d_free, [-x], rtol=1e-12)
+        np.testing.assert_allclose(found.d_state, [1.0 / (6.0 * x)], rtol=1e-12)
+        np.testing.assert_allclose(found.d_coefficient, [-0.5 / x, 0.0], atol=1e-10)
+
+
+def test_bogdanov_takens_in_closed_form():
+    """Folds of x' = y, y' = b1 + b2 x + x^2 - x y at b1 = b2^2/4; Hopf points at b1 = 0, x = 0."""
+    problem = pk.Problem(["y", "b1 + b2*x + x**2 - x*y"], ("x", "y"), {"b1": -1.0, "b2": -0.8})
+    branch = pk.continuation(problem, "b1", x0=[-0.67, 0.0], span=(-1, 1))
+    (fold,), (hopf,) = branch.special("LP"), branch.special("H")
+    found = fold.sensitivity.sel(parameter="b2")
+    np.testing.assert_allclose(found.d_free, [-0.4], rtol=1e-12)
+    np.testing.assert_allclose(found.d_state, [-0.5, 0.0], atol=1e-13)
+    found = hopf.sensitivity.sel(parameter="b2")
+    np.testing.assert_allclose([*found.d_free, *found.d_state], 0.0, atol=1e-13)
+    omega = found.d_coefficient.sel(coefficient="omega")
+    np.testing.assert_allclose(omega, -0.5 / np.sqrt(0.8), rtol=1e-10)
+
+
+def test_branch_point_lost_and_kept():
+    problem = pk.Problem("l*x - x**3 + c*(x - l) + e", "x", {"l": -1.0, "c": 0.0, "e": 0.0})
+    (point,) = pk.continuation(problem, "l", x0=[0.0], span=(-1, 1)).special("BP")
+    found = point.sensitivity
+    assert "destroys" in found.reason.sel(parameter="e").item()
+    assert np.isnan(found.d_free.sel(parameter="e"))
+    even = pk.Problem("(l + c)*x - x**3", "x", {"l": -1.0, "c": 0.0})
+    (point,) = pk.continuation(even, "l", x0=[0.0], span=(-1, 1)).special("BP")
+    assert point.sensitivity.d_free.item() == pytest.approx(-1.0, abs=1e-12)
+
+
+def test_points_of_codimension_two():
+    """Cusp of l + m x + s x^2 - x^3 moved by s: x = s/3, m = -s^2/3, l = s^3/27."""
+    problem = pk.Problem("l + m*x + s*x**2 - x**3", "x", {"l": -1.0, "m": 1.0, "s": 0.3})
+    fold = pk.continuation(problem, "l", x0=[-1.0], span=(-2, 2)).special("LP")[0]
+    (point,) = fold.curve("m", (-1.0, 2.0)).special("CP")
+    found = point.sensitivity.sel(parameter="s")
+    np.testing.assert_allclose(found.d_state, [1.0 / 3.0], rtol=1e-9)
+    np.testing.assert_allclose(found.d_free, [0.01, -0.2], rtol=1e-9)
+
+
+def test_unknown_points_say_why():
+    cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 0.75})
+    branch = pk.continuation(cusp, "mu", x0=[-1.3], span=(-1, 1))
+    found = branch.special("EP")[0].sensitivity
+    assert "no equation" in found.reason.item()
+    assert np.isnan(found.d_state).all()
+
+
+def test_period_doubling_of_a_map():
+    """The map r x (1 - x) + s doubles where r (1 - 2 x) = -1."""
+    logistic = pk.Problem("r*x*(1 - x) + s", "x", {"r": 2.0, "s": 0.0}, map=True)
+    (point,) = pk.continuation(logistic, "r", x0=[0.5], span=(1.5, 3.5)).special("PD")
+    found = point.sensitivity.sel(parameter="s")
+    # F = r x (1 - x) + s - x, G = r (1 - 2 x) + 1 at r = 3, x = 2/3.
+    J = np.array([[-2.0, 2.0 / 9.0], [-6.0, -1.0 / 3.0]])
+    wanted = -np.linalg.solve(J, [1.0, 0.0])
+    np.testing.assert_allclose([*found.d_state, *found.d_free], wanted, rtol=1e-12)
