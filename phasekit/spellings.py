@@ -65,7 +65,7 @@ NAMES: tuple[tuple[str, str], ...] = (
         "pseudo_arclength track",
     ),
     ("continuation(...).special('BP')", "branch_point branch_points"),
-    ("continuation(...).special('HB')", "hopf hopf_point hopf_points"),
+    ("continuation(...).special('H')", "hopf hopf_point hopf_points"),
     (
         "continuation(...).special('LP')",
         "fold fold_point fold_points folds limit_point saddle_node",

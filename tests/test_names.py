@@ -230,3 +230,13 @@ def test_functions_take_few_parameters():
                 name = f"{owners[node].name}.{node.name}" if node in owners else node.name
                 wide.add(f"kernels: {name}" if compiled else name)
     assert wide == WIDE
+
+
+def test_special_points_that_are_recommended_exist():
+    labels = re.findall(r"special\('(\w+)'\)", "\n".join(target for target, _ in NAMES))
+    assert len(labels) > 2
+    branch = pk.continuation(PROBLEM, "mu", x0=[1.0], span=(-1.0, 2.0))
+    for label in labels:
+        branch.special(label)
+    with pytest.raises(pk.ParameterError, match="did you mean 'hopf'"):
+        branch.special("HB")

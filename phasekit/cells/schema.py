@@ -6,6 +6,7 @@ run: two identical computations make identical Datasets.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -20,6 +21,9 @@ from phasekit.systems.identity import MODEL, SCHEMA, SCHEMA_VERSION, versions
 from phasekit.systems.system import System
 from phasekit.table.quantities import ROWS
 from phasekit.table.row import Quantity
+
+#: States that are places and rates.
+PLACES = ("state_phi", "state_dphi")
 
 
 def dataset_attrs(system: System) -> dict[str, str]:
@@ -54,16 +58,16 @@ def input_attrs(system: System, name: str) -> dict[str, str]:
         return {"long_name": f"{own} at the start", "units": law.units.get(own, "1")}
     if name == "time" and system.rung is Map:
         return {"long_name": "number of iterations", "units": "1"}
-    if name in STATES:
-        return {"long_name": STATES[name][1], "units": STATES[name][0]}
-    return {}
+    if name not in STATES:
+        return {}
+    units, words = STATES[name]
+    if name in PLACES and system.unit_of(name) is None:  # of a coordinate of any kind
+        return {"long_name": words.replace("angular ", "").replace("angle", "coordinate")}
+    return {"long_name": words, "units": units}
 
 
-#: Places and rates, which a system that names its coordinate calls by that name.
-_PLACES = (
-    *("phi", "phi_min", "phi_max", "saddle_phi", "turning_phi", "motion_phi", "motion_dphi"),
-    *("state_phi", "state_dphi"),
-)
+#: Places and rates, which a system that names its coordinate calls by that name; not their errors.
+_PLACE = re.compile(r"(?<![^\W_])(d*)phi(?![^\W_])(?!\w*_(?:error|kind)$)")
 
 
 def own_names(coordinate: str, variables: Mapping[str, xr.Variable]) -> dict[str, xr.Variable]:
@@ -74,7 +78,9 @@ def own_names(coordinate: str, variables: Mapping[str, xr.Variable]) -> dict[str
     if coordinate == "phi":
         return {}
     named = {
-        name.replace("phi", coordinate): variables[name] for name in _PLACES if name in variables
+        _PLACE.sub(rf"\g<1>{coordinate}", name): one
+        for name, one in variables.items()
+        if _PLACE.search(name)
     }
     taken = {dim for one in variables.values() for dim in one.dims} | variables.keys()
     return {name: one.copy(deep=False) for name, one in named.items() if name not in taken}

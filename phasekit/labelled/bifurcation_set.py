@@ -10,7 +10,7 @@ import xarray as xr
 from phasekit.bifurcation.along import Loci, loci_in
 from phasekit.bifurcation.curves import Cusp
 from phasekit.cells.request import with_words
-from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.atlas import limits, resting, tell_missing
@@ -183,6 +183,7 @@ def _dataset(system: System, names: tuple[str, str], box: Any, found: Loci) -> x
             coords[name] = variable((), value, input_attrs(system, name))
     ends = {"xlim": list(box[0]), "ylim": list(box[1])}
     attrs = {**dataset_attrs(system), "x": x, "y": y, **ends}
+    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
     return xr.Dataset(data, coords=coords, attrs=attrs)
 
 

@@ -15,7 +15,7 @@ from phasekit.bifurcation.exact.critical import critical_reduced
 from phasekit.bifurcation.exact.fold_values import fold_values
 from phasekit.cells.evaluate import evaluate
 from phasekit.cells.request import with_words
-from phasekit.cells.schema import dataset_attrs, input_attrs
+from phasekit.cells.schema import dataset_attrs, input_attrs, own_names
 from phasekit.errors import MergerKind
 from phasekit.labelled.atlas import limits, resting, tell_missing
 from phasekit.labels.arguments import FloatArray, bad, call_checked, unknown
@@ -175,6 +175,7 @@ def _in_span(system: System, parameter: str, span: Any) -> xr.Dataset:
     for name, given in grid.inputs.items():
         if name not in coords:
             coords[name] = variable(map(str, given.dims), given.data, input_attrs(system, name))
+    coords |= own_names(getattr(system, "coordinate", "phi"), {**data, **coords})
     return xr.Dataset(data, coords, dataset_attrs(system))
 
 

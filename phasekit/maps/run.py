@@ -251,7 +251,7 @@ def _say_damaged(job: Job) -> None:
         warnings.warn(
             f"store: {job.place.name} is damaged: {describe(job.damaged, job.plan.sizes)}; the "
             f"damaged tiles are computed again",
-            stacklevel=4,
+            stacklevel=5,
         )
 
 

@@ -148,7 +148,7 @@ def sweep(
         options = StoreOptions.from_request(
             request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
-        warn_of_invalid(request.system.declared, request.system.parameters)
+        warn_of_invalid(request.system.declared, request.system.parameters, stacklevel=3)
         sweep_into(place, request, options, progress)
         ds = open_map(store)
         _warn_of_incomplete(system, ds)
@@ -163,7 +163,7 @@ def sweep(
         dtypes = check_dtypes(dtype, rows)
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
     request = _asked(system, axes, axes_by_name, rows, table)
-    warn_of_invalid(request.system.declared, request.system.parameters)
+    warn_of_invalid(request.system.declared, request.system.parameters, stacklevel=3)
     ds = _computed(request, progress)
     _warn_of_incomplete(system, ds)
     if target is not None:
@@ -183,7 +183,7 @@ def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
             f"equilibria: it is not proved that there are no others in {number} of {open_.size} "
             "systems; there `complete` is False",
             RuntimeWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 

@@ -63,3 +63,74 @@ def test_states_of_equilibria_have_columns_by_their_names():
         n, p = table.loc[m][["n", "p"]].to_numpy().T
         np.testing.assert_allclose(n, [0.0, 0.1, m, 1.0], atol=1e-12)
         np.testing.assert_allclose(p, [0.0, 0.0, (m - 0.1) * (1 - m), 0.0], atol=1e-12)
+
+
+def test_eigenvalues_and_the_period_of_small_oscillations_have_columns():
+    lorenz = pk.Problem(
+        {"x": "s*(y - x)", "y": "r*x - y - x*z", "z": "x*y - b*z"},
+        parameters={"s": 10.0, "r": [10.0, 28.0], "b": 8 / 3},
+        window={"x": (-25, 25), "y": (-30, 30), "z": (-1, 50)},
+    )
+    for ds in (pk.equilibria(lorenz), pk.sweep(lorenz, r=[10.0, 28.0], of="equilibria")):
+        table = ds.phasekit.table()
+        assert len(table) == 6
+        for (r, _), row in table.iterrows():
+            x, y, z = row[["x", "y", "z"]]
+            jacobian = np.array([[-10, 10, 0], [r - z, -1, -x], [y, x, -8 / 3]])
+            wanted = np.linalg.eigvals(jacobian)
+            got = row[[f"eigenvalue {i}" for i in (1, 2, 3)]].to_numpy(complex)
+            assert np.allclose(np.sort_complex(got), np.sort_complex(wanted), atol=1e-9)
+            turning = wanted[wanted.imag > 0]
+            assert np.allclose(row["small_period"], 2 * np.pi / turning.imag, rtol=1e-9)
+            assert np.isnan(row["small_period"]) == (turning.size == 0)
+    rotor = pk.equilibria(SYSTEM).phasekit.table()
+    at_rest = pk.orbits(SYSTEM, rotor["phi (rad)"].to_numpy(), 0.0).period
+    centers = (rotor["kind"] == "center").to_numpy()
+    np.testing.assert_allclose(rotor["small_period (s)"][centers], at_rest[centers], rtol=1e-12)
+    assert rotor["small_period (s)"][~centers].isna().all()
+
+
+def test_a_coordinate_of_its_own_name_is_not_called_phi():
+    well = pk.Potential("x^4/4 - k*x^2/2 + h*x", "x", {"k": 1.0, "h": 0.0})
+    results = [
+        pk.equilibria(well),
+        pk.separatrices(well),
+        pk.orbits(well, [0.1, 0.2], 0.0),
+        pk.flow(well, 0.1, 0.0, [0.0, 1.0]),
+        pk.branches(well, "k", (-1.0, 1.0)),
+        pk.critical(well, "k", span=(-1.0, 1.0)),
+        pk.quasi_static(well, k=[1.0, 0.5]),
+        pk.bifurcation_set(well, "h", "k", xlim=(-1, 1), ylim=(-1, 1)),
+    ]
+    for ds in results:
+        table = ds.phasekit.table()
+        assert len(table), ds
+        assert not [name for name in table if "phi" in name]
+        for name in map(str, ds.data_vars):
+            if "phi" in name and not name.endswith(("_error", "_kind")):
+                twin = ds[name.replace("phi", "x")]
+                np.testing.assert_array_equal(twin, ds[name])
+    assert {"x", "x_error"} <= set(results[0].phasekit.table())
+    assert "critical_fold_x" in results[5].phasekit.table()
+    assert "units" not in results[2].state_x.attrs
+
+
+def test_points_of_branches_have_one_row_each():
+    hopf = pk.Problem(
+        {"x": "m*x - y - x*(x^2 + y^2)", "y": "x + m*y - y*(x^2 + y^2)"}, parameters={"m": -0.5}
+    )
+    branch = pk.continuation(hopf, "m", x0=[0.0, 0.0], span=(-1.0, 1.0))
+    cycles = branch.special("H")[0].switch()
+    for one in (branch, cycles):
+        table = one.points.phasekit.table()
+        assert len(table) == one.points.sizes["point"]
+        np.testing.assert_array_equal(table["m"], one.points.m)
+    np.testing.assert_array_equal(table["multiplier 2"], cycles.points.multiplier[:, 1])
+    assert len(branch.to_dataset().phasekit.table()) == len(branch.special_points)
+
+
+def test_dims_without_rows_come_last():
+    """No jump happens: the steps are shown."""
+    table = pk.quasi_static(pk.Coefficients(2.0, 1.0, 0.0), B=[1.0, 0.9]).phasekit.table()
+    assert table.index.name == "step"
+    assert len(table) == 2

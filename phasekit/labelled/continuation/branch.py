@@ -63,6 +63,8 @@ _SYNONYMS = {
     "saddle_node": "fold",
     "turning_point": "fold",
     "andronov_hopf": "hopf",
+    "hb": "hopf",
+    "sn": "fold",
     "flip": "period_doubling",
     "neimark_sacker": "torus",
     "bautin": "generalized_hopf",
