@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, ClassVar, NoReturn, Self
 
@@ -19,6 +19,7 @@ from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
 from phasekit.laws.ladder import Conservative, Flow, Law, Map, Routhian
+from phasekit.systems.blocks import Block, blocks_of, coordinates_of, is_blocks, states_of
 from phasekit.systems.grid import axes_of
 from phasekit.systems.grid_rates import GridSlopes, rates_on_grid
 from phasekit.systems.moving_problem import moving_formulas, moving_words
@@ -37,6 +38,7 @@ from phasekit.systems.problem_parts import (
     observables_of,
     problem_of_dataset,
     refuse_arrays,
+    refuse_of_fields,
     refuse_of_maps,
     start_of,
     window_of,
@@ -62,14 +64,20 @@ class Problem(ProblemSources, System):
         ``numba.njit`` is stepped in compiled code. Formulas (strings in Python's syntax, or sympy
         expressions), one a state or by its name, are turned into machine code, with exact
         derivatives.
-    state : str or sequence of str, optional
-        Names of the states; of one state the name alone. Formulas by name need none.
+    state : str, sequence of str, int, or sequence of (str, int), optional
+        Names of the states; of one state the name alone. Formulas by name need none. Of many
+        states of a function their number, or names of fields with the number of states of each,
+        which come one after the other: ``[("u", 5000), ("v", 5000)]``. Branches are then arrays
+        over the places of the states, and derivatives are sparse matrices.
     parameters : mapping of str to float, 1-D array_like or xarray.DataArray, optional
         The parameters and their values. Arrays span the cells of maps and motions, as in other
         systems; what follows one system, as `continuation` does, takes numbers.
-    jac : callable, optional
+    jac : callable, sparse matrix or LinearOperator, optional
         ``jac(x, **parameters)``, the matrix of derivatives of f by x, for a Python function.
-        Without it derivatives are central differences.
+        Without it derivatives are central differences. Of fields of states it returns a sparse
+        matrix, or is one: of numbers if f is linear in x, or of booleans that say which entries
+        are not zero, so that few differences take them all. A LinearOperator serves up to 2,000
+        states.
     periods : mapping of str to float, optional
         States that are angles, with their periods: points that differ by a period are the same.
     time : str, optional
@@ -104,6 +112,9 @@ class Problem(ProblemSources, System):
         What `pk.grid` made: f then maps fields to formulas that may hold the coordinates and the
         derivatives ``lap(u)``, ``dx(u)`` and ``dxx(u)`` along an axis x, of fields, of formulas and
         of derivatives. Beyond an end where fields have a value inner derivatives are 0.
+    coords : mapping of str to 1-D array_like or xarray.DataArray, optional
+        Coordinates of the places of fields of states, by dim: a field lies on the dim with as many
+        values as it has states, or on all dims if it has as many as their product.
 
     Raises
     ------
@@ -141,8 +152,9 @@ class Problem(ProblemSources, System):
     """
 
     __slots__ = (
-        "_field", "_own", "_values", "conservative", "f", "jac", "map", "noise", "observables",
-        "period", "periods", "start", "state", "system", "time", "times", "window", "words",
+        "_field", "_own", "_values", "blocks", "conservative", "coords", "f", "jac", "map", "noise",
+        "observables", "period", "periods", "start", "state", "system", "time", "times", "window",
+        "words",
     )  # fmt: skip
 
     #: Whether there are conditions at both ends of a stretch of time.
@@ -151,8 +163,10 @@ class Problem(ProblemSources, System):
     declared: ClassVar[Any] = OfInstance(declared_of, ())
 
     f: Any
-    jac: Callable[..., Any] | None
+    jac: Any
     state: tuple[str, ...]
+    blocks: tuple[Block, ...]  # fields of states; none where states have names
+    coords: Mapping[str, Any]  # coordinates of their places
     window: Mapping[str, tuple[float, float]]
     start: Mapping[str, float]
     observables: Mapping[str, Any]
@@ -173,9 +187,9 @@ class Problem(ProblemSources, System):
     def __init__(
         self,
         f: Any,
-        state: str | Sequence[str] | None = None,
+        state: str | Sequence[str] | int | Sequence[tuple[str, int]] | None = None,
         parameters: Mapping[str, Any] | None = None,
-        jac: Callable[..., Any] | None = None,
+        jac: Any = None,
         *,
         periods: Mapping[str, float] | None = None,
         time: str | None = None,
@@ -189,6 +203,7 @@ class Problem(ProblemSources, System):
         observables: Mapping[str, Any] | None = None,
         noise: Mapping[str, Any] | None = None,
         grid: Any = None,
+        coords: Mapping[str, Any] | None = None,
     ) -> None:
         if grid is not None:
             axes = axes_of(grid)
@@ -199,6 +214,13 @@ class Problem(ProblemSources, System):
             f = rates_on_grid(f, axes, names, definitions, functions)
             state, jac = f.states, GridSlopes(f)
             definitions = functions = None
+        places = coordinates_of(coords)
+        blocks = blocks_of(state, places) if is_blocks(state) else ()
+        if places and not blocks:
+            raise bad("coords", list(places), "None beside states that have names")
+        if blocks:
+            refuse_of_fields(conservative=conservative, map=map, time=time, noise=noise)
+            state = states_of(blocks)
         if state is None:
             if not isinstance(f, Mapping):
                 raise bad("state", None, "the names of the states, beside an f that has no names")
@@ -206,9 +228,10 @@ class Problem(ProblemSources, System):
         if isinstance(state, Mapping):
             raise bad("state", state, "names", "values of parameters are given as parameters={...}")
         states = names_of("state", (state,) if isinstance(state, str) else state)
+        named = (*states, *(block.name for block in blocks), *places)
         values = arrays_of("parameters", {} if parameters is None else parameters)
         for name in values:
-            if name in states:
+            if name in named:
                 raise bad("parameters", list(values), f"names that are no states; {name!r} is one")
         angles = angles_of(periods, states)
         flag("conservative", conservative)
@@ -216,7 +239,7 @@ class Problem(ProblemSources, System):
         refuse_of_maps(
             map, conservative=conservative or None, time=time, period=period, noise=noise or None
         )
-        if jac is not None and not callable(jac):
+        if jac is not None and not callable(jac) and not blocks:
             raise bad("jac", jac, "a function jac(x, **parameters), or None")
         if conservative and len(states) > 1 and len(states) % 2:
             raise bad("conservative", True, "one state (the force) or pairs of states")
@@ -228,6 +251,8 @@ class Problem(ProblemSources, System):
         self._set("time", time)
         self._set("period", clock)
         self._set("state", states)
+        self._set("blocks", blocks)
+        self._set("coords", MappingProxyType(places))
         self._set("_values", values)
         self._set("periods", MappingProxyType(angles))
         self._set("window", MappingProxyType(window_of("window", window, states)))
@@ -239,7 +264,9 @@ class Problem(ProblemSources, System):
         self._set("system", None)
         self._set("words", MappingProxyType({}))
         names = (*values, *self._times())
-        own, kept = make_field(f, jac, states, names, definitions=definitions, functions=functions)
+        own, kept = make_field(
+            f, jac, states, names, definitions=definitions, functions=functions, sparse=bool(blocks)
+        )
         field = make_field(kept, jac, states, names, discrete=True)[0] if map else own
         self._set("f", kept)
         self._set("_field", field)
@@ -354,12 +381,14 @@ class Problem(ProblemSources, System):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles are made from the arguments; f must allow it, as a lambda does not."""
-        arguments = (self.f, self.state, dict(self.parameters), self.jac, dict(self.periods))
+        state = [(block.name, block.size) for block in self.blocks] or self.state
+        arguments = (self.f, state, dict(self.parameters), self.jac, dict(self.periods))
         more = {name: getattr(self, name) for name in ("conservative", "time", "period", "map")}
         more |= {
             name: dict(getattr(self, name)) for name in ("window", "start", "observables", "noise")
         }
         more["times"] = self.times
+        more["coords"] = dict(self.coords) or None
         words = {name: dict(one) for name, one in self.words.items()}
         return _restored, (type(self), *arguments, more, self.system, words)
 
@@ -433,7 +462,8 @@ class Problem(ProblemSources, System):
         'm s-1'
         """
         copy = self.replace()
-        copy._set("words", words_checked(words, (*self.state, *self.parameters)))
+        names = (*self.state, *(block.name for block in self.blocks), *self.parameters)
+        copy._set("words", words_checked(words, names))
         return copy
 
     def __call__(self, x: npt.ArrayLike, **changes: float) -> FloatArray:

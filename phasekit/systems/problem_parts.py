@@ -14,6 +14,12 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.code_fields import CompiledField, PythonField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField, refuse_uncompiled
+from phasekit.bifurcation.continuation.large.field import (
+    DENSE,
+    SparseField,
+    as_columns,
+    pattern_of,
+)
 from phasekit.errors import ParameterError
 from phasekit.labels.arguments import Value, bad, brief, number, numeric, pair, unknown
 from phasekit.laws.formulas import (
@@ -288,6 +294,13 @@ def refuse_of_maps(discrete: bool, **given: Any) -> None:
             raise bad(name, value, "nothing with map=True: a map has no time and no energy")
 
 
+def refuse_of_fields(**given: Any) -> None:
+    """Refuse what is not answered of fields of states."""
+    for name, value in given.items():
+        if value:
+            raise bad(name, value, "nothing with a number of states: give them names, or leave it")
+
+
 def shorthands(
     definitions: Any, functions: Any, symbols: Mapping[str, Any], declare: str
 ) -> dict[str, Any]:
@@ -345,13 +358,19 @@ def expressions_of(
 
 
 def make_field(
-    f: Any, jac: Callable[..., Any] | None, states: tuple[str, ...], names: tuple[str, ...],
+    f: Any, jac: Any, states: tuple[str, ...], names: tuple[str, ...],
     *, discrete: bool = False, definitions: Any = None, functions: Any = None,
+    sparse: bool = False,
 ) -> tuple[Field, Any]:  # fmt: skip
     """The right-hand side in the form that the stepping code takes, and f as it is kept.
 
     Of a map the field is f(x) - x, whose zeros are the fixed points.
     """
+    if sparse:
+        for argument, value in (("definitions", definitions), ("functions", functions)):
+            if value is not None:
+                raise bad(argument, value, "None beside an f that is no formula")
+        return sparse_field(f, jac, states, names), f
     if isinstance(f, Mapping):
         for name in f:
             if name not in states:
@@ -394,6 +413,25 @@ def make_field(
     if jac is not None:
         check_call("jac", jac, names)
     return PythonField(f, jac, states, names, less=discrete), f
+
+
+def sparse_field(f: Any, jac: Any, states: tuple[str, ...], names: tuple[str, ...]) -> SparseField:
+    """A right-hand side of fields of states, its derivatives checked as far as they can be now."""
+    n = len(states)
+    if not callable(f):
+        raise bad("f", f, "a function f(x, **parameters) of all states in x")
+    check_call("f", f, names)
+    if jac is None and n > DENSE:
+        raise bad(
+            "jac", None,
+            f"of more than {DENSE} states a sparse matrix: a function that returns one, or a "
+            "pattern of booleans that says which derivatives are not zero",
+        )  # fmt: skip
+    if callable(jac) and not hasattr(jac, "matmat"):
+        check_call("jac", jac, names)
+    elif jac is not None and pattern_of(jac, n) is None:
+        as_columns("jac", jac, n)
+    return SparseField(f, jac, states, names)
 
 
 def check_call(argument: str, function: Any, names: Sequence[str]) -> None:

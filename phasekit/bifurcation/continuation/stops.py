@@ -60,24 +60,26 @@ def track_stop(curve: Any, reason: int, which: int, w: Array) -> Stop:
     if reason == trace.CLOSED:
         return Stop("closed", f"the curve closed on its start at {where}")
     if reason == trace.STUCK:
-        step = f"min_step = {curve.options.min_step:g}"
-        words = {
-            newton.DIVERGED: f"Newton's method converged for no step longer than {step}",
-            newton.SINGULAR: f"the derivatives of f are singular beyond, for every step "
-            f"longer than {step}",
-            TURNS: f"the curve turns by more than max_turn = {curve.options.max_turn:g} "
-            f"within {step}",
-            CROSSES: f"branches cross or pass each other within {step}",
-        }
         why = not_isolated(curve, w[: curve.m], where)
-        if why:
-            return Stop("stuck", why)
-        return Stop("stuck", f"{words[which]} at {where}{_differences(curve)}")
+        return Stop("stuck", why) if why else stuck(curve, which, where)
     if reason == trace.NOT_FINITE:
         return Stop("not_finite", f"f is not finite beyond {where}{curve.field.raised}")
     if reason == trace.INTERRUPTED:
         return Stop("interrupted", f"it was interrupted behind {where}")
     return Stop("max_points", f"max_points were computed, the last at {where}")
+
+
+def stuck(curve: Any, which: int, where: str) -> Stop:
+    """The end of a curve where no step stands, and why the last one was refused."""
+    step = f"min_step = {curve.options.min_step:g}"
+    words = {
+        newton.DIVERGED: f"Newton's method converged for no step longer than {step}",
+        newton.SINGULAR: f"the derivatives of f are singular beyond, for every step "
+        f"longer than {step}",
+        TURNS: f"the curve turns by more than max_turn = {curve.options.max_turn:g} within {step}",
+        CROSSES: f"branches cross or pass each other within {step}",
+    }
+    return Stop("stuck", f"{words[which]} at {where}{_differences(curve)}")
 
 
 def _ends_nowhere(curve: Any, w: Array, which: int) -> bool:

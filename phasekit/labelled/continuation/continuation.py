@@ -184,6 +184,17 @@ def continuation(
         raise bad("fix", fix, "None without an orbit")
     low, high = _span(problem, parameter, span)
     check_certify(problem, parameter, options.certify)
+    if problem.blocks:
+        from phasekit.labelled.continuation.large_start import continue_fields
+
+        if events is not None:
+            raise bad("events", events, "None of fields of states", "record= takes functions")
+        if callable(stop):
+            raise bad("stop", stop, "a kind of special points, of fields of states")
+        _, ends = stop_of(problem, stop, (), options.detect, np.empty(0))
+        return announced(continue_fields(
+            problem, parameter, x0, (low, high), _record(problem, record), options, ends
+        ))  # fmt: skip
     guess = _start(problem, x0, given)
     curve = equilibrium_curve(problem, parameter, (low, high), options)
     if events is not None or stop is not None:

@@ -85,7 +85,11 @@ def recorded(
 def _values(
     problem: Problem, ds: xr.Dataset, free: Sequence[str], name: str, function: Callable[..., Any]
 ) -> xr.DataArray:
-    x = np.array([ds[state].values for state in problem.state])
+    if problem.blocks:
+        parts = [ds[block.name].values for block in problem.blocks]
+        x = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1).T
+    else:
+        x = np.array([ds[state].values for state in problem.state])
     varying = {key: ds[key].values for key in free}
     fixed = {key: value for key, value in problem.parameters.items() if key not in varying}
     count = x.shape[1]

@@ -1,0 +1,1 @@
+"""Equilibria of thousands of states: sparse derivatives, one factorisation a step."""

@@ -1,0 +1,163 @@
+"""From a guess of many states to the start of a curve: its size, its symmetry, its tangent."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from phasekit.bifurcation.continuation.large.curve import ROUNDING, Corrected, LargeCurve
+from phasekit.bifurcation.continuation.large.factors import Factors
+from phasekit.bifurcation.continuation.large.field import STEP
+from phasekit.bifurcation.continuation.scales import LARGE
+from phasekit.errors import ConvergenceError, ParameterError
+
+Array = npt.NDArray[np.float64]
+
+STEPS = 60
+SHORTEST = 2.0**-20  # part of a Newton step
+WRONG = (
+    1e-3  # part by which derivatives differ from differences of f, which says that they are wrong
+)
+SYMMETRIC = 1e-13
+PROBES = 2
+
+
+def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeCurve, Array]:
+    """The curve with sizes of its fields, and the equilibrium that a guess leads to.
+
+    Raises
+    ------
+    ParameterError
+        If ``jac`` is not what differences of f say.
+    ConvergenceError
+        If f is not finite there, or Newton's method finds no equilibrium.
+    """
+    curve = sized(curve, u, given)
+    value = curve.value(u)
+    if not np.isfinite(value).all():
+        raise ConvergenceError(
+            f"x0: f is not finite there{curve.sparse.raised}; give another x0"
+        ) from curve.sparse.failure
+    matrix, slope = curve.derivatives(u)
+    check_derivatives(curve, u, matrix)
+    u = _newton(curve, u)
+    matrix, slope = curve.derivatives(u)
+    if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
+        raise ConvergenceError(
+            f"x0: the derivatives of f are not finite at the equilibrium that it leads to"
+            f"{curve.sparse.raised}; give another x0, or start beside"
+        )
+    curve = curve.replace(symmetric=is_symmetric(matrix, curve.sparse.differenced))
+    motion = Factors(matrix).solve(-slope) * (curve.high[curve.n] - curve.low[curve.n])
+    return sized(curve, u, given, motion), u
+
+
+def _newton(curve: LargeCurve, u: Array) -> Array:
+    """The equilibrium at a fixed parameter, by Newton's method with shorter steps where it must."""
+    n, u = curve.n, np.array(u)
+    value = curve.value(u)
+    begun, size, before = float(np.max(np.abs(value))), np.inf, np.inf
+    for _ in range(STEPS):
+        matrix, slope = curve.derivatives(u)
+        if not np.isfinite(matrix.data).all():
+            break
+        small = np.all(np.abs(value) <= ROUNDING * curve.terms(matrix, slope, u))
+        if (small and size >= 0.25 * before) or not np.any(value):
+            return u
+        step = Factors(matrix).solve(-value)
+        before, size = size, float(np.sqrt(np.mean((step / curve.scale[:n]) ** 2)))
+        norm, part = float(np.max(np.abs(value))), 1.0
+        while part >= SHORTEST:
+            trial = u.copy()
+            trial[:n] += part * step
+            found = curve.value(trial)
+            if np.isfinite(found).all() and (
+                np.max(np.abs(found)) <= (1.0 - 0.1 * part) * norm or (part == 1.0 and size < 1e-6)
+            ):
+                break
+            part *= 0.5
+        else:
+            break
+        u, value = trial, found
+        if size <= 1e-14 or (size <= 1e-9 and size >= 0.25 * before):
+            return u
+    raise ConvergenceError(
+        f"x0: no equilibrium was found from there by Newton's method (|f| = {begun:.3g} there, "
+        f"{float(np.max(np.abs(value))):.3g} at its end); give an x0 that is closer"
+    )
+
+
+def sized(
+    curve: LargeCurve, u: Array, given: dict[str, float], motion: Array | None = None
+) -> LargeCurve:
+    """The curve with sizes of its fields: given, their mean at the start, or of their motion."""
+    scale = curve.scale.copy()
+    for name, place in curve.places.items():
+        size = float(np.sqrt(np.mean(u[place] ** 2)))
+        if motion is not None and np.isfinite(motion).all():
+            size = max(size, float(np.sqrt(np.mean(motion[place] ** 2))))
+        scale[place] = given.get(name, size if size > 1e-12 else 1.0)
+    low, high = curve.low.copy(), curve.high.copy()
+    for place in curve.places.values():
+        if motion is not None and not np.isfinite([*low[place], *high[place]]).any():
+            reach = LARGE * max(float(scale[place.start]), float(np.max(np.abs(u[place]))), 1.0)
+            low[place], high[place] = u[place] - reach, u[place] + reach
+    return curve.replace(scale=scale, low=low, high=high)
+
+
+def is_symmetric(matrix: Any, differenced: bool) -> bool:
+    """Whether a matrix is symmetric, within rounding or differences of its entries."""
+    gap = sp.csc_array(matrix - matrix.T)
+    size = float(np.max(np.abs(matrix.data), initial=0.0))
+    most = 1e-8 if differenced else SYMMETRIC
+    return float(np.max(np.abs(gap.data), initial=0.0)) <= most * size
+
+
+def check_derivatives(curve: LargeCurve, u: Array, matrix: Any) -> None:
+    """Refuse derivatives that are not those of f, along a few directions at random.
+
+    Raises
+    ------
+    ParameterError
+    """
+    n, generator = curve.n, np.random.default_rng(0)
+    sizes = np.maximum(np.abs(u[:n]), curve.scale[:n])
+    for _ in range(PROBES):
+        z = np.append(generator.choice([-1.0, 1.0], n) * sizes, 0.0)
+        ahead, behind = curve.value(u + STEP * z), curve.value(u - STEP * z)
+        found, said = (ahead - behind) / (2.0 * STEP), matrix @ z[:n]
+        if not np.isfinite(found).all():
+            return
+        terms = abs(matrix) @ sizes
+        noise = ROUNDING * np.maximum(np.abs(ahead), terms) / STEP
+        gap = np.abs(found - said) - WRONG * np.maximum(np.abs(found), terms) - noise
+        worst = int(np.argmax(gap))
+        if gap[worst] > 0.0:
+            name = curve.field.states[worst]
+            raise ParameterError(
+                f"jac: its row of {name} times a direction is {said[worst]:.6g}, wants "
+                f"{found[worst]:.6g}, which differences of f say: an entry is wrong, or missing "
+                "in the pattern"
+            )
+
+
+def start_at(curve: LargeCurve, u: Array) -> Corrected:
+    """The start with its unit tangent towards a larger parameter."""
+    row = np.zeros(curve.n + 1)
+    row[curve.n] = 1.0
+    matrix, slope = curve.derivatives(u)
+    return start_along(curve, u, curve.bordered(matrix, slope, row).solve(row))
+
+
+def start_along(curve: LargeCurve, u: Array, tangent: Array) -> Corrected:
+    """A start in the direction of a tangent."""
+    t = tangent / curve.length(tangent)
+    matrix, slope = curve.derivatives(u)
+    bordered = curve.bordered(matrix, slope, curve.weight * t)
+    value = np.abs(curve.value(u))
+    ratio = np.zeros(curve.n)
+    np.divide(value, curve.terms(matrix, slope, u), ratio, where=value > 0.0)
+    return Corrected(u, matrix, slope, t, bordered, 0, float(np.max(ratio)))

@@ -1,0 +1,72 @@
+"""Special points on a path of many states: where signs change, one point each."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.path import LargePath
+from phasekit.bifurcation.continuation.large.singular import branch_point, fold
+from phasekit.bifurcation.continuation.locate import FLAT
+from phasekit.bifurcation.continuation.placed import Placed
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.numerics.waits import stage
+
+Array = npt.NDArray[np.float64]
+
+ALONG, SIDE, POSITIVE = range(3)
+
+
+def find(curve: LargeCurve, path: LargePath) -> tuple[list[Placed], tuple[str, ...]]:
+    """Special points of a path in order, and what is not certain."""
+    detect = curve.detect
+    if not detect:
+        return [], ()
+    with np.errstate(all="ignore"):
+        return _find(curve, path, detect)
+
+
+def _find(
+    curve: LargeCurve, path: LargePath, detect: tuple[str, ...]
+) -> tuple[list[Placed], tuple[str, ...]]:
+    tests = path.tests
+    placed: list[Placed] = []
+    messages: list[str] = []
+    stage(f"looking for special points on {path.count:,} points")
+    own = np.flatnonzero(np.isfinite(tests[:, SIDE]))  # on a branch point it starts at nothing is
+    for i, j in itertools.pairwise(own.tolist()):
+        a, b = tests[i], tests[j]
+        crosses, turns = a[SIDE] * b[SIDE] < 0.0, a[ALONG] * b[ALONG] <= 0.0 and a[ALONG] != 0.0
+        jump = int(abs(b[POSITIVE] - a[POSITIVE])) if min(a[POSITIVE], b[POSITIVE]) >= 0 else 0
+        found: list[Special] = []
+        if crosses and "branch_point" in detect:
+            found.append(branch_point(curve, path.u[i], path.u[j]))
+        elif turns and not crosses and "fold" in detect and _moves(curve, path, i, j):
+            found.append(fold(curve, path.u[i], path.u[j]))
+        left = jump - len(found)
+        if left > 0 and detect:
+            at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
+            messages.append(f"{left} more eigenvalues cross zero together at {at}: not refined")
+        for one in found:
+            if j > i + 1:  # it is the start itself
+                placed.append(Placed(i, 1.0, one))
+            else:
+                placed.append(placement(curve, path, i, one))
+    return placed, tuple(messages)
+
+
+def _moves(curve: LargeCurve, path: LargePath, i: int, j: int) -> bool:
+    """Whether the parameter moves between two points by more than rounding."""
+    ends = path.u[[i, j], curve.n]
+    along = np.max(np.abs(path.tests[[i, j], ALONG]))
+    return bool(along >= FLAT and np.ptp(ends) > FLAT * np.max(np.abs(ends)))
+
+
+def placement(curve: LargeCurve, path: LargePath, i: int, special: Special) -> Placed:
+    """Where between two points of the path a special point stands."""
+    chord, gap = path.u[i + 1] - path.u[i], special.u - path.u[i]
+    square = float(curve.weight @ chord**2)
+    return Placed(i, float(curve.weight @ (chord * gap)) / square if square else 0.0, special)

@@ -1,0 +1,234 @@
+"""Folds and branch points of many states, by a bordered f_x that is regular at them.
+
+With the border (w, v) next to the null vectors of f_x, ``[f_x w; v 0] (y, g) = (0, 1)`` defines a
+function g that vanishes where f_x is singular; a second one vanishes where f_u is, and the forms of
+second derivatives on both null vectors give the directions of the branches ([Govaerts2000]
+chapter 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+
+from phasekit.bifurcation.continuation.large.curve import Corrected, LargeCurve
+from phasekit.bifurcation.continuation.large.factors import Bordered, Factors
+from phasekit.bifurcation.continuation.large.forms import Forms
+from phasekit.bifurcation.continuation.large.path import Between
+from phasekit.bifurcation.continuation.points.special import CONVERGED, GUESS, Special
+
+Array = npt.NDArray[np.float64]
+
+STEPS = 15
+NOTHING = 1e-5  # of its terms, from which on a coefficient vanishes but for differences
+CLOSE = 1e-11  # last step of Newton's method on a branch point, on scaled axes
+
+
+@dataclass(frozen=True)
+class Border:
+    """F_x bordered, with its null vectors: y and z of unit length where it is singular."""
+
+    system: Bordered
+    right: Array
+    left: Array
+    defect: float  # g
+
+    @classmethod
+    def of(cls, matrix: Any, left: Array, right: Array, times: int = 1) -> Border:
+        """The border next to a matrix, from a guess of its null vectors, sharpened some times."""
+        factors = Factors(matrix)
+        n = factors.size
+        side = np.zeros(n + 1)
+        side[n] = 1.0
+        for _ in range(times):
+            system = Bordered(factors, left, right)
+            y, z = system.solve(side), system.solve_transposed(side)
+            found = cls(system, y[:n], z[:n], float(y[n]))
+            right, left = y[:n] / np.linalg.norm(y[:n]), z[:n] / np.linalg.norm(z[:n])
+        return found
+
+
+def border_at(matrix: Any) -> Border:
+    """The border of a matrix that is singular, or next to it, from nothing."""
+    n = matrix.shape[0]
+    guess = 1.0 + 0.5 * np.cos(1.7 * np.arange(n)) + 0.3 * np.sin(0.013 * np.arange(n))
+    guess = guess / np.linalg.norm(guess)
+    return Border.of(matrix, guess, guess, 4)
+
+
+def interval_of(curve: LargeCurve, a: Array, b: Array) -> tuple[float, float]:
+    """The values of the parameter at two points."""
+    ends = float(a[curve.n]), float(b[curve.n])
+    return min(ends), max(ends)
+
+
+def fold(curve: LargeCurve, a: Array, b: Array) -> Special:
+    """The fold between two points at which the parameter moves in opposite directions."""
+    chord = Between(curve, a, b)
+
+    def test(s: float) -> float:
+        point = chord.at(s)
+        return np.nan if point is None else float(point.tangent[curve.n] / curve.scale[curve.n])
+
+    point, message = _root(chord, test)
+    form: dict[str, float] = {}
+    if point is None:
+        return _guess(curve, "fold", a, b, message)
+    null = border_at(point.matrix)
+    v = null.right / np.linalg.norm(null.right)
+    w = null.left / (null.left @ v)
+    forms = Forms(curve, point.u)
+    form = {"a": float(0.5 * w @ forms.second(v, v)), "b": float(w @ point.slope)}
+    return Special(
+        "fold", point.u, interval_of(curve, a, b), float(np.max(np.abs(curve.value(point.u)))),
+        CONVERGED, "", form, tangent=point.tangent, extra=v, corank=1,
+    )  # fmt: skip
+
+
+def _guess(curve: LargeCurve, kind: str, a: Array, b: Array, message: str) -> Special:
+    u = 0.5 * (a + b)
+    residual = float(np.max(np.abs(curve.value(u))))
+    return Special(kind, u, interval_of(curve, a, b), residual, GUESS, message, corank=1)
+
+
+def _root(chord: Between, test: Any, width: float = 1e-13) -> tuple[Corrected | None, str]:
+    """The point of a chord at which a function vanishes."""
+    low, high = test(0.0), test(1.0)
+    if not low * high <= 0.0:
+        return None, "the test function has the same sign at both points of the path"
+    try:
+        s = brentq(test, 0.0, 1.0, xtol=width, rtol=8.9e-16, maxiter=60)
+    except (ValueError, RuntimeError):
+        return None, "no points were found between two points of the path"
+    point = chord.at(float(s))
+    return point, "" if point is not None else "no point was found between two points of the path"
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """F_u next to a point where it loses rank: a border, and two directions in its kernel."""
+
+    border: Border
+    one: Array  # the null vector of f_x, no part along the parameter
+    two: Array  # the other, its part along the parameter one
+    defects: tuple[float, float]
+
+
+def crossing_at(matrix: Any, slope: Array, near: Border) -> Crossing:
+    """The two directions at a point, next to the border of another one."""
+    n = len(slope)
+    left, right = near.left / np.linalg.norm(near.left), near.right / np.linalg.norm(near.right)
+    border = Border.of(matrix, left, right)
+    other = border.system.solve(np.append(slope, 0.0))
+    two = np.append(-other[:n], 1.0)
+    return Crossing(border, np.append(border.right, 0.0), two, (border.defect, float(other[n])))
+
+
+def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
+    """The branch point between two points with opposite signs of the bordered determinant."""
+    n = curve.n
+    chord = Between(curve, a, b)
+    middle = chord.at(0.5) or chord.at(0.4)
+    if middle is None:
+        return _guess(curve, "branch_point", a, b, "no point was found between two of the path")
+    near = border_at(middle.matrix)
+
+    def test(s: float) -> float:
+        point = chord.at(s)
+        if point is None:
+            return np.nan
+        found = crossing_at(point.matrix, point.slope, near)
+        t, (g1, g2) = curve.weight * point.tangent, found.defects
+        return float(g1 * (t @ found.two) + g2 * (t @ found.one))
+
+    point, message = _root(chord, test, 1e-4)
+    u, residual = (0.5 * (a + b), np.inf) if point is None else (point.u, np.inf)
+    polished = _polished(curve, u, near, chord.length)
+    if polished is None:
+        return _guess(curve, "branch_point", a, b, message or "Newton's method did not converge")
+    u, found, residual = polished
+    forms = Forms(curve, u)
+    v, w = found.one / np.linalg.norm(found.one), found.border.left
+    w = w / (w @ v[:n])
+    bent = forms.second(v, v)
+    across, along = forms.second(v, found.two), forms.second(found.two, found.two)
+    q = np.array([w @ bent, w @ across, w @ along])
+    terms = float(np.abs(w) @ np.abs(bent))
+    flat = bool(abs(q[0]) <= NOTHING * terms) or not terms
+    form = {"a": float(0.5 * q[0]), "d": float(q[1])}
+    kind = "transcritical"
+    if flat:
+        kind = "pitchfork"
+        slaved = found.border.system.solve(np.append(bent, 0.0))[:n]
+        cubic = w @ (forms.third(v, v) - 3.0 * forms.second(v, slaved)) / 6.0
+        form = {"c": float(cubic), "d": float(q[1])}
+    rays = _directions(0.0 if flat else q[0], q[1], q[2])
+    if not rays:
+        return _guess(curve, "branch_point", a, b, "branches touch here, or none meet")
+    lines = [alpha * v + beta * found.two for alpha, beta in rays]
+    lines = [t / curve.length(t) for t in lines]
+    chords = (b - a) / chord.length
+    cosines = [abs(float(curve.weight @ (t * chords))) for t in lines]
+    own = int(np.argmax(cosines))
+    sign = 1.0 if curve.weight @ (lines[own] * chords) >= 0.0 else -1.0
+    return Special(
+        kind, u, interval_of(curve, a, b), residual, CONVERGED, "", form,
+        tangent=sign * lines[own], others=(lines[1 - own],), corank=1,
+    )  # fmt: skip
+
+
+def _directions(a: float, b: float, c: float) -> list[tuple[float, float]]:
+    """Both rays with a x^2 + 2 b x y + c y^2 = 0."""
+    root = b * b - a * c
+    if not root > 1e-10 * max(abs(a), abs(b), abs(c)) ** 2:
+        return []
+    far = -(b + np.copysign(np.sqrt(root), b))
+    return [(far, a), (c, far)]
+
+
+def _polished(
+    curve: LargeCurve, start: Array, near: Border, reach: float
+) -> tuple[Array, Crossing, float] | None:
+    """Newton's method on f + w b = 0, g = 0 by the unknowns and b: the point and its directions."""
+    n, u, offset, before = curve.n, np.array(start), 0.0, np.inf
+    for _ in range(STEPS):
+        value = curve.value(u)
+        matrix, slope = curve.derivatives(u)
+        if not (np.isfinite(value).all() and np.isfinite(matrix.data).all()):
+            return None
+        found = crossing_at(matrix, slope, near)
+        w = found.border.left
+        column = near.left / np.linalg.norm(near.left)
+        rest = found.border.system.solve(np.append(-value - column * offset, 0.0))
+        still = np.append(rest[:n], 0.0)
+        forms = Forms(curve, u)
+        both = [forms.second(z, still) for z in (found.one, found.two)]
+        q = [w @ forms.second(x, y) for x, y in (
+            (found.one, found.one), (found.one, found.two), (found.two, found.two)
+        )]  # fmt: skip
+        g1, g2 = found.defects
+        system = np.array([[q[0], q[1]], [q[1], q[2]]])
+        side = np.array([g1 - w @ both[0], -g2 - w @ both[1]])
+        size = np.max(np.abs(system))
+        if not size > 0.0 or abs(np.linalg.det(system)) <= 1e-12 * size**2:
+            return None
+        alpha, beta = np.linalg.solve(system, side)
+        step = still + alpha * found.one + beta * found.two
+        offset += float(rest[n] + alpha * g1 - beta * g2)
+        u = u + step
+        length = curve.length(step)
+        if not np.isfinite(length) or curve.length(u - start) > 2.0 * reach:
+            return None
+        if length <= CLOSE or (length <= 1e-8 and length >= 0.3 * before):
+            if abs(offset) * np.max(np.abs(column)) > 1e-6 * np.max(np.abs(slope) + 1.0):
+                return None
+            matrix, slope = curve.derivatives(u)
+            found = crossing_at(matrix, slope, near)
+            value = curve.value(u)
+            return u, found, float(np.max(np.abs(value)))
+        before = length
+    return None

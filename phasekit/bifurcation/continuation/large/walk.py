@@ -1,0 +1,94 @@
+"""How curves of equilibria of many states are walked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve_walk import START, CurveWalk
+from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.path import join
+from phasekit.bifurcation.continuation.large.search import find
+from phasekit.bifurcation.continuation.placed import Placed
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.stops import Stop
+from phasekit.bifurcation.continuation.walk import Tracks
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LargeWalk(CurveWalk):
+    """A curve of many states as a `Walker`: the same walk, with sparse derivatives."""
+
+    curve: LargeCurve
+    singular: bool = False  # whether it starts on a branch point
+    chunk: ClassVar[int] = 32
+
+    def over(self, **changes: Any) -> LargeWalk:
+        """The same with changes of the curve, such as wider bounds."""
+        return replace(self, curve=self.curve.replace(**changes))
+
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of what its bounds are bounds of."""
+        return (*self.curve.field.states, self.curve.free)
+
+    def hindered(self, start: Any) -> Stop | None:
+        """Nothing that is seen before the first step."""
+        return None
+
+    def turned(self, start: Any) -> Any:
+        """The start in the other direction."""
+        return replace(start, tangent=-start.tangent)
+
+    def follow(self, state: Any, points: int, start: Any) -> Any:
+        """At most so many points from a state."""
+        return self.curve.follow(state, points)
+
+    def passed(self, start: Any, track: Any, since: int) -> list[Placed]:
+        """Special points from one of its points on."""
+        path = join(start, self._own(start), None, track)
+        return [one for one in find(self.curve, path)[0] if one.index >= since]
+
+    def _own(self, start: Any) -> Array:
+        """The tests of the start; NaN on a branch point, where rounding would tell."""
+        curve = self.curve
+        if self.singular:
+            return np.array([np.nan, np.nan, -1.0])
+        side = curve.bordered(start.matrix, start.slope, curve.weight * start.tangent).sign
+        along = start.tangent[curve.n] / curve.scale[curve.n]
+        return np.array([along, side, float(curve.positive(start))])
+
+    def is_start(self, seen: Placed, start: Any) -> bool:
+        """Whether a special point is the start itself."""
+        return not self.curve.length(seen.special.u - start.u) > START
+
+    def joined(self, start: Any, tracks: Tracks, origin: Stop) -> Any:
+        """One path of two tracks."""
+        return join(start, self._own(start), *tracks)
+
+    def search(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
+        """The path, its special points, and what is not certain."""
+        placed, messages = find(self.curve, path)
+        return path, placed, messages
+
+    def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
+        """The same where there was no time to look for them."""
+        return path, [], ("special points were not looked for: extend() does it",)
+
+    def at_ends(self, path: Any) -> list[Placed]:
+        """The two ends of a path as special points."""
+        curve, last = self.curve, path.count - 1
+        found = []
+        for i, along, stop in ((0, -np.inf, path.stops[0]), (last, np.inf, path.stops[1])):
+            there = path.ends[0 if along < 0.0 else 1]
+            u = path.u[i] if there is None else there.special.u
+            at = float(u[curve.n])
+            residual = float(np.max(np.abs(curve.value(u))))
+            special = Special("end", u, (at, at), residual, "converged", stop.message)
+            found.append(Placed(i, along, special))
+        return found

@@ -1,0 +1,143 @@
+"""From a problem of fields of states to a branch of its equilibria."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
+from phasekit.bifurcation.continuation.large.begin import settle, start_along, start_at
+from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.walk import LargeWalk
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.walk import run
+from phasekit.bifurcation.special_points import KINDS
+from phasekit.inputs import is_whole
+from phasekit.labelled.continuation.branch import Branch, Record, branch_of
+from phasekit.labelled.continuation.checks import check_options, refuse_kind
+from phasekit.labelled.continuation.large_branch import LargeBranch
+from phasekit.labels.arguments import bad, numeric, unknown
+from phasekit.numerics.waits import notice
+from phasekit.systems.problem import Problem
+
+Array = npt.NDArray[np.float64]
+
+
+def continue_fields(
+    problem: Problem, parameter: str, x0: Any, span: tuple[float, float], record: Record,
+    options: ContinuationOptions, ends: tuple[str, ...],
+) -> Branch:  # fmt: skip
+    """Follow equilibria of fields of states along a parameter."""
+    guess = state_of(problem, x0)
+    curve = field_curve(problem, parameter, span, options, ends)
+    with notice(f"following equilibria of {curve.n:,} states along {parameter}"):
+        u = np.append(guess, problem.parameters[parameter])
+        curve, u = settle(
+            curve, u, {n: options.scales[n] for n in curve.places if n in options.scales}
+        )
+        start = start_at(curve, u)
+        walker = LargeWalk(curve)
+        tracks = run(walker, start, options.directions)
+        return branch_of(LargeBranch, problem, walker, start, tracks, record)
+
+
+def state_of(problem: Problem, x0: Any) -> Array:
+    """A start: all states, or each field by name, a number or an array over its places.
+
+    Raises
+    ------
+    ParameterError
+        If it is none.
+    """
+    n = len(problem.state)
+    if x0 is None:
+        return np.array([problem.start.get(name, 0.0) for name in problem.state])
+    blocks = {block.name: block for block in problem.blocks}
+    if isinstance(x0, Mapping):
+        for name in x0:
+            if name not in blocks:
+                raise unknown("x0: field", name, blocks)
+        missing = [name for name in blocks if name not in x0]
+        if missing:
+            raise bad("x0", list(x0), f"a value for each of {', '.join(blocks)}")
+        return np.concatenate([
+            _filled(f"x0[{name!r}]", x0[name], block.shape) for name, block in blocks.items()
+        ])  # fmt: skip
+    return _filled("x0", x0, (n,))
+
+
+def _filled(argument: str, value: Any, shape: tuple[int, ...]) -> Array:
+    size = int(np.prod(shape))
+    wants = f"a number, or an array of shape {shape}"
+    given = np.asarray(numeric(argument, np.ravel(np.asarray(value)), None, wants))
+    if given.size not in (1, size) or not np.isfinite(given).all():
+        raise bad(argument, value, wants)
+    return np.broadcast_to(given, (size,)).astype(float)
+
+
+def field_curve(
+    problem: Problem, parameter: str, span: tuple[float, float], options: ContinuationOptions,
+    ends: tuple[str, ...],
+) -> LargeCurve:  # fmt: skip
+    """The curve of equilibria in one parameter, its fields not yet scaled."""
+    n, names = len(problem.state), list(problem.parameters)
+    places = {block.name: block.size for block in problem.blocks}
+    for name in (*options.bounds, *options.scales):
+        if name not in places and name not in names:
+            raise unknown("bounds and scales: field", name, [*places, *names])
+    low, high = np.full(n + 1, -np.inf), np.full(n + 1, np.inf)
+    first = 0
+    for name, count in places.items():
+        pair = options.bounds.get(name, (-np.inf, np.inf))
+        low[first : first + count], high[first : first + count] = pair
+        first += count
+    low[n], high[n] = span
+    return LargeCurve(
+        field=problem.field, kind=EQUILIBRIUM, par=np.array(list(problem.parameters.values())),
+        active=(names.index(parameter),), scale=np.append(np.ones(n), span[1] - span[0]),
+        period=np.zeros(n + 1), low=low, high=high, options=options, ends=ends,
+        blocks=tuple(places.items()),
+    )  # fmt: skip
+
+
+def switch(
+    point: Any, direction: int = 0, options: ContinuationOptions | None = None,
+    kind: str | None = None,
+) -> Branch:  # fmt: skip
+    """Another branch through a branch point of fields of states, followed to both sides.
+
+    Raises
+    ------
+    ParameterError
+        If it is no branch point, or the direction of the other branch is not known.
+    """
+    refuse_kind(point.kind, kind)
+    if KINDS[point.kind].label != "BP":
+        raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
+    others = point.special.others
+    if not others:
+        raise bad("point", point.status, "a branch point whose directions are known", point.message)
+    if not is_whole(direction) or not 0 <= direction < len(others):
+        raise bad("direction", direction, f"a whole number from 0 to {len(others) - 1}")
+    curve = point.branch.curve
+    curve = curve.replace(options=curve.options if options is None else check_options(options))
+    u = point.special.u
+    with notice(f"following equilibria of {curve.n:,} states along {curve.free}"):
+        walker = LargeWalk(curve, singular=True)
+        start = start_along(curve, u, others[direction])
+        tracks = run(walker, start, curve.options.directions)
+        branch = point.branch
+        return branch_of(LargeBranch, branch.problem, walker, start, tracks, branch.record)
+
+
+def point_curve(point: Any, parameter: Any, span: Any, options: Any = None) -> Branch:
+    """Refuse: curves of special points of fields of states are not followed.
+
+    Raises
+    ------
+    ParameterError
+    """
+    raise bad("point", point.kind, "a point of a problem whose states have names, for a curve")

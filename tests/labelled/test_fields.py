@@ -1,0 +1,230 @@
+"""Continuation of fields of many states, against closed forms and against the dense engine."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from scipy.sparse.linalg import aslinearoperator
+
+import phasekit as pk
+
+FOLD = 3.513830719125  # of u'' + lam exp(u) = 0, u(0) = u(1) = 0
+BOUNDED = pk.ContinuationOptions(bounds={"u": (-1.0, 10.0)})
+
+
+def laplacian(n):
+    h = 1.0 / (n + 1)
+    entries = [np.full(n - 1, h**-2), np.full(n, -2.0 * h**-2), np.full(n - 1, h**-2)]
+    return sp.diags_array(entries, offsets=[-1, 0, 1], format="csc")
+
+
+def bratu(n, jac="sparse", **keywords):
+    L = laplacian(n)
+
+    def f(u, lam):
+        return L @ u + lam * np.exp(u)
+
+    def slopes(u, lam):
+        return L + sp.diags_array(lam * np.exp(u), format="csc")
+
+    forms = {
+        "sparse": slopes,
+        "pattern": L != 0.0,
+        "operator": lambda u, lam: aslinearoperator(slopes(u, lam)),
+        "full": lambda u, lam: slopes(u, lam).toarray(),
+        "none": None,
+    }
+    keywords.setdefault("state", [("u", n)])
+    return pk.Problem(f, parameters={"lam": 0.0}, jac=forms[jac], **keywords)
+
+
+def fold_of(problem, **keywords):
+    (point,) = pk.continuation(
+        problem, "lam", span=(0.0, 4.0), options=BOUNDED, **keywords
+    ).special("fold")
+    return point
+
+
+def test_folds_converge_as_the_square_of_the_cells():
+    errors = [fold_of(bratu(n))["lam"] - FOLD for n in (49, 99, 199)]
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=2e-3)
+    assert errors[1] / errors[2] == pytest.approx(4.0, rel=1e-3)
+    # What is left after one extrapolation is of fourth order.
+    assert abs(errors[2] - (errors[1] - errors[2]) / 3.0) < 2e-8
+
+
+@pytest.mark.parametrize("form", ["pattern", "operator", "full", "none"])
+def test_forms_of_derivatives_give_the_same_fold(form):
+    one, other = fold_of(bratu(60)), fold_of(bratu(60, form))
+    assert other["lam"] == pytest.approx(one["lam"], rel=1e-9)
+    assert other.normal_form["a"] == pytest.approx(one.normal_form["a"], rel=1e-6)
+    assert other.normal_form["b"] == pytest.approx(one.normal_form["b"], rel=1e-6)
+
+
+def test_it_is_what_the_dense_engine_finds():
+    n = 30
+    names = [f"u_{i}" for i in range(n)]
+    dense = pk.Problem(
+        bratu(n).f, names, {"lam": 0.0}, jac=lambda u, lam: bratu(n).jac(u, lam).toarray()
+    )
+    options = pk.ContinuationOptions(bounds={"u_15": (-1.0, 10.0)})
+    branch = pk.continuation(dense, "lam", span=(0.0, 4.0), options=options)
+    (one,) = branch.special("fold")
+    two = fold_of(bratu(n))
+    assert two["lam"] == pytest.approx(one["lam"], rel=1e-12)
+    assert two.x == pytest.approx(one.x, rel=1e-6)
+    sign = np.sign(one.special.extra @ two.special.extra)
+    for name in ("a", "b"):
+        assert sign * two.normal_form[name] == pytest.approx(one.normal_form[name], rel=1e-6)
+
+
+def test_more_cells_make_no_more_points():
+    points = [
+        pk.continuation(bratu(n), "lam", span=(0.0, 4.0), options=BOUNDED).points.sizes["point"]
+        for n in (50, 800)
+    ]
+    assert abs(points[0] - points[1]) <= 3
+
+
+def test_branches_are_arrays_over_space():
+    import xarray as xr
+
+    n = 40
+    x = xr.DataArray(np.arange(1, n + 1) / (n + 1), dims="x", attrs={"units": "m"})
+    problem = bratu(n, coords={"x": x}).described({"u": {"long_name": "heat", "units": "K"}})
+    branch = pk.continuation(
+        problem, "lam", span=(0.0, 4.0), options=BOUNDED, record={"middle": lambda u, lam: u[20]}
+    )
+    points = branch.points
+    assert points.u.dims == ("point", "x")
+    assert points.u.attrs == {"long_name": "heat", "units": "K"}
+    assert points.x.attrs["units"] == "m"
+    assert np.array_equal(points.middle, points.u[:, 20])
+    assert np.array_equal(points.u_max, points.u.max("x"))
+    (fold,) = branch.special("LP")
+    assert fold["u"].dims == ("x",)
+    assert branch.to_dataset().special_u.dims == ("special_point", "x")
+    assert points.u[int(fold.index)].identical(points.u[fold.index])
+    # One eigenvalue crosses at the fold.
+    assert set(points.n_unstable.values[: fold.index].tolist()) == {0}
+    assert set(points.n_unstable.values[fold.index + 1 :].tolist()) == {1}
+    assert float(points.residual.max()) < 1e-13
+    assert "LP" in repr(branch)
+    assert branch.table().kind.tolist() == ["end", "fold", "end"]
+
+
+def allen_cahn(n):
+    L = laplacian(n)
+    return pk.Problem(
+        lambda u, lam: L @ u + lam * (u - u**3), n, {"lam": 1.0},
+        jac=lambda u, lam: L + sp.diags_array(lam * (1.0 - 3.0 * u**2), format="csc"),
+    )  # fmt: skip
+
+
+def test_branch_points_of_a_trivial_branch_are_eigenvalues():
+    n = 99
+    branch = pk.continuation(allen_cahn(n), "lam", span=(0.0, 200.0))
+    found = branch.special("pitchfork")
+    modes = np.arange(1, 5)
+    exact = (2.0 * (n + 1) * np.sin(modes * np.pi / (2 * (n + 1)))) ** 2
+    assert [point["lam"] for point in found] == pytest.approx(exact, rel=1e-10)
+    # On sin(k pi x), of length one: lam - lam_k = -c xi^2 by projection.
+    for point, lam in zip(found, exact, strict=True):
+        assert point.normal_form["d"] == pytest.approx(1.0, rel=1e-6)
+        assert point.normal_form["c"] == pytest.approx(-lam * 1.5 / (n + 1), rel=1e-3)
+    side = found[1].switch()
+    assert [stop.reason for stop in side.stops] == ["bound", "bound"]
+    assert float(side.points.u_max.max()) > 0.9
+    (own,) = side.special("pitchfork")
+    assert own["lam"] == pytest.approx(exact[1], rel=1e-8)
+    # The second side branch is the first one of half the length, turned.
+    u = side.points.u.values[-1]
+    assert u == pytest.approx(-u[::-1], abs=1e-8)
+
+
+def test_a_branch_ends_at_a_kind_and_goes_on():
+    branch = pk.continuation(bratu(50), "lam", span=(0.0, 4.0), options=BOUNDED, stop="fold")
+    assert branch.stops[1].reason == "fold"
+    longer = branch.extend()
+    whole = pk.continuation(bratu(50), "lam", span=(0.0, 4.0), options=BOUNDED)
+    assert longer.points.u.identical(whole.points.u)
+
+
+def test_two_fields_one_after_the_other():
+    problem = pk.Problem(
+        lambda x, a: np.append(a - x[:3], x[:3] - x[3:] ** 3), [("u", 3), ("v", 3)], {"a": 1.0},
+        jac=sp.csr_array(np.kron([[1, 0], [1, 1]], np.eye(3)).astype(bool)),
+    )  # fmt: skip
+    assert problem.state == ("u_0", "u_1", "u_2", "v_0", "v_1", "v_2")
+    branch = pk.continuation(problem, "a", x0={"u": 1.0, "v": [1.0, 1.0, 1.0]}, span=(0.5, 8.0))
+    last = branch.points.isel(point=-1)
+    assert last.u.values == pytest.approx([8.0] * 3)
+    assert last.v.values == pytest.approx([2.0] * 3)
+    assert last.u.dims == ("cell",)
+    again = copy.deepcopy(problem)
+    assert [block.name for block in again.blocks] == ["u", "v"]
+
+
+def test_a_constant_matrix_serves_where_f_is_linear():
+    L = laplacian(50)
+    problem = pk.Problem(lambda u, q: L @ u + q, 50, {"q": 0.0}, jac=L)
+    last = pk.continuation(problem, "q", span=(0.0, 8.0)).points.isel(point=-1)
+    x = np.arange(1, 51) / 51
+    assert last.u.values == pytest.approx(4.0 * x * (1.0 - x), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"state": 0}, "state: got 0"),
+        ({"state": [("u", 20), ("u", 20)]}, "names that differ"),
+        ({"state": [("for", 20)]}, "state: got 'for'"),
+        ({"coords": {"x": np.arange(7.0)}}, "7 values of x"),
+        ({"coords": {"u": np.arange(20.0)}}, "coords: got 'u'"),
+        ({"coords": {"x": [[1.0]]}}, "1-D array"),
+        ({"jac": sp.eye_array(7)}, r"shape \(7, 7\), wants \(20, 20\)"),
+        ({"jac": sp.eye_array(7).astype(bool)}, r"pattern of shape \(7, 7\)"),
+        ({"jac": "exact"}, "jac"),
+        ({"state": 5000}, "of more than 2000 states a sparse matrix"),
+        ({"conservative": True}, "conservative"),
+        ({"map": True}, "map"),
+        ({"f": "u"}, "f: got 'u'"),
+    ],
+)
+def test_bad_fields_are_named(change, says):
+    given = {"f": lambda u, lam: lam - u, "state": 20, "parameters": {"lam": 0.0}, **change}
+    with pytest.raises(pk.ParameterError, match=says):
+        pk.Problem(given.pop("f"), **given)
+
+
+@pytest.mark.parametrize(
+    ("jac", "says"),
+    [
+        (lambda u, lam: sp.eye_array(7), r"jac: got a matrix of shape \(7, 7\), wants \(20, 20\)"),
+        (lambda u, lam: 2.0 * sp.eye_array(20), "jac: its row of u_"),
+        (sp.eye_array(20).astype(bool), "missing in the pattern"),
+    ],
+)
+def test_wrong_derivatives_are_announced(jac, says):
+    def f(u, lam):
+        return lam - u - 0.5 * np.roll(u, 1)
+
+    problem = pk.Problem(f, 20, {"lam": 0.0}, jac=jac)
+    with pytest.raises(pk.ParameterError, match=says):
+        pk.continuation(problem, "lam", span=(0.0, 1.0))
+
+
+def test_what_is_not_a_start_is_named():
+    problem = bratu(20)
+    for x0, says in (
+        ([1.0, 2.0], "x0"), ({"v": 1.0}, "field"), ({}, "a value for each"), ("low", "x0"),
+    ):  # fmt: skip
+        with pytest.raises(pk.ParameterError, match=says):
+            pk.continuation(problem, "lam", x0=x0, span=(0.0, 4.0))
+    with pytest.raises(pk.ParameterError, match="wants 20|shape"):
+        pk.continuation(
+            pk.Problem(lambda u, a: u[:3], 20, {"a": 0.0}, jac=sp.eye_array(20)), "a", span=(0, 1)
+        )
