@@ -194,7 +194,7 @@ def points_of(
             label[place] = label[place] or KINDS["end"].label
         else:
             place, seen = int(mine[seen]), seen + 1
-        places.append((one, place, _known(one, nothing)))
+        places.append((one, place, _critical(one, nothing)))
     table = functools.partial(_dataset, problem, curve, u, info, residual, unstable, label, record)
     return table, places
 
@@ -205,7 +205,7 @@ def labels_of_zero() -> tuple[str, ...]:
     return tuple(kind.name for kind in KINDS.values() if kind.label in marked)
 
 
-def _known(one: Placed, nothing: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+def _critical(one: Placed, nothing: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
     """The eigenvalues that are known at a special point: those that are critical."""
     special = one.special
     if special.kind in labels_of_zero() and special.corank:

@@ -81,7 +81,7 @@ class Between:
         self._ends: tuple[Array, Array] | None = None
         self._seen: dict[float, Corrected | None] = {}
 
-    def at(self, s: float) -> Corrected | None:
+    def point(self, s: float) -> Corrected | None:
         """The point at a fraction of the chord, its tangent along it; None if it is not found."""
         if s not in self._seen:
             self._seen[s] = self._found(s)
@@ -90,7 +90,7 @@ class Between:
     def _found(self, s: float) -> Corrected | None:
         guess = self.a + s * self.chord
         if 0.0 < s < 1.0:
-            one, two = self.at(0.0), self.at(1.0)
+            one, two = self.point(0.0), self.point(1.0)
             if one is not None and two is not None:  # the cubic with the tangents of both ends
                 a, b = one.tangent, two.tangent
                 bend = (1.0 - s) * (a - self.part(a) * self.chord)

@@ -38,7 +38,7 @@ class Border:
     defect: float  # g
 
     @classmethod
-    def of(cls, matrix: Any, left: Array, right: Array, times: int = 1) -> Border:
+    def next_to(cls, matrix: Any, left: Array, right: Array, times: int = 1) -> Border:
         """The border next to a matrix, from a guess of its null vectors, sharpened some times."""
         factors = Factors(matrix)
         n = factors.size
@@ -57,7 +57,7 @@ def border_at(matrix: Any) -> Border:
     n = matrix.shape[0]
     guess = 1.0 + 0.5 * np.cos(1.7 * np.arange(n)) + 0.3 * np.sin(0.013 * np.arange(n))
     guess = guess / np.linalg.norm(guess)
-    return Border.of(matrix, guess, guess, 4)
+    return Border.next_to(matrix, guess, guess, 4)
 
 
 def interval_of(curve: LargeCurve, a: Array, b: Array) -> tuple[float, float]:
@@ -71,7 +71,7 @@ def fold(curve: LargeCurve, a: Array, b: Array) -> Special:
     chord = Between(curve, a, b)
 
     def test(s: float) -> float:
-        point = chord.at(s)
+        point = chord.point(s)
         return np.nan if point is None else float(point.tangent[curve.n] / curve.scale[curve.n])
 
     point, message = _root(chord, test)
@@ -104,7 +104,7 @@ def _root(chord: Between, test: Any, width: float = 1e-13) -> tuple[Corrected | 
         s = brentq(test, 0.0, 1.0, xtol=width, rtol=8.9e-16, maxiter=60)
     except (ValueError, RuntimeError):
         return None, "no points were found between two points of the path"
-    point = chord.at(float(s))
+    point = chord.point(float(s))
     return point, "" if point is not None else "no point was found between two points of the path"
 
 
@@ -122,7 +122,7 @@ def crossing_at(matrix: Any, slope: Array, near: Border) -> Crossing:
     """The two directions at a point, next to the border of another one."""
     n = len(slope)
     left, right = near.left / np.linalg.norm(near.left), near.right / np.linalg.norm(near.right)
-    border = Border.of(matrix, left, right)
+    border = Border.next_to(matrix, left, right)
     other = border.system.solve(np.append(slope, 0.0))
     two = np.append(-other[:n], 1.0)
     return Crossing(border, np.append(border.right, 0.0), two, (border.defect, float(other[n])))
@@ -132,13 +132,13 @@ def branch_point(curve: LargeCurve, a: Array, b: Array) -> Special:
     """The branch point between two points with opposite signs of the bordered determinant."""
     n = curve.n
     chord = Between(curve, a, b)
-    middle = chord.at(0.5) or chord.at(0.4)
+    middle = chord.point(0.5) or chord.point(0.4)
     if middle is None:
         return _guess(curve, "branch_point", a, b, "no point was found between two of the path")
     near = border_at(middle.matrix)
 
     def test(s: float) -> float:
-        point = chord.at(s)
+        point = chord.point(s)
         if point is None:
             return np.nan
         found = crossing_at(point.matrix, point.slope, near)
