@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from phasekit.bifurcation.continuation.options import ContinuationOptions as ContinuationOptions
     from phasekit.cells.offered import quantities as quantities
     from phasekit.errors import AttractorKind as AttractorKind
+    from phasekit.errors import BranchStatus as BranchStatus
     from phasekit.errors import ConvergenceError as ConvergenceError
     from phasekit.errors import EquilibriumKind as EquilibriumKind
     from phasekit.errors import EscapeRegime as EscapeRegime
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
     from phasekit.errors import OrbitKind as OrbitKind
     from phasekit.errors import ParameterError as ParameterError
     from phasekit.errors import PhasekitError as PhasekitError
+    from phasekit.errors import PointStatus as PointStatus
+    from phasekit.errors import SpecialPointKind as SpecialPointKind
     from phasekit.errors import StoreError as StoreError
     from phasekit.errors import Topology as Topology
     from phasekit.errors import Validity as Validity
@@ -128,6 +131,7 @@ _MODULES = {
     "phasekit.bifurcation.continuation.options": ("ContinuationOptions",),
     "phasekit.errors": (
         "AttractorKind",
+        "BranchStatus",
         "ConvergenceError",
         "EquilibriumKind",
         "FlowEquilibriumKind",
@@ -139,6 +143,8 @@ _MODULES = {
         "OrbitKind",
         "ParameterError",
         "PhasekitError",
+        "PointStatus",
+        "SpecialPointKind",
         "StoreError",
         "Topology",
         "Validity",

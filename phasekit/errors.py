@@ -138,6 +138,76 @@ class FlowEquilibriumKind(IntEnum):
     UNSTABLE_FOCUS = 7
 
 
+class SpecialPointKind(IntEnum):
+    """Kind of a special point on a branch of equilibria, or of fixed points of a map.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> cusp = pk.Problem("mu + nu*x - x^3", "x", {"mu": 0.0, "nu": 1.0}, window={"x": (-3, 3)})
+    >>> ds = pk.sweep(cusp, nu=[0.75], along=("mu", (-1, 1)), of="special_points")
+    >>> [pk.SpecialPointKind(k).name for k in ds.special_kind.values[0]]
+    ['FOLD', 'FOLD']
+    """
+
+    ABSENT = 0
+    FOLD = 1
+    BRANCH_POINT = 2
+    PITCHFORK = 3
+    TRANSCRITICAL = 4
+    HOPF = 5
+    NEUTRAL_SADDLE = 6
+    BOGDANOV_TAKENS = 7
+    PERIOD_DOUBLING = 8
+    TORUS = 9
+    OTHER = 10
+
+
+class PointStatus(IntEnum):
+    """Whether a special point solves its defining equations, or is a guess.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> cusp = pk.Problem("mu + nu*x - x^3", "x", {"mu": 0.0, "nu": 1.0}, window={"x": (-3, 3)})
+    >>> ds = pk.sweep(cusp, nu=[-1.0, 0.75], along=("mu", (-1, 1)), of="special_points")
+    >>> pk.PointStatus(ds.special_status.sel(nu=0.75, special_point=0).item()).name
+    'CONVERGED'
+    """
+
+    ABSENT = 0
+    CONVERGED = 1
+    GUESS = 2
+
+
+class BranchStatus(IntEnum):
+    """Whether the branches of a cell of a map are all there are, and if not, why.
+
+    ``COMPLETE``: all equilibria in the window at both ends of the span are proved to be there, and
+    each branch through them was followed to its ends. ``UNPROVED``: the same without the proof.
+    ``CUT``: a branch ended within the span, for its number of points or as it could not go on.
+    ``MISSED``: special points that all neighbours have were not found, also from theirs.
+    ``NO_EQUILIBRIUM``: there is none in the window at either end. ``FAILED``: nothing was followed.
+    ``NOT_COMPUTED``: the parameters are no numbers.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> none = pk.Problem("a + x^2 + mu^2", "x", {"a": 1.0, "mu": 0.0}, window={"x": (-3, 3)})
+    >>> ds = pk.sweep(none, a=[1.0], along=("mu", (-1, 1)), of="n_fold")
+    >>> pk.BranchStatus(ds.branch_status.item()).name
+    'NO_EQUILIBRIUM'
+    """
+
+    NOT_COMPUTED = -1
+    COMPLETE = 0
+    UNPROVED = 1
+    CUT = 2
+    MISSED = 3
+    NO_EQUILIBRIUM = 4
+    FAILED = 5
+
+
 class MergerKind(IntEnum):
     """How equilibria merge or cross at a critical value of a parameter.
 

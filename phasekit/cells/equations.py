@@ -53,7 +53,7 @@ def table_of(system: Any, law: Equations) -> Table:
         passes.append(Pass(function, (*law.names, *more), groups, rung, rows=rows))
 
     states = tuple(f"state_{name}" for name in law.states)
-    problem = _unset(system) if law.time is None else None
+    problem = problem_without_values(system) if law.time is None else None
     if problem is not None:
         rest = functools.partial(equilibria, problem, natural_window(system))
         passes.append(
@@ -144,13 +144,13 @@ def _grid_of(law: Equations, parameters: dict[str, float], given: list[float]) -
     return StartGrid(law, axes, fixed, parameters)
 
 
-def _unset(system: Any) -> Problem:
+def problem_without_values(system: Any) -> Problem:
     """The problem of a system without its values, which each cell brings."""
     problem = as_problem(system, arrays=True)
     return problem.replace(**dict.fromkeys(problem.parameters, 0.0))
 
 
-def _cells(
+def each_cell(
     count: int, arrays: Iterable[Any]
 ) -> tuple[tuple[int, ...], Iterator[tuple[int, list[float], list[float]]]]:
     """The shape of cells, and of each that has numbers its place, parameters and other values."""
@@ -174,7 +174,7 @@ def _back(shape: tuple[int, ...], found: Mapping[str, Any]) -> dict[str, Any]:
 def equilibria(problem: Problem, window: Any, *arrays: Any) -> dict[str, Any]:
     """Equilibria in a window, by default that of the problem, of each cell."""
     low, high = corners(problem, window)
-    shape, cells = _cells(len(arrays), arrays)
+    shape, cells = each_cell(len(arrays), arrays)
     names, size = tuple(problem.parameters), int(np.prod(shape, dtype=int))
     own = {k: problem.replace(**dict(zip(names, values, strict=True))) for k, values, _ in cells}
     ones = dict(zip(own, equilibria_of_cells(list(own.values()), low, high), strict=True))
@@ -223,7 +223,7 @@ def _found(law: Equations, arrays: Iterable[Any], *, shares: bool) -> dict[str, 
     from phasekit.motion.attractors import find_of
     from phasekit.motion.basins import ESCAPED, basins
 
-    shape, cells = _cells(len(law.names), arrays)
+    shape, cells = each_cell(len(law.names), arrays)
     size = int(np.prod(shape, dtype=int))
     rows = {
         name: row
@@ -272,7 +272,7 @@ def along_attractor(
 
     from phasekit.motion.attractors import find_of
 
-    shape, cells = _cells(len(law.names), arrays)
+    shape, cells = each_cell(len(law.names), arrays)
     size = int(np.prod(shape, dtype=int))
     period, found = np.full(size, np.nan), list[_Attracted]()
     names = (*law.states, *observables)

@@ -27,6 +27,8 @@ from phasekit.table.row import Pass, Quantity
 NUMBERED = {
     "equilibrium": "equilibrium, by its coordinate",
     "saddle": "saddle, by its coordinate",
+    "special_point": "special point, by its parameter",
+    "interval": "interval of a parameter",
 }
 
 _POINTWISE = (
@@ -97,7 +99,7 @@ def sized(rows: Iterable[Quantity], widths: Widths) -> tuple[Quantity, ...]:
 def _labels(widths: Widths, row: Quantity) -> dict[str, Labels]:
     labels = row.labels or LABELS
     own = NUMBERED if row.labels is None else {}
-    texts = {dim: own.get(dim, labels[dim][1]) for dim in NUMBERED}
+    texts = {dim: own.get(dim) or labels[dim][1] for dim in NUMBERED if dim in {**own, **labels}}
     return {**labels, **{dim: (range(widths.get(dim, 0)), text) for dim, text in texts.items()}}
 
 

@@ -55,7 +55,8 @@ class Request:
         """Whether equilibria are numbered, so that the length of their dims is yet to be found."""
         where = self.system.standing
         fixed = where.rung.labels_fixed and self.table is TABLE
-        return not fixed and self.table.offers(where, "equilibria")
+        numbered_groups = ("equilibria", "special_points")
+        return not fixed and any(self.table.offers(where, group) for group in numbered_groups)
 
     @property
     def states(self) -> frozenset[str]:

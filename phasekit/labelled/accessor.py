@@ -25,6 +25,8 @@ from phasekit.systems.system import System
 if TYPE_CHECKING:
     import pandas as pd
 
+    from phasekit.labelled.continuation.branch import Branch
+
 
 load_dask_later()
 
@@ -74,6 +76,38 @@ class PhasekitAccessor:
         Reduced(lam=0.2, psi=0.2, Omega_sq=1.0)
         """
         return model_named("ds", model_name(self._ds)).from_dataset(self._ds)
+
+    def branch(self, number: int = 0) -> Branch:
+        """Follow a branch of one cell of a map of branches again, with all of its points.
+
+        Parameters
+        ----------
+        number : int, default 0
+            Which of its branches, where it has several that do not hang together, or that cross:
+            those from equilibria at the lower end of the span come first.
+
+        Returns
+        -------
+        Branch
+            The special points on it are those of the cell.
+
+        Raises
+        ------
+        ParameterError
+            If this is not one cell of a map with ``along=``, or there is no such branch.
+
+        Examples
+        --------
+        >>> import phasekit as pk
+        >>> cusp = pk.Problem("mu + nu*x - x^3", "x", {"mu": 0, "nu": 1}, window={"x": (-3, 3)})
+        >>> ds = pk.sweep(cusp, nu=[0.75, 1.0], along=("mu", (-1, 1)), of="special_points")
+        >>> branch = ds.isel(nu=0).phasekit.branch()
+        >>> [round(fold["mu"], 9) for fold in branch.special("fold")]
+        [0.25, -0.25]
+        """
+        from phasekit.labelled.continuation.cell_branch import cell_branch
+
+        return cell_branch(self._ds, self.system(), number)
 
     def to(self, units: Mapping[str, str] | None = None, **units_by_name: str) -> xr.Dataset:
         """Return this Dataset with some variables and coordinates in other units.

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from phasekit.cells.evaluate import compute
 from phasekit.cells.request import Request, ask, needs_of, passes_of
-from phasekit.errors import ParameterError
+from phasekit.errors import BranchStatus, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labels.arguments import Value, bad, flag, numeric, unknown
 from phasekit.labels.coordinates import STATES
@@ -37,6 +38,7 @@ def sweep(
     axes: Mapping[str, Any] | None = None,
     *,
     of: str | Iterable[str] = OFFERED,
+    along: tuple[str, Sequence[float]] | None = None,
     store: str | PathLike[str] | Any | None = None,
     chunks: int | Mapping[str, int] | None = None,
     workers: int | None = None,
@@ -66,6 +68,14 @@ def sweep(
         ``n`` iterations), and the ``period`` and ``extrema`` of the attractor to which it comes:
         ``min_``, ``max_`` and ``mean_`` of each state and observable, ``_error`` beside the first
         two. So it is of systems with terms, for what no other line of the table bears.
+    along : (str, (float, float)), optional
+        A parameter and its span: in each cell all branches of equilibria (of a map: of fixed
+        points) along it are followed, from all equilibria in the window at both ends of the span
+        and through branch points. Then ``of`` takes ``special_points`` (kind, parameter, states,
+        coefficient of the normal form and status on the dim ``special_point``, and numbers of
+        each kind: ``n_fold``, ``n_hopf``, ...), ``n_stable`` (how many stable equilibria there are
+        at one value, at most) and ``hysteresis`` (the intervals with two of them or more).
+        ``branch_status`` says of each cell whether these are all; see `BranchStatus`.
     store : path, URL or zarr store, optional
         Put the map there: a name that ends in ``.zarr``, a URL that fsspec knows, or a store of
         zarr (Zarr v3), tile by tile, so that it need not fit into memory; or a name that ends in
@@ -140,11 +150,15 @@ def sweep(
         flag("progress", progress)
     place = None if store is None else target_of(store)
     system = as_system(system)
-    table, rows = _selected(system, of, starts="starts" in {**_plain(axes), **axes_by_name})
+    given, ends = {**_plain(axes), **axes_by_name}, dict[str, float]()
+    if along is None:
+        table, rows = _selected(system, of, starts="starts" in given)
+    else:
+        table, rows, ends = _branches(system, of, along, given)
     if place is not None and not place.is_netcdf:
         from phasekit.maps.run import sweep_into  # here: it loads multiprocessing
 
-        request = _asked(system, axes, axes_by_name, rows, table, loaded=True)
+        request = _asked(system, axes, axes_by_name, rows, table, ends, loaded=True)
         options = StoreOptions.from_request(
             request, chunks, dtype, workers, client, overwrite=overwrite, force=force
         )
@@ -152,6 +166,7 @@ def sweep(
         sweep_into(place, request, options, progress)
         ds = open_map(store)
         _warn_of_incomplete(system, ds)
+        _warn_of_branches(ds)
         return ds
     for name, value in {
         "chunks": chunks, "workers": workers, "client": client, "force": force or None
@@ -162,10 +177,11 @@ def sweep(
     if dtype is not None:
         dtypes = check_dtypes(dtype, rows)
         rows = tuple(replace(row, dtype=dtypes.get(row.name, row.dtype)) for row in rows)
-    request = _asked(system, axes, axes_by_name, rows, table)
+    request = _asked(system, axes, axes_by_name, rows, table, ends)
     warn_of_invalid(request.system.declared, request.system.parameters, stacklevel=3)
     ds = _computed(request, progress)
     _warn_of_incomplete(system, ds)
+    _warn_of_branches(ds)
     if target is not None:
         target.write(ds)
     return ds
@@ -184,6 +200,28 @@ def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
             "systems; there `complete` is False",
             RuntimeWarning,
             stacklevel=4,
+        )
+
+
+def _warn_of_branches(ds: xr.Dataset) -> None:
+    """Say in how many cells a map may lack branches or special points, and why."""
+    if "branch_status" not in ds or ds["branch_status"].chunks is not None:
+        return
+    words = {
+        BranchStatus.UNPROVED: "it is not proved that all equilibria at the ends of the span are "
+        "there",
+        BranchStatus.CUT: "a branch ends within the span",
+        BranchStatus.MISSED: "special points that all neighbours have were not found",
+        BranchStatus.FAILED: "nothing could be followed",
+    }
+    status = ds["branch_status"].values
+    numbers = {why: int(np.sum(status == code)) for code, why in words.items()}
+    found = [f"in {number} {why}" for why, number in numbers.items() if number]
+    if found:
+        warnings.warn(
+            f"branches of {status.size} cells: {'; '.join(found)}; branch_status says where",
+            RuntimeWarning,
+            stacklevel=3,
         )
 
 
@@ -240,6 +278,29 @@ def _selected(
     return table, table.select(of)
 
 
+def _branches(
+    system: System, of: Any, along: Any, given: Mapping[str, Any]
+) -> tuple[Table, tuple[Quantity, ...], dict[str, float]]:
+    """Return the table of branches, the rows of it that are named, and the ends of their span.
+
+    How sure they are goes along.
+    """
+    from phasekit.cells.along import check_along, table_along
+
+    parameter, ends = check_along(system, along, given)
+    table = table_along(system, parameter)
+    chosen = table.select(("special_points", "n_stable") if of is OFFERED else of)
+    whole = {row.group for row in chosen if row.name == row.group}
+    rows = tuple(row for row in table.rows.values() if row in chosen or row.group in whole)
+    sure = [row for row in table.select("branch_status") if row not in rows]
+    return table, (*sure, *rows), ends
+
+
+def _is_along(table: Table) -> bool:
+    """Whether a table is that of branches, which start from no state."""
+    return "branch_status" in table.rows
+
+
 def _own_table(system: System, of: Any, starts: bool) -> Table | None:
     """The rows of the first-order equations of a system with terms, where these alone answer."""
     names = (of,) if isinstance(of, str) else tuple(of) if isinstance(of, Iterable) else ()
@@ -268,11 +329,16 @@ def _asked(
     by_name: Mapping[str, Any],
     rows: tuple[Quantity, ...],
     table: Table = TABLE,
+    ends: Mapping[str, float] | None = None,
     *,
     loaded: bool = False,
 ) -> Request:
-    """Return what is computed along axes, whose dims come first; chunked axes `loaded` if so."""
+    """Return what is computed along axes, whose dims come first; chunked axes `loaded` if so.
+
+    With the ``ends`` of the span of branches, where these are followed.
+    """
     swept, states, called = _swept(system, axes, by_name, rows, table)
+    states = {**states, **(ends or {})}
     if loaded:
         swept, states = swept.replace(**_loaded(swept.parameters)), _loaded(states)
     kept = {**swept.parameters, **states}
@@ -304,7 +370,7 @@ def _swept(
     declared = [parameter.name for parameter in system.declared]
     starts = given.pop("starts", None) if "starts" not in declared else None
     law = _law(system, table)
-    known = _states_of(law)
+    known = () if _is_along(table) else _states_of(law)
     called: dict[str, str] = {}
     for key in given:
         name = key if key in declared or key in known else _state_called(key, system, law)
@@ -336,7 +402,7 @@ def _swept(
                 "a 1-D list, array or range of values to sweep over",
                 f"to change a fixed parameter use system.replace({name}=...)",
             )
-    if table is not TABLE:
+    if table is not TABLE and not _is_along(table):
         states |= _middles(system, rows, table, states, starts)
     elif starts is not None:
         raise bad("starts", starts, "nothing for these quantities: no motions start from a grid")

@@ -15,6 +15,7 @@ from phasekit.bifurcation.continuation.kernels import trace
 from phasekit.bifurcation.continuation.kernels.defining import EVENT, HOPF, REGULAR, TORUS
 from phasekit.bifurcation.continuation.rows import across, largest
 from phasekit.bifurcation.continuation.spectrum import eigenvalues_of
+from phasekit.bifurcation.continuation.stops import NO_START
 
 Array = npt.NDArray[np.float64]
 
@@ -82,10 +83,9 @@ def join(curve: Curve, start: Sample, backward: Track | None, forward: Track | N
     behind[:, -trace.RECORDED + trace.ARCLENGTH] *= -1.0
     ahead = forward.record if forward is not None else nothing
     table = np.concatenate([behind, middle, ahead])
-    start_stop = Stop("start", "the start; this direction was not requested")
     stops = (
-        backward.stop if backward is not None else start_stop,
-        forward.stop if forward is not None else start_stop,
+        backward.stop if backward is not None else NO_START,
+        forward.stop if forward is not None else NO_START,
     )
     if forward is not None and forward.stop.reason == "closed":
         stops = (forward.stop, forward.stop)

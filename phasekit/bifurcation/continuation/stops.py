@@ -96,6 +96,8 @@ def wished(stop: Stop, ends: tuple[str, ...]) -> bool:
     return stop.reason in ends and stop.message.startswith("stop = ")
 
 
+#: Where a branch begins that was followed to one side.
+NO_START = Stop("start", "the start; this direction was not requested")
 #: Where special points were not yet looked for.
 SEARCHED = Stop("interrupted", "it was interrupted while special points were looked for")
 #: Where there was no time for a first point.

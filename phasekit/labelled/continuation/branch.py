@@ -15,6 +15,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.bifurcation.continuation.stops import NO_START
 from phasekit.bifurcation.continuation.walk import (
     Found,
     Tracks,
@@ -52,7 +53,6 @@ Record = Mapping[str, Any]
 Place = tuple[Any, int, Any]
 B = TypeVar("B", bound="Branch")
 
-NO_START = Stop("start", "the start; this direction was not requested")
 #: Special points that a branch shows at most.
 SHOWN = 20
 
@@ -587,17 +587,18 @@ def branch_of(
     """A branch of what was followed: special points are looked for, quantities recorded."""
     try:
         found = search(walker, start, tracks, origin)
-        return _branch(form, problem, walker, start, tracks, record, origin, found)
+        return branch_of_found(form, problem, walker, start, tracks, record, found, origin)
     except KeyboardInterrupt:  # what was followed is kept
         tracks = halted(tracks)
         found = search(walker, start, tracks, origin, interrupted=True)
-        return _branch(form, problem, walker, start, tracks, record, origin, found)
+        return branch_of_found(form, problem, walker, start, tracks, record, found, origin)
 
 
-def _branch(
+def branch_of_found(
     form: type[B], problem: Problem, walker: Walker, start: Any, tracks: Tracks, record: Record,
-    origin: Stop, found: Found,
+    found: Found, origin: Stop = NO_START,
 ) -> B:  # fmt: skip
+    """A branch of what was followed and found on it: quantities are recorded."""
     table, places = form._tabulated(problem, walker, found, record)
     branch = form(
         problem, walker, start, tracks, origin, MappingProxyType(dict(record)),

@@ -9,24 +9,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.connected import begun
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.curve_walk import CurveWalk
-from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.path import Sample
-from phasekit.bifurcation.continuation.scales import guessed, scaled
-from phasekit.bifurcation.continuation.start import settle, tangent_of
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.certified import check_certify, refuse_certify
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
-from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.continuation.user_events import events_of, stop_of
 from phasekit.labels.arguments import bad, flag, numeric, unknown
 from phasekit.numerics.waits import notice
+from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem, system_of
 from phasekit.systems.problem_parts import refuse_aperiodic
 from phasekit.systems.system import System
@@ -211,10 +208,7 @@ def continuation(
         if not curve.low[i] <= guess[i] <= curve.high[i]:
             raise bad("x0", guess, f"{name} within its bounds {options.bounds[name]}")
     given = {i: options.scales[s] for i, s in enumerate(problem.state) if s in options.scales}
-    curve = guessed(curve, u, given)
-    u = settle(curve, u, where)
-    curve = scaled(curve, u, given)
-    start = Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
+    curve, start = begun(curve, u, given, where)
     with notice(f"following equilibria along {parameter}"):
         walker = CurveWalk(curve)
         tracks = run(walker, start, options.directions)
@@ -223,38 +217,6 @@ def continuation(
         with notice(f"proving the branch along {parameter}"):
             _ = branch.points
     return announced(branch)
-
-
-def equilibrium_curve(
-    problem: Problem, parameter: str, span: tuple[float, float], options: ContinuationOptions
-) -> Curve:
-    """The curve of equilibria in one parameter, its states not yet scaled."""
-    if problem.time is not None:
-        raise bad(
-            "problem", problem, "one whose f does not depend on time, for equilibria",
-            "follow periodic orbits: pk.continuation(..., orbit=pk.periodic_orbit(problem, x0))",
-        )  # fmt: skip
-    n = len(problem.state)
-    check_names((*problem.state, parameter))
-    names = list(problem.parameters)
-    for name in (*options.bounds, *options.scales):
-        if name not in problem.state and name not in names:
-            raise unknown("bounds and scales: state", name, [*problem.state, *names])
-    bounds = [options.bounds.get(name, (-np.inf, np.inf)) for name in problem.state]
-    low, high = span
-    return Curve(
-        field=problem.field,
-        kind=EQUILIBRIUM,
-        par=np.array(list(problem.parameters.values())),
-        active=(names.index(parameter),),
-        scale=np.append(np.ones(n), high - low),
-        period=np.array([*(problem.periods.get(name, 0.0) for name in problem.state), 0.0]),
-        low=np.array([*(pair[0] for pair in bounds), low]),
-        high=np.array([*(pair[1] for pair in bounds), high]),
-        options=options,
-        conservative=problem.conservative,
-        discrete=problem.map,
-    )
 
 
 def _span(problem: Problem, parameter: Any, span: Any) -> tuple[float, float]:

@@ -31,9 +31,9 @@ from phasekit.labelled.continuation.checks import (
     check_span,
     refuse_kind,
 )
-from phasekit.labelled.continuation.columns import check_names
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.labels.columns import check_names
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 

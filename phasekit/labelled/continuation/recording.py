@@ -12,9 +12,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.errors import ParameterError
-from phasekit.labelled.continuation.columns import columns
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.labels.arguments import bad, unknown
+from phasekit.labels.columns import columns
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]

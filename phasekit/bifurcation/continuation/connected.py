@@ -1,0 +1,148 @@
+"""All curves of equilibria that hang together: from starts, and through every branch point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.curve_walk import CurveWalk
+from phasekit.bifurcation.continuation.path import Path, Sample
+from phasekit.bifurcation.continuation.placed import Placed
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.same_path import lies_on, turned
+from phasekit.bifurcation.continuation.scales import guessed, scaled
+from phasekit.bifurcation.continuation.start import settle, tangent_of
+from phasekit.bifurcation.continuation.stops import NO_START
+from phasekit.bifurcation.continuation.walk import Found, Tracks, run, search
+from phasekit.bifurcation.special_points import KINDS
+
+Array = npt.NDArray[np.float64]
+
+SAME = 1e-6  # distance on scaled axes within which two branch points are one
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A curve that was followed from a start: its points, and the special points on it."""
+
+    walker: CurveWalk
+    start: Sample
+    tracks: Tracks
+    found: Found
+
+    @property
+    def curve(self) -> Curve:
+        """Its equations."""
+        return self.walker.curve
+
+    @property
+    def path(self) -> Path:
+        """Its points."""
+        path: Path = self.found.path
+        return path
+
+    @property
+    def placed(self) -> list[Placed]:
+        """Its special points where they stand, without its ends."""
+        return [one for one in self.found.specials if one.kind != "end"]
+
+    @property
+    def specials(self) -> list[Special]:
+        """The special points alone."""
+        return [one.special for one in self.placed]
+
+    @property
+    def unfinished(self) -> str:
+        """Why it ends where it might go on; nothing where it does not."""
+        for stop in self.path.stops:
+            if stop.reason not in ("bound", "closed", "start"):
+                return stop.message
+        return ""
+
+
+def begun(curve: Curve, guess: Array, given: dict[int, float], where: str) -> tuple[Curve, Sample]:
+    """The curve with its scales, and its first point, from a guess of an equilibrium.
+
+    Raises
+    ------
+    ConvergenceError
+        If the guess leads to none.
+    """
+    curve = guessed(curve, guess, given)
+    u = settle(curve, guess, where)
+    curve = scaled(curve, u, given)
+    return curve, Sample(u, tangent_of(curve, u), curve.evaluate(u)[1])
+
+
+def traced(curve: Curve, start: Sample) -> Traced:
+    """The curve through a point, with its special points."""
+    walker = CurveWalk(curve)
+    tracks = run(walker, start, curve.options.directions)
+    return Traced(walker, start, tracks, search(walker, start, tracks, NO_START))
+
+
+def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]:
+    """All curves through equilibria, each once, with those that branch off, to a depth.
+
+    Parameters
+    ----------
+    curve : Curve
+        Of equilibria in one parameter, its states not yet scaled.
+    starts : iterable of ndarray
+        Unknowns of equilibria, shape (states + 1,).
+    depth : int
+        How many times branches are switched in a row.
+
+    Raises
+    ------
+    ConvergenceError
+        If a start leads to no equilibrium.
+    """
+    found: list[Traced] = []
+    passed: list[tuple[Curve, Array]] = []
+    for u in starts:
+        if any(lies_on(one.curve, one.path, u) for one in found):
+            continue
+        given = {i: curve.options.scales[name] for i, name in enumerate(curve.field.states)
+                 if name in curve.options.scales}  # fmt: skip
+        found.append(traced(*begun(curve, u, given, "the start")))
+        queue = [(found[-1], 0)]
+        while queue:
+            one, level = queue.pop(0)
+            for special in one.specials if level < depth else ():
+                if KINDS[special.kind].label != "BP" or _seen(passed, special.u):
+                    continue
+                passed.append((one.curve, special.u))
+                for tangent in special.others:
+                    if _led(found, one.curve, special.u, tangent):
+                        continue
+                    slopes = one.curve.evaluate(special.u)[1]
+                    found.append(traced(one.curve, Sample(special.u, tangent, slopes)))
+                    queue.append((found[-1], level + 1))
+    return found
+
+
+def _seen(passed: list[tuple[Curve, Array]], u: Array) -> bool:
+    """Whether branches were switched at a point before."""
+    return any(
+        np.max(np.abs(turned(curve, u[: curve.m] - other[: curve.m]) / curve.scale[: curve.m]))
+        < SAME
+        for curve, other in passed
+    )
+
+
+def _led(found: list[Traced], curve: Curve, u: Array, tangent: Array) -> bool:
+    """Whether both ways along a tangent at a branch point were followed before."""
+    for sign in (1.0, -1.0):
+        step = sign * curve.options.initial_step * tangent
+        probe = curve.refine(u + step, curve.weight * tangent)
+        if not probe.converged:
+            return False
+        inside = np.all((probe.u >= curve.low) & (probe.u <= curve.high))
+        if inside and not any(lies_on(one.curve, one.path, probe.u) for one in found):
+            return False
+    return True

@@ -1,0 +1,72 @@
+"""Where along its parameter curves of equilibria are stable, and where several are at once."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.connected import Traced
+
+Array = npt.NDArray[np.float64]
+
+
+def stable_spans(one: Traced) -> Array:
+    """Spans of the parameter over which a curve is stable, rows (low, high).
+
+    Between special points stability does not change, and the parameter does not turn back.
+    """
+    curve, path, n = one.curve, one.path, one.curve.n
+    breaks = [placed for placed in one.placed if placed.kind != "neutral_saddle"]
+    values = path.eigenvalues
+    assert values is not None
+    growth = curve.growth(values)
+    worst = np.max(growth, axis=1)
+    places = [-1, *(placed.index for placed in breaks), path.count - 1]
+    ends = [path.u[0], *(placed.special.u for placed in breaks), path.u[-1]]
+    found = []
+    for (a, b), (p, q) in zip(pairwise(places), pairwise(ends), strict=True):
+        inside = np.arange(a + 1, b + 1)
+        if len(inside):  # where the least eigenvalue is farthest from zero, the sign is sure
+            sure = inside[np.argmax(np.min(np.abs(growth[inside]), axis=1))]
+            top = float(worst[sure])
+        else:
+            top = _middle(one, p[: curve.m], q[: curve.m])
+        if top < 0.0:
+            along = [float(p[n]), float(q[n])]
+            found.append([min(along), max(along)])
+    return np.array(found).reshape(-1, 2)
+
+
+def _middle(one: Traced, p: Array, q: Array) -> float:
+    """The largest growth halfway between two special points; NaN where it is not found."""
+    curve = one.curve
+    point = curve.refine(0.5 * (p + q), curve.weight[: curve.m] * (q - p))
+    if not point.converged:
+        return np.nan
+    return float(
+        np.max(curve.growth(np.linalg.eigvals(curve.linear(point.slopes)).astype(complex)))
+    )
+
+
+def overlaps(spans: Array, least: int) -> Array:
+    """Where at least so many of several spans (rows) hold at once, merged where they touch."""
+    spans = spans[spans[:, 0] < spans[:, 1]]
+    marks = np.unique(spans)
+    found: list[list[float]] = []
+    for a, b in zip(marks[:-1].tolist(), marks[1:].tolist(), strict=True):
+        if np.sum((spans[:, 0] <= a) & (b <= spans[:, 1])) >= least:
+            if found and found[-1][1] == a:
+                found[-1][1] = b
+            else:
+                found.append([a, b])
+    return np.array(found).reshape(-1, 2)
+
+
+def most(spans: Array) -> int:
+    """How many spans hold at one value, at most."""
+    number = 0
+    while len(overlaps(spans, number + 1)):
+        number += 1
+    return number

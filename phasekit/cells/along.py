@@ -1,0 +1,310 @@
+"""Branches of equilibria in cells: what is found along one parameter, for values of the others."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.connected import Traced, connected
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
+from phasekit.bifurcation.continuation.same_path import turned
+from phasekit.bifurcation.continuation.stable_spans import most, overlaps, stable_spans
+from phasekit.bifurcation.special_points import KINDS
+from phasekit.cells.equations import each_cell, problem_without_values
+from phasekit.errors import BranchStatus, ConvergenceError, PointStatus, SpecialPointKind
+from phasekit.labels.arguments import bad, pair, unknown
+from phasekit.laws.equations import equations_of
+from phasekit.laws.ladder import Flow, Law, Map
+from phasekit.systems.equilibrium_curve import equilibrium_curve
+from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
+from phasekit.systems.system import System
+from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, rows_of
+from phasekit.table.row import Pass, Table
+
+Array = npt.NDArray[np.float64]
+
+DEPTH = 3  # how many times branches are switched in a row
+SAME = 1e-7  # distance on scaled axes within which points of two branches are one
+ROUNDING = 1e-12  # part of a span by which a point at its end may lie outside
+#: How many times shorter steps are where a cell lacks what its neighbours have.
+CAREFUL = 5.0
+
+
+def ends_of(parameter: str) -> tuple[str, str]:
+    """Inputs that say from where to where branches go."""
+    return f"first_{parameter}", f"last_{parameter}"
+
+
+def parameter_along(names: Iterable[str], inputs: Iterable[str]) -> str | None:
+    """The parameter along which branches go, by the names of a map's inputs."""
+    known = set(inputs)
+    return next((name for name in names if known.issuperset(ends_of(name))), None)
+
+
+def check_along(system: System, along: Any, axes: Iterable[str]) -> tuple[str, dict[str, float]]:
+    """The parameter of branches, and the inputs that say their span.
+
+    Raises
+    ------
+    ParameterError
+        If there are no branches in such a parameter, or of such a system.
+    """
+    law = equations_of(system)
+    if law is None:
+        raise bad(
+            "along", along, "None, for maps of a system that states no equations of its own",
+            "pk.bifurcation_set answers a rotor; pk.sweep(pk.Problem(...), along=...) the rest",
+        )  # fmt: skip
+    wants = "a parameter and its span, as in along=('p', (0.0, 1.0))"
+    if not isinstance(along, (tuple, list)) or len(along) != 2:
+        raise bad("along", along, wants)
+    name, span = along
+    if not isinstance(name, str) or name not in system.parameters:
+        raise unknown("along: parameter of the system", name, system.parameters)
+    low, high = pair("along", span, "two finite numbers, low < high", system.unit_of(name))
+    if not low < high:
+        raise bad("along", span, "two finite numbers, low < high")
+    if name in axes or not isinstance(system.parameters[name], float):
+        raise bad("along", name, f"a parameter that is no axis of the map; {name} is one")
+    if law.time is not None:
+        raise bad("system", system, "one whose f does not depend on time, for branches along=")
+    problem = problem_without_values(system)
+    corners(problem, natural_window(system), "window")
+    equilibrium_curve(problem.replace(**{name: low}), name, (low, high), ContinuationOptions())
+    return name, dict(zip(ends_of(name), (low, high), strict=True))
+
+
+def table_along(system: System, parameter: str) -> Table:
+    """The rows that a map of branches in a parameter has, and what computes them."""
+    law = equations_of(system)
+    assert law is not None
+    rung: type[Law] = Map if isinstance(law, Map) else Flow
+    problem = problem_without_values(system)
+    rows = rows_of(law, parameter)
+    others = tuple(name for name in problem.parameters if name != parameter)
+    function = functools.partial(branches, problem, natural_window(system), parameter)
+    inputs = (*others, *ends_of(parameter))
+    return Table(rows.values(), [Pass(function, inputs, GROUPS, rung, rows=tuple(rows.values()))])
+
+
+def branches(
+    problem: Problem, window: Any, parameter: str, *arrays: Any
+) -> tuple[dict[str, Any], ...]:
+    """Special points, stable equilibria and hysteresis of the branches of each cell."""
+    shape, cells = each_cell(len(problem.parameters) - 1, arrays)
+    names = [name for name in problem.parameters if name != parameter]
+    corner = corners(problem, window)
+    own = {
+        k: _Cell(problem.replace(**dict(zip(names, values, strict=True))), (span[0], span[1]))
+        for k, values, span in cells
+    }
+    _start(own, parameter, corner)
+    for cell in own.values():
+        _follow(cell, parameter, ContinuationOptions())
+    for k, beside in _alone(shape, own).items():
+        _follow_again(own[k], parameter, beside)
+    return _tabulated(problem, parameter, shape, own)
+
+
+def branches_of(
+    system: System, parameter: str, span: tuple[float, float]
+) -> tuple[Problem, list[Traced]]:
+    """The problem of a system at the lower end of a span, and all branches, as in a cell of a map.
+
+    Raises
+    ------
+    ConvergenceError
+        If a start leads to no equilibrium.
+    """
+    problem = as_problem(system)
+    cell = _Cell(problem.replace(**{parameter: span[0]}), span)
+    _start({0: cell}, parameter, corners(problem, natural_window(system)))
+    curve = equilibrium_curve(cell.problem, parameter, span, ContinuationOptions())
+    return cell.problem, connected(curve, cell.starts, DEPTH)
+
+
+@dataclass
+class _Cell:
+    """One cell: its problem, from where its branches are followed, and what they are."""
+
+    problem: Problem
+    span: tuple[float, float]
+    starts: list[Array] = field(default_factory=list)
+    proved: bool = False
+    traced: list[Traced] = field(default_factory=list)
+    failure: str = ""
+    missed: bool = False
+
+    def _within(self, special: Special) -> bool:
+        """Whether a point lies in the span: a step may pass the fold next to a bound."""
+        (low, high), at = self.span, special.u[len(self.problem.state)]
+        room = ROUNDING * (high - low)
+        return bool(low - room <= at <= high + room)
+
+    def points(self) -> list[tuple[Curve, Special]]:
+        """The special points of all branches, once each, by their parameter."""
+        found: list[tuple[Curve, Special]] = []
+        for one in self.traced:
+            m = one.curve.m
+            for special in one.specials:
+                gaps = (
+                    np.abs(turned(one.curve, special.u[:m] - other.u[:m]) / one.curve.scale[:m])
+                    for _, other in found
+                    if KINDS[other.kind].label == KINDS[special.kind].label
+                )
+                if self._within(special) and all(np.max(gap) > SAME for gap in gaps):
+                    found.append((one.curve, special))
+        n = len(self.problem.state)
+        return sorted(found, key=lambda point: float(point[1].u[n]))
+
+    @property
+    def counts(self) -> tuple[int, ...]:
+        """How many special points there are of each label."""
+        labels = [KINDS[special.kind].label for _, special in self.points()]
+        return tuple(labels.count(label) for label in COUNTED)
+
+    @property
+    def status(self) -> BranchStatus:
+        """Whether these are all branches."""
+        if self.failure:
+            return BranchStatus.FAILED
+        if not self.starts:
+            return BranchStatus.NO_EQUILIBRIUM
+        if any(one.unfinished for one in self.traced):
+            return BranchStatus.CUT
+        if self.missed:
+            return BranchStatus.MISSED
+        return BranchStatus.COMPLETE if self.proved else BranchStatus.UNPROVED
+
+
+def _start(own: Mapping[int, _Cell], parameter: str, corner: tuple[Array, Array]) -> None:
+    """Look for the equilibria in the window at both ends of the span."""
+    for end in (0, 1):
+        problems = [cell.problem.replace(**{parameter: cell.span[end]}) for cell in own.values()]
+        for cell, one in zip(own.values(), equilibria_of_cells(problems, *corner), strict=True):
+            cell.starts += [np.append(x, cell.span[end]) for x in one.x]
+            cell.proved = one.complete and (cell.proved or end == 0)
+
+
+def _follow(cell: _Cell, parameter: str, options: ContinuationOptions) -> None:
+    """Follow the branches of a cell."""
+    curve = equilibrium_curve(cell.problem, parameter, cell.span, options)
+    try:
+        cell.traced = connected(curve, cell.starts, DEPTH)
+    except (ConvergenceError, np.linalg.LinAlgError) as error:
+        cell.failure = str(error) or type(error).__name__
+
+
+def _alone(shape: Sequence[int], own: Mapping[int, _Cell]) -> dict[int, list[_Cell]]:
+    """Cells that lack special points which all their neighbours have, with these.
+
+    Those on the rim of a block have not all of their neighbours in it, and are not judged.
+    """
+    counts = {k: cell.counts for k, cell in own.items()}
+    strides = [int(np.prod(shape[i + 1 :], dtype=int)) for i in range(len(shape))]
+    found = {}
+    for k, cell in own.items():
+        place = np.unravel_index(k, tuple(shape)) if shape else ()
+        beside = [
+            k + sign * stride
+            for at, length, stride in zip(place, shape, strides, strict=True)
+            for sign in (-1, 1)
+            if 0 <= at + sign < length and k + sign * stride in own
+        ]
+        theirs = {counts[other] for other in beside}
+        every = 2 * sum(length > 1 for length in shape)
+        if len(beside) == every > 0 and len(theirs) == 1 and not cell.failure:
+            if any(a < b for a, b in zip(counts[k], theirs.pop(), strict=True)):
+                found[k] = [own[other] for other in beside]
+    return found
+
+
+def _follow_again(cell: _Cell, parameter: str, beside: list[_Cell]) -> None:
+    """Follow the branches of a cell by shorter steps, and from its neighbours' special points."""
+    options = ContinuationOptions()
+    careful = replace(
+        options, max_step=options.max_step / CAREFUL, turn=options.turn / CAREFUL,
+        max_points=int(options.max_points * CAREFUL),
+    )  # fmt: skip
+    again = replace(cell)
+    _follow(again, parameter, careful)
+    curve = equilibrium_curve(cell.problem, parameter, cell.span, careful)
+    for _, special in beside[0].points():
+        with contextlib.suppress(ConvergenceError, np.linalg.LinAlgError):
+            more = connected(curve, [*cell.starts, special.u[: curve.m]], DEPTH)
+            if len(more) > len(again.traced):
+                again.traced = more
+    if sum(again.counts) > sum(cell.counts):
+        cell.traced = again.traced
+    lacking = zip(cell.counts, beside[0].counts, strict=True)
+    cell.missed = any(a < b for a, b in lacking)
+
+
+def _tabulated(
+    problem: Problem, parameter: str, shape: tuple[int, ...], own: Mapping[int, _Cell]
+) -> tuple[dict[str, Any], ...]:
+    """What was found in all cells, by the names of rows."""
+    size, n = int(np.prod(shape, dtype=int)), len(problem.state)
+    points = {k: cell.points() for k, cell in own.items()}
+    stable = {
+        k: np.concatenate(
+            [np.empty((0, 2)), *(np.clip(stable_spans(one), *cell.span) for one in cell.traced)]
+        )
+        for k, cell in own.items()
+    }
+    double = {k: overlaps(spans, 2) for k, spans in stable.items()}
+    wide = (size, max(map(len, points.values()), default=0))
+    special: dict[str, Any] = {
+        name: np.full(wide, np.nan)
+        for name in (f"special_{x}" for x in (parameter, *problem.state, "coefficient"))
+    }
+    special["special_kind"] = np.zeros(wide, np.int8)
+    special["special_status"] = np.zeros(wide, np.int8)
+    counts = {name: np.full(size, -1, np.int64) for name in COUNTED.values()}
+    status = np.full(size, BranchStatus.NOT_COMPUTED, np.int8)
+    n_stable, n_hysteresis = (np.full(size, -1, np.int64) for _ in range(2))
+    width = np.full(size, np.nan)
+    intervals = np.full((size, max(map(len, double.values()), default=0), 2), np.nan)
+    for k, cell in own.items():
+        for i, (_, one) in enumerate(points[k]):
+            special[f"special_{parameter}"][k, i] = one.u[n]
+            for j, name in enumerate(problem.state):
+                special[f"special_{name}"][k, i] = one.u[j]
+            special["special_coefficient"][k, i] = one.normal_form.get(
+                COEFFICIENT.get(one.kind, ""), np.nan
+            )
+            special["special_kind"][k, i] = SpecialPointKind.__members__.get(
+                one.kind.upper(), SpecialPointKind.OTHER
+            )
+            sure = one.status == CONVERGED
+            special["special_status"][k, i] = PointStatus.CONVERGED if sure else PointStatus.GUESS
+        status[k] = cell.status
+        if cell.failure:
+            continue
+        for name, number in zip(counts, cell.counts, strict=True):
+            counts[name][k] = number
+        n_stable[k], n_hysteresis[k] = most(stable[k]), len(double[k])
+        width[k] = float(np.sum(double[k][:, 1] - double[k][:, 0]))
+        intervals[k, : len(double[k])] = double[k]
+    back = functools.partial(_back, shape)
+    return (
+        back({"branch_status": status}),
+        back({**special, **counts}),
+        back({"n_stable": n_stable}),
+        back({
+            "hysteresis": intervals, "n_hysteresis": n_hysteresis, "hysteresis_width": width
+        }),
+    )  # fmt: skip
+
+
+def _back(shape: tuple[int, ...], found: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: values.reshape(shape + values.shape[1:]) for name, values in found.items()}

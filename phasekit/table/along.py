@@ -1,0 +1,99 @@
+"""What maps of branches hold: rows by the names of the states and of the parameter along these."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from phasekit.errors import BranchStatus, PointStatus, SpecialPointKind
+from phasekit.labels.arguments import bad
+from phasekit.labels.coordinates import LABELS
+from phasekit.laws.equations import Equations
+from phasekit.laws.ladder import Flow, Law, Map
+from phasekit.table.row import Quantity
+
+#: Cells of a tile at most: a branch takes milliseconds, and neighbours are looked at together.
+CELLS = 1024
+GROUPS = ("branch_status", "special_points", "n_stable", "hysteresis")
+#: What special points are counted by, their labels, and the rows of their numbers.
+COUNTED = {
+    "LP": "n_fold",
+    "BP": "n_branch_point",
+    "H": "n_hopf",
+    "PD": "n_period_doubling",
+    "TR": "n_torus",
+}
+#: The coefficient of the normal form that says most of a kind.
+COEFFICIENT = {
+    "fold": "a", "hopf": "l1", "pitchfork": "c", "transcritical": "a", "period_doubling": "c",
+    "torus": "d",
+}  # fmt: skip
+TRACED = "[AllgowerGeorg1990] 6; [Kuznetsov2004] 10"
+
+
+def rows_of(law: Equations, parameter: str) -> dict[str, Quantity]:
+    """Rows that a map of branches of one system has, by name.
+
+    Examples
+    --------
+    >>> from phasekit.laws.equations import Rates
+    >>> rows = rows_of(Rates(("x", "y"), ("a", "b"), None), "a")
+    >>> rows["special_a"].dims, rows["hysteresis"].label_shape
+    (('special_point',), (0, 2))
+
+    Raises
+    ------
+    ParameterError
+        If a state or the parameter has the name of something else that is said of special points.
+    """
+    rung: type[Law] = Map if isinstance(law, Map) else Flow
+    rest = "fixed points" if rung is Map else "equilibria"
+    labels = {
+        **LABELS,
+        "special_point": (range(0), f"special point, by {parameter}"),
+        "interval": (range(0), f"interval of {parameter}"),
+        "end": (("low", "high"), "end of an interval"),
+    }
+    for name in (parameter, *law.states):
+        if name in ("kind", "status", "coefficient"):
+            wants = "other names of states and of the parameter than kind, status, coefficient"
+            raise bad("system", name, wants)
+
+    def row(
+        name: str, group: str, dims: tuple[str, ...], dtype: str, units: str, text: str,
+        equation: str, flags: type[IntEnum] | None = None,
+    ) -> Quantity:  # fmt: skip
+        return Quantity(
+            name, group, dims, dtype, units, text, equation, TRACED, flags=flags, of=rung,
+            labels=labels, most_cells=CELLS,
+        )  # fmt: skip
+
+    unit = {name: law.units.get(name, "1") for name in (parameter, *law.states)}
+    each, both = ("special_point",), "f = 0, and the equations of its kind"
+    found = [
+        row("branch_status", "branch_status", (), "int8", "1",
+            f"whether all branches of {rest} in the window at the ends of the span were followed",
+            "box proofs at both ends of the span", BranchStatus),
+        row("special_kind", "special_points", each, "int8", "1", "kind of the special point",
+            "by its defining equations", SpecialPointKind),
+        row(f"special_{parameter}", "special_points", each, "float64", unit[parameter],
+            f"{parameter} at the special point", both),
+        *(row(f"special_{name}", "special_points", each, "float64", unit[name],
+              f"{name} at the special point", both) for name in law.states),
+        row("special_coefficient", "special_points", each, "float64", "1",
+            "coefficient of the normal form: a of a fold, l1 of a Hopf point, ...", "normal form"),
+        row("special_status", "special_points", each, "int8", "1",
+            "whether the special point converged", "Newton's method", PointStatus),
+        *(row(name, "special_points", (), "int64", "1",
+              f"number of special points {label} on all branches; -1: not computed", both)
+          for label, name in COUNTED.items()),
+        row("n_stable", "n_stable", (), "int64", "1",
+            f"greatest number of stable {rest} at one value of {parameter}; -1: not computed",
+            "all eigenvalues inside the border"),
+        row("hysteresis", "hysteresis", ("interval", "end"), "float64", unit[parameter],
+            f"interval of {parameter} with two or more stable {rest}", "stable branches overlap"),
+        row("n_hysteresis", "hysteresis", (), "int64", "1",
+            "number of such intervals; -1: not computed", "stable branches overlap"),
+        row("hysteresis_width", "hysteresis", (), "float64", unit[parameter],
+            "sum of their lengths", "sum of high - low"),
+    ]  # fmt: skip
+    return {one.name: one for one in found}

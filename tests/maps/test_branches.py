@@ -1,0 +1,196 @@
+"""Maps of branches: special points, stability and hysteresis along a parameter in each cell."""
+
+import warnings
+
+import dask.array as da
+import numpy as np
+import pytest
+import xarray as xr
+
+import phasekit as pk
+
+AB = pk.Problem(
+    ["-x + p1*(1 - x)*exp(y)", "-y + p1*p2*(1 - x)*exp(y) - p3*y"],
+    ("x", "y"),
+    {"p1": 0.0, "p2": 14.0, "p3": 2.0},
+    window={"x": (-1, 2), "y": (-1, 8)},
+)
+CUSP = pk.Problem("mu + nu*x - x^3", "x", {"mu": 0.0, "nu": 1.0}, window={"x": (-3, 3)})
+HOPF = pk.Problem(
+    {"x": "mu*x - w*y - x*(x^2 + y^2)", "y": "w*x + mu*y - y*(x^2 + y^2)"},
+    parameters={"mu": -1.0, "w": 1.0},
+    window={"x": (-1, 1), "y": (-1, 1)},
+)
+PITCHFORK = pk.Problem("r*x + e*x^2 - x^3", "x", {"r": 0.0, "e": 0.0}, window={"x": (-2, 2)})
+ALL = ("special_points", "n_stable", "hysteresis")
+WIDE = {"along": ("p1", (0, 0.2)), "of": ALL}
+
+
+def folds_of_ab(p2, p3):
+    """Values of p1 at the folds: x (1 - x) c = 1 with y = c x and c = p2/(1 + p3)."""
+    c = p2 / (1 + p3)
+    if c <= 4.0:
+        return []
+    roots = 0.5 * (1 + np.array([-1, 1]) * np.sqrt(1 - 4 / c))
+    return sorted((roots / (1 - roots) * np.exp(-c * roots)).tolist())
+
+
+def test_cells_equal_single_branches():
+    p2, p3 = np.linspace(12, 16, 4), np.linspace(1.5, 2.5, 5)
+    ds = pk.sweep(AB, p2=p2, p3=p3, **WIDE)
+    assert set(ds.branch_status.values.ravel()) == {pk.BranchStatus.COMPLETE}
+    for i, j in np.ndindex(4, 5):
+        cell = ds.isel(p2=i, p3=j)
+        problem = AB.replace(p2=p2[i], p3=p3[j])
+        one = pk.continuation(problem, "p1", x0=[0, 0], span=(0, 0.2))
+        found = sorted((s["p1"], s.kind, *s.x) for s in one.special_points if s.kind != "end")
+        kinds = [pk.SpecialPointKind(k).name.lower() for k in cell.special_kind.values if k]
+        assert kinds == [kind for _, kind, *_ in found]
+        names = ("special_p1", "special_x", "special_y")
+        own = np.array([cell[name].values[: len(found)] for name in names]).T
+        want = np.array([(at, *x) for at, _, *x in found]).reshape(-1, 3)
+        np.testing.assert_allclose(own, want, rtol=1e-12, atol=0)
+        assert cell.n_hopf == kinds.count("hopf")
+        exact = folds_of_ab(p2[i], p3[j])
+        at_folds = cell.special_p1.values[cell.special_kind.values == pk.SpecialPointKind.FOLD]
+        np.testing.assert_allclose(at_folds, exact, rtol=1e-12)
+
+
+def test_folds_and_hysteresis_of_the_cusp_are_exact():
+    nu = np.linspace(-1.0, 1.4, 9)
+    ds = pk.sweep(CUSP, nu=nu, along=("mu", (-1, 1)), of=ALL)
+    fold = 2 * (np.maximum(nu, 0) / 3) ** 1.5
+    assert ds.n_fold.values.tolist() == (2 * (nu > 1e-9)).tolist()
+    some = nu > 1e-9
+    np.testing.assert_allclose(ds.special_mu.values[some], np.outer(fold[some], [-1, 1]), 1e-12)
+    np.testing.assert_allclose(ds.hysteresis.values[some, 0], np.outer(fold[some], [-1, 1]), 1e-12)
+    np.testing.assert_allclose(ds.hysteresis_width, 2 * fold, rtol=1e-12)
+    assert ds.n_stable.values.tolist() == (1 + some).tolist()
+    assert np.isnan(ds.hysteresis.values[~some]).all()
+    # a = -V'''/2 of mu' = ... on the center manifold: 3 |x| with x = sqrt(nu/3).
+    size = 3 * np.sqrt(nu[some] / 3)
+    np.testing.assert_allclose(np.abs(ds.special_coefficient.values[some, 0]), size, rtol=1e-12)
+
+
+def test_hopf_points_of_the_normal_form():
+    ds = pk.sweep(HOPF, w=[0.5, 1.0, 3.0], along=("mu", (-0.7, 0.9)), of=ALL)
+    assert ds.n_hopf.values.tolist() == [1, 1, 1]
+    np.testing.assert_allclose(ds.special_mu.values[:, 0], 0.0, atol=1e-14)
+    assert (ds.special_coefficient.values < 0).all()
+    assert ds.n_stable.values.tolist() == [1, 1, 1]
+
+
+def test_branches_through_branch_points_are_followed():
+    ds = pk.sweep(PITCHFORK, e=[0.0, 0.5], along=("r", (-1.0, 1.0)), of=ALL)
+    assert ds.n_branch_point.values.tolist() == [1, 1]
+    assert ds.n_fold.values.tolist() == [0, 1]
+    np.testing.assert_allclose(ds.special_r.values[1, 0], -(0.5**2) / 4, rtol=1e-12)
+    # Both branches of the transcritical point are stable from the fold to it, and after it two.
+    np.testing.assert_allclose(ds.hysteresis.values[1, 0], [-0.0625, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(ds.hysteresis.values[0, 0], [0.0, 1.0], atol=1e-9)
+    assert ds.n_stable.values.tolist() == [2, 2]
+    first = ds.isel(e=1).phasekit.branch()
+    assert first.special("BP")
+    assert ds.isel(e=1).phasekit.branch(1).special("LP")
+    with pytest.raises(pk.ParameterError, match="number"):
+        ds.isel(e=1).phasekit.branch(7)
+
+
+def test_fixed_points_of_a_map():
+    logistic = pk.Problem(
+        "r*x*(1 - x) + e", "x", {"r": 2.0, "e": 0.0}, map=True, window={"x": (-1, 1)}
+    )
+    ds = pk.sweep(logistic, e=[0.0, 0.01], along=("r", (0.5, 3.5)), of="special_points")
+    assert ds.n_period_doubling.values.tolist() == [1, 1]
+    at = ds.special_kind.values[0] == pk.SpecialPointKind.PERIOD_DOUBLING
+    assert ds.special_r.values[0, at].item() == pytest.approx(3.0, rel=1e-12)
+    assert ds.n_branch_point.values.tolist() == [1, 0]
+
+
+def test_stored_workers_and_blocks_are_what_is_computed_at_once(tmp_path):
+    p2, p3 = np.linspace(12, 16, 4), np.linspace(1.5, 2.5, 5)
+    whole = pk.sweep(AB, p2=p2, p3=p3, **WIDE)
+    name = tmp_path / "map.zarr"
+    pk.sweep(AB, p2=p2[:2], p3=p3, store=name, chunks=2, workers=1, **WIDE)
+    longer = pk.sweep(AB, p2=p2, p3=p3, store=name, workers=2, **WIDE)
+    assert longer.identical(whole)
+    assert pk.open_map(name, verify=True).identical(whole)
+    with pytest.raises(pk.StoreError, match="last_p1"):
+        pk.sweep(AB, p2=p2, p3=p3, store=name, along=("p1", (0, 0.3)), of=ALL)
+    (name / "n_fold" / "c.0.0").write_bytes(b"gone")
+    with pytest.warns(UserWarning, match="damaged"):
+        again = pk.sweep(AB, p2=p2, p3=p3, store=name, **WIDE)
+    assert again.identical(whole)
+    lazy = pk.sweep(AB, p2=xr.DataArray(da.from_array(p2, chunks=2), dims="p2"), p3=p3, **WIDE)
+    assert lazy.n_fold.chunks is not None
+    for variable in whole.data_vars:
+        assert lazy[variable].equals(whole[variable]), variable
+
+
+def test_a_cell_gives_its_system_and_branch_back():
+    ds = pk.sweep(AB, p2=[12.0, 14.0], p3=[2.0], **WIDE)
+    cell = ds.isel(p2=1, p3=0)
+    assert cell.phasekit.system() == AB
+    branch = cell.phasekit.branch()
+    single = pk.continuation(AB, "p1", x0=[0, 0], span=(0, 0.2))
+    assert branch.points.drop_attrs().equals(single.points.drop_attrs())
+    assert [repr(s) for s in branch.special_points] == [repr(s) for s in single.special_points]
+    with pytest.raises(pk.ParameterError, match="one cell"):
+        ds.phasekit.branch()
+    with pytest.raises(pk.ParameterError, match="a map of branches"):
+        pk.sweep(AB, p1=[0.1, 0.2]).isel(p1=0).phasekit.branch()
+
+
+def test_cells_that_fail_say_so():
+    pole = pk.Problem("sqrt(a - mu) - x", "x", {"a": 1.0, "mu": 0.0}, window={"x": (-3, 3)})
+    with pytest.warns(RuntimeWarning, match="in 1 .*a branch ends within the span"):
+        ds = pk.sweep(pole, a=[0.5, 2.0, np.nan], along=("mu", (0, 1)), of="special_points")
+    wanted = [pk.BranchStatus.CUT, pk.BranchStatus.COMPLETE, pk.BranchStatus.NOT_COMPUTED]
+    assert ds.branch_status.values.tolist() == wanted
+    assert ds.n_fold.values.tolist() == [0, 0, -1]
+    none = pk.Problem("a + x^2 + mu^2", "x", {"a": 1.0, "mu": 0.0}, window={"x": (-3, 3)})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ds = pk.sweep(none, a=[1.0], along=("mu", (-1, 1)), of="special_points")
+    assert ds.branch_status.values.tolist() == [pk.BranchStatus.NO_EQUILIBRIUM]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"along": ("q", (0, 1))}, "along: parameter"),
+        ({"along": ("p1", (1, 0))}, r"along: got \(1, 0\), wants two finite numbers, low < high"),
+        ({"along": ("p1", (0, np.nan))}, "along: got nan"),
+        ({"along": "p1"}, "along: got 'p1', wants a parameter and its span"),
+        ({"along": ("p2", (0, 1))}, "along: got 'p2', wants a parameter that is no axis"),
+        ({"along": ("p1", (0, 1)), "of": "orbits"}, "of: the quantity 'orbits' is unknown"),
+        ({"along": ("p1", (0, 1)), "starts": 3}, "starts: got 3"),
+        ({"along": ("p1", (0, 1)), "x": 0.5}, "'x' is unknown"),
+    ],
+    ids=str,
+)
+def test_bad_input_is_refused_by_name(given, words):
+    with pytest.raises(pk.ParameterError, match=words):
+        pk.sweep(AB, p2=[1.0, 2.0], **given)
+
+
+def test_systems_without_such_branches_are_refused():
+    with pytest.raises(pk.ParameterError, match="along: .* states no equations"):
+        pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1], along=("psi", (0, 1)))
+    with pytest.raises(pk.ParameterError, match="window"):
+        pk.sweep(pk.Problem("a*x + b", "x", {"a": 1, "b": 1}), b=[1, 2], along=("a", (0, 1)))
+    forced = pk.Problem(
+        "-x + a*cos(t)", "x", {"a": 1.0, "b": 1}, time="t", period=2 * np.pi, window={"x": (0, 1)}
+    )
+    with pytest.raises(pk.ParameterError, match="does not depend on time"):
+        pk.sweep(forced, b=[1.0, 2.0], along=("a", (0, 1)))
+
+
+def test_counts_are_right_in_every_cell():
+    nu, tilt = np.linspace(-1.0, 1.4, 12), np.linspace(-0.5, 0.5, 11)
+    law = pk.Problem("mu + nu*x - x^3 + s", "x", {"mu": 0, "nu": 1, "s": 0}, window={"x": (-3, 3)})
+    ds = pk.sweep(law, nu=nu, s=tilt, along=("mu", (-0.9, 0.9)), of=ALL)
+    fold = 2 * (np.maximum(nu, 0.0)[:, None, None] / 3) ** 1.5 * [-1, 1] - tilt[None, :, None]
+    exact = np.sum((np.abs(fold) < 0.9) & (nu[:, None, None] > 0), axis=2)
+    assert ds.branch_status.values.max() == pk.BranchStatus.COMPLETE
+    np.testing.assert_array_equal(ds.n_fold, exact)
