@@ -221,7 +221,7 @@ def _warn_of_branches(ds: xr.Dataset) -> None:
         warnings.warn(
             f"branches of {status.size} cells: {'; '.join(found)}; branch_status says where",
             RuntimeWarning,
-            stacklevel=3,
+            stacklevel=4,
         )
 
 
