@@ -90,11 +90,13 @@ def check_sections(branch, exact, rng, count):
             Fraction(float(c)) + s * Fraction(float(d))
             for c, d in zip(tubes.middle[k], tubes.chord[k], strict=True)
         ]
-        (x, mu) = (
-            sp.Rational(b * Fraction(float(u))) + sp.Rational(Fraction(float(t[0] * u))) * W
+        x, mu = (
+            sp.Poly([Fraction(float(t[0] * u)), b * Fraction(float(u))], W, domain="QQ")
             for b, t, u in zip(base, tubes.across[k], units, strict=True)
         )
-        cut = sp.Poly(exact.as_expr().subs({X: x, MU: mu}, simultaneous=True), W, domain="QQ")
+        cut = sp.Poly(0, W, domain="QQ")
+        for (p, q), c in exact.as_dict().items():
+            cut += x**p * mu**q * c
         for reach in (tubes.radius[k, 0], tubes.alone[k, 0]):
             end = sp.Rational(float(reach))
             assert cut.count_roots(-end, end) == 1, (k, float(s))
@@ -102,8 +104,11 @@ def check_sections(branch, exact, rng, count):
 
 def root_index(exact, x, mu):
     """How many real roots lie below the one next to x; None where that is not clear."""
-    roots = sp.Poly(exact.as_expr().subs(MU, sp.Rational(mu)), X).real_roots()
-    gaps = np.array([abs(float(root) - x) for root in roots])
+    found = np.roots([float(c.subs(MU, mu)) for c in sp.Poly(exact.as_expr(), X).all_coeffs()])
+    roots = np.sort(found[np.abs(found.imag) < 1e-9].real)
+    if not roots.size:  # two that are all but equal
+        return None
+    gaps = np.abs(roots - x)
     near = int(np.argmin(gaps))
     apart = np.delete(gaps, near).min(initial=np.inf)
     return near if gaps[near] < 1e-7 and apart > 1e-4 else None
@@ -128,7 +133,7 @@ def check_folds(branch, exact):
     for fold in branch.special("fold"):
         if fold.certified:
             low, high = (sp.Rational(end) for end in fold.enclosure["mu"])
-            assert met.count_roots(low, high) >= 1
+            assert met.count_roots(low, high) == 1
             assert fold.enclosure["x"][0] <= fold.x[0] <= fold.enclosure["x"][1]
 
 
@@ -159,8 +164,9 @@ def test_random_curves_are_proved_and_no_certificate_is_wrong():
 
 
 @pytest.mark.slow
-def test_a_thousand_random_curves_are_proved_and_no_certificate_is_wrong():
-    assert try_random(1000, 2) > 20_000
+@pytest.mark.parametrize("seed", range(2, 6))
+def test_a_thousand_random_curves_are_proved_and_no_certificate_is_wrong(seed):
+    assert try_random(250, seed) > 5_000
 
 
 def try_apart(count, seed):
@@ -335,7 +341,7 @@ def test_certificates_are_kept_by_copies_stores_and_longer_branches(tmp_path):
     assert part.certified_onward.sizes == {"point": 6}
     ds = branch.to_dataset()
     assert ds.special_certified.all()
-    assert ds.special_mu_enclosure.shape == (3, 2) or len(ds.special_mu_enclosure) >= 2
+    assert ds.special_mu_enclosure.sizes == {"special_point": len(ds.special_kind), "end": 2}
 
 
 def test_nothing_is_said_without_being_asked_for():

@@ -28,8 +28,10 @@ Flags = npt.NDArray[np.bool_]
 
 #: How much further than its chord a tube goes at either end at least, in parts of the chord.
 BEYOND = 1e-3
-#: How often a tube is widened until it holds its image, and once it does, by how much.
-TRIES, WIDER = 12, 4.0
+#: How often a tube is widened until it holds its image, and once it does, and by how much then.
+TRIES, WIDENINGS, WIDER = 12, 2, 4.0
+#: Part of what an image was beside its tube, above which widening is given up.
+STUCK = 0.97
 #: What frames of chords are off by, beside one.
 FRAME = 1e-14
 
@@ -163,7 +165,7 @@ def _tubes_about(system: System, start: Array, end: Array) -> Tubes:
     # Zeros of a tube lie in its image: the tube may be wider than where the curve can be.
     alone, radius, proved = _held(whole, WIDER**3 * (tip + floors), floors)
     proved &= held
-    for _ in range(TRIES):
+    for _ in range(WIDENINGS):
         wider = alone * WIDER
         holds = np.all(whole(wider) < wider, axis=1) & proved
         alone = np.where(holds[:, None], wider, alone)
@@ -229,12 +231,13 @@ def _held(
 ) -> tuple[Array, Array, Flags]:
     """Radii that hold their images, the images, and whether these were found."""
     radius, proved = least.copy(), np.zeros(len(floor), dtype=bool)
-    found = np.full_like(radius, np.inf)
+    found, ratio = np.full_like(radius, np.inf), np.full(len(floor), np.inf)
     for _ in range(TRIES):
         found = image(radius)
         proved = np.all(found < radius, axis=1)
         finite = np.isfinite(found).all(axis=1)
-        if (proved | ~finite).all():
+        before, ratio = ratio, np.max(found / radius, axis=1, initial=0.0)
+        if (proved | ~finite | (ratio > STUCK * before)).all():
             break
         grows = (finite & ~proved)[:, None]
         radius = np.where(grows, np.maximum(radius, 1.2 * found + floor), radius)
