@@ -168,3 +168,63 @@ def test_period_doubling_of_a_map():
     J = np.array([[-2.0, 2.0 / 9.0], [-6.0, -1.0 / 3.0]])
     wanted = -np.linalg.solve(J, [1.0, 0.0])
     np.testing.assert_allclose([*found.d_state, *found.d_free], wanted, rtol=1e-12)
+
+
+#: r' = mu r + b r^3 - r^5, theta' = w + c r^2: cycles fold at mu = -b^2/4, r^2 = b/2.
+QUINTIC = pk.Problem(
+    [
+        "(mu + b*(x*x + y*y) - (x*x + y*y)**2)*x - (w + c*(x*x + y*y))*y",
+        "(mu + b*(x*x + y*y) - (x*x + y*y)**2)*y + (w + c*(x*x + y*y))*x",
+    ],
+    ("x", "y"), {"mu": -0.5, "b": 1.0, "w": 2.0, "c": 0.3},
+)  # fmt: skip
+
+
+def test_fold_of_cycles_in_closed_form():
+    rest = pk.continuation(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3))
+    (fold,) = rest.special("H")[0].switch().special("LPC")
+    found = fold.sensitivity
+    assert list(found.parameter.values) == ["b", "w", "c"]
+    assert all(one == "" for one in found.reason.values)
+    np.testing.assert_allclose(found.d_free[0], [-0.5, 0.0, 0.0], atol=1e-9)
+    period = 2.0 * np.pi / 2.15
+    slope = -(period**2) / (2.0 * np.pi) * np.array([0.15, 1.0, 0.5])
+    np.testing.assert_allclose(found.d_period, slope, rtol=1e-8)
+    rise = found.d_number.sel(number="x_max")
+    np.testing.assert_allclose(rise, [0.25 / np.sqrt(0.5), 0.0, 0.0], atol=1e-8)
+
+
+def test_events_of_cycles_in_closed_form():
+    """Where the period is that of r^2 = 0.7: mu = r^4 - b r^2, w + c r^2 fixed."""
+    flow = QUINTIC.replace(mu=0.2)
+    start = pk.periodic_orbit(flow, [1.08, 0.0], settle=30.0)
+    target = 2.0 * np.pi / (2.0 + 0.3 * 0.7)
+    family = pk.continuation(
+        flow, "mu", orbit=start, span=(-0.5, 0.6), events={"long": f"period - {target!r}"}
+    )
+    found = family.special("long")[0].sensitivity
+    # d r^2 = -(dw + r^2 dc)/c, mu = r^4 - b r^2.
+    square = np.array([0.0, -1.0, -0.7]) / 0.3
+    wanted = (2.0 * 0.7 - 1.0) * square - np.array([0.7, 0.0, 0.0])
+    np.testing.assert_allclose(found.d_free[0], wanted, rtol=1e-7, atol=1e-7)
+    np.testing.assert_allclose(found.d_period, 0.0, atol=1e-8)
+
+
+def doubling(**changes):
+    """The first period doubling of Roessler's cycles."""
+    flow = pk.Problem(
+        ["-y - z", "x + a*y", "b + z*(x - c)"], ("x", "y", "z"),
+        {"a": 0.2, "b": 0.2, "c": 2.5, **changes},
+    )  # fmt: skip
+    orbit = pk.periodic_orbit(flow, [2.0, 2.0, 0.03], settle=100.0)
+    return pk.continuation(flow, "c", orbit=orbit, span=(2.4, 3.2)).special("PD")[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_doubling_of_roessler_moves_as_its_solutions_do(name):
+    point, h = doubling(), 1e-4
+    up, down = (doubling(**{name: 0.2 + s * h}) for s in (1.0, -1.0))
+    found = point.sensitivity.sel(parameter=name)
+    for number, column in (("c", found.d_free.item()), ("period", found.d_period.item())):
+        assert column == pytest.approx((up[number] - down[number]) / (2.0 * h), rel=2e-6)

@@ -9,7 +9,7 @@ derivatives of the function of the curve that vanishes there.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -29,6 +29,7 @@ Form = Callable[[Derivatives, Array], Mapping[str, float]]
 
 SINGULAR = 1e-10  # least singular value of a scaled system that is no rounding
 STAYS = 1e-8  # part of its scale by which a branch point that a parameter keeps may be lost
+STEPS = 25  # of Newton's method
 STEP = 1e-3  # of the scales, in differences along a line
 #: Weights of f(x - 2h), f(x - h), f(x + h), f(x + 2h) in h f'(x), to the fourth order.
 STENCIL = ((-2.0, 1.0 / 12.0), (-1.0, -2.0 / 3.0), (1.0, 2.0 / 3.0), (2.0, -1.0 / 12.0))
@@ -89,6 +90,29 @@ def sensitivity(curve: Curve, special: Special) -> Sensitivity:
     point = _Point(curve, special, others)
     with np.errstate(all="ignore"):
         return point.solved()
+
+
+def moved(
+    curve: Curve, special: Special, par: Array, by: Sensitivity
+) -> tuple[Curve, Special] | None:
+    """The point at other parameters, next to where its derivatives lead; None if there is none."""
+    others = by.others
+    change = par[list(others)] - curve.par[list(others)]
+    here, n, m = curve.replace(par=par), curve.n, curve.m
+    u = special.u.copy()
+    u[:n] += np.nan_to_num(by.x) @ change
+    u[n:m] += np.nan_to_num(by.free) @ change
+    with np.errstate(all="ignore"):
+        point = _Point(here, replace(special, u=u), others)
+        if not point.refined():
+            return None
+        form = point.form_at()
+        found = {} if form is None else dict(form(Derivatives(point.made, point.u), point.u))
+    k = m + len(others)
+    extra = special.extra
+    if extra is not None and point.made.size > k:
+        extra = np.append(point.u[k:], extra[point.made.size - k :])
+    return here, replace(special, u=point.u[:m], extra=extra, normal_form=found)
 
 
 def _hindered(curve: Curve, special: Special) -> str:
@@ -154,18 +178,44 @@ class _Point:
         kinds = [one for one in looked_for_on(self.curve) if one.kind == self.special.kind]
         return kinds[0]
 
-    def solved(self) -> Sensitivity:
-        """One linear solve."""
-        made, special, k = self.made, self.special, len(self.others)
-        _, G = made.equations_at(self.u)
+    def _equations(self) -> tuple[Array, Array, Array]:
+        """G, and its derivatives by the unknowns and by the other parameters, in their scales."""
+        made = self.made
+        value, G = made.equations_at(self.u)
         if made.kind == defining.BRANCH and len(made.active) == 3:
-            G = np.delete(G, -2, axis=0)  # that the branches meet is no equation here
+            value, G = np.delete(value, -2), np.delete(G, -2, axis=0)  # that branches meet
         if (test := self.test) is not None:
+            value = np.append(value, self._value(test, self.u))
             G = np.vstack([G, self._gradient(test)])
         A, B = G[:, self.own] * made.scale[self.own], G[:, self.given] * made.scale[self.given]
         rows = np.max(np.abs(A), axis=1, initial=0.0)
         rows[rows == 0.0] = 1.0
-        A, B = A / rows[:, None], B / rows[:, None]
+        return value / rows, A / rows[:, None], B / rows[:, None]
+
+    def refined(self) -> bool:
+        """Newton's method at the parameters given; whether it converged."""
+        before, sizes = np.inf, self.made.scale[self.own]
+        for _ in range(STEPS):
+            value, A, _ = self._equations()
+            if not (np.isfinite(value).all() and np.isfinite(A).all()):
+                return False
+            try:
+                step = np.linalg.solve(A, -value)
+            except np.linalg.LinAlgError:
+                return False
+            size = float(np.max(np.abs(step)))
+            if not size < 1e3:
+                return False
+            self.u[self.own] += step * sizes
+            if size <= 1e-14 or (size <= 1e-9 and size >= 0.5 * before):
+                return True
+            before = size
+        return False
+
+    def solved(self) -> Sensitivity:
+        """One linear solve."""
+        made, special, k = self.made, self.special, len(self.others)
+        _, A, B = self._equations()
         names = [made.field.parameters[i] for i in self.others]
         values = np.linalg.svd(A, compute_uv=False) if np.isfinite(A).all() else np.zeros(1)
         if not values[-1] > SINGULAR * values[0]:
@@ -198,13 +248,17 @@ class _Point:
                 return f"{name} destroys the branch point: without a symmetry the branches part"
         return ""
 
+    def _value(self, test: CurveTest, at: Array) -> float:
+        made = self.made
+        return float(test.values(made, at[None], made.evaluate(at)[1][None])[0])
+
     def _gradient(self, test: CurveTest) -> Array:
         """Derivatives of a function of the curve by all unknowns, by differences."""
         made, u = self.made, self.u
         steps = STEP * np.maximum(made.scale, np.abs(u))
 
         def value(at: Array) -> float:
-            return float(test.values(made, at[None], made.evaluate(at)[1][None])[0])
+            return self._value(test, at)
 
         out = np.zeros(made.size)
         for j in range(made.size):
@@ -215,7 +269,7 @@ class _Point:
 
     def _form(self, slope: Array) -> dict[str, float]:
         """Derivatives of the coefficients of the normal form along a line, by differences."""
-        form = self._form_at()
+        form = self.form_at()
         if form is None:
             return {}
         made = self.made
@@ -229,7 +283,7 @@ class _Point:
                 out[name] += weight * found.get(name, np.nan) / step
         return out
 
-    def _form_at(self) -> Form | None:
+    def form_at(self) -> Form | None:
         """The normal form at a point beside."""
         if (test := self.test) is not None:
             return lambda d, u: test.form(d)[0]

@@ -11,8 +11,8 @@ from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.extended import extended
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
+from phasekit.bifurcation.continuation.periodic.extended import Extended, extended
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.labelled.continuation.branch import branch_of
@@ -108,6 +108,23 @@ def curve_from(
     span: tuple[float, float], record: Any,
 ) -> CycleBranch:  # fmt: skip
     """The curve of critical orbits of a kind through one of a family, over a second parameter."""
+    made, found = critical_orbit(problem, cycles, here, kind, parameter, span)
+    start = first_point(
+        made, found,
+        f"of the curve of {kind} points at {parameter} = {problem.parameters[parameter]:.12g}",
+    )  # fmt: skip
+    if start.dy[2] < 0.0:
+        start = start.flipped()
+    walker = CycleWalk(made)
+    tracks = run(walker, start, cycles.options.directions)
+    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+
+
+def critical_orbit(
+    problem: Problem, cycles: Cycles, here: Point, kind: str, parameter: str,
+    span: tuple[float, float],
+) -> tuple[Extended, Solution]:  # fmt: skip
+    """A critical orbit with its function, and how it goes on as a second parameter changes."""
     value = problem.parameters[parameter]
     options = cycles.options
     first = float(cycles.low[0]), float(cycles.high[0])
@@ -118,13 +135,7 @@ def curve_from(
     clock = clock_code(problem, (cycles.active[0], place))
     made = extended(cycles, kind, place, span, clock, first)
     guess = starts.with_function(made, cycles, here, value)
-    found = starts.settled(made, guess, held=2)
-    start = first_point(made, found, f"of the curve of {kind} points at {parameter} = {value:.9g}")
-    if start.dy[2] < 0.0:
-        start = start.flipped()
-    walker = CycleWalk(made)
-    tracks = run(walker, start, options.directions)
-    return branch_of(CycleBranch, problem, walker, start, tracks, record)
+    return made, starts.settled(made, guess, held=2)
 
 
 def _options(cycles: Cycles, options: Any) -> ContinuationOptions:

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation import sensitivity as equilibria
+from phasekit.bifurcation.continuation.periodic import starts
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.functionals import numbers_of_orbit
+from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
+from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.labelled.continuation.special_point import SpecialPoint
-from phasekit.labels.arguments import bad
+from phasekit.systems.problem import Problem
+
+Array = npt.NDArray[np.float64]
 
 TEXT = np.dtypes.StringDType()
 
@@ -21,7 +32,167 @@ def of_equilibrium(point: SpecialPoint[Any]) -> xr.Dataset:
 
 def of_orbit(point: SpecialPoint[Any]) -> xr.Dataset:
     """Of a point of a family of periodic orbits."""
-    raise bad("point", point.kind, "a point of a branch of equilibria or of a curve of theirs")
+    found, numbers = orbits(point)
+    ds = labelled(point, found)
+    names = np.array(list(numbers), dtype=TEXT)
+    words = {"long_name": "derivative of the numbers of the orbit"}
+    return ds.assign_coords(number=names).assign(
+        d_number=(("number", "parameter"), np.array(list(numbers.values())), words)
+    )
+
+
+def orbits(
+    point: SpecialPoint[Any],
+) -> tuple[equilibria.Sensitivity, Mapping[str, Array]]:
+    """Derivatives of an orbit, and of its period and the extremes and means of its states."""
+    cycles, problem, here = point.branch.curve, point.branch.problem, point.special.point
+    names = list(problem.parameters)
+    others = tuple(i for i in range(len(names)) if i not in cycles.active)
+    k, why = len(others), _hindered(point)
+    numbers = {name: np.full(k, np.nan) for name in numbers_of_orbit(cycles, here.orbit)}
+    for name in names:
+        del numbers[name]
+    found = equilibria.unknown(others, cycles.own, len(cycles.active), {}, why)
+    period, reasons = np.full(k, np.nan), [why] * k
+    if not why:
+        problem = problem.replace(**point.parameters)
+        cycles = cycles.replace(par=_par(cycles, point.parameters))
+        for i, place in enumerate(others):
+            line = _line(problem, cycles, point, names[place])
+            if isinstance(line, str):
+                reasons[i] = line
+                continue
+            found.x[:, i], found.free[:, i] = line.dx[0], line.dy[1]
+            period[i] = line.dy[0]
+            for name, rate in line.rates(cycles, tuple(numbers)).items():
+                numbers[name][i] = rate
+    return replace(found, period=period, reasons=tuple(reasons)), numbers
+
+
+def _hindered(point: SpecialPoint[Any]) -> str:
+    """Why an orbit has no equations that make it an isolated one."""
+    if point.branch.kind != "cycle" or len(point.branch.free) != 1:
+        return "only points of families of periodic orbits in one parameter have derivatives"
+    if point.status != "converged":
+        return "the point has not converged"
+    if point.kind not in (*CURVES, "event"):
+        return f"no equations of its own define a point of kind {point.kind}"
+    return ""
+
+
+def _par(cycles: Cycles, parameters: Mapping[str, float]) -> Array:
+    """All parameters in their places; of a forced system time behind them."""
+    par = cycles.par.copy()
+    par[: len(parameters)] = list(parameters.values())
+    return par
+
+
+@dataclass(frozen=True)
+class _Line:
+    """An orbit, and its derivatives by a parameter: of its states and (period, own parameter)."""
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    parameter: str
+
+    def rates(self, cycles: Cycles, names: tuple[str, ...]) -> dict[str, float]:
+        """Derivatives of numbers of the orbit, by differences along the line."""
+        at = {
+            s: numbers_of_orbit(cycles, self._at(cycles, s))
+            for s, _ in equilibria.STENCIL
+        }  # fmt: skip
+        return {
+            name: sum(weight * at[s][name] for s, weight in equilibria.STENCIL) / self._step(cycles)
+            for name in names
+        }
+
+    def rate(self, cycles: Cycles, event: Any) -> float:
+        """The derivative of an event's function."""
+        step = self._step(cycles)
+        values = (w * self._value(cycles, event, s) for s, w in equilibria.STENCIL)
+        return sum(values) / step
+
+    def _value(self, cycles: Cycles, event: Any, s: float) -> float:
+        par = cycles.par.copy()
+        place = cycles.field.parameters.index(self.parameter)
+        if place not in cycles.active:
+            par[place] += s * self._step(cycles)
+        return float(event.value(cycles.replace(par=par), self._at(cycles, s)))
+
+    def _step(self, cycles: Cycles) -> float:
+        size = float(np.max(np.abs(self.dx) / cycles.scale))
+        size = max(size, abs(self.dy[0]) / self.orbit.y[0], abs(self.dy[1]) / cycles.width[0])
+        return equilibria.STEP / size if size > 0.0 else 1.0
+
+    def _at(self, cycles: Cycles, s: float) -> Orbit:
+        step = s * self._step(cycles)
+        return Orbit(self.orbit.mesh, self.orbit.x + step * self.dx, self.orbit.y + step * self.dy)
+
+
+def _line(problem: Problem, cycles: Cycles, point: SpecialPoint[Any], name: str) -> _Line | str:
+    """The derivative of an orbit by a parameter; why there is none."""
+    here, n = point.special.point, cycles.own
+    value = problem.parameters[name]
+    size = abs(value) or 1.0
+    if point.kind == "event":
+        return _event_line(problem, cycles, point, name)
+    made, found = critical_orbit(
+        problem, cycles, here, point.kind, name, (value - size, value + size)
+    )
+    if not found.converged:
+        return found.message
+    per = found.dy[2]
+    if not abs(per) > equilibria.SINGULAR * size:
+        return "its defining system is singular there"
+    orbit = Orbit(found.orbit.mesh, found.orbit.x[:, :n].copy(), found.orbit.y[:2].copy())
+    return _Line(orbit, found.dx[:, :n] / per, found.dy[:2] / per, name)
+
+
+def _held_line(problem: Problem, cycles: Cycles, here: Point, name: str) -> _Line | str:
+    """The derivative of an orbit by a parameter while all others stay."""
+    place = list(problem.parameters).index(name)
+    value = problem.parameters[name]
+    one = cycles.replace(
+        active=(place,), clock=clock_code(problem, (place,)), events=(), ends=(),
+        width=np.array([abs(value) or 1.0]), low=np.array([-np.inf]), high=np.array([np.inf]),
+    )  # fmt: skip
+    y = np.array([here.orbit.y[0], value])
+    found = starts.settled(one, Orbit(here.orbit.mesh, here.orbit.x, y))
+    if not found.converged or found.dy[1] == 0.0:
+        return found.message or "its defining system is singular there"
+    own = place in cycles.active
+    dy = np.array([found.dy[0] / found.dy[1], 1.0 if own else 0.0])
+    y = np.array([found.orbit.y[0], here.orbit.y[1]])
+    return _Line(Orbit(found.orbit.mesh, found.orbit.x, y), found.dx / found.dy[1], dy, name)
+
+
+def _event_line(
+    problem: Problem, cycles: Cycles, point: SpecialPoint[Any], name: str
+) -> _Line | str:
+    """The derivative of an orbit at which a number keeps its value zero."""
+    (event,) = (one for one in cycles.events if one.name == point.name)
+    lines = [
+        _held_line(problem, cycles, point.special.point, one)
+        for one in (point.branch.parameter, name)
+    ]
+    along, beside = lines
+    if isinstance(along, str):
+        return along
+    if isinstance(beside, str):
+        return beside
+    slope = along.rate(cycles, event)
+    part = -beside.rate(cycles, event) / slope if slope != 0.0 else np.nan
+    if not np.isfinite(part):
+        return f"the event {point.name!r} does not move with {point.branch.parameter}"
+    x = _on_mesh(cycles, along, beside.orbit)
+    return _Line(beside.orbit, beside.dx + part * x, beside.dy + part * along.dy, name)
+
+
+def _on_mesh(cycles: Cycles, line: _Line, orbit: Orbit) -> Array:
+    """Derivatives of the states on the mesh of another orbit."""
+    _, (dx,) = cycles.on(orbit.mesh, line.orbit, line.dx)
+    return dx
 
 
 def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Dataset:

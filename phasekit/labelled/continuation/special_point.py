@@ -219,7 +219,8 @@ class SpecialPoint(Generic[Of]):
         xarray.Dataset
             Over `parameter`, the others: ``d_free`` of the parameters of the branch (`free`),
             ``d_state`` (`state`), ``d_coefficient`` of those of the normal form (`coefficient`),
-            of periodic orbits ``d_period``; ``reason`` says why a column is NaN.
+            of periodic orbits instead ``d_period``, and ``d_number`` of the period and the
+            extremes and means of states (`number`); ``reason`` says why a column is NaN.
             Units are those of coordinates ``free_units``, ``state_units`` over
             ``parameter_units``; empty where the problem has none.
 
@@ -228,8 +229,9 @@ class SpecialPoint(Generic[Of]):
         With G(u, q) = 0 the equations of the point ([Kuznetsov2004] chapter 10), u its unknowns,
         ``du/dq = -G_u^-1 G_q``. Where G_u is singular, as of points in a family in more parameters,
         and of branch points that a parameter destroys, there is no derivative, and none is given.
-        Derivatives of formulas are exact; those of coefficients, and the conditions of points of
-        codimension two, are differences of fourth order along that line.
+        Of events of periodic orbits the family and its neighbours give them. Derivatives of
+        formulas are exact; those of coefficients and numbers of orbits, and the conditions of
+        points of codimension two, are differences of fourth order along that line.
 
         Examples
         --------
