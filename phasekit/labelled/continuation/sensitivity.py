@@ -99,7 +99,7 @@ class _Line:
     def rates(self, cycles: Cycles, names: tuple[str, ...]) -> dict[str, float]:
         """Derivatives of numbers of the orbit, by differences along the line."""
         at = {
-            s: numbers_of_orbit(cycles, self._at(cycles, s))
+            s: numbers_of_orbit(cycles, self._orbit(cycles, s))
             for s, _ in equilibria.STENCIL
         }  # fmt: skip
         return {
@@ -118,14 +118,14 @@ class _Line:
         place = cycles.field.parameters.index(self.parameter)
         if place not in cycles.active:
             par[place] += s * self._step(cycles)
-        return float(event.value(cycles.replace(par=par), self._at(cycles, s)))
+        return float(event.value(cycles.replace(par=par), self._orbit(cycles, s)))
 
     def _step(self, cycles: Cycles) -> float:
         size = float(np.max(np.abs(self.dx) / cycles.scale))
         size = max(size, abs(self.dy[0]) / self.orbit.y[0], abs(self.dy[1]) / cycles.width[0])
         return equilibria.STEP / size if size > 0.0 else 1.0
 
-    def _at(self, cycles: Cycles, s: float) -> Orbit:
+    def _orbit(self, cycles: Cycles, s: float) -> Orbit:
         step = s * self._step(cycles)
         return Orbit(self.orbit.mesh, self.orbit.x + step * self.dx, self.orbit.y + step * self.dy)
 
