@@ -205,11 +205,19 @@ class GridRates:
         """Names of all states."""
         return tuple(f"{name}_{i}" for name in self.fields for i in range(self.count))
 
-    def __call__(self, x: Array, **values: float) -> Array:
-        """The rates, field by field."""
+    def __call__(self, x: Array, **values: Any) -> Array:
+        """The rates, field by field; of many states at once, the columns of x."""
+        x = np.asarray(x, float)
+        if any(np.ndim(value) for value in values.values()):
+            given = [np.broadcast_to(value, x.shape[1]) for value in values.values()]
+            each = (dict(zip(values, one, strict=True)) for one in zip(*given, strict=True))
+            return np.stack([self(y, **v) for y, v in zip(x.T, each, strict=True)], axis=1)
         work = workings(self)
-        points, par = work.points(x, values)
-        return work.formulas(points[: self.count], par).T.ravel()
+        many = x.reshape(len(x), -1)
+        points, par = work.points(many, values)
+        found = work.formulas(points[: self.count].reshape(-1, points.shape[-1]), par)
+        ordered = found.reshape(self.count, many.shape[1], -1).transpose(2, 0, 1)
+        return np.ascontiguousarray(ordered).reshape(x.shape)
 
 
 @dataclass(frozen=True)
@@ -274,26 +282,30 @@ class Workings:
         return fields.index(argument.name) if own else -1
 
     def points(self, x: Array, values: Mapping[str, float]) -> tuple[Array, Array]:
-        """Fields, coordinates and derivatives at all places and, as far as known, beyond ends."""
+        """Fields, coordinates and derivatives at all places and, as far as known, beyond ends.
+
+        Of states that are the columns of x: shape (places, states, values).
+        """
         rates = self.rates
         par = np.array([values[name] for name in rates.parameters], float)
         count, wide, first = rates.count, len(self.place), len(self.local)
-        out = np.zeros((wide, first + len(rates.derivatives)))
-        fields = len(rates.fields)
-        out[:count, :fields] = np.reshape(x, (fields, count)).T
-        out[:, fields:first] = self.place
+        many, fields = x.shape[1], len(rates.fields)
+        out = np.zeros((wide, many, first + len(rates.derivatives)))
+        out[:count, :, :fields] = x.reshape(fields, count, many).transpose(1, 2, 0)
+        out[:, :, fields:first] = self.place[:, None]
         if wide > count:
             edges = self.edges(np.zeros((1, 0)), par).reshape(-1, fields)
-            out[count:, :fields] = edges[self.end]
+            out[count:, :, :fields] = edges[self.end][:, None]
         for k, (matrix, source, flat) in enumerate(
             zip(self.matrices, self.sources, self.flat, strict=True)
         ):
             if flat >= 0:
-                given = out[:, flat]
+                given = out[:, :, flat]
             else:
-                given = source(out[:, : first + k], par)[:, 0]
+                inner = out[:, :, : first + k].reshape(wide * many, -1)
+                given = source(inner, par).reshape(wide, many)
                 given[count:][self.sloped] = 0.0
-            out[:count, first + k] = matrix @ given
+            out[:count, :, first + k] = matrix @ given
         return out, par
 
     def _structure(self) -> None:
@@ -376,7 +388,8 @@ class Workings:
 
         rates = self.rates
         fields, count = len(rates.fields), rates.count
-        points, par = self.points(x, values)
+        points, par = self.points(np.reshape(x, (-1, 1)), values)
+        points = points[:, 0]
         slopes = self.formulas.slopes(points[:count], par)
         data = self.factors * slopes[self.cell, self.slope]
         summed = np.add.reduceat(data, self.begin) if len(data) else data

@@ -175,6 +175,18 @@ def test_copies():
     np.testing.assert_array_equal(copy(x), problem(x))
 
 
+def test_many_states_at_once():
+    """Columns are states, with parameters of their own where these are arrays."""
+    axis = pk.grid("x", 0.0, 1.0, 5, values={"u": "A"})
+    problem = pk.Problem({"u": "lap(u^2) - D*u"}, parameters={"D": 1.0, "A": 2.0}, grid=axis)
+    x = np.random.default_rng(4).uniform(size=(5, 3))
+    given = {"D": np.array([1.0, 2.0, 3.0]), "A": 0.5}
+    wanted = [problem.f(one, D=d, A=0.5) for one, d in zip(x.T, given["D"], strict=True)]
+    np.testing.assert_array_equal(problem.f(x, **given), np.stack(wanted, axis=1))
+    same = [problem.f(one, D=1.0, A=0.5) for one in x.T]
+    np.testing.assert_array_equal(problem.f(x, D=1.0, A=0.5), np.stack(same, axis=1))
+
+
 def test_definitions_and_functions():
     """Names of formulas, and functions, stand in formulas of fields."""
     axis = pk.grid("x", 0.0, 1.0, 6)

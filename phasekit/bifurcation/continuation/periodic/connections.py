@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import collocation, wide
 from phasekit.bifurcation.continuation.periodic.bounded import Bounded, Rows, of_ends
 from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 
@@ -243,7 +243,7 @@ def solved(
     W[:, :, -1] = 0.0
     dx, dy = np.empty((2, *orbit.x.shape)), np.empty((2, bounded.q))
     none = np.zeros(bounded.n)
-    if kernels.solve(W, rows, rows_y, right, none, none, bounded.m, dx, dy) == 0.0:
+    if wide.solve(W, rows, rows_y, right, none, none, bounded.m, dx, dy) == 0.0:
         dx[:], dy[:] = np.nan, np.nan
     return dx[0], dy[0]
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.fields import Field
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import along, collocation, kernels, newton
+from phasekit.bifurcation.continuation.periodic import along, collocation, newton, wide
 from phasekit.bifurcation.continuation.periodic.jets import Jets
 from phasekit.bifurcation.continuation.periodic.multipliers import across, hidden, multipliers
 
@@ -297,7 +297,8 @@ class Cycles:
             rows, rows_y, target = self.rows_beside(Orbit(mesh, x, y), rows, rows_y, target) or (
                 rows, rows_y, target,
             )  # fmt: skip
-            end, steps, side, residual, trace, size, length = newton.newton(
+            end, steps, side, residual, trace, size, length = wide.follow(
+                n,
                 jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
                 self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, local.scale,
                 local.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
@@ -324,7 +325,7 @@ class Cycles:
         c = collocation.scheme(self.m)
         W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
         jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
-        _, residual, _, divergence = kernels.condense(
+        _, residual, _, divergence = wide.condense(
             jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
             self.scale, orbit.x, orbit.y, W,
         )  # fmt: skip

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import collocation, wide
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.divergence import gradient
 from phasekit.bifurcation.continuation.periodic.newton import FLAT, ROUNDING
@@ -39,7 +39,7 @@ def correct(
     before, residual, divergence, message = np.inf, np.inf, np.nan, ""
     for step in range(1, iterations + 1):
         jets = cycles.jets(mesh, x, y, cycles.m, cycles.sizes)
-        sign, residual, speed, divergence = kernels.condense(
+        sign, residual, speed, divergence = wide.condense(
             jets, cycles.forced, mesh, c.nodes, c.weights, c.value, c.slope, c.side, cycles.scale,
             x, y, W,
         )  # fmt: skip
@@ -53,7 +53,7 @@ def correct(
             own, slope = cycles.own_period(y)
             border[0, 0], border[0, 1:], right[0] = 1.0, -slope, own - y[0]
         gap = cycles.closure * x[0] + cycles.turns - x[-1]
-        if kernels.solve(W, rows, border, right, gap, cycles.closure, cycles.m, dx, dy) == 0.0:
+        if wide.solve(W, rows, border, right, gap, cycles.closure, cycles.m, dx, dy) == 0.0:
             message = "the equations are singular"
             break
         size = float(max(

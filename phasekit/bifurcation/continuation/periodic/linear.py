@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import collocation, wide
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.multilinear import OfMatrices, OfValues
 
@@ -123,11 +123,11 @@ class Linear:
         what is meant.
         """
         n, q, parts = self.n, len(columns), 1 if turn == 0.0 else 2
-        wide = n * parts
+        total = n * parts
         count = len(self.A)
-        jets = np.zeros((count, wide * (1 + wide + q)))
-        jets[:, :wide] = g
-        slopes = jets[:, wide:].reshape(count, wide, wide + q)
+        jets = np.zeros((count, total * (1 + total + q)))
+        jets[:, :total] = g
+        slopes = jets[:, total:].reshape(count, total, total + q)
         for k in range(parts):
             here = slice(k * n, (k + 1) * n)
             slopes[:, here, here] = self.A
@@ -136,13 +136,13 @@ class Linear:
             slopes[:, i, n + i] = turn
             slopes[:, n + i, i] = -turn
         for k, column in enumerate(columns):
-            slopes[:, :, wide + k] = -column
+            slopes[:, :, total + k] = -column
         c, o = collocation.scheme(self.m), self.orbit
         places = len(o.x)
-        x, y = np.zeros((places, wide)), np.zeros(1 + q)
+        x, y = np.zeros((places, total)), np.zeros(1 + q)
         y[0] = o.y[0]
-        W = np.empty((o.intervals, self.m * wide, wide + q + 2))
-        kernels.condense(
+        W = np.empty((o.intervals, self.m * total, total + q + 2))
+        wide.condense(
             jets,
             False,
             o.mesh,
@@ -151,24 +151,24 @@ class Linear:
             c.value,
             c.slope,
             c.side,
-            np.ones(wide),
+            np.ones(total),
             x,
             y,
             W,
         )
-        border = np.zeros((1 + q, places, wide))
+        border = np.zeros((1 + q, places, total))
         border_y = np.zeros((1 + q, 1 + q))
         border_y[0, 0] = 1.0  # the period is what it is
         for k, row in enumerate(rows):
             border[1 + k] = collocation.functional(
-                o.mesh, row.reshape(o.intervals, self.m, wide), self.m
+                o.mesh, row.reshape(o.intervals, self.m, total), self.m
             )
         sides = np.zeros(1 + q)
         if right is not None:
             sides[1:] = right
-        dx, dy = np.empty((2, places, wide)), np.empty((2, 1 + q))
-        sign = kernels.solve(
-            W, border, border_y, sides, np.zeros(wide), np.full(wide, sigma), self.m, dx,
+        dx, dy = np.empty((2, places, total)), np.empty((2, 1 + q))
+        sign = wide.solve(
+            W, border, border_y, sides, np.zeros(total), np.full(total, sigma), self.m, dx,
             dy,
         )  # fmt: skip
         if sign == 0.0:  # singular still: there is no such coefficient

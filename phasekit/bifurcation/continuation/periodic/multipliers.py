@@ -15,6 +15,7 @@ Complex = npt.NDArray[np.complex128]
 APART = 1e-14  # entries below the diagonal blocks that are rounding
 ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative error they are
 PASSES = 12
+WIDE = 1  # states from which LAPACK is faster
 LARGEST = 709.0  # logarithm of the largest numbers
 ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
 LOST = 0.1  # relative change of a multiplier by errors of its matrices, from which it is not known
@@ -124,6 +125,43 @@ def iterate(G: Array, Q: Array, R: Array, log: Array, turn: Array, cut: Array) -
             break
 
 
+def iterate_wide(G: Array, Q: Array, R: Array, log: Array, turn: Array, cut: Array) -> None:
+    """What `iterate` does, of many states, by LAPACK."""
+    log[:], cut[:], Q[:] = np.nan, 1.0, np.eye(len(Q))
+    if not np.isfinite(G).all():
+        return
+    for _ in range(PASSES // 2):
+        with np.errstate(all="ignore"):
+            _triangular_wide(G, 2, Q, R, log, turn)
+            apart = log[:-1] - log[1:]
+        size = np.maximum.accumulate(np.abs(turn), axis=1)
+        below = np.diagonal(np.maximum.accumulate(size[::-1])[::-1], -1)
+        cut[:-1] = below <= np.where(apart > ALIKE, ROUNDED, APART)
+        if not np.isfinite(log).all() or np.all((cut[:-1] == 1.0) | (np.abs(apart) <= ALIKE)):
+            break
+
+
+def _triangular_wide(G: Array, passes: int, Q: Array, R: Array, log: Array, turn: Array) -> None:
+    """What `triangular` does, of many states, by LAPACK."""
+    from scipy.linalg import qr
+
+    start = Q.copy()
+    for number in range(passes):
+        log[:], start[:] = 0.0, Q
+        last = number == passes - 1
+        R[:] = np.eye(len(Q))
+        for one in G:
+            found, step = qr(one @ Q, mode="economic", check_finite=False)
+            size = np.diagonal(step).copy()
+            side = np.where(size < 0.0, -1.0, 1.0)
+            Q[:] = found * side
+            if last:
+                unit = np.triu(step / size[:, None] * np.exp(log - log[:, None]), 1)
+                R += unit @ R
+            log += np.log(np.abs(size))
+    turn[:] = start.T @ Q
+
+
 def multipliers(G: Array) -> tuple[Complex, float]:
     """Eigenvalues of G_N ... G_1, largest first, and the logarithm of the size of their product.
 
@@ -134,7 +172,7 @@ def multipliers(G: Array) -> tuple[Complex, float]:
     n = G.shape[-1]
     Q, R, turn = np.empty((3, n, n))
     log, cut = np.empty((2, n))
-    iterate(np.ascontiguousarray(G), Q, R, log, turn, cut)
+    (iterate if n < WIDE else iterate_wide)(np.ascontiguousarray(G), Q, R, log, turn, cut)
     values, logs, first = [], 0.0, 0
     for last, parted in enumerate(cut.tolist(), 1):
         if not parted:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from phasekit.bifurcation.continuation.periodic import collocation, kernels
+from phasekit.bifurcation.continuation.periodic import collocation, wide
 from phasekit.bifurcation.continuation.periodic.adapt import LEAST, SPARE, count_for, fitted
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
 from phasekit.bifurcation.continuation.periodic.extended import DOUBLING, FOLD, Extended
@@ -255,7 +255,7 @@ def crossing(cycles: Cycles, orbit: Orbit, own: tuple[Array, Array]) -> Solution
             period, slope = cycles.own_period(y)
             border[0, 0], border[0, 1:q], right[0] = 1.0, -slope, period - y[0]
         gap = cycles.closure * x[0] + cycles.turns - x[-1]
-        if kernels.solve(V, rows, border, right, gap, cycles.closure, cycles.m, dx, dy) == 0.0:
+        if wide.solve(V, rows, border, right, gap, cycles.closure, cycles.m, dx, dy) == 0.0:
             return None
         orbit = Orbit(orbit.mesh, x + dx[0], y + dy[0, :q])
         found = cycles.looked_at(orbit, *own)
@@ -294,7 +294,7 @@ def _null_vector(
             if v is not row
             else row / len(row)
         )
-        kernels.solve(
+        wide.solve(
             V, rows, rows_y, np.zeros(more + 1), np.zeros(n), np.full(n, sigma), cycles.m, dx, dy
         )
         length = np.sqrt(cycles.inner(orbit.mesh, dx[1], dx[1], nothing, nothing))

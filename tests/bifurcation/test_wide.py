@@ -1,0 +1,79 @@
+"""Linear algebra along orbits by LAPACK and by sparse matrices is that of the kernels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from phasekit.bifurcation.continuation.periodic import collocation, kernels, multipliers, wide
+
+
+@pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])
+@pytest.mark.parametrize("band", [0, 2], ids=["dense", "sparse"])
+def test_elimination(monkeypatch, forced, band):
+    """Condensed equations, signs of determinants, residuals and solutions."""
+    monkeypatch.setattr(wide, "LONG", 10)
+    rng = np.random.default_rng(1 + band)
+    n, q, m, count = 30, 3, 4, 5
+    c, extra = collocation.scheme(m), q - 1 + forced
+    mesh = np.sort(np.concatenate([[0.0, 1.0], rng.uniform(size=count - 1)]))
+    jets = rng.normal(size=(count * m, n * (1 + n + extra)))
+    if band:
+        places = np.arange(n)
+        slopes = jets[:, n:].reshape(count * m, n, n + extra)
+        slopes[:, :, :n] *= np.abs(places[:, None] - places) < band
+    x, y = rng.normal(size=(count * m + 1, n)), rng.uniform(0.5, 1.5, size=q)
+    W, V = np.empty((2, count, m * n, n + q + 1))
+    common = jets, forced, mesh, c.nodes, c.weights, c.value, c.slope, c.side, np.ones(n), x, y
+    np.testing.assert_allclose(wide.condense(*common, V), kernels.condense(*common, W), rtol=1e-11)
+    np.testing.assert_allclose(V, W, atol=1e-11 * np.max(np.abs(W)))
+    rows, rows_y = rng.normal(size=(q, *x.shape)), rng.normal(size=(q, q))
+    sides, gap = rng.normal(size=q), rng.normal(size=n)
+    sigma = np.where(rng.uniform(size=n) < 0.5, -1.0, 1.0)
+    found = []
+    for solve in (wide.solve, kernels.solve):
+        dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
+        sign = solve(W, rows, rows_y, sides, gap, sigma, m, dx, dy)
+        found.append((sign, dx, dy))
+    assert abs(found[0][0]) == 1.0
+    assert found[0][0] == found[1][0]
+    for one, other in zip(found[0][1:], found[1][1:], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9 * np.max(np.abs(other)))
+
+
+def test_singular_and_undefined_equations():
+    """What cannot be solved is said as the kernels do."""
+    n, q, m, count = 30, 2, 4, 3
+    c, mesh = collocation.scheme(m), np.linspace(0.0, 1.0, count + 1)
+    x, y = np.ones((count * m + 1, n)), np.ones(q)
+    jets = np.zeros((count * m, n * (2 + n)))
+    W = np.empty((count, m * n, n + q + 1))
+    common = c.nodes, c.weights, c.value, c.slope, c.side, np.ones(n), x, y, W
+    assert wide.condense(jets, False, mesh, *common)[0] != 0.0
+    zero = np.zeros((q, *x.shape))
+    dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
+    nothing = np.zeros(q)
+    sign = wide.solve(W, zero, np.zeros((q, q)), nothing, np.zeros(n), np.ones(n), m, dx, dy)
+    assert sign == 0.0
+    jets[3, 5] = np.nan
+    assert wide.condense(jets, False, mesh, *common)[0] == 0.0
+
+
+def test_multipliers_of_many_states():
+    """Multipliers of a product that is known, largest first, and the size of their product."""
+    rng = np.random.default_rng(3)
+    n, count = 40, 10
+    logs = np.linspace(0.1, -1.5, n)
+    frames = [np.linalg.qr(rng.normal(size=(n, n)))[0] for _ in range(count)]
+    G = np.array(
+        [
+            frames[(j + 1) % count] @ np.diag(np.exp(logs)) @ frames[j].T
+            for j in range(count)
+        ]
+    )  # fmt: skip
+    values, log = multipliers.multipliers(G)
+    np.testing.assert_allclose(np.abs(values), np.exp(count * logs), rtol=1e-8)
+    assert abs(log - count * logs.sum()) < 1e-9 * abs(log)
+    broken = G.copy()
+    broken[2, 0, 0] = np.nan
+    assert np.isnan(multipliers.multipliers(broken)[0]).all()
