@@ -29,7 +29,8 @@ settings.load_profile("phasekit")
 
 #: Files that workers begin with. Of the first four, each compiles the kernels of another subject,
 #: for all workers, while the others compile theirs; kernels that share routines are compiled by one
-#: process, which compiles those once. The rest take long for so few tests.
+#: process, which compiles those once. The rest take long for so few tests: begun last, they would
+#: leave one worker alone at the end.
 FIRST = (
     "phase/test_phase_space_kernel.py",
     "labelled/test_continuation.py",
@@ -45,6 +46,17 @@ FIRST = (
     "maps/test_interrupts.py",
     "docs/test_pages.py",
     "test_studies.py",
+    "published/test_any_law.py",
+    "motion/test_creeping_attractors.py",
+    "labelled/test_warm.py",
+    "maps/test_seal.py",
+    "labelled/test_manifolds.py",
+    "labelled/test_connections.py",
+    "labelled/test_periodic_orbits.py",
+    "labelled/test_noise.py",
+    "test_recipes.py",
+    "maps/test_s3.py",
+    "phase/test_motions_near_saddles.py",
 )
 FAST = "not slow"
 

@@ -145,7 +145,7 @@ def test_manifolds_of_a_python_function_are_those_of_formulas():
 
     plain = pk.Problem(rates, ("x", "y"), {"a": 1.5}, window=dict(system.window))
     with pytest.warns(UserWarning, match="there may be other equilibria"):
-        same = pk.manifolds(plain, 1, length=3.0)
+        same = pk.manifolds(plain, 1, length=1.5)
     for k in range(2):
         x, y = strand(ds, int(np.flatnonzero(out)[k]))
         u, v = strand(same, k)

@@ -18,9 +18,10 @@ from phasekit.maps.whole import WholeTarget, target_of
 zarr = pytest.importorskip("zarr")
 
 WELL = pk.Potential("x^4/4 - mu*x^2/2 + k*x", "x", {"mu": 1.0, "k": 0.1})
-#: Some of it is NaN everywhere, of which Zarr writes no chunk.
 GRID = {"mu": [-1.0, 1.0], "k": [0.0, 0.1]}
-MAP = pk.sweep(WELL, **GRID)
+#: A result of each type, on cells, equilibria, sides. One is NaN everywhere: Zarr writes no chunk.
+KEPT = ["phi", "kind", "n_equilibria", "figure_eight", "winding_area", "turning_offset"]
+MAP = pk.sweep(WELL, **GRID)[KEPT].reset_coords(["x", "turning_x", "saddle_x"], drop=True)
 
 
 def damages(store, rng):
@@ -111,7 +112,7 @@ def test_every_damage_of_a_map_of_a_potential(stored_map):
             return ds.load()
 
     count, refused = tried(stored_map, MAP.identical, call, None, 2)
-    assert count > 200
+    assert count > 80
     assert len(refused) >= count - 8
 
 
@@ -205,10 +206,10 @@ def test_damages_of_branches(made, tmp_path, capsys):
     def same(other):
         return other.to_dataset().identical(branch.to_dataset())
 
-    count, refused = tried(path, same, pk.Branch.load, 16)
+    count, refused = tried(path, same, pk.Branch.load, 10)
     assert len(refused) > count // 4  # the points are made again from less than is stored
     codes = []
     count, _ = tried(path, bool, lambda path: codes.append(main(["info", str(path), "--verify"]))
-                     or True, 6, 3)  # fmt: skip
+                     or True, 4, 3)  # fmt: skip
     assert codes[:-1] == [2] * count
     assert codes[-1] == 0

@@ -1,7 +1,12 @@
-"""Values that others print, or that follow by hand, of laws that users bring."""
+"""Values that others print, or that follow by hand, of laws that users bring.
+
+``PHASEKIT_PUBLISHED=all`` tries a thousand random products of lines, a hundred random systems with
+cycles built in, and basins as fine as those that are printed; a part of them is tried in every run.
+"""
 
 from __future__ import annotations
 
+import os
 import warnings
 from fractions import Fraction
 from itertools import product
@@ -13,6 +18,7 @@ import phasekit as pk
 
 pytestmark = pytest.mark.slow
 KIND = pk.FlowEquilibriumKind
+ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 
 
 def magnets():
@@ -38,14 +44,16 @@ def test_henon_keeps_and_loses_these_shares():
     assert (ds.basin == -2).mean().item() == pytest.approx(0.574, abs=5e-4)
 
 
+# A part of the states lies on a coarser grid.
+@pytest.mark.filterwarnings("ignore:basin. .* too coarse:RuntimeWarning")
 def test_magnetic_pendulum_from_rest():
-    axis = np.linspace(-2.0, 2.0, 201)
+    axis = np.linspace(-2.0, 2.0, 201 if ALL else 101)
     # At rest in the middle the pendulum stays: there the forces of the magnets cancel.
     with pytest.warns(RuntimeWarning, match="1 of the motions that were followed"):
         ds = pk.basins(magnets(), {"x": axis, "y": axis}, fixed={"u": 0.0, "v": 0.0})
     assert ds.sizes["attractor"] == 3
     undecided = np.argwhere(ds.basin.values < 0)
-    np.testing.assert_array_equal(undecided, [[100, 100]])
+    np.testing.assert_array_equal(undecided, [[axis.size // 2] * 2])
     wanted = {(-0.5, 0.87): 0.331, (-0.5, -0.87): 0.331, (1.0, 0.0): 0.338}
     for x, y, share in zip(
         ds.attractor_x[:, 0].values, ds.attractor_y[:, 0].values, ds.basin_fraction.values,
@@ -292,10 +300,10 @@ def kind_by_fractions(slopes):
     return KIND.UNSTABLE_FOCUS if turns < 0 else KIND.UNSTABLE_NODE
 
 
-def test_rests_of_a_thousand_products_of_lines_have_their_exact_kinds():
+def test_rests_of_products_of_lines_have_their_exact_kinds():
     """X' = l1 l2, y' = l3 l4: at rest where a line of the one meets one of the other."""
     rng, seen, box = np.random.default_rng(29), 0, {"x": (-40, 40), "y": (-40, 40)}
-    for _ in range(1000):
+    for _ in range(1000 if ALL else 200):
         lines = [line(rng) for _ in range(4)]
         formulas = ["({}*x + {}*y - {})*({}*x + {}*y - {})".format(*one, *other)
                     for one, other in (lines[:2], lines[2:])]  # fmt: skip
@@ -327,7 +335,7 @@ def test_rests_of_a_thousand_products_of_lines_have_their_exact_kinds():
             assert np.hypot(x[k] - float(a), y[k] - float(b)) < 1e-9 * size, formulas
             assert ds.kind.values.ravel()[k] == kind, (formulas, a, b)
             seen += 1
-    assert seen > 2000
+    assert seen > (2000 if ALL else 400)
 
 
 def rings(rng):
@@ -355,7 +363,7 @@ def rings(rng):
 @pytest.mark.parametrize("seed", range(4))
 def test_cycles_of_random_systems_are_those_built_in(seed):
     rng = np.random.default_rng(seed)
-    for _ in range(25):
+    for _ in range(25 if ALL else 5):
         system, squares, x0, period, slopes = rings(rng)
         ds = pk.periodic_orbits(system)
         assert ds.n_cycles.item() == squares.size, system

@@ -57,7 +57,7 @@ def passages(
     Where a state is next to nothing beside its amplitude the mesh error sees nothing of it. Yet
     where f vanishes with it, by how much it decays may decide how long the orbit takes. Intervals
     over which rate times length exceeds ``reach`` are divided until it is at most ``aim``, or into
-    ``most`` parts.
+    ``most`` parts; the mesh has about `MOST` intervals at the most.
     """
     if not cycles.closes or cycles.own != cycles.n:
         return None
@@ -81,6 +81,8 @@ def passages(
     if not np.any(rate > reach):
         return None
     counts = np.ceil(np.minimum(rate / aim, MOST))
+    if most is None and np.sum(counts) > MOST:  # as fine as so many intervals resolve them
+        most = max(1, MOST // int(np.count_nonzero(counts > 1.0)))
     if most is not None:
         counts = np.minimum(counts, most)
     counts = np.maximum(counts, 1.0).astype(np.int64)
