@@ -52,6 +52,8 @@ if TYPE_CHECKING:
     from phasekit.labelled.basins import attractors as attractors
     from phasekit.labelled.basins import basins as basins
     from phasekit.labelled.bifurcation_set import bifurcation_set as bifurcation_set
+    from phasekit.labelled.continuation.atlas import Atlas as Atlas
+    from phasekit.labelled.continuation.atlas import atlas as atlas
     from phasekit.labelled.continuation.branch import Branch as Branch
     from phasekit.labelled.continuation.connection import connection as connection
     from phasekit.labelled.continuation.continuation import continuation as continuation
@@ -152,6 +154,7 @@ _MODULES = {
     "phasekit.explorer.explore": ("explore",),
     "phasekit.labelled.asymptotics": ("near_center", "near_separatrix"),
     "phasekit.labelled.atlas": ("branches",),
+    "phasekit.labelled.continuation.atlas": ("Atlas", "atlas"),
     "phasekit.labelled.continuation.branch": ("Branch",),
     "phasekit.labelled.continuation.connection": ("connection",),
     "phasekit.labelled.continuation.continuation": ("continuation",),

@@ -97,7 +97,7 @@ def test_every_call_says_what_its_arguments_are():
     wrong |= {f"plot.{name}": getattr(pk.plot, name) for name in pk.plot.__all__}
     for name, thing in wrong.items():
         made = inspect.isclass(thing) and not issubclass(thing, (enum.Enum, Exception))
-        results = (pk.SpecialPoint, pk.Branch, pk.System)
+        results = (pk.SpecialPoint, pk.Branch, pk.Atlas, pk.System)
         if inspect.isfunction(thing) or (made and not issubclass(thing, results)):
             with pytest.raises(pk.ParameterError) as error:
                 thing(nonsense_=1)

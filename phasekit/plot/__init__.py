@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING as _TYPE_CHECKING
 from typing import Any as _Any
 
 if _TYPE_CHECKING:
+    from phasekit.plot.atlas import atlas as atlas
     from phasekit.plot.basins import basins as basins
     from phasekit.plot.bearing_forces import bearing_forces as bearing_forces
     from phasekit.plot.bearing_load_map import bearing_load_map as bearing_load_map
@@ -41,6 +42,7 @@ if _TYPE_CHECKING:
 _ELSEWHERE = {"frequency_action": "periods", "period_energy": "periods", "waterfall": "spectrum"}
 
 __all__ = [
+    "atlas",
     "basins",
     "bearing_forces",
     "bearing_load_map",

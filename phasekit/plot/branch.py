@@ -66,7 +66,8 @@ _SHORT = {
     )
     for more in ("", _EXTREMES)
 }  # fmt: skip
-_CURVES: dict[str, style.Look] = {
+#: Curves in two parameters, by their kind.
+CURVES: dict[str, style.Look] = {
     "fold": {"color": style.BLACK, "linestyle": "-", "linewidth": 2.0, "label": "fold"},
     "hopf": {"color": style.GREEN, "linestyle": "-", "linewidth": 2.0, "label": "Hopf"},
     "neutral_saddle": {
@@ -319,9 +320,9 @@ def _looks(one: Branch) -> list[style.Look]:
     points = one.points
     if "kind_of_pair" in points:
         pair = [str(name) or one.kind for name in points.kind_of_pair.values]
-        return [_CURVES[name] for name in pair]
+        return [CURVES[name] for name in pair]
     if one.kind not in ("equilibrium", "cycle", "event"):
-        return [_CURVES[one.kind]] * points.sizes["point"]
+        return [CURVES[one.kind]] * points.sizes["point"]
     if "kind" in points:
         kinds = points.kind.values.copy()
         # A degenerate point has the look of what comes after it.

@@ -59,6 +59,16 @@ def loop():
 
 
 @functools.cache
+def excitable_atlas():
+    excitable = pk.Problem(
+        {"v": "v - v^3/3 - w + current", "w": "0.08*(v + 0.7 - b*w)"},
+        parameters={"current": 0.5, "b": 0.8},
+        window={"v": (-3, 3), "w": (-3, 4)},
+    )
+    return pk.atlas(excitable, "current", "b", span={"current": (-0.5, 2), "b": (0.5, 2)})
+
+
+@functools.cache
 def loci(kind):
     if kind == "disk":
         return pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
@@ -215,6 +225,7 @@ CASES = {
         "cycles": lambda: P.branch(cycles()),
         "disk": lambda: P.branch(diagram(), units={"phi": "deg", "beta": "deg"}, cut=-90.0),
     },
+    "atlas": {"excitable": lambda: P.atlas(excitable_atlas())},
     "bifurcation_set": {
         "astroid": lambda: P.bifurcation_set(loci("astroid")),
         "disk": lambda: P.bifurcation_set(loci("disk"), units={"beta": "deg", "a": "mm"}),

@@ -34,6 +34,11 @@ def the_atlas():
 
 
 @functools.cache
+def the_plane():
+    return pk.atlas(DISK, "beta", "a", span={"beta": (0.2, 1.5), "a": (-0.06, 0.06)})
+
+
+@functools.cache
 def the_set():
     return pk.bifurcation_set(DISK, "beta", "a", xlim=(0.0, 1.5), ylim=(-0.06, 0.06))
 
@@ -158,6 +163,12 @@ CASES = {
         {"beta": "deg", "phi": "degrees"},
         (DEG, DEG),
         ("(°)", "(°)"),
+    ),
+    "atlas": (
+        lambda **o: P.atlas(the_plane(), **o),
+        {"beta": "deg", "a": "mm"},
+        (DEG, MM),
+        ("(°)", "(mm)"),
     ),
     "bifurcation_set": (
         lambda **o: P.bifurcation_set(the_set(), **o),

@@ -27,7 +27,7 @@ from phasekit.systems.trajectory import Trajectory
 
 #: What models share for the rest of the package, and results that only phasekit makes.
 MACHINERY = {"in_domain", "valid_coefficients", "formula_inputs", "unit_of"}
-RESULTS = (pk.Branch, pk.CycleBranch, pk.ConnectionBranch, pk.SpecialPoint)
+RESULTS = (pk.Atlas, pk.Branch, pk.CycleBranch, pk.ConnectionBranch, pk.SpecialPoint)
 
 
 class Odd:
@@ -182,6 +182,12 @@ def dataset() -> xr.Dataset:
 @functools.cache
 def loads() -> xr.Dataset:
     return dataset().phasekit.bearing_forces(on="separatrix")
+
+
+@functools.cache
+def plane_atlas() -> pk.Atlas:
+    cusp = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
+    return pk.atlas(cusp, "mu", "l", span={"mu": (-1, 1), "l": (-1, 2)})
 
 
 @functools.cache
@@ -436,6 +442,10 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "bifurcation_set": {
         "x": lambda: "B", "y": lambda: "C", "xlim": lambda: (-3, 3), "ylim": lambda: (-3, 3),
     },
+    "atlas": {
+        "problem": lambda: plane_atlas().problem, "x": lambda: "mu", "y": lambda: "l",
+        "span": lambda: {"mu": (-1, 1), "l": (-1, 2)},
+    },
     "quasi_static": {"path": lambda: {"A": [1.0, 2.0]}},
     "plot.hysteresis_loop": {
         "dataset": lambda: pk.quasi_static(pk.Coefficients(1.0, 0.4, 0.1), A=[1.0, 0.2]),
@@ -540,6 +550,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
         "cells": lambda: 8,
     },
     "plot.bifurcation_set": {"dataset": loci},
+    "plot.atlas": {"atlas": plane_atlas},
     "plot.bearing_forces": {"orbit": lambda: (0.3, 0.2)},
     "plot.bifurcation_diagram": {"dataset": lambda: dataset().isel(a=0)},
     "plot.bearing_load_map": {"dataset": loads},
@@ -551,6 +562,7 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
 #: Instances whose methods are called, by the name of their class.
 INSTANCES: dict[str, Callable[[], Any]] = {
     "ContinuationOptions": pk.ContinuationOptions,
+    "Atlas": plane_atlas,
     "Branch": branch,
     "SpecialPoint": lambda: branch().special_points[0],
     "CycleBranch": cycles,

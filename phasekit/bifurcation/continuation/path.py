@@ -189,7 +189,7 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
     )
     guess += (s - np.dot(row, guess - a.u) / np.dot(row, chord)) * chord
     if curve.kind in (HOPF, TORUS):
-        curve, guess = _in_phase(curve, a if s < 0.5 else b, guess)
+        curve, guess = in_phase(curve, a if s < 0.5 else b, guess)
     point = curve.refine(guess, row)
     if not point.converged or curve.length(point.u - guess) > 0.5 * h:
         return None
@@ -197,7 +197,7 @@ def between(curve: Curve, a: Sample, b: Sample, fraction: float) -> Sample | Non
     return Sample(point.u, sign * point.tangent, point.slopes)
 
 
-def _in_phase(curve: Curve, near: Sample, guess: Array) -> tuple[Curve, Array]:
+def in_phase(curve: Curve, near: Sample, guess: Array) -> tuple[Curve, Array]:
     """A curve of pairs whose phase condition is that of a point of it, and v as it is there.
 
     A trace turns v in its plane from time to time.

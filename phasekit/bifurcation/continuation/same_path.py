@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
-from phasekit.bifurcation.continuation.path import Path
+from phasekit.bifurcation.continuation.kernels.defining import HOPF, TORUS
+from phasekit.bifurcation.continuation.path import Path, Sample, in_phase
 
 Array = npt.NDArray[np.float64]
 SAME = 1e-7  # distance on scaled axes
@@ -22,9 +23,11 @@ def turned(curve: Curve, gap: Array) -> Array:
 
 
 def lies_on(curve: Curve, path: Path, u: Array) -> bool:
-    """Whether the curve of a path goes through a point of the same problem."""
+    """Whether the curve of a path goes through a point of the same problem, given as far as m."""
     m = curve.m
     weight = 1.0 / curve.scale[:m] ** 2
+    if not path.count:
+        return False
     gap = turned(curve, u[:m] - path.u[:, :m])
     distance = np.sqrt(np.sum(weight * gap**2, axis=1))
     if np.min(distance) < SAME:
@@ -38,16 +41,23 @@ def lies_on(curve: Curve, path: Path, u: Array) -> bool:
     length = np.sqrt(square)
     near = np.flatnonzero((across < 0.3 * length + SAME) & (along > -0.05) & (along < 1.05))
     for i in near:
-        row = weight * chord[i]
+        row = np.zeros(curve.size)
+        row[:m] = weight * chord[i]
         s = along[i]
         target = path.u[i, :m] + gap[i]
+        step = path.u[i + 1] - path.u[i]
         guess = (
-            path.u[i, :m]
-            + (3.0 - 2.0 * s) * s * s * chord[i]
-            + length[i] * s * (1.0 - s)
-            * ((1.0 - s) * path.tangent[i, :m] - s * path.tangent[i + 1, :m])
+            path.u[i]
+            + (3.0 - 2.0 * s) * s * s * step
+            + curve.length(step) * s * (1.0 - s)
+            * ((1.0 - s) * path.tangent[i] - s * path.tangent[i + 1])
         )  # fmt: skip
-        point = curve.refine(guess, row, float(np.dot(row, target)))
+        here = curve
+        if curve.kind in (HOPF, TORUS):
+            k = int(i) + int(s > 0.5)
+            sample = Sample(path.u[k], path.tangent[k], path.slopes[k])
+            here, guess = in_phase(curve, sample, guess)
+        point = here.refine(guess, row, float(np.dot(row[:m], target)))
         if point.converged:
             off = turned(curve, point.u[:m] - target)
             if np.sqrt(np.sum(weight * off**2)) < SAME:

@@ -89,11 +89,28 @@ class UnstableCount:
         return np.stack(signs), undefined
 
 
-@functools.lru_cache(maxsize=64)
 def hurwitz_determinants(
     f: tuple[Any, ...], states: tuple[Any, ...], discrete: bool = False
 ) -> tuple[Any, ...]:
     """The first coefficient of the characteristic polynomial, D_1 to D_(n-1), the last one."""
+    coefficients, inner = _hurwitz(f, states, discrete)
+    return coefficients[0], *inner, coefficients[-1]
+
+
+def stability_signs(f: tuple[Any, ...], states: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What is positive of an equilibrium if, and only if, it is stable; the determinant first.
+
+    Where one is negative it is unstable. With the determinant the number of equilibria changes.
+    """
+    coefficients, inner = _hurwitz(f, states, False)
+    return coefficients[-1], *coefficients[1:-1], *inner[1:]
+
+
+@functools.lru_cache(maxsize=64)
+def _hurwitz(
+    f: tuple[Any, ...], states: tuple[Any, ...], discrete: bool
+) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """The coefficients of the characteristic polynomial, the highest first; D_1 to D_(n-1)."""
     n = len(states)
     if n > MOST:
         raise ValueError(f"{n} states")
@@ -115,6 +132,6 @@ def hurwitz_determinants(
 
     matrix = sp.Matrix(n, n, lambda i, j: entry(i + 1, j + 1))
     inner = [matrix[:k, :k].det(method="berkowitz") for k in range(1, n)]
-    found = [coefficients[0], *inner, coefficients[n]]
     own_slopes = dict(zip(entries, slopes, strict=True))
-    return tuple(e.xreplace(values).xreplace(own_slopes) for e in found)
+    every = [e.xreplace(values).xreplace(own_slopes) for e in (*coefficients, *inner)]
+    return tuple(every[: n + 1]), tuple(every[n + 1 :])

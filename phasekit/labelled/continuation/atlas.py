@@ -1,0 +1,432 @@
+"""`atlas`: all bifurcations of equilibria in a rectangle of two parameters."""
+
+from __future__ import annotations
+
+import functools
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from phasekit.cells.schema import dataset_attrs
+from phasekit.inputs import call_checked
+from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch
+from phasekit.labelled.continuation.atlas_regions import Regions, RegionSearch, missing
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.branch_points import attrs_of
+from phasekit.labelled.continuation.checks import check_parameter, check_span
+from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labelled.pictures import picture
+from phasekit.labels.arguments import bad, numeric, unknown
+from phasekit.labels.grid import LABEL_DTYPE, variable
+from phasekit.numerics.waits import notice, stage
+from phasekit.systems.problem import Problem, as_problem
+from phasekit.systems.rests import corners, window_of
+
+Array = npt.NDArray[np.float64]
+
+#: Cuts of the rectangle along each parameter, and places on each at which branches begin.
+CUTS = 5
+#: How often curves are looked for where something may change that no curve explains.
+ROUNDS = 4
+#: Places through which they are looked for each time.
+PLACES = 6
+#: What a curve of the atlas is called, by what was followed.
+CALLED = {"event": "window_exit"}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Atlas:
+    """Curves in a rectangle of two parameters, and the regions between them; made by `atlas`.
+
+    Attributes
+    ----------
+    problem : Problem
+        What it is an atlas of.
+    names : (str, str)
+        The two parameters.
+    span, window : dict
+        Their ranges, and those of the states.
+    curves : tuple of Branch
+        Curves of folds, Hopf points and branch points, and those on which an equilibrium lies on
+        the edge of the window (of kind event), each once.
+    messages : tuple of str
+        What was not found, or is not proved.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> cusp = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
+    >>> found = pk.atlas(cusp, "mu", "l", span={"mu": (-1, 1), "l": (-1, 2)})
+    >>> [curve.kind for curve in found.curves], [point.kind for point in found.special_points]
+    (['fold'], ['cusp'])
+    >>> found.counts(mu=[0.0, 0.0], l=[-0.5, 1.0]).n_equilibria.values.tolist()
+    [1, 3]
+    >>> found.to_dataset().curve_kind.values.tolist(), len(found.lines())
+    (['fold'], 1)
+    >>> ax = found.plot()
+    """
+
+    problem: Problem
+    names: tuple[str, str]
+    span: Mapping[str, tuple[float, float]]
+    window: Mapping[str, tuple[float, float]]
+    curves: tuple[Branch, ...]
+    messages: tuple[str, ...]
+    _counts: RegionSearch
+    _regions: Regions
+
+    @functools.cached_property
+    def special_points(self) -> tuple[SpecialPoint[Branch], ...]:
+        """Points of codimension two, each once though two curves meet there."""
+        found: list[SpecialPoint[Branch]] = []
+        scale = np.array([high - low for low, high in self.span.values()])
+        for curve in self.curves:
+            if curve.kind == "event":
+                continue
+            for point in curve.special_points:
+                if point.kind in ("end", "event"):
+                    continue
+                at = np.array([point[name] for name in self.names])
+                same = (
+                    one for one in found
+                    if one.kind == point.kind
+                    and np.all(np.abs(at - [one[n] for n in self.names]) < 1e-6 * scale)
+                    and np.allclose(one.x, point.x, rtol=1e-4, atol=1e-6)
+                )  # fmt: skip
+                if next(same, None) is None:
+                    found.append(point)
+        return tuple(found)
+
+    @property
+    def complete(self) -> dict[str, bool]:
+        """Whether each number is proved off the curves: of equilibria, and of stable ones."""
+        found = self._regions
+        return {
+            "n_equilibria": not found.why and not found.far(found.open_equilibria).any()
+            and not bool((found.n_equilibria < 0).any()),
+            "n_stable": not found.why_stable and not found.far(found.open_stable).any()
+            and not bool((found.n_stable < 0).any()),
+        }  # fmt: skip
+
+    def counts(self, **parameters: Any) -> xr.Dataset:
+        """The numbers of equilibria at points of the plane.
+
+        Those of a point whose cell is proved are those of its region; near curves, and where
+        nothing is proved, equilibria are counted at the point itself.
+
+        Parameters
+        ----------
+        **parameters : float or array_like
+            Both parameters by name, of one shape.
+
+        Returns
+        -------
+        xarray.Dataset
+            On ``place``: ``n_equilibria``, ``n_stable``, ``region`` (-1 in cells that a curve
+            crosses) and ``complete``, whether the first number is proved.
+
+        Raises
+        ------
+        ParameterError
+            If a parameter is missing or unknown, or a point lies outside of the rectangle.
+        """
+        for name in parameters:
+            if name not in self.names:
+                raise unknown("parameter of the atlas", name, self.names)
+        columns = []
+        for name in self.names:
+            if name not in parameters:
+                raise bad(name, None, "one number or several")
+            low, high = self.span[name]
+            values = np.atleast_1d(numeric(name, parameters[name], None, "numbers"))
+            if values.ndim != 1 or not np.all((values >= low) & (values <= high)):
+                raise bad(name, parameters[name], f"numbers from {low:.9g} to {high:.9g}")
+            columns.append(values)
+        if columns[0].shape != columns[1].shape:
+            raise bad(self.names[1], columns[1].shape, f"as many as of {self.names[0]}")
+        places = np.stack(columns, axis=1)
+        found = self._regions
+        i, j = self._counts.cells(places).T
+        region = found.region[i, j]
+        numbers = np.stack([found.n_equilibria[region], found.n_stable[region]], axis=1)
+        sure = (region >= 0) & ~found.open_equilibria[i, j] & ~found.open_stable[i, j]
+        sure &= (numbers >= 0).all(axis=1) & (not found.why) & (not found.why_stable)
+        proved = sure.copy()
+        if not sure.all():
+            numbers[~sure], proved[~sure] = self._counts.counted(places[~sure])
+        dim = ("place",)
+        return xr.Dataset(
+            {
+                "n_equilibria": variable(dim, numbers[:, 0], {"long_name": "number of equilibria"}),
+                "n_stable": variable(dim, numbers[:, 1], {"long_name": "number of stable ones"}),
+                "region": variable(dim, region, {"long_name": "number of the region"}),
+                "complete": variable(
+                    dim, proved, {"long_name": "whether the number of equilibria is proved"}
+                ),
+            },
+            {
+                name: variable(dim, column, attrs_of(self.problem, name))
+                for name, column in zip(self.names, columns, strict=True)
+            },
+        )
+
+    def to_dataset(self) -> xr.Dataset:
+        """Curves, points of codimension two, regions and cells as one Dataset.
+
+        Returns
+        -------
+        xarray.Dataset
+            Both parameters and the states on (``curve``, ``point``), shorter curves end in NaN;
+            ``curve_kind``; on ``special_point`` ``special_kind``, ``special_label`` and where they
+            are; on ``region`` ``region_n_equilibria``, ``region_n_stable``, a point well inside and
+            how far (``region_reach``); on (``cell_<first>``, ``cell_<second>``) the ``region``, -1
+            where a curve crosses the cell, ``n_equilibria_open`` and ``n_stable_open``, where a
+            change is not excluded though no curve is there. ``complete`` on ``number``.
+        """
+        free = (*self.names, *self.problem.state)
+        most = max((curve.points.sizes["point"] for curve in self.curves), default=0)
+        table = np.full((len(free), len(self.curves), most), np.nan)
+        for k, curve in enumerate(self.curves):
+            points = curve.points
+            for row, name in enumerate(free):
+                table[row, k, : points.sizes["point"]] = points[name].values
+        found, specials = self._regions, self.special_points
+        data: dict[str, Any] = {
+            name: variable(("curve", "point"), table[row], attrs_of(self.problem, name))
+            for row, name in enumerate(free)
+        }
+        kinds = [CALLED.get(curve.kind, curve.kind) for curve in self.curves]
+        data["curve_kind"] = variable(("curve",), np.array(kinds, LABEL_DTYPE))
+        for what in ("kind", "label"):
+            words = np.array([getattr(point, what) for point in specials], LABEL_DTYPE)
+            data[f"special_{what}"] = variable(("special_point",), words)
+        for name in free:
+            values = np.array([point[name] for point in specials], float)
+            data[f"special_{name}"] = variable(("special_point",), values)
+        data["region_n_equilibria"] = variable(("region",), found.n_equilibria)
+        data["region_n_stable"] = variable(("region",), found.n_stable)
+        data["region_reach"] = variable(("region",), found.reach)
+        for k, name in enumerate(self.names):
+            data[f"region_{name}"] = variable(("region",), found.place[:, k])
+        cells = tuple(f"cell_{name}" for name in self.names)
+        data["cell_region"] = variable(cells, found.region)
+        data["n_equilibria_open"] = variable(cells, found.open_equilibria)
+        data["n_stable_open"] = variable(cells, found.open_stable)
+        complete = self.complete
+        data["complete"] = variable(("number",), np.array(list(complete.values())))
+        coords = {"number": variable(("number",), np.array(list(complete), LABEL_DTYPE))}
+        for k, name in enumerate(cells):
+            middles = (
+                self._counts.start[k]
+                + (np.arange(self._counts.side) + 0.5) * (self._counts.step[k])
+            )
+            coords[name] = variable((name,), middles)
+        attrs = {**dataset_attrs(self.problem), "x": self.names[0], "y": self.names[1]}
+        attrs["messages"] = "; ".join(self.messages)
+        return xr.Dataset(data, coords, attrs)
+
+    def lines(self) -> list[list[Array]]:
+        """The curves in the plane, each as runs of points closer than cells.
+
+        Returns
+        -------
+        list of list of ndarray
+            Of each of ``curves``: runs of shape (points, 2); of a Hopf curve without its neutral
+            saddles.
+        """
+        return [self._counts.lines(curve) for curve in self.curves]
+
+    def plot(self, ax: Any = None, **keywords: Any) -> Any:
+        """Draw the curves, the regions and the points of codimension two.
+
+        Parameters
+        ----------
+        ax : matplotlib.axes.Axes, optional
+            Where to draw; a new figure if left out.
+        **keywords
+            What `phasekit.plot.atlas` takes.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+        """
+        return picture("atlas")(self, ax=ax, **keywords)
+
+    def __repr__(self) -> str:
+        """Write the curves, the points, the regions, and what is proved."""
+        ranges = ", ".join(f"{n} from {a:.6g} to {b:.6g}" for n, (a, b) in self.span.items())
+        kinds = [CALLED.get(curve.kind, curve.kind) for curve in self.curves]
+        numbers = [f"{kinds.count(kind)} {kind}" for kind in dict.fromkeys(kinds)]
+        lines = [f"<Atlas: {ranges}; curves: {', '.join(numbers) or 'none'}"]
+        lines += [repr(point) for point in self.special_points]
+        found = self._regions
+        labels: dict[tuple[int, int], list[int]] = {}
+        for k, pair in enumerate(zip(found.n_equilibria, found.n_stable, strict=True)):
+            labels.setdefault((int(pair[0]), int(pair[1])), []).append(k)
+        area = np.bincount(found.region[found.region >= 0], minlength=len(found.place))
+        for (number, stable), rows in sorted(labels.items()):
+            part = area[rows].sum() / found.region.size
+            lines.append(
+                f"{number} equilibria, {stable} stable: {len(rows)} "
+                f"region{'s'[: len(rows) != 1]}, {part:.1%} of the plane"
+            )
+        proved = [name for name, sure in self.complete.items() if sure]
+        lines.append(f"proved off the curves: {', '.join(proved) or 'nothing'}")
+        return "\n  ".join([*lines, *self.messages]) + ">"
+
+
+@call_checked
+def atlas(
+    problem: Any,
+    x: str,
+    y: str,
+    *,
+    span: Mapping[str, Any],
+    window: Mapping[str, Any] | None = None,
+) -> Atlas:
+    """All bifurcations of equilibria in a rectangle of two parameters, from a box alone.
+
+    Parameters
+    ----------
+    problem : Problem or system
+        A flow without forcing, whose other parameters are numbers.
+    x, y : str
+        The two parameters.
+    span : mapping of str to (float, float)
+        Lowest and highest value of each.
+    window : mapping of str to (float, float), optional
+        Where equilibria are looked for, by state; by default the problem's own, and of angles the
+        whole turn.
+
+    Returns
+    -------
+    Atlas
+        Curves of folds, Hopf points and branch points, and of equilibria on the edge of the window,
+        each once; points of codimension two; the regions between the curves with their numbers of
+        equilibria and of stable ones.
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Warns
+    -----
+    RuntimeWarning
+        If it is not proved that no curve is missing.
+
+    Notes
+    -----
+    All equilibria at places along cuts of the rectangle are found by interval arithmetic and
+    followed; the curves through their special points are followed once each, and those that pass
+    through points of codimension two.
+
+    Then the rectangle is divided into 128 x 128 cells. In boxes of states and parameters it is
+    excluded by interval arithmetic that an equilibrium merges with another one (the determinant of
+    the derivatives vanishes), lies on the edge of the window, or loses stability (a coefficient of
+    the characteristic polynomial or a determinant of Hurwitz passes zero)
+    [MooreKearfottCloud2009]. Over each connected part of the rest both numbers are constant, and
+    counted once. Cells where a change is not excluded and no curve is near are looked through by
+    more cuts. What is left is hatched in the picture. Within three cells of a curve another one may
+    hide. `Atlas.complete` says what is proved otherwise.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> predator = pk.Problem(
+    ...     {"x": "x - x*y/(1 + al*x) - ep*x^2", "y": "-ga*y + x*y/(1 + al*x) - de*y^2"},
+    ...     parameters={"al": 0.3, "de": 0.2, "ga": 1.0, "ep": 0.01},
+    ...     window={"x": (0.5, 99.0), "y": (0.05, 30.0)},
+    ... )
+    >>> found = pk.atlas(predator, "al", "de", span={"al": (0.2, 0.6), "de": (0.05, 0.6)})
+    >>> sorted({point.label for point in found.special_points})
+    ['BT', 'CP']
+    """
+    problem, names, spans, low, high = _checked(problem, x, y, span, window)
+    with notice(f"looking for all bifurcations in {x} and {y}"):
+        search = CurveSearch(problem, names, spans, low, high)
+        for along, other in (names, names[::-1]):
+            for k, value in enumerate(np.linspace(*spans[other], CUTS)):
+                stage(f"cut {k + 1} of {CUTS} along {along}, {len(search.curves)} curves")
+                search.cut(along, float(value), np.linspace(*spans[along], CUTS))
+        counts = RegionSearch(search)
+        for _ in range(ROUNDS):
+            stage(f"what may change between {len(search.curves)} curves")
+            found = counts.regions()
+            places = missing(found, counts)
+            before = len(search.curves)
+            for place in places[:PLACES]:
+                for k, along in enumerate(names):
+                    search.cut(along, float(place[1 - k]), [float(place[k])])
+            if len(search.curves) == before:
+                break
+    corner = zip(low.tolist(), high.tolist(), strict=True)
+    made = Atlas(
+        problem, names, spans, dict(zip(problem.state, corner, strict=True)),
+        tuple(sorted(search.curves, key=_order)),
+        tuple(_messages(found, search)), counts, found,
+    )  # fmt: skip
+    if made.messages:
+        warnings.warn(f"atlas: {'; '.join(made.messages)}", RuntimeWarning, stacklevel=2)
+    return made
+
+
+def _order(curve: Branch) -> int:
+    return KINDS_OF_CURVES.index(curve.kind)
+
+
+def _messages(found: Regions, search: CurveSearch) -> list[str]:
+    """What is not proved, and what was not found."""
+    messages: list[str] = []
+    for what, why, cells, numbers in (
+        ("equilibria", found.why, found.open_equilibria, found.n_equilibria),
+        ("stable equilibria", found.why_stable, found.open_stable, found.n_stable),
+    ):
+        if why:
+            messages.append(f"the number of {what} is not proved: {why}")
+            continue
+        part = found.far(cells).mean()
+        if part:
+            messages.append(f"the number of {what} is not proved in {part:.2%} of the plane")
+        if (numbers < 0).any():
+            messages.append(f"a curve at which the number of {what} changes is missing")
+    # What was not found does not matter where it is proved that nothing is missing.
+    return [*dict.fromkeys(search.missed), *messages] if messages else []
+
+
+def _checked(
+    problem: Any, x: Any, y: Any, span: Any, window: Any
+) -> tuple[Problem, tuple[str, str], dict[str, tuple[float, float]], Array, Array]:
+    """What `atlas` takes, before any work."""
+    given, problem = problem, as_problem(problem)
+    if problem.map or problem.time is not None or problem.bounded:
+        raise bad("problem", problem, "a flow without forcing")
+    names = check_parameter(problem, x, "x: parameter"), check_parameter(problem, y, "y: parameter")
+    if x == y:
+        raise bad("y", y, "another parameter than x")
+    if not isinstance(span, Mapping):
+        raise bad("span", span, f"a mapping: (low, high) of {x} and of {y}")
+    for name in span:
+        if name not in names:
+            raise unknown("span: parameter", name, names)
+    spans = {}
+    system = problem.system
+    for name in names:
+        if name not in span:
+            raise bad("span", span, f"(low, high) of {x} and of {y}")
+        argument = f"span[{name!r}]"
+        unit = None if system is None else system.unit_of(name)
+        spans[name] = check_span(span[name], unit, argument)
+        for declared in () if system is None else system.declared:
+            if declared.name == name and not all(map(declared.valid, spans[name])):
+                raise bad(argument, spans[name], f"values of {name}, each {declared.wants}")
+    asked = window_of(given, window)
+    if window is None and asked is not None:  # at rest the rate is no state
+        asked = {name: ends for name, ends in asked.items() if name in problem.state}
+    low, high = corners(problem, asked, "window")
+    return problem, names, spans, low, high

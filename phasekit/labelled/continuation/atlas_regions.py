@@ -1,0 +1,239 @@
+"""Regions of an atlas: what is the same all over each, and where that is proved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.errors import FlowEquilibriumKind
+from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.laws.formulas import symbols_of
+from phasekit.numerics.intervals.program import NoRule
+from phasekit.numerics.intervals.sheets import Changes, Sheets
+from phasekit.numerics.intervals.stability import MOST
+from phasekit.systems.rests import equilibria_of_cells
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+Index = npt.NDArray[np.int64]
+
+#: Halvings of the rectangle to its cells.
+DEPTH = 7
+#: Cells from a curve within which nothing but that curve is looked for.
+BESIDE = 3
+#: How often cells with no curve near them are quartered twice, and up to which part of all.
+DEEPER, MOST_OPEN = 2, 0.05
+#: Parts of the side of a cell at which points of curves are taken.
+FINE = 0.2
+#: Stable ones; without damping those are centers.
+STABLE = (
+    FlowEquilibriumKind.STABLE_NODE, FlowEquilibriumKind.STABLE_FOCUS, FlowEquilibriumKind.CENTER,
+)  # fmt: skip
+
+
+class Regions(NamedTuple):
+    """Cells of the plane, on (first, second), and the regions that they form."""
+
+    region: Index
+    """Number of the region; -1 in cells that a curve crosses."""
+    place: Array
+    """A point well inside each region, shape (regions, 2)."""
+    n_equilibria: Index
+    n_stable: Index
+    """Of each region; -1 where parts of it differ, so that a curve is missing."""
+    reach: Array
+    """How far inside these are, in parts of the rectangle."""
+    open_equilibria: Flags
+    open_stable: Flags
+    """Cells without a curve in which the number may change."""
+    why: str
+    why_stable: str
+    """Why nothing is proved; empty where something is."""
+
+    def far(self, cells: Flags) -> Flags:
+        """Cells of these that are not beside a curve."""
+        from scipy import ndimage
+
+        near = ndimage.binary_dilation(self.region < 0, np.ones((3, 3), bool), iterations=BESIDE)
+        return np.asarray(cells & ~near)
+
+
+@dataclass
+class RegionSearch:
+    """Counts equilibria between the curves of a search."""
+
+    search: CurveSearch
+
+    def __post_init__(self) -> None:
+        """The rectangle, and the bounds of what happens in it, where formulas have such."""
+        search = self.search
+        ends = np.array([search.span[name] for name in search.names])
+        self.start, self.end = ends.T
+        self.side = 1 << DEPTH
+        self.step = (self.end - self.start) / self.side
+        problem = search.problem
+        self.sheets: Sheets | None = None
+        self.why = ""
+        if problem.kind != "symbolic":
+            self.why = "f is code"
+        elif len(problem.state) > MOST:
+            self.why = f"there are more than {MOST} states"
+        else:
+            symbols = symbols_of([*problem.state, *problem.parameters])
+            others = {
+                symbols[name]: float(value)
+                for name, value in problem.parameters.items()
+                if name not in search.names
+            }
+            try:
+                self.sheets = Sheets(
+                    problem.f, [symbols[name] for name in problem.state],
+                    [symbols[name] for name in search.names], others, (search.low, search.high),
+                    search.faces,
+                )  # fmt: skip
+            except NoRule as rule:
+                self.why = f"no bounds are known for {rule}"
+
+    def lines(self, curve: Branch, finer: int = 1) -> list[Array]:
+        """A curve as points closer than cells."""
+        return polyline(curve, self.search.names, FINE / finer * self.step)
+
+    def cells(self, places: Array, finer: int = 1) -> Index:
+        """The cells in which points lie."""
+        found = np.floor((places - self.start) / self.step * finer).astype(np.int64)
+        return np.asarray(np.clip(found, 0, finer * self.side - 1))
+
+    def crossed(self, curves: Sequence[Branch], finer: int = 1) -> Changes:
+        """Cells that curves cross, of a grid so many times finer."""
+        side = finer * self.side
+        found = {kind: np.zeros((side, side), bool) for kind in KINDS_OF_CURVES}
+        for curve in curves:
+            for line in self.lines(curve, finer):
+                # A curve on a line of the grid crosses the cells of both sides.
+                for off in (-1e-7, 1e-7):
+                    for way in ((off, off), (off, -off)):
+                        i, j = self.cells(line + np.array(way) * self.step, finer).T
+                        found[curve.kind][i, j] = True
+        merging = found["fold"] | found["branch_point"]
+        return Changes(merging, merging | found["hopf"], found["event"], 0)
+
+    def changes(self, own: Changes) -> Changes:
+        """Cells in which a number may change, and no further halvings exclude it."""
+        from scipy import ndimage
+
+        if self.sheets is None:
+            return own
+        found = self.sheets.changes(self.start, self.end, DEPTH, own)
+        crossed = own.merging | own.losing | own.leaving
+        near = ndimage.binary_dilation(crossed, np.ones((3, 3), bool), iterations=BESIDE)
+        for deeper in range(2, 2 * DEEPER + 1, 2):
+            far = (found.merging | found.losing | found.leaving) & ~near
+            if not 0 < far.mean() <= MOST_OPEN:
+                break
+            blocks = np.argwhere(far)
+            parts = 1 << deeper
+            fine = self.sheets.changes(
+                self.start, self.end, DEPTH + deeper, self.crossed(self.search.curves, parts),
+                (blocks * parts, (blocks + 1) * parts),
+            )  # fmt: skip
+            shape = (self.side, parts, self.side, parts)
+            for whole, part in zip(found.cells, fine.cells, strict=True):
+                left = np.asarray(np.any(part.reshape(shape), axis=(1, 3)))
+                whole[far] &= left[far]
+        return found
+
+    def regions(self) -> Regions:
+        """The regions between the curves that are there now."""
+        from scipy import ndimage
+
+        own = self.crossed(self.search.curves)
+        found = self.changes(own)
+        any_curve = own.merging | own.losing | own.leaving
+        blocked = found.merging | found.leaving
+        blocked_stable = blocked | found.losing
+        region, count = ndimage.label(~any_curve)
+        place, reach = self._places(region, count)
+        number, why = self._agreed(region, count, ~blocked, place, 0)
+        stable, why_stable = self._agreed(region, count, ~blocked_stable, place, 1)
+        problem = self.search.problem
+        undamped = problem.conservative and len(problem.state) > 1
+        return Regions(
+            region.astype(np.int64) - 1, place, number, stable, reach,
+            blocked & ~any_curve, blocked_stable & ~any_curve,
+            self.why or why,
+            self.why or why_stable or ("nothing is damped" if undamped else ""),
+        )  # fmt: skip
+
+    def _places(self, region: Index, count: int) -> tuple[Array, Array]:
+        """Middles of the cells that lie deepest in each region, and how deep."""
+        from scipy import ndimage
+
+        padded = np.pad(region, 1)
+        depth = ndimage.distance_transform_cdt(self._same(padded), metric="chessboard")[1:-1, 1:-1]
+        at = np.zeros((count, 2), np.int64)
+        for k, where in enumerate(ndimage.find_objects(region)):
+            own = np.where(region[where] == k + 1, depth[where], -1)
+            at[k] = [s.start for s in where] + np.array(np.unravel_index(own.argmax(), own.shape))
+        return self.start + (at + 0.5) * self.step, depth[at[:, 0], at[:, 1]] / self.side
+
+    @staticmethod
+    def _same(region: Index) -> Flags:
+        """Cells whose neighbors are all of their region."""
+        same = region > 0
+        for axis in (0, 1):
+            for way in (-1, 1):
+                same &= np.roll(region, way, axis) == region
+        return same
+
+    def _agreed(
+        self, region: Index, count: int, clear: Flags, place: Array, which: int
+    ) -> tuple[Index, str]:
+        """The number in each region, counted once in each part in which it cannot change."""
+        from scipy import ndimage
+
+        parts, many = ndimage.label(clear)
+        spots, _ = self._places(parts, many)
+        i, j = self.cells(spots).T
+        own = region[i, j] - 1
+        # Regions that no clear cell lies in are counted as they are.
+        bare = np.setdiff1d(np.arange(count), own)
+        spots = np.concatenate([spots, place[bare]])
+        own = np.concatenate([own, bare])
+        numbers, sure = self.counted(spots)
+        result = np.full(count, -2)
+        for k, value in zip(own, numbers[:, which], strict=True):
+            result[k] = value if result[k] in (-2, value) else -1
+        why = "" if sure[:many].all() else "equilibria at some points of it are not all proved"
+        return result, why
+
+    def counted(self, places: Array) -> tuple[Index, Flags]:
+        """Numbers of equilibria and of stable ones at points; whether both are proved."""
+        names = self.search.names
+        problems = [
+            self.search.problem.replace(**dict(zip(names, map(float, place), strict=True)))
+            for place in places
+        ]
+        found = equilibria_of_cells(problems, self.search.low, self.search.high)
+        numbers = np.array(
+            [(len(one.x), np.isin(one.kind, STABLE).sum()) for one in found], np.int64
+        ).reshape(-1, 2)
+        return numbers, np.array([one.complete for one in found], bool)
+
+
+def missing(found: Regions, regions: RegionSearch) -> list[tuple[Any, ...]]:
+    """Places where a curve may be that is not there yet: points of the plane to look through."""
+    from scipy import ndimage
+
+    spots: list[tuple[Any, ...]] = []
+    for cells in (found.far(found.open_equilibria), found.far(found.open_stable)):
+        parts, count = ndimage.label(cells, np.ones((3, 3)))
+        for k in range(1, count + 1):
+            rows = np.argwhere(parts == k)
+            middle = rows[np.argmin(np.abs(rows - rows.mean(axis=0)).sum(axis=1))]
+            spots.append(tuple(regions.start + (middle + 0.5) * regions.step))
+    return spots

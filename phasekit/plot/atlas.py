@@ -1,0 +1,181 @@
+"""Atlases: the curves and regions of a rectangle of two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+import numpy.typing as npt
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from phasekit.bifurcation.special_points import KINDS
+from phasekit.inputs import call_checked
+from phasekit.labelled.continuation.atlas import Atlas
+from phasekit.labels.arguments import bad, flag
+from phasekit.plot.branch import CURVES
+from phasekit.plot.parts import labels as words
+from phasekit.plot.parts import style
+from phasekit.plot.parts.points import label_points
+from phasekit.plot.parts.style import look_of
+from phasekit.plot.parts.units import Units
+
+#: Regions thinner than this part of the rectangle are not annotated.
+READABLE = 0.03
+#: How much of a color regions have, by their number of stable equilibria.
+TINTS = (0.12, 0.3, 0.48, 0.66)
+#: Colors of regions by their number of equilibria, after the last again from the first.
+COLORS = (style.GRAY, style.BLUE, style.ORANGE, style.GREEN, style.PURPLE, style.SKY)
+_EXIT: style.Look = {
+    "color": style.VERMILLION, "linestyle": (0, (4, 2)), "linewidth": 1.4, "label": "window's edge",
+}  # fmt: skip
+
+
+@call_checked
+def atlas(
+    atlas: Any,
+    *,
+    angles: style.Angles = "rad",
+    units: Mapping[str, str] | None = None,
+    counts: bool = True,
+    labels: bool = True,
+    legend: bool = True,
+    ax: Axes | None = None,
+) -> Axes:
+    """Draw the curves of an atlas, its regions, and its points of codimension two.
+
+    Each region shows its number of equilibria and, behind the stroke, how many are stable; its
+    color says the same. What is not proved is hatched.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        What `phasekit.atlas` returns.
+    angles : {"rad", "deg"}
+        Unit in which angles are shown.
+    units : mapping of str to str, optional
+        Units in which parameters are shown, by name.
+    counts : bool
+        Whether to write the numbers into each region.
+    labels : bool
+        Whether to write BT, CP, GH, ... beside points.
+    legend : bool
+        Whether to explain lines and colors under the axes.
+    ax : matplotlib.axes.Axes, optional
+        Where to draw; a new figure if left out.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+
+    Raises
+    ------
+    ParameterError
+        If an argument is unusable.
+
+    Examples
+    --------
+    >>> import phasekit as pk
+    >>> cusp = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
+    >>> found = pk.atlas(cusp, "mu", "l", span={"mu": (-1, 1), "l": (-1, 2)})
+    >>> ax = pk.plot.atlas(found)
+    >>> sorted(text.get_text() for text in ax.texts)
+    ['1/1', '3/2', 'CP']
+    """
+    if not isinstance(atlas, Atlas):
+        raise bad("atlas", atlas, "what pk.atlas returns")
+    for name, value in (("counts", counts), ("labels", labels), ("legend", legend)):
+        flag(name, value)
+    ds = atlas.to_dataset()
+    ds, shown = Units.of_dataset(ds, angles, units)
+    axes = style.axes_for(ax, legend=legend)
+    scales = [shown.scale(name, str(ds[name].attrs.get("units", ""))) for name in atlas.names]
+    ends = [
+        (low * scale, high * scale)
+        for (low, high), scale in zip(atlas.span.values(), scales, strict=True)
+    ]
+    handles: dict[str, Artist] = {}
+    _fill(axes, ds, ends)
+    open_ = (ds["n_equilibria_open"] | ds["n_stable_open"]).values
+    if not ds["complete"].values.all() and open_.any():
+        handles["open"] = _hatch(axes, open_, ends)
+    for curve, lines in zip(atlas.curves, atlas.lines(), strict=True):
+        look = style.inked(_EXIT if curve.kind == "event" else CURVES[curve.kind])
+        for line in lines:
+            x, y = (line[:, k] * scales[k] for k in (0, 1))
+            (drawn,) = axes.plot(x, y, zorder=2.0 if curve.kind == "event" else 2.5, **look)
+            handles.setdefault(str(look["label"]), drawn)
+    names: dict[tuple[float, float], str] = {}
+    for point in atlas.special_points:
+        look = look_of(point.kind)
+        place = point[atlas.names[0]] * scales[0], point[atlas.names[1]] * scales[1]
+        axes.plot(*place, linestyle="none", zorder=4, clip_on=False, **look)
+        names[place] = KINDS[point.kind].label
+        handles.setdefault(point.kind, Line2D([], [], linestyle="none", **look))
+    axes.set(xlim=ends[0], ylim=ends[1])
+    if labels:
+        label_points(axes, names)
+    if counts:
+        _write_counts(axes, ds, atlas.names, scales)
+    axes.set_xlabel(words.label(ds[atlas.names[0]], shown, style.letters(axes, "x")))
+    axes.set_ylabel(words.label(ds[atlas.names[1]], shown, style.letters(axes, "y")))
+    if legend:
+        style.legend_below(axes, list(handles.values()))
+    return axes
+
+
+def _fill(axes: Axes, ds: Any, ends: Any) -> None:
+    """Color the cells by their region; those that a curve crosses by the nearest one."""
+    from scipy import ndimage
+
+    region = ds["cell_region"].values
+    if not (region >= 0).any():
+        return
+    nearest = ndimage.distance_transform_edt(
+        region < 0, return_distances=False, return_indices=True
+    )
+    region = region[tuple(nearest)]
+    number, stable = ds["region_n_equilibria"].values, ds["region_n_stable"].values
+    colors = [
+        _tint(COLORS[max(n, 0) % len(COLORS)], TINTS[min(max(s, 0), len(TINTS) - 1)])
+        for n, s in zip(number.tolist(), stable.tolist(), strict=True)
+    ]
+    axes.imshow(
+        region.T, origin="lower", extent=(*ends[0], *ends[1]), aspect="auto",
+        interpolation="nearest", cmap=ListedColormap(colors), vmin=-0.5, vmax=len(colors) - 0.5,
+        zorder=0.5,
+    )  # fmt: skip
+
+
+def _tint(color: Any, part: float) -> npt.NDArray[np.float64]:
+    ground = np.array(to_rgb(plt.rcParams["axes.facecolor"]))
+    return np.asarray(ground + part * (np.array(to_rgb(color)) - ground))
+
+
+def _hatch(axes: Axes, open_: npt.NDArray[np.bool_], ends: Any) -> Patch:
+    """Hatch cells; the entry of the legend that says what it means."""
+    x, y = (
+        low + (np.arange(size) + 0.5) * (high - low) / size
+        for (low, high), size in zip(ends, open_.shape, strict=True)
+    )
+    drawn = axes.contourf(
+        x, y, open_.T.astype(float), levels=[0.5, 1.5], colors="none", hatches=["xxxx"], zorder=1.0
+    )
+    drawn.set(edgecolor=style.GRAY, linewidth=0.0)
+    return Patch(facecolor="none", edgecolor=style.GRAY, hatch="xxxx", label="not proved")
+
+
+def _write_counts(axes: Axes, ds: Any, names: tuple[str, str], scales: Any) -> None:
+    places = [ds[f"region_{name}"].values * s for name, s in zip(names, scales, strict=True)]
+    number, stable = ds["region_n_equilibria"].values, ds["region_n_stable"].values
+    for k in np.flatnonzero(ds["region_reach"].values > READABLE):
+        text = axes.text(
+            places[0][k], places[1][k], f"{number[k]}/{stable[k]}", ha="center", va="center",
+            color=plt.rcParams["text.color"], zorder=5,
+        )  # fmt: skip
+        text.set_path_effects(style.halo(plt.rcParams["axes.facecolor"], 3.0))

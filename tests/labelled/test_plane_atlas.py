@@ -1,0 +1,176 @@
+"""Atlases in two parameters against closed forms, roots of polynomials and the exact rung."""
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+CUSP = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
+#: Holmes: the symmetric unfolding of a double zero eigenvalue.
+SYMMETRIC = pk.Problem(
+    {"x": "y", "y": "a*x + b*y - x^3 - x^2*y"},
+    parameters={"a": -1.0, "b": 0.5},
+    window={"x": (-2, 2), "y": (-2, 2)},
+)
+#: Takens and Bogdanov.
+DOUBLE_ZERO = pk.Problem(
+    {"x": "y", "y": "a + b*y + x^2 + x*y"},
+    parameters={"a": -0.5, "b": 0.5},
+    window={"x": (-2, 2), "y": (-2, 2)},
+)
+OXIDATION = pk.Problem(
+    {
+        "x": "2*q1*(1 - x - y - s)^2 - 2*q5*x^2 - q3*x*y",
+        "y": "q2*(1 - x - y - s) - q6*y - q3*x*y",
+        "s": "q4*((1 - x - y - s) - k*s)",
+    },
+    parameters={"q1": 2.5, "q2": 1.0, "q3": 10.0, "q4": 0.0675, "q5": 1.0, "q6": 0.1, "k": 0.4},
+    window={"x": (0, 1), "y": (0, 1), "s": (0, 1)},
+)
+SQUARE = (-1.0, 1.0)
+
+
+def random_places(atlas, count, seed=0):
+    ends = np.array(list(atlas.span.values())).T
+    places = ends[0] + np.random.default_rng(seed).random((count, 2)) * (ends[1] - ends[0])
+    return dict(zip(atlas.names, places.T, strict=True))
+
+
+def test_the_cusp_has_one_curve_and_its_numbers_are_those_of_roots():
+    atlas = pk.atlas(CUSP, "mu", "l", span={"mu": SQUARE, "l": (-1, 2)})
+    (curve,) = atlas.curves
+    np.testing.assert_allclose(27 * curve.points.mu**2, 4 * curve.points.l**3, atol=1e-12)
+    (point,) = atlas.special_points
+    assert point.kind == "cusp"
+    np.testing.assert_allclose(
+        [point["mu"], point["l"], point.normal_form["c"]], [0, 0, -1], atol=1e-12
+    )
+    assert all(atlas.complete.values())
+    places = random_places(atlas, 10_000)
+    found = atlas.counts(**places)
+    mu, ell = places["mu"], places["l"]
+    expected = np.where(4 * ell**3 > 27 * mu**2, 3, 1)
+    np.testing.assert_array_equal(found.n_equilibria, expected)
+    np.testing.assert_array_equal(found.n_stable, (expected + 1) // 2)
+    assert found.complete.all()
+
+
+@pytest.mark.slow
+def test_the_symmetric_double_zero_is_complete():
+    """Branch points a = 0, Hopf points b = 0 (a < 0) of x = 0 and b = a (a > 0) of x^2 = a."""
+    atlas = pk.atlas(SYMMETRIC, "a", "b", span={"a": SQUARE, "b": SQUARE})
+    assert [curve.kind for curve in atlas.curves] == ["hopf", "hopf", "branch_point"]
+    assert [point.kind for point in atlas.special_points] == ["bogdanov_takens"]
+    for curve, lines in zip(atlas.curves, atlas.lines(), strict=True):
+        a, b = np.concatenate(lines).T
+        off = a if curve.kind == "branch_point" else np.where(a < 0, b, np.minimum(b - a, b))
+        np.testing.assert_allclose(off, 0, atol=1e-9)
+    assert all(atlas.complete.values())
+    places = random_places(atlas, 10_000)
+    a, b = places["a"], places["b"]
+    found = atlas.counts(**places)
+    np.testing.assert_array_equal(found.n_equilibria, np.where(a > 0, 3, 1))
+    np.testing.assert_array_equal(found.n_stable, np.where(a > 0, 2 * (b < a), b < 0))
+
+
+@pytest.mark.slow
+def test_the_double_zero_with_the_edge_of_its_window():
+    """Folds a = 0; Hopf points a = -b^2, b > 0; x = -sqrt(-a) leaves at none of these a."""
+    span = {"a": (-1.0, 0.5), "b": SQUARE}
+    atlas = pk.atlas(DOUBLE_ZERO.replace(a=-0.5), "a", "b", span=span)
+    assert sorted(curve.kind for curve in atlas.curves) == ["fold", "hopf"]
+    (point,) = atlas.special_points
+    assert point.kind == "bogdanov_takens"
+    places = random_places(atlas, 10_000)
+    a, b = places["a"], places["b"]
+    found = atlas.counts(**places)
+    np.testing.assert_array_equal(found.n_equilibria, np.where(a < 0, 2, 0))
+    stable = (a < 0) & (b < np.sqrt(np.abs(a)))  # x = -sqrt(-a), of trace b + x
+    np.testing.assert_array_equal(found.n_stable, stable.astype(int))
+    narrow = pk.atlas(DOUBLE_ZERO, "a", "b", span=span, window={"x": (-0.5, 2), "y": (-2, 2)})
+    (edge,) = [curve for curve in narrow.curves if curve.kind == "event"]
+    np.testing.assert_allclose(edge.points.a, -0.25, atol=1e-12)
+    assert "window_exit" in narrow.to_dataset().curve_kind.values.tolist()
+    found = narrow.counts(**places)
+    np.testing.assert_array_equal(found.n_equilibria, (a < 0) * 1 + ((a < 0) & (a > -0.25)))
+    assert narrow.complete["n_equilibria"]
+
+
+@pytest.mark.slow
+def test_oxidation_of_co():
+    atlas = pk.atlas(OXIDATION, "q2", "k", span={"q2": (0.5, 2.0), "k": (0.1, 2.0)})
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
+    assert [curve.kind for curve in atlas.curves] == ["fold", "hopf"]
+    places = sorted((point.label, point["q2"], point["k"]) for point in atlas.special_points)
+    published = [
+        ("BT", 1.1611987, 0.7223391),
+        ("BT", 1.4176276, 0.9713976),
+        ("CP", 1.0064083, 0.3559913),
+        ("GH", 0.891319, 0.2324874),
+        ("GH", 0.924255, 0.3058793),
+    ]
+    assert [label for label, *_ in places] == [label for label, *_ in published]
+    np.testing.assert_allclose([at for _, *at in places], [at for _, *at in published], atol=1e-6)
+    places = random_places(atlas, 500)
+    found = atlas.counts(**places)
+    for q2, k, number in zip(*places.values(), found.n_equilibria.values, strict=True):
+        # with z = 1 - x - y - s: s = z/k, y = q2 z/(q6 + q3 x), z = (1 - x)/(1 + y/z + 1/k)
+        x = np.polynomial.Polynomial([0, 1])
+        c = 0.1 + 10 * x
+        z_above, z_below = (1 - x) * c, (1 + 1 / k) * c + q2
+        f = 5 * z_above**2 * c - 2 * x**2 * z_below**2 * c - 10 * x * q2 * z_above * z_below
+        roots = f.roots()
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        assert number == np.sum((real > 0) & (real < 1))
+
+
+def test_trigonometric_laws_have_the_curves_of_their_bifurcation_set():
+    law = pk.Reduced(0.3, 0.2)
+    span = {"lam": (-1.5, 1.5), "psi": (-1.5, 1.5)}
+    atlas = pk.atlas(law, "lam", "psi", span=span)
+    assert {curve.kind for curve in atlas.curves} == {"fold"}
+    exact = pk.bifurcation_set(law, "lam", "psi", xlim=span["lam"], ylim=span["psi"])
+    (row,) = np.flatnonzero(exact.curve_kind.values == "fold")
+    phi = exact.phi.isel(curve=row).values
+    assert len(phi) > 100
+    for curve in atlas.curves:
+        x = curve.points.phi.values
+        # cos^3 and sin^3 of the merged angle are the parameters, on both
+        np.testing.assert_allclose(curve.points.lam, np.cos(x) ** 3, atol=1e-10)
+        np.testing.assert_allclose(np.abs(curve.points.psi), np.abs(np.sin(x) ** 3), atol=1e-10)
+    np.testing.assert_allclose(exact.lam.isel(curve=row), np.cos(phi) ** 3, atol=1e-10)
+    assert len(atlas.special_points) == exact.sizes["cusp"] == 4
+    places = random_places(atlas, 2_000)
+    inside = np.abs(places["lam"]) ** (2 / 3) + np.abs(places["psi"]) ** (2 / 3) < 1
+    np.testing.assert_array_equal(atlas.counts(**places).n_equilibria, np.where(inside, 4, 2))
+
+
+def test_code_is_not_proved_and_that_is_said():
+    code = pk.Problem(
+        lambda x, mu, nu: np.array([mu + nu * x[0] - x[0] ** 3]), "x", {"mu": 0.0, "nu": 0.0},
+        window={"x": (-3, 3)},
+    )  # fmt: skip
+    with pytest.warns(RuntimeWarning, match="not proved: f is code"):
+        atlas = pk.atlas(code, "mu", "nu", span={"mu": SQUARE, "nu": (-1, 2)})
+    assert [curve.kind for curve in atlas.curves] == ["fold"]
+    assert not any(atlas.complete.values())
+    assert "proved off the curves: nothing" in repr(atlas)
+    assert not atlas.counts(mu=0.0, nu=1.0).complete.any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"x": "nu"}, "x: parameter"),
+        ({"y": "mu"}, "y: got 'mu'"),
+        ({"span": {"mu": SQUARE}}, "span: got"),
+        ({"span": {"mu": SQUARE, "l": (1, 0)}}, r"span\['l'\]"),
+        ({"span": {"mu": SQUARE, "l": SQUARE, "x": SQUARE}}, "span: parameter"),
+        ({"window": {"z": SQUARE}}, "window: state"),
+        ({"problem": pk.Problem("x*l", "x", {"l": 1.0}, map=True)}, "problem: got"),
+    ],
+)
+def test_what_does_not_fit_is_refused_by_name(arguments, message):
+    given = {"problem": CUSP, "x": "mu", "y": "l", "span": {"mu": SQUARE, "l": SQUARE}}
+    with pytest.raises(pk.ParameterError, match=message):
+        pk.atlas(**given | arguments)
