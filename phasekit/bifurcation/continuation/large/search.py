@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.large.curve import LargeCurve
+from phasekit.bifurcation.continuation.large.hopf import hopf_points
 from phasekit.bifurcation.continuation.large.path import LargePath
 from phasekit.bifurcation.continuation.large.singular import branch_point, fold
+from phasekit.bifurcation.continuation.large.spectrum import Spectrum, spectrum_at
 from phasekit.bifurcation.continuation.locate import FLAT
 from phasekit.bifurcation.continuation.placed import Placed
 from phasekit.bifurcation.continuation.points.special import Special
@@ -20,21 +23,32 @@ Array = npt.NDArray[np.float64]
 ALONG, SIDE, POSITIVE = range(3)
 
 
-def find(curve: LargeCurve, path: LargePath) -> tuple[list[Placed], tuple[str, ...]]:
-    """Special points of a path in order, and what is not certain."""
+def find(curve: LargeCurve, path: LargePath) -> tuple[LargePath, list[Placed], tuple[str, ...]]:
+    """A path that knows how many eigenvalues grow, its special points, and what is not certain."""
     detect = curve.detect
     if not detect:
-        return [], ()
+        return path, [], ()
     with np.errstate(all="ignore"):
         return _find(curve, path, detect)
 
 
 def _find(
     curve: LargeCurve, path: LargePath, detect: tuple[str, ...]
-) -> tuple[list[Placed], tuple[str, ...]]:
+) -> tuple[LargePath, list[Placed], tuple[str, ...]]:
     tests = path.tests
+    spectra = spectra_of(curve, path) if "hopf" in detect and not curve.symmetric else []
     placed: list[Placed] = []
     messages: list[str] = []
+    if spectra:
+        tests = tests.copy()
+        tests[:, POSITIVE] = [one.positive for one in spectra]
+        path = replace(path, tests=tests)
+        missing = sum(not one.complete for one in spectra)
+        if missing:
+            messages.append(
+                f"at {missing} of {path.count} points not all eigenvalues right of the axis are "
+                "known: n_unstable is -1 there, and Hopf points next to them may be missing"
+            )
     stage(f"looking for special points on {path.count:,} points")
     own = np.flatnonzero(np.isfinite(tests[:, SIDE]))  # on a branch point it starts at nothing is
     for i, j in itertools.pairwise(own.tolist()):
@@ -46,8 +60,13 @@ def _find(
             found.append(branch_point(curve, path.u[i], path.u[j]))
         elif turns and not crosses and "fold" in detect and _moves(curve, path, i, j):
             found.append(fold(curve, path.u[i], path.u[j]))
-        left = jump - len(found)
-        if left > 0 and detect:
+        crossing = len(found)
+        if spectra and spectra[i].pairs != spectra[j].pairs:
+            pairs = hopf_points(curve, path.u[i], path.u[j], (spectra[i], spectra[j]))
+            found += pairs
+            jump = abs(spectra[i].real - spectra[j].real) if jump else 0
+        left = jump - crossing
+        if left > 0 and not spectra:
             at = f"{curve.free} between {path.u[i, curve.n]:.9g} and {path.u[j, curve.n]:.9g}"
             messages.append(f"{left} more eigenvalues cross zero together at {at}: not refined")
         for one in found:
@@ -55,7 +74,18 @@ def _find(
                 placed.append(Placed(i, 1.0, one))
             else:
                 placed.append(placement(curve, path, i, one))
-    return placed, tuple(messages)
+    placed.sort(key=lambda one: (one.index, one.along))
+    return path, placed, tuple(messages)
+
+
+def spectra_of(curve: LargeCurve, path: LargePath) -> list[Spectrum]:
+    """Eigenvalues right of the axis and next to it, at all points of a path."""
+    found = []
+    for k, u in enumerate(path.u):
+        stage(f"eigenvalues of {k:,} of {path.count:,} points")
+        matrix, _ = curve.derivatives(u)
+        found.append(spectrum_at(matrix, curve.scale[: curve.n]))
+    return found
 
 
 def _moves(curve: LargeCurve, path: LargePath, i: int, j: int) -> bool:

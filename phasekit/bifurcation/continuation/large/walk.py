@@ -52,7 +52,7 @@ class LargeWalk(CurveWalk):
     def passed(self, start: Any, track: Any, since: int) -> list[Placed]:
         """Special points from one of its points on."""
         path = join(start, self._own(start), None, track)
-        return [one for one in find(self.curve, path)[0] if one.index >= since]
+        return [one for one in find(self.curve, path)[1] if one.index >= since]
 
     def _own(self, start: Any) -> Array:
         """The tests of the start; NaN on a branch point, where rounding would tell."""
@@ -73,8 +73,7 @@ class LargeWalk(CurveWalk):
 
     def search(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
         """The path, its special points, and what is not certain."""
-        placed, messages = find(self.curve, path)
-        return path, placed, messages
+        return find(self.curve, path)
 
     def unsearched(self, path: Any) -> tuple[Any, list[Placed], tuple[str, ...]]:
         """The same where there was no time to look for them."""

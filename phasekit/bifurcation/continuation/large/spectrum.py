@@ -1,0 +1,152 @@
+"""Eigenvalues of a sparse f_x next to the imaginary axis, and whether none is missed.
+
+In units of the fields, with the symmetric part S and the skew one K of f_x, no eigenvalue with a
+real part >= 0 lies beyond the largest of S to the right, nor beyond the norm of K up or down
+(Bendixson). Disks on the axis cover that box: each holds the eigenvalues nearest to its center, by
+Arnoldi's method on the inverse, with the residuals of their vectors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, splu
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+FULL = 200  # states up to which all eigenvalues are computed
+NEAREST = 12  # eigenvalues of a disk
+DISKS = 24  # of a point
+SAME = 1e-7  # distance of eigenvalues that two disks share, beside their sizes
+TRUE = 1e-7  # residual of an eigenvector of the inverse
+INSIDE = 0.999  # of a radius
+ASIDE = 1e-3  # of the height of the box: centers are no eigenvalues that lie on the axis
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Eigenvalues in the upper half plane and on the real axis that were found.
+
+    ``complete`` says whether all of those with a real part >= 0 are among them.
+    """
+
+    values: Complex
+    complete: bool
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs have a positive real part."""
+        return int(np.sum((self.values.imag > 0.0) & (self.values.real > 0.0)))
+
+    @property
+    def real(self) -> int:
+        """How many real ones are positive."""
+        return int(np.sum((self.values.imag == 0.0) & (self.values.real > 0.0)))
+
+    @property
+    def positive(self) -> int:
+        """How many there are with a positive real part; -1 if it is not known."""
+        return 2 * self.pairs + self.real if self.complete else -1
+
+
+def box_of(matrix: Any, scale: Array) -> tuple[float, float]:
+    """How far to the right and up eigenvalues with a real part >= 0 may lie."""
+    units = sp.diags_array(scale)
+    even = sp.csr_array(sp.diags_array(1.0 / scale) @ matrix @ units)
+    both, skew = 0.5 * (even + even.T), 0.5 * (even - even.T)
+    diagonal = both.diagonal()
+    sums = np.asarray(abs(both).sum(axis=1)).ravel()
+    right = float(np.max(diagonal + sums - np.abs(diagonal)))
+    return max(right, 0.0), float(np.max(np.asarray(abs(skew).sum(axis=1))))
+
+
+def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
+    """The eigenvalues of a matrix in units of its fields that may lie right of the axis."""
+    n = matrix.shape[0]
+    if n <= FULL:
+        values = np.linalg.eigvals(matrix.toarray()).astype(complex)
+        return Spectrum(values[values.imag >= 0.0], True)
+    right, up = box_of(matrix, scale)
+    if right == 0.0:
+        return Spectrum(np.empty(0, dtype=complex), True)
+    found: list[complex] = []
+    height = max(up, ASIDE * right)
+    complete, low, step, middle = True, 0.0, 0.25 * height, 0.5 * right
+    for _ in range(DISKS):
+        center = low + max(step, ASIDE * height)
+        disk = nearest(matrix, middle + 1j * center)
+        if disk is None:
+            return Spectrum(np.array(found, dtype=complex), False)
+        values, radius = disk
+        found += [one for one in values if not _seen(one, found)]
+        square = radius**2 - middle**2  # the chord of the disk at both sides of the box
+        half = float(np.sqrt(square)) if square > 0.0 else 0.0
+        if half > 0.0 and center - half <= low:
+            low, step = center + half, half
+        elif step > ASIDE * height:
+            step = min(0.5 * step, half) if half > 0.0 else 0.5 * step
+        else:
+            complete = False
+            break
+        if low >= height:
+            break
+    else:
+        complete = False
+    values = np.array(found, dtype=complex)
+    size = np.max(np.abs(values), initial=1.0)
+    values.imag[np.abs(values.imag) <= 1e-9 * size] = 0.0  # real ones, but for rounding
+    return Spectrum(values, complete)
+
+
+def _seen(value: complex, found: list[complex]) -> bool:
+    return any(abs(value - other) <= SAME * max(1e-300, abs(value)) for other in found)
+
+
+def nearest(matrix: Any, center: complex, count: int = NEAREST) -> tuple[Complex, float] | None:
+    """Eigenvalues next to a point of the axis, of the upper half plane, and how far they are all.
+
+    None if Arnoldi's method does not end, or residuals say that they are wrong.
+    """
+    found = pairs_near(matrix, center, count)
+    if found is None:
+        return None
+    values = found[0]
+    radius = INSIDE * float(np.max(np.abs(values - center)))
+    values = np.where(values.imag < 0.0, np.conj(values), values)
+    kept: list[complex] = []
+    for one in values.tolist():
+        if not _seen(one, kept):
+            kept.append(one)
+    return np.array(kept), radius
+
+
+def pairs_near(
+    matrix: Any, center: complex, count: int, *, left: bool = False
+) -> tuple[Complex, Complex] | None:
+    """Eigenvalues nearest to a point with their vectors; with ``left`` those of the transpose."""
+    n = matrix.shape[0]
+    shifted = sp.csc_array(matrix - center * sp.eye_array(n, format="csc"), dtype=complex)
+    try:
+        factors = splu(shifted)
+    except RuntimeError:
+        return None
+    way = "T" if left else "N"
+    inverse = LinearOperator(
+        (n, n), matvec=lambda b: factors.solve(b.ravel().astype(complex), way), dtype=complex
+    )
+    begin = (1.0 + 0.5 * np.cos(1.7 * np.arange(n))).astype(complex)
+    try:
+        ritz, vectors = eigs(inverse, k=min(count, n - 2), v0=begin, tol=1e-13, maxiter=200)
+    except ArpackError:
+        return None
+    values = center + 1.0 / ritz
+    operand = matrix.T if left else matrix
+    rest = operand @ vectors - vectors * values
+    # What is left, by the inverse: that is how far they are off.
+    wrong = np.linalg.norm(np.stack([factors.solve(one, way) for one in rest.T]), axis=1) > TRUE
+    return None if wrong.any() else (values, vectors)
