@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.labelled.crossings import Motions, motions_in_cells
-from phasekit.labels.arguments import bad
+from phasekit.labels.arguments import bad, list_names
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.laws.equations import Equations
 from phasekit.laws.formulas import take_formula
@@ -165,7 +165,7 @@ def _called(law: Equations, name: str, given: Any) -> Event:
         for one in inspect.signature(given).parameters.values()
     )
     if count != 2:
-        raise bad(argument, given, f"a function of (t, x), x holding {', '.join(law.states)}")
+        raise bad(argument, given, f"a function of (t, x), x holding {list_names(law.states)}")
     terminal, direction = getattr(given, "terminal", 0), getattr(given, "direction", 0)
     return Event(lambda t, x: float(given(t, x)), int(terminal), float(direction))
 

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from phasekit.cells.states import at_states
-from phasekit.labels.arguments import bad, numeric, one_of, unknown, whole
+from phasekit.labels.arguments import bad, list_names, numeric, one_of, unknown, whole
 from phasekit.labels.coordinates import LABELS, STATES
 from phasekit.labels.grid import variable
 from phasekit.laws.equations import Equations
@@ -84,7 +84,7 @@ def starts_of(
 
 
 def _spread(law: Equations, x0: Any) -> dict[str, Any]:
-    n, wants = len(law.states), f"a value for each of {', '.join(law.states)}"
+    n, wants = len(law.states), f"a value for each of {list_names(law.states)}"
     if isinstance(x0, Mapping) or isinstance(x0, xr.Dataset):
         for name in x0:
             if name not in law.states:
@@ -162,7 +162,7 @@ def with_observables(ds: xr.Dataset, law: Equations, observables: Mapping[str, A
         text = str(formula)
         attrs = {
             "long_name": f"{name} along the motion", "units": law.units.get(name, "1"),
-            "equation": text if len(text) < 200 else f"{name} = g({', '.join(law.states)})",
+            "equation": text if len(text) < 200 else f"{name} = g({list_names(law.states)})",
         }  # fmt: skip
         ds[f"motion_{name}"] = variable(map(str, dims), values.data, attrs)
     return ds

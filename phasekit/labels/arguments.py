@@ -56,6 +56,17 @@ Value: TypeAlias = Union[float, FloatArray, "xr.DataArray"]  # noqa: UP007
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
+#: Names that a message or a representation lists in full.
+LISTED = 40
+
+
+def list_names(names: Sequence[str]) -> str:
+    """Write names one after the other, many by their ends."""
+    if len(names) <= LISTED:
+        return ", ".join(names)
+    return f"{', '.join(names[:3])}, ..., {names[-1]}"
+
+
 def unknown(what: str, name: object, valid: Iterable[str], listed: str = "") -> ParameterError:
     """Return the error for a name that is not one of `valid`, with the nearest of them.
 
@@ -71,7 +82,7 @@ def unknown(what: str, name: object, valid: Iterable[str], listed: str = "") -> 
         text += f"; did you mean {near[0]!r}?" if near else ";"
         return ParameterError(f"{text} {listed} lists those that are valid")
     text += f"; did you mean {near[0]!r}? Valid are: " if near else "; valid are: "
-    return ParameterError(text + ", ".join(names))
+    return ParameterError(text + list_names(names))
 
 
 #: What `numeric` takes.

@@ -14,7 +14,17 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.code_fields import CompiledField
 from phasekit.bifurcation.continuation.fields import Field, SymbolicField
 from phasekit.bifurcation.continuation.iterated_field import MOST, IteratedField
-from phasekit.labels.arguments import Value, bad, call_checked, flag, reals, same, unknown, whole
+from phasekit.labels.arguments import (
+    Value,
+    bad,
+    call_checked,
+    flag,
+    list_names,
+    reals,
+    same,
+    unknown,
+    whole,
+)
 from phasekit.labels.equality import equal
 from phasekit.laws.equations import Rates, Step
 from phasekit.laws.formulas import symbols_of
@@ -543,7 +553,7 @@ class Problem(ProblemSources, System):
             If x is not a number for each state.
         """
         n = len(self.state)
-        wants = f"{n} numbers: {', '.join(self.state)}"
+        wants = f"{n} numbers: {list_names(self.state)}"
         x = np.atleast_1d(reals("x", x, wants))
         if x.shape != (n,):
             raise bad("x", x, wants)

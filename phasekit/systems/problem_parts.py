@@ -21,7 +21,7 @@ from phasekit.bifurcation.continuation.large.field import (
     pattern_of,
 )
 from phasekit.errors import ParameterError
-from phasekit.labels.arguments import Value, bad, brief, number, numeric, pair, unknown
+from phasekit.labels.arguments import Value, bad, brief, list_names, number, numeric, pair, unknown
 from phasekit.laws.formulas import (
     NAME,
     is_name,
@@ -385,7 +385,7 @@ def make_field(
             raise bad("jac", jac, "None with formulas, whose derivatives are exact")
         given = [f] if is_one and not hasattr(f, "tolist") else list(f)
         if len(given) != len(states):
-            raise bad("f", given, f"{len(states)} formulas, one for each of {', '.join(states)}")
+            raise bad("f", given, f"{len(states)} formulas, one for each of {list_names(states)}")
         expressions = tuple(
             expressions_of(given, [*states, *names], "f", states, definitions, functions)
         )
@@ -465,7 +465,9 @@ def written(problem: Any) -> str:
             equations = equations[:200] + " ..."
     else:
         name = getattr(problem.f, "__name__", "f")
-        equations = f"({', '.join(problem.state)}){arrow}{name}(x, **parameters), {problem.kind}"
+        fields = [f"{block.name}: {block.size}" for block in problem.blocks]
+        states = ", ".join(fields) or list_names(problem.state)
+        equations = f"({states}){arrow}{name}(x, **parameters), {problem.kind}"
     notes = [f"applied {problem.times} times"] * (problem.times > 1)
     notes += [f"{name}={brief(value)}" for name, value in problem.parameters.items()]
     notes += [f"{name} modulo {value:.6g}" for name, value in problem.periods.items()]

@@ -245,3 +245,16 @@ def test_selections_of_pictures_are_checked():
     branch = pk.continuation(problem, "r", x0=[0.7], span=(-1.0, 0.5), options=few)
     with pytest.raises(pk.ParameterError, match=r"^sel: got 'abc', wants a mapping"):
         pk.plot.branch(branch, sel="abc")
+
+
+def test_a_thousand_states_are_named_by_their_ends():
+    """Messages and representations say how many there are, and do not list them all."""
+    field = pk.Problem(lambda x, a: -a * x, [("u", 500), ("v", 500)], {"a": 1.0})
+    assert repr(field).startswith("Problem((u: 500, v: 500)' = <lambda>(")
+    for call in (
+        lambda: pk.flow(field, x0=[1.0, 2.0], t=[0.0, 1.0]),
+        lambda: pk.periodic_orbit(field, [1.0, 2.0]),
+    ):
+        with pytest.raises(pk.ParameterError, match="u_0, u_1, u_2, ..., v_499") as raised:
+            call()
+        assert len(str(raised.value)) < 200

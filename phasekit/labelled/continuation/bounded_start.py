@@ -22,7 +22,7 @@ from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
 from phasekit.labelled.continuation.cycle_start import spans_of
 from phasekit.labelled.continuation.orbit_guess import first_point, scale_of
-from phasekit.labels.arguments import bad, reals
+from phasekit.labels.arguments import bad, list_names, reals
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -109,7 +109,7 @@ def _free(problem: Any, parameter: Any) -> list[str]:
 def guess_of(problem: Problem, x0: Any, values: Sequence[float], options: Any) -> Orbit:
     """A solution to begin with: one state, samples even in time, a function of s, or a Dataset."""
     n = len(problem.state)
-    names = ", ".join(problem.state)
+    names = list_names(problem.state)
     wants = f"{n} numbers ({names}), samples of shape (samples, {n}), or a function of s in [0, 1]"
     mesh = np.linspace(0.0, 1.0, (options.intervals or FIRST) + 1)
     if x0 is None:

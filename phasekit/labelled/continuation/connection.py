@@ -35,7 +35,7 @@ from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
 from phasekit.labelled.continuation.orbit_guess import first_point, scale_of, units_of
 from phasekit.labelled.continuation.periodic_orbit import Simulation
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
-from phasekit.labels.arguments import bad, number, reals
+from phasekit.labels.arguments import bad, list_names, number, reals
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 
@@ -267,7 +267,7 @@ def _guesses(problem: Problem, trial: Bounded, given: Any, y: FloatArray) -> Any
 
 
 def _state(problem: Problem, given: Any) -> FloatArray:
-    names = ", ".join(problem.state)
+    names = list_names(problem.state)
     if isinstance(given, Mapping):
         if set(given) != set(problem.state):
             raise bad("orbit", list(given), f"a value for each of {names}")

@@ -21,7 +21,7 @@ from phasekit.labelled.continuation.certified import check_certify, refuse_certi
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labelled.continuation.user_events import events_of, stop_of
-from phasekit.labels.arguments import bad, flag, numeric, unknown
+from phasekit.labels.arguments import bad, flag, list_names, numeric, unknown
 from phasekit.numerics.waits import notice
 from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem, system_of
@@ -246,9 +246,9 @@ def _start(problem: Problem, x0: Any, given: Any) -> FloatArray:
         missing = [name for name in problem.state if name not in x0]
         extra = [name for name in x0 if name not in problem.state]
         if missing or extra:
-            raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
+            raise bad("x0", list(x0), f"a value for each of {list_names(problem.state)}")
         x0 = [x0[name] for name in problem.state]
-    names = ", ".join(problem.state)
+    names = list_names(problem.state)
     guess = np.atleast_1d(numeric("x0", x0, None, f"{n} numbers: {names}"))
     if guess.shape != (n,) or not np.isfinite(guess).all():
         raise bad("x0", x0, f"{n} finite numbers: {names}")

@@ -11,7 +11,7 @@ from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.connection import connection
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
-from phasekit.labels.arguments import bad, number, unknown
+from phasekit.labels.arguments import bad, list_names, number, unknown
 from phasekit.systems.problem import Problem, as_problem
 
 
@@ -99,7 +99,7 @@ def critical_rate(
     places = []
     for argument, given in (("attractor", attractor), ("edge", edge)):
         if not isinstance(given, Mapping) or set(given) != set(states):
-            raise bad(argument, given, f"values of {', '.join(states)}")
+            raise bad(argument, given, f"values of {list_names(states)}")
         places.append([number(f"{argument}[{s!r}]", given[s], "a number", None) for s in states])
     for argument, place, wanted in (("attractor", places[0], 0), ("edge", places[1], 1)):
         value, slopes = problem.replace(**{name: place[-1]}).derivatives(place[:-1])

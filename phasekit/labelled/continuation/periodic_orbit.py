@@ -28,7 +28,7 @@ from phasekit.labelled.continuation.orbit_guess import (
     units_of,
 )
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
-from phasekit.labels.arguments import bad, number, reals
+from phasekit.labels.arguments import bad, list_names, number, reals
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
@@ -143,9 +143,9 @@ def periodic_orbit(
     if isinstance(x0, Mapping):
         missing = [name for name in problem.state if name not in x0]
         if missing or len(x0) != n:
-            raise bad("x0", list(x0), f"a value for each of {', '.join(problem.state)}")
+            raise bad("x0", list(x0), f"a value for each of {list_names(problem.state)}")
         x0 = [x0[name] for name in problem.state]
-    wants = f"{n} numbers ({', '.join(problem.state)}), or samples of shape (samples, {n})"
+    wants = f"{n} numbers ({list_names(problem.state)}), or samples of shape (samples, {n})"
     x = np.atleast_1d(reals("x0", x0, wants))
     if not np.isfinite(x).all() or x.shape[-1] != n or x.ndim > 2:
         raise bad("x0", x0, wants)
