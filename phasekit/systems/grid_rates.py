@@ -201,9 +201,9 @@ class GridRates:
         return {axis.name: axis.coordinates for axis in self.axes}
 
     @property
-    def states(self) -> tuple[str, ...]:
-        """Names of all states."""
-        return tuple(f"{name}_{i}" for name in self.fields for i in range(self.count))
+    def state(self) -> list[tuple[str, int]]:
+        """The fields, and how many states each has."""
+        return [(name, self.count) for name in self.fields]
 
     def __call__(self, x: Array, **values: Any) -> Array:
         """The rates, field by field; of many states at once, the columns of x."""

@@ -222,7 +222,8 @@ class Problem(ProblemSources, System):
                     raise bad(argument, value, "None with a grid, on which formulas name fields")
             names = tuple({} if parameters is None else parameters)
             f = rates_on_grid(f, axes, names, definitions, functions)
-            state, jac = f.states, GridSlopes(f)
+            state, jac = f.state, GridSlopes(f)
+            coords = f.coordinates
             definitions = functions = None
         places = coordinates_of(coords)
         blocks = blocks_of(state, places) if is_blocks(state) else ()

@@ -468,6 +468,8 @@ def written(problem: Any) -> str:
         fields = [f"{block.name}: {block.size}" for block in problem.blocks]
         states = ", ".join(fields) or list_names(problem.state)
         equations = f"({states}){arrow}{name}(x, **parameters), {problem.kind}"
+        if hasattr(problem.f, "formulas"):
+            equations = f"{name}; {states}"
     notes = [f"applied {problem.times} times"] * (problem.times > 1)
     notes += [f"{name}={brief(value)}" for name, value in problem.parameters.items()]
     notes += [f"{name} modulo {value:.6g}" for name, value in problem.periods.items()]
