@@ -261,6 +261,15 @@ def test_a_third_branch_through_a_branch_point_is_seen():
         assert not any(point.certified for point in branch.special("BP"))
 
 
+def test_formulas_of_very_many_terms_are_not_expanded():
+    """Factoring these would take for ever."""
+    problem = pk.Problem(
+        ["x*(l - x) + x^3*sin(x)^40*(1 + x + l)^60*(2 + x*l)^60/4^60"], "x", {"l": -0.25}
+    )
+    branch = pk.continuation(problem, "l", x0=[0.0], span=(-0.5, 0.5), certify=True)
+    assert branch.special("BP")[0].certified
+
+
 def test_a_jump_to_another_branch_is_not_proved():
     """Steps too long for curves 1e-5 apart, which cross in the eyes of Newton's method."""
     problem = pk.Problem("(x - l)*(x + l) - e", "x", {"l": -1.0, "e": 1e-10})

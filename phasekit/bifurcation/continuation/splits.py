@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import functools
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -30,6 +31,8 @@ Array = npt.NDArray[np.float64]
 
 #: Longest formulas that are factored and simplified, and subspaces that are tried.
 LONG, SIMPLE, MOST = 400, 100, 8
+#: Most terms of a formula that is expanded.
+TERMS = 200.0
 #: How close to 0, beside their sizes, states are that may be 0 or equal.
 NEAR = 1e-9
 
@@ -126,7 +129,8 @@ def _vanishes(formula: Any) -> bool:
     if value.is_number and abs(value) > 1e-20 * sum(terms):
         return False
     return bool(
-        sp.expand(formula) == 0 or (formula.count_ops() <= SIMPLE and sp.simplify(formula) == 0)
+        (_terms(formula) <= 20.0 * TERMS and sp.expand(formula) == 0)
+        or (formula.count_ops() <= SIMPLE and sp.simplify(formula) == 0)
     )
 
 
@@ -164,10 +168,9 @@ def _factors(zero: tuple[Any, ...], states: tuple[Any, ...]) -> tuple[Split, ...
             slope = rows[i].diff(x)
             if slope.is_number and slope != 0:
                 value = x - rows[i] / slope
-                rows = [
-                    other if k == i else sp.expand(other.xreplace({x: sp.expand(value)}))
-                    for k, other in enumerate(rows)
-                ]
+                put = [row if k == i else row.xreplace({x: value}) for k, row in enumerate(rows)]
+                if max(map(_terms, put)) <= TERMS:
+                    rows = [row if k == i else sp.expand(row) for k, row in enumerate(put)]
                 break
     found = []
     nothing = np.zeros((len(states), 0))
@@ -183,10 +186,25 @@ def _factors(zero: tuple[Any, ...], states: tuple[Any, ...]) -> tuple[Split, ...
 
 def _product(row: Any) -> Sequence[Any]:
     """The different factors of a formula that hold symbols, as far as they are found."""
-    try:
-        whole = sp.factor(sp.together(row))
-    except (sp.PolynomialError, NotImplementedError, ValueError):
-        whole = row
-    upper, _ = sp.fraction(whole)
-    bases = [factor.base if factor.is_Pow else factor for factor in sp.Mul.make_args(upper)]
+    upper, symbols = sp.fraction(sp.together(row))[0], sorted(row.free_symbols, key=str)
+    if _terms(upper) <= TERMS and upper.is_polynomial(*symbols):
+        whole = sp.factor(upper)
+    else:
+        whole = sp.factor_terms(row)
+    bases = [
+        factor.base if factor.is_Pow else factor
+        for factor in sp.Mul.make_args(whole)
+        if not (factor.is_Pow and not factor.exp.is_positive)
+    ]
     return list(dict.fromkeys(base for base in bases if base.free_symbols))
+
+
+def _terms(formula: Any) -> float:
+    """A bound of how many terms a formula has when it is expanded."""
+    if formula.is_Add:
+        return sum(map(_terms, formula.args))
+    if formula.is_Mul:
+        return math.prod(map(_terms, formula.args))
+    if formula.is_Pow and formula.exp.is_Integer:
+        return min(_terms(formula.base) ** abs(int(formula.exp)), np.inf)
+    return 1.0
