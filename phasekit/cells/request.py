@@ -113,9 +113,8 @@ def ask(
     grid = make_grid(inputs, axis=axis, called=called, order=order)
     needs = needs_of(system, passes)
     for one, names in needs.items():
-        for name in names:
-            if name not in inputs:
-                raise _missing(system, one, name)
+        if missing := [name for name in names if name not in inputs]:
+            raise _missing(system, one, missing)
     if not grid.sizes and any(set(system.rung.derived) & set(one.inputs) for one in passes):
         system.coefficients()  # scalars that are invalid raise, where cells of arrays become NaN
     titles, dims = {row.name for row in rows}, {dim for row in rows for dim in row.dims}
@@ -162,14 +161,17 @@ def needs_of(system: System, passes: Sequence[Pass]) -> dict[Pass, tuple[str, ..
     return needs
 
 
-def _missing(system: System, one: Pass, name: str) -> ParameterError:
-    way = ", which has no such parameter"
-    if name in [parameter.name for parameter in system.declared]:
-        way = f"; use system.replace({name}=...)"
-    elif name in STATES:
-        way = f"; give {name}="
+def _missing(system: System, one: Pass, names: Sequence[str]) -> ParameterError:
+    declared = [parameter.name for parameter in system.declared]
+    ways = []
+    if own := [name for name in names if name in declared]:
+        ways.append(f"use system.replace({', '.join(f'{name}=...' for name in own)})")
+    if states := [name for name in names if name in STATES and name not in declared]:
+        ways.append(f"give {', '.join(f'{name}=' for name in states)}")
+    way = "".join(f"; {way}" for way in ways) or ", which has no such parameter"
+    wants = "wants a value" if len(names) == 1 else "wants values"
     return ParameterError(
-        f"{name}: got nothing, wants a value for {' and '.join(one.groups)} of "
+        f"{', '.join(names)}: got nothing, {wants} for {' and '.join(one.groups)} of "
         f"{type(system).__name__}{way}"
     )
 

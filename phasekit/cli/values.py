@@ -2,72 +2,17 @@
 
 from __future__ import annotations
 
-import math
 import re
-from decimal import Decimal
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
-from phasekit.labels.units import UNITS, usual
+from phasekit.labels.units import TYPED, UNITS, brief_value, number
 
 #: Most values that a range may have.
 LONGEST = 10_000_000
-
-_NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*")
-
-
-def number(name: str, text: Any, units: str) -> float:
-    """Read one number with an optional unit; without one it is in SI units and radians.
-
-    Parameters
-    ----------
-    name : str
-        Name used in messages.
-    text : str, int or float
-        What the user wrote.
-    units : str
-        Unit of the result, as the models declare it.
-
-    Raises
-    ------
-    ParameterError
-        If it is not a number, or the unit does not fit.
-
-    Examples
-    --------
-    >>> number("e", "1.153mm", "m")
-    0.001153
-    >>> number("beta", "30mm", "rad")
-    Traceback (most recent call last):
-    ...
-    phasekit.errors.ParameterError: beta: got '30mm', wants a number in rad or deg or °
-    """
-    known = UNITS.get(units, {})
-    wants = f"a number in {' or '.join(known)}" if known else "a number without unit"
-    plain = isinstance(text, (int, float)) and not isinstance(text, bool)
-    match = _NUMBER.fullmatch(text) if isinstance(text, str) else None
-    unit = usual(match[2]) if match else ""
-    if not plain and (match is None or (unit and unit not in known)):
-        raise ParameterError(f"{name}: got {_short(text)}, wants {wants}")
-    try:
-        # Decimals have bounds of their own, far beyond those of doubles.
-        value = float(text if match is None else Decimal(match[1]) * known.get(unit, Decimal(1)))
-    except ArithmeticError:
-        value = math.inf
-    if not math.isfinite(value):
-        raise ParameterError(f"{name}: got {_short(text)}, wants {wants}, and a finite one")
-    return value
-
-
-def _short(value: Any) -> str:
-    """Write a value for a message that must stay one readable line."""
-    if isinstance(value, int) and value.bit_length() > 1024:  # repr refuses thousands of digits
-        return f"a whole number of {value.bit_length()} bits"
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:40]}... ({len(text)} letters)"
 
 
 def is_range(text: str) -> bool:
@@ -87,10 +32,10 @@ def span(name: str, text: str, units: str) -> NDArray[np.float64]:
     if len(parts) != 3:
         raise ParameterError(f"{name}: got {text!r}, wants FROM:TO:COUNT, such as 0:90deg:181")
     first, last, count = parts
-    bare = _NUMBER.fullmatch(first)
-    suffix = _NUMBER.fullmatch(last)
-    if bare is not None and suffix is not None and not bare[2]:
-        first += suffix[2]
+    bare = TYPED.fullmatch(first)
+    suffix = TYPED.fullmatch(last)
+    if bare is not None and suffix is not None and not bare["unit"]:
+        first += suffix["unit"]
     return between(name, first, last, count, units)
 
 
@@ -122,7 +67,7 @@ def between(
         size = -1
     if not 2 <= size <= LONGEST:
         raise ParameterError(
-            f"{name}: got {_short(count)} as count, wants a whole number from 2 to {LONGEST}"
+            f"{name}: got {brief_value(count)} as count, wants a whole number from 2 to {LONGEST}"
         )
     if spacing == "log":
         if not (start > 0.0 and stop > 0.0):

@@ -6,6 +6,7 @@ Array parameters of the system and of the states span the result's dims, times t
 from __future__ import annotations
 
 import functools
+import inspect
 from dataclasses import replace
 from typing import Any
 
@@ -25,6 +26,7 @@ from phasekit.labels.arguments import (
 )
 from phasekit.laws.ladder import Conservative
 from phasekit.numerics.waits import notice
+from phasekit.spellings import argument_meant
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import System, as_system
 from phasekit.table.quantities import select
@@ -167,6 +169,10 @@ def flow(
 
         if t is None:
             t, dphi0 = dphi0, None
+        known = (*law.states, *(f"{name}0" for name in law.states))
+        if strange := [name for name in states if name not in known]:
+            expected = inspect.signature(flow).parameters
+            refuse_call(flow, [name for name in strange if argument_meant(name, expected)])
         start, named = starts_of(system, x0, states, phi0, dphi0)
         tolerances = checked_tolerances(rtol, atol)
         watched = None if events is None else watched_of(law, events)

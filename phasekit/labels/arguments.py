@@ -29,7 +29,8 @@ from phasekit.inputs import (
     reals,
     whole,
 )  # fmt: skip
-from phasekit.labels.units import factor, si_unit
+from phasekit.labels.units import TYPED, factor, si_unit
+from phasekit.labels.units import number as typed
 from phasekit.spellings import respelled
 
 __all__ = ["FloatArray", "NumberLike", "Value", "bad", "brief", "call_checked", "describe"]
@@ -105,9 +106,10 @@ def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANT
     argument : str
         Name used in messages.
     value : float, 1-D array_like or xarray.DataArray
-        Real numbers. Bools, strings, None, complex numbers, dates, bare arrays of two and more
-        dimensions and empty arrays are refused. A scalar must be finite; an array may hold
-        NaN, infinity and masked values, which become invalid cells.
+        Real numbers; as text with a unit, ``"40deg"``, or without, ``"pi/4"``. Bools, other text,
+        None, complex numbers, dates, bare arrays of two and more dimensions and empty arrays are
+        refused. A scalar must be finite; an array may hold NaN, infinity and masked values, which
+        become invalid cells.
     units : str or None, optional
         The unit that is wanted; a DataArray whose attribute ``units`` is another one is converted.
         None: any unit, to SI units; by default units do not matter.
@@ -125,6 +127,8 @@ def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANT
         raise bad(argument, value, wants, hint or "name one variable of it")
     if isinstance(value, (list, tuple)) and xr.DataArray in set(map(type, value)):
         value = [_single(argument, item, units) for item in value]
+    if units != "" and (isinstance(value, str) or str in set(map(type, _listed(value)))):
+        value = _typed(argument, value, units or "1")
     array = reals(argument, value, wants)
     if array.ndim == 0:
         if not np.isfinite(array):
@@ -137,6 +141,17 @@ def numeric(argument: str, value: Any, units: str | None = "", wants: str = WANT
         raise bad(argument, value, "at least one value")
     array.flags.writeable = False
     return array
+
+
+def _listed(value: Any) -> Sequence[Any]:
+    return value if isinstance(value, (list, tuple)) else ()
+
+
+def _typed(argument: str, value: Any, units: str) -> Any:
+    """Return numbers that are written as text; what is none is left to be refused."""
+    if isinstance(value, str):
+        return typed(argument, value, units) if TYPED.fullmatch(value) else value
+    return [_typed(argument, item, units) if isinstance(item, str) else item for item in value]
 
 
 def _single(argument: str, item: Any, units: str | None) -> Any:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping
 from decimal import Decimal
 from typing import Any
@@ -97,6 +99,82 @@ def si_unit(unit: object) -> str | None:
     """
     name = usual(unit) if isinstance(unit, str) else ""
     return next((held for held, fits in UNITS.items() if name == held or name in fits), None)
+
+
+#: A number as people write it, with a decimal point or comma or as a part of pi, and its unit.
+TYPED = re.compile(
+    r"\s*(?:(?P<digits>[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)(?!\s*\*?\s*(?:pi|\u03c0)\b)"
+    r"|(?P<sign>[-+]?)\s*(?P<times>\d+(?:\.\d+)?)?\s*\*?\s*(?:pi|\u03c0)(?:\s*/\s*(?P<over>\d+(?:\.\d+)?))?)"
+    r"\s*(?P<unit>.*?)\s*"
+)
+#: What may be a number with a decimal comma, or thousands.
+_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+
+
+def number(name: str, text: Any, units: str) -> float:
+    """Read one number with an optional unit; without one it is in SI units and radians.
+
+    Parameters
+    ----------
+    name : str
+        Name used in messages.
+    text : str, int or float
+        What the user wrote: ``40deg``, ``1.153 mm``, ``pi/4``, ``0,7``.
+    units : str
+        Unit of the result, as the models declare it.
+
+    Raises
+    ------
+    ParameterError
+        If it is not a number, or the unit does not fit.
+
+    Examples
+    --------
+    >>> number("e", "1.153mm", "m"), number("beta", "pi/4", "rad"), number("psi", "0,7", "1")
+    (0.001153, 0.7853981633974483, 0.7)
+    >>> number("beta", "30mm", "rad")
+    Traceback (most recent call last):
+    ...
+    phasekit.errors.ParameterError: beta: got '30mm', wants a number in rad or deg or °
+    """
+    known = UNITS.get(units, {})
+    wants = f"a number in {' or '.join(known)}" if known else "a number without unit"
+    plain = isinstance(text, (int, float)) and not isinstance(text, bool)
+    match = TYPED.fullmatch(text) if isinstance(text, str) else None
+    unit = usual(match["unit"]) if match else ""
+    if not plain and (match is None or (unit and unit not in known)):
+        raise ParameterError(f"{name}: got {brief_value(text)}, wants {wants}")
+    digits = (match["digits"] or "") if match else ""
+    if _THOUSANDS.fullmatch(digits):
+        raise ParameterError(
+            f"{name}: got {text!r}, wants {digits.replace(',', '')} or {digits.replace(',', '.')}"
+        )
+    try:
+        # Decimals have bounds of their own, far beyond those of doubles.
+        if match is None:
+            value = float(text)
+        else:
+            value = float(_decimal(match) * known.get(unit, Decimal(1)))
+    except ArithmeticError:
+        value = math.inf
+    if not math.isfinite(value):
+        raise ParameterError(f"{name}: got {brief_value(text)}, wants {wants}, and a finite one")
+    return value
+
+
+def _decimal(match: re.Match[str]) -> Decimal:
+    if match["digits"]:
+        return Decimal(match["digits"].replace(",", "."))
+    turned = float(match["times"] or 1) * math.pi / float(match["over"] or 1)
+    return Decimal(-turned if match["sign"] == "-" else turned)
+
+
+def brief_value(value: Any) -> str:
+    """Write a value for a message that must stay one readable line."""
+    if isinstance(value, int) and value.bit_length() > 1024:  # repr refuses thousands of digits
+        return f"a whole number of {value.bit_length()} bits"
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:40]}... ({len(text)} letters)"
 
 
 def factor(argument: str, unit: Any, wanted: str | None) -> Decimal:

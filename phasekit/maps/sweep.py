@@ -441,16 +441,20 @@ def _middles(
     law = _law(system, table)
     needs = needs_of(system, passes_of(system, rows, table=table))
     names = dict.fromkeys(name for one in needs.values() for name in one)
-    if "time" in names and "time" not in given:
-        clock = "n" if isinstance(law, Map) else "duration"
-        raise bad(
-            clock, None, f"{'iterations' if clock == 'n' else 'a time'} for lyapunov, {clock}="
-        )
-    found: dict[str, Value] = {
-        key: start_of(law, name)
-        for key, name in {f"state_{name}": name for name in law.states}.items()
-        if key in names and key not in given
-    }
+    clock = "n" if isinstance(law, Map) else "duration"
+    missing = [clock] * ("time" in names and "time" not in given)
+    found: dict[str, Value] = {}
+    for key, name in {f"state_{name}": name for name in law.states}.items():
+        if key in names and key not in given:
+            if name in law.start or name in law.window:
+                found[key] = start_of(law, name)
+            else:
+                missing.append(name)
+    if missing:
+        words = {"n": "iterations", "duration": "a time"}
+        wants = [f"{words.get(name, 'a state at the start')}, {name}=" for name in missing]
+        hint = "states may have a window instead" if missing != [clock] else ""
+        raise bad(", ".join(missing), None, f"{'; '.join(wants)}, for lyapunov", hint)
     if names.keys().isdisjoint(starts_of(law)):
         if starts is not None:
             wants = "nothing for these quantities: no motions start from a grid"

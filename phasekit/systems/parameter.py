@@ -85,7 +85,11 @@ class Parameter:
         kept = numeric(self.name, value, self.units)
         if isinstance(kept, float):
             if not self.valid(kept):
-                in_degrees = self.units == "rad" and self.valid(kept * np.pi / 180.0)
+                in_degrees = (
+                    self.units == "rad"
+                    and not isinstance(value, str)
+                    and self.valid(kept * np.pi / 180.0)
+                )
                 hint = f"if it is in degrees: {kept:.15g} * pk.deg" if in_degrees else ""
                 raise bad(self.name, value, self.wants, hint)
             return kept

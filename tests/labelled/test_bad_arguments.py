@@ -20,7 +20,7 @@ CALLS = {
     pk.critical: {"parameter": "lam"},
     pk.sweep: {"axes": {"A": [1.0]}},
 }
-WRONG_STATES = [True, "0.3", None, 1j, np.nan, np.inf, [], [[0.1, 0.2]], np.ones((2, 2)), [None]]
+WRONG_STATES = [True, "three", None, 1j, np.nan, np.inf, [], [[0.1, 0.2]], np.ones((2, 2)), [None]]
 WRONG_STATES += [{}, object, xr.DataArray([True]), xr.DataArray(np.nan), ["a"], [0.1, True]]
 WRONG_SYSTEMS = [None, 3.0, "disk", pk.GyroRotorDisk, [1, 2], {}, np.ones(3), pk.equilibria(C)]
 

@@ -464,7 +464,7 @@ FUNCTIONS = {
     "near_separatrix": (pk.near_separatrix, {"gap": 0.1}),
 }
 STATES_OF = [(key, name) for key, (_, given) in FUNCTIONS.items() for name in given]
-WRONG = [True, "0.3", 1j, np.nan, np.inf, [], [[0.1, 0.2]], np.ones((2, 2)), [None], {}]
+WRONG = [True, "three", 1j, np.nan, np.inf, [], [[0.1, 0.2]], np.ones((2, 2)), [None], {}]
 WRONG += [object, xr.DataArray([True]), xr.DataArray(np.nan), ["a"], [0.1, True]]
 
 
@@ -532,7 +532,7 @@ def test_wrong_families(family):
         ({"n": None}, "^n: got None"),
         ({"energy_max": np.nan}, "^energy_max: got nan, wants a finite"),
         ({"energy_max": [1.0]}, r"^energy_max: got \[1.0\], wants one number"),
-        ({"energy_max": "1"}, "^energy_max: got '1'"),
+        ({"energy_max": "one"}, "^energy_max: got 'one'"),
     ],
 )
 def test_wrong_arguments_of_families(given, message):

@@ -127,7 +127,7 @@ def test_guises_are_the_same_equation():
     np.testing.assert_allclose(pk.potential(magnet, phi).potential + 1.7, stored, rtol=1e-14)
 
 
-WRONG = [True, np.bool_(True), "0.3", b"0.3", None, 1j, np.nan, np.inf, -np.inf, 10**400]
+WRONG = [True, np.bool_(True), "three", b"0.3", None, 1j, np.nan, np.inf, -np.inf, 10**400]
 WRONG += [[], np.array([]), [[1.0, 2.0]], np.ones((2, 2)), [1.0, None], [True, False], ["a"]]
 WRONG += [np.array([1j]), {"a": 1}, object(), float, np.array(True), np.datetime64("2020-01-01")]
 WRONG += [xr.DataArray([True]), xr.DataArray(["a"]), xr.DataArray(np.nan), xr.DataArray([1j])]
