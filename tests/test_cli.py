@@ -12,7 +12,8 @@ import pytest
 
 import phasekit as pk
 from phasekit.cli import COMMANDS, common, main
-from phasekit.cli.values import between, glue_negative_values, number, span
+from phasekit.cli.values import between, glue_negative_values, span
+from phasekit.labels.units import number
 
 matplotlib.use("Agg")
 

@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from phasekit.cli import Parser
 from phasekit.cli.models import model_called, read_file
-from phasekit.cli.values import glue_negative_values, is_range, number, span
+from phasekit.cli.values import glue_negative_values, is_range, span
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
-from phasekit.labels.units import UNITS
+from phasekit.labels.units import UNITS, number
 from phasekit.systems.registry import models
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from phasekit.cli import Parser, common
-from phasekit.cli.values import ends, glue_negative_values, number
+from phasekit.cli.values import ends, glue_negative_values
 from phasekit.errors import ParameterError
+from phasekit.labels.units import number
 
 #: What is shown where no parameter is given: the rotor of the demo, with mass and bearings.
 EXAMPLE = {

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from phasekit.cli import Parser, common
-from phasekit.cli.values import LONGEST, number
+from phasekit.cli.values import LONGEST
 from phasekit.errors import ParameterError
+from phasekit.labels.units import number
 
 #: Files of numbers.
 TABLES = (".csv",)

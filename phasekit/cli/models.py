@@ -26,10 +26,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from phasekit.cli.values import number
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
-from phasekit.labels.units import UNITS
+from phasekit.labels.units import UNITS, number
 from phasekit.systems.registry import models
 from phasekit.systems.system import System
 

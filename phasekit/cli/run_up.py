@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from phasekit.cli import Parser, common
-from phasekit.cli.values import number
 from phasekit.errors import ParameterError
+from phasekit.labels.units import number
 
 
 def run(argv: Sequence[str]) -> None:

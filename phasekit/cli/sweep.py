@@ -31,11 +31,11 @@ import numpy as np
 
 from phasekit.cli import Parser, common
 from phasekit.cli.models import LAWS, OF_MAPS, model_called, model_of, read_file, read_toml
-from phasekit.cli.values import between, number
+from phasekit.cli.values import between
 from phasekit.errors import ParameterError, StoreError
 from phasekit.labels.arguments import unknown
 from phasekit.labels.coordinates import STATES
-from phasekit.labels.units import UNITS
+from phasekit.labels.units import UNITS, number
 from phasekit.systems.system import System
 
 KEYS = ("model", *OF_MAPS[:-1], "parameters", "axes")
