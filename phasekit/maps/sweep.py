@@ -452,9 +452,9 @@ def _middles(
                 missing.append(name)
     if missing:
         words = {"n": "iterations", "duration": "a time"}
-        wants = [f"{words.get(name, 'a state at the start')}, {name}=" for name in missing]
+        asked = [f"{words.get(name, 'a state at the start')}, {name}=" for name in missing]
         hint = "states may have a window instead" if missing != [clock] else ""
-        raise bad(", ".join(missing), None, f"{'; '.join(wants)}, for lyapunov", hint)
+        raise bad(", ".join(missing), None, f"{'; '.join(asked)}, for lyapunov", hint)
     if names.keys().isdisjoint(starts_of(law)):
         if starts is not None:
             wants = "nothing for these quantities: no motions start from a grid"
