@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.same_path import turned
 from phasekit.bifurcation.continuation.stable_spans import most, overlaps, stable_spans
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.cells.along_cycles import CycleFamily, families_of
 from phasekit.cells.equations import each_cell, problem_without_values
 from phasekit.errors import BranchStatus, ConvergenceError, PointStatus, SpecialPointKind
 from phasekit.labels.arguments import bad, pair, unknown
@@ -27,7 +28,7 @@ from phasekit.systems.equilibrium_curve import equilibrium_curve
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, equilibria_of_cells, natural_window
 from phasekit.systems.system import System
-from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, rows_of
+from phasekit.table.along import COEFFICIENT, COUNTED, GROUPS, OF_CYCLES, rows_of
 from phasekit.table.row import Pass, Table
 
 Array = npt.NDArray[np.float64]
@@ -83,21 +84,28 @@ def check_along(system: System, along: Any, axes: Iterable[str]) -> tuple[str, d
     return name, dict(zip(ends_of(name), (low, high), strict=True))
 
 
-def table_along(system: System, parameter: str) -> Table:
-    """The rows that a map of branches in a parameter has, and what computes them."""
+def table_along(system: System, parameter: str, of: Iterable[str]) -> Table:
+    """The rows that a map of branches in a parameter has, and what computes them.
+
+    Families of periodic orbits are followed where a row ``of`` theirs is asked for.
+    """
     law = equations_of(system)
     assert law is not None
     rung: type[Law] = Map if isinstance(law, Map) else Flow
     problem = problem_without_values(system)
     rows = rows_of(law, parameter)
     others = tuple(name for name in problem.parameters if name != parameter)
-    function = functools.partial(branches, problem, natural_window(system), parameter)
+    cycles = {OF_CYCLES, *(row.name for row in rows.values() if row.group == OF_CYCLES)}
+    asked = not cycles.isdisjoint(of) and any(row.group == OF_CYCLES for row in rows.values())
+    groups = (*GROUPS, OF_CYCLES) if asked else GROUPS
+    function = functools.partial(branches, problem, natural_window(system), parameter, asked)
+    chosen = tuple(row for row in rows.values() if row.group in groups)
     inputs = (*others, *ends_of(parameter))
-    return Table(rows.values(), [Pass(function, inputs, GROUPS, rung, rows=tuple(rows.values()))])
+    return Table(chosen, [Pass(function, inputs, groups, rung, rows=chosen)])
 
 
 def branches(
-    problem: Problem, window: Any, parameter: str, *arrays: Any
+    problem: Problem, window: Any, parameter: str, cycles: bool, *arrays: Any
 ) -> tuple[dict[str, Any], ...]:
     """Special points, stable equilibria and hysteresis of the branches of each cell."""
     shape, cells = each_cell(len(problem.parameters) - 1, arrays)
@@ -112,6 +120,10 @@ def branches(
         _follow(cell, parameter, ContinuationOptions())
     for k, beside in _alone(shape, own).items():
         _follow_again(own[k], parameter, beside)
+    if cycles:
+        for cell in own.values():
+            _follow_cycles(cell)
+        return (*_tabulated(problem, parameter, shape, own), _tabulated_cycles(problem, shape, own))
     return _tabulated(problem, parameter, shape, own)
 
 
@@ -143,6 +155,7 @@ class _Cell:
     traced: list[Traced] = field(default_factory=list)
     failure: str = ""
     missed: bool = False
+    families: list[CycleFamily] = field(default_factory=list)
 
     def _within(self, special: Special) -> bool:
         """Whether a point lies in the span: a step may pass the fold next to a bound."""
@@ -166,6 +179,12 @@ class _Cell:
         n = len(self.problem.state)
         return sorted(found, key=lambda point: float(point[1].u[n]))
 
+    @functools.cached_property
+    def stable(self) -> Array:
+        """Spans over which a branch is stable, rows (low, high)."""
+        spans = [np.clip(stable_spans(one), *self.span) for one in self.traced]
+        return np.concatenate([np.empty((0, 2)), *spans])
+
     @property
     def counts(self) -> tuple[int, ...]:
         """How many special points there are of each label."""
@@ -179,7 +198,9 @@ class _Cell:
             return BranchStatus.FAILED
         if not self.starts:
             return BranchStatus.NO_EQUILIBRIUM
-        if any(one.unfinished for one in self.traced):
+        if any(one.unfinished for one in self.traced) or not all(
+            one.finished for one in self.families
+        ):
             return BranchStatus.CUT
         if self.missed:
             return BranchStatus.MISSED
@@ -200,6 +221,14 @@ def _follow(cell: _Cell, parameter: str, options: ContinuationOptions) -> None:
     curve = equilibrium_curve(cell.problem, parameter, cell.span, options)
     try:
         cell.traced = connected(curve, cell.starts, DEPTH)
+    except (ConvergenceError, np.linalg.LinAlgError) as error:
+        cell.failure = str(error) or type(error).__name__
+
+
+def _follow_cycles(cell: _Cell) -> None:
+    """Follow the periodic orbits from the Hopf points of a cell."""
+    try:
+        cell.families = families_of(cell.problem, cell.points(), ContinuationOptions())
     except (ConvergenceError, np.linalg.LinAlgError) as error:
         cell.failure = str(error) or type(error).__name__
 
@@ -255,13 +284,7 @@ def _tabulated(
     """What was found in all cells, by the names of rows."""
     size, n = int(np.prod(shape, dtype=int)), len(problem.state)
     points = {k: cell.points() for k, cell in own.items()}
-    stable = {
-        k: np.concatenate(
-            [np.empty((0, 2)), *(np.clip(stable_spans(one), *cell.span) for one in cell.traced)]
-        )
-        for k, cell in own.items()
-    }
-    double = {k: overlaps(spans, 2) for k, spans in stable.items()}
+    double = {k: overlaps(cell.stable, 2) for k, cell in own.items()}
     wide = (size, max(map(len, points.values()), default=0))
     special: dict[str, Any] = {
         name: np.full(wide, np.nan)
@@ -292,7 +315,7 @@ def _tabulated(
             continue
         for name, number in zip(counts, cell.counts, strict=True):
             counts[name][k] = number
-        n_stable[k], n_hysteresis[k] = most(stable[k]), len(double[k])
+        n_stable[k], n_hysteresis[k] = most(cell.stable), len(double[k])
         width[k] = float(np.sum(double[k][:, 1] - double[k][:, 0]))
         intervals[k, : len(double[k])] = double[k]
     back = functools.partial(_back, shape)
@@ -304,6 +327,45 @@ def _tabulated(
             "hysteresis": intervals, "n_hysteresis": n_hysteresis, "hysteresis_width": width
         }),
     )  # fmt: skip
+
+
+def _tabulated_cycles(
+    problem: Problem, shape: tuple[int, ...], own: Mapping[int, _Cell]
+) -> dict[str, Any]:
+    """What families of periodic orbits are in all cells, by the names of rows."""
+    size = int(np.prod(shape, dtype=int))
+    spans = {
+        k: np.concatenate([np.empty((0, 2)), *(one.stable for one in cell.families)])
+        for k, cell in own.items()
+    }
+    families: dict[str, Callable[[CycleFamily], Array]] = {
+        "period": lambda one: one.period,
+        "cycle_extent": lambda one: one.extent,
+        **{f"cycle_{x}": functools.partial(_states_of, i) for i, x in enumerate(problem.state)},
+    }
+    columns = {
+        name: {k: [take(one) for one in cell.families] for k, cell in own.items()}
+        for name, take in families.items()
+    }
+    columns["oscillation"] = {k: list(overlaps(one, 1)) for k, one in spans.items()}
+    columns["bistability"] = {
+        k: list(overlaps(np.concatenate([cell.stable, spans[k]]), 2)) for k, cell in own.items()
+    }
+    number = np.full(size, -1, np.int64)
+    found: dict[str, Any] = {"n_cycle_families": number}
+    for name, cells in columns.items():
+        found[name] = np.full((size, max(map(len, cells.values()), default=0), 2), np.nan)
+        for k, rows in cells.items():
+            if rows and not own[k].failure:
+                found[name][k, : len(rows)] = rows
+    for k, cell in own.items():
+        number[k] = -1 if cell.failure else len(cell.families)
+    return _back(shape, found)
+
+
+def _states_of(place: int, family: CycleFamily) -> Array:
+    row: Array = family.states[place]
+    return row
 
 
 def _back(shape: tuple[int, ...], found: Mapping[str, Any]) -> dict[str, Any]:

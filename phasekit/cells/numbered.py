@@ -29,6 +29,9 @@ NUMBERED = {
     "saddle": "saddle, by its coordinate",
     "special_point": "special point, by its parameter",
     "interval": "interval of a parameter",
+    "cycle_family": "family of periodic orbits",
+    "oscillation_interval": "interval of a parameter",
+    "bistable_interval": "interval of a parameter",
 }
 
 _POINTWISE = (

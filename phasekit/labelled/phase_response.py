@@ -16,16 +16,11 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import attrs_of
-from phasekit.labelled.continuation.orbit_guess import (
-    cycles_of,
-    first_point,
-    given_orbit,
-    scale_of,
-    units_of,
-)
+from phasekit.labelled.continuation.orbit_guess import given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, unfolded
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, flag
+from phasekit.systems.cycle_families import cycles_of, first_point
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]

@@ -288,8 +288,10 @@ def _branches(
     from phasekit.cells.along import check_along, table_along
 
     parameter, ends = check_along(system, along, given)
-    table = table_along(system, parameter)
-    chosen = table.select(("special_points", "n_stable") if of is OFFERED else of)
+    of = ("special_points", "n_stable") if of is OFFERED else of
+    names = (of,) if isinstance(of, str) else of if isinstance(of, (list, tuple, set)) else ()
+    table = table_along(system, parameter, map(str, names))
+    chosen = table.select(of)
     whole = {row.group for row in chosen if row.name == row.group}
     rows = tuple(row for row in table.rows.values() if row in chosen or row.group in whole)
     sure = [row for row in table.select("branch_status") if row not in rows]

@@ -14,6 +14,8 @@ from phasekit.table.row import Quantity
 #: Cells of a tile at most: a branch takes milliseconds, and neighbours are looked at together.
 CELLS = 1024
 GROUPS = ("branch_status", "special_points", "n_stable", "hysteresis")
+#: What takes families of periodic orbits as well.
+OF_CYCLES = "period"
 #: What special points are counted by, their labels, and the rows of their numbers.
 COUNTED = {
     "LP": "n_fold",
@@ -51,6 +53,9 @@ def rows_of(law: Equations, parameter: str) -> dict[str, Quantity]:
         **LABELS,
         "special_point": (range(0), f"special point, by {parameter}"),
         "interval": (range(0), f"interval of {parameter}"),
+        "cycle_family": (range(0), f"family of periodic orbits, by {parameter} at its Hopf point"),
+        "oscillation_interval": (range(0), f"interval of {parameter}"),
+        "bistable_interval": (range(0), f"interval of {parameter}"),
         "end": (("low", "high"), "end of an interval"),
     }
     for name in (parameter, *law.states):
@@ -94,6 +99,25 @@ def rows_of(law: Equations, parameter: str) -> dict[str, Quantity]:
         row("n_hysteresis", "hysteresis", (), "int64", "1",
             "number of such intervals; -1: not computed", "stable branches overlap"),
         row("hysteresis_width", "hysteresis", (), "float64", unit[parameter],
-            "sum of their lengths", "sum of high - low"),
+            "length of the intervals of hysteresis", "sum of high - low"),
     ]  # fmt: skip
+    if rung is Flow:
+        family, when = ("cycle_family", "end"), "x(t + T) = x(t)"
+        found += [
+            row("period", OF_CYCLES, family, "float64", "1",
+                "least and greatest period of the family that begins at a Hopf point", when),
+            row("cycle_extent", OF_CYCLES, family, "float64", unit[parameter],
+                f"least and greatest {parameter} of its orbits", when),
+            *(row(f"cycle_{name}", OF_CYCLES, family, "float64", unit[name],
+                  f"least and greatest {name} on its orbits", when) for name in law.states),
+            row("n_cycle_families", OF_CYCLES, (), "int64", "1",
+                "number of families from Hopf points; -1: not computed", when),
+            row("oscillation", OF_CYCLES, ("oscillation_interval", "end"), "float64",
+                unit[parameter], f"interval of {parameter} with a stable cycle",
+                "multipliers inside the unit circle"),
+            row("bistability", OF_CYCLES, ("bistable_interval", "end"), "float64",
+                unit[parameter],
+                f"interval of {parameter} with two or more stable equilibria or cycles",
+                "stable branches and families overlap"),
+        ]  # fmt: skip
     return {one.name: one for one in found}

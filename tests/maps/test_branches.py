@@ -80,6 +80,47 @@ def test_hopf_points_of_the_normal_form():
     assert ds.n_stable.values.tolist() == [1, 1, 1]
 
 
+def test_cycles_of_the_normal_form():
+    """x^2 + y^2 = mu with the period 2 pi/w, stable; unstable where the cubic pushes outwards."""
+    ds = pk.sweep(HOPF, w=[0.5, 2.0], along=("mu", (-0.7, 0.9)), of=[*ALL, "period"])
+    assert ds.n_cycle_families.values.tolist() == [1, 1]
+    np.testing.assert_allclose(
+        ds.period.values[:, 0], 2 * np.pi / np.array([[0.5], [2.0]]) + [0, 0]
+    )
+    np.testing.assert_allclose(ds.cycle_extent.values[:, 0], [[0, 0.9]] * 2, atol=1e-9)
+    size = np.sqrt(0.9)
+    np.testing.assert_allclose(ds.cycle_x.values[:, 0], [[-size, size]] * 2, rtol=1e-6)
+    np.testing.assert_allclose(ds.oscillation.values[:, 0], [[0, 0.9]] * 2, atol=1e-9)
+    assert ds.sizes["bistable_interval"] == 0
+    # r' = r (mu + r^2 - r^4): a fold of cycles at mu = -1/4, and a stable cycle beyond it.
+    r = "(x^2 + y^2)"
+    bautin = pk.Problem(
+        {"x": f"x*(mu + b*{r} - {r}^2) - y", "y": f"y*(mu + b*{r} - {r}^2) + x"},
+        parameters={"mu": -1.0, "b": 1.0}, window={"x": (-1, 1), "y": (-1, 1)},
+    )  # fmt: skip
+    ds = pk.sweep(bautin, b=[1.0], along=("mu", (-0.7, 0.5)), of=[*ALL, "period"])
+    np.testing.assert_allclose(ds.oscillation.values[0, 0], [-0.25, 0.5], atol=1e-7)
+    np.testing.assert_allclose(ds.bistability.values[0, 0], [-0.25, 0.0], atol=1e-7)
+    assert ds.hysteresis.size == 0
+    assert ds.n_stable.item() == 1
+
+
+def test_cycles_end_at_another_hopf_point_once():
+    """Between mu = -1/2 and 1/2 the growth 1/4 - mu^2 is positive."""
+    both = pk.Problem(
+        {
+            "x": "x*(g - mu^2 - x^2 - y^2) - y",
+            "y": "y*(g - mu^2 - x^2 - y^2) + x",
+        },
+        parameters={"mu": -1.0, "g": 0.25},
+        window={"x": (-1, 1), "y": (-1, 1)},
+    )
+    ds = pk.sweep(both, g=[-0.1, 0.25], along=("mu", (-1, 1)), of=["special_points", "period"])
+    assert ds.n_hopf.values.tolist() == [0, 2]
+    assert ds.n_cycle_families.values.tolist() == [0, 1]
+    np.testing.assert_allclose(ds.oscillation.values[1, 0], [-0.5, 0.5], atol=1e-6)
+
+
 def test_branches_through_branch_points_are_followed():
     ds = pk.sweep(PITCHFORK, e=[0.0, 0.5], along=("r", (-1.0, 1.0)), of=ALL)
     assert ds.n_branch_point.values.tolist() == [1, 1]
@@ -107,6 +148,7 @@ def test_fixed_points_of_a_map():
     assert ds.n_branch_point.values.tolist() == [1, 0]
 
 
+@pytest.mark.slow
 def test_stored_workers_and_blocks_are_what_is_computed_at_once(tmp_path):
     p2, p3 = np.linspace(12, 16, 4), np.linspace(1.5, 2.5, 5)
     whole = pk.sweep(AB, p2=p2, p3=p3, **WIDE)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.connected import Traced
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles
+from phasekit.bifurcation.continuation.periodic.family import Found
+from phasekit.bifurcation.continuation.periodic.family import Path as CyclePath
+from phasekit.bifurcation.continuation.periodic.point import critical_count
 
 Array = npt.NDArray[np.float64]
 
@@ -25,17 +30,43 @@ def stable_spans(one: Traced) -> Array:
     worst = np.max(growth, axis=1)
     places = [-1, *(placed.index for placed in breaks), path.count - 1]
     ends = [path.u[0], *(placed.special.u for placed in breaks), path.u[-1]]
+
+    def stable(inside: npt.NDArray[np.int64], p: Array, q: Array) -> bool:
+        if not len(inside):
+            return _middle(one, p[: curve.m], q[: curve.m]) < 0.0
+        # Where the least eigenvalue is farthest from zero, the sign is sure.
+        sure = inside[np.argmax(np.min(np.abs(growth[inside]), axis=1))]
+        return bool(worst[sure] < 0.0)
+
+    return _joined(places, [(float(u[n]), u) for u in ends], stable)
+
+
+def stable_cycles(
+    cycles: Cycles, path: CyclePath, specials: Sequence[Found], first: float
+) -> Array:
+    """Spans of the parameter over which a family of periodic orbits is stable, from its first."""
+    breaks = [found for found in specials if found.kind not in ("end", "event")]
+    places = [-1, *(found.index for found in breaks), path.count - 1]
+    last = path.points[-1].orbit
+    ends = [first, *(float(found.point.orbit.y[1]) for found in breaks), float(last.y[1])]
+
+    def stable(inside: npt.NDArray[np.int64], p: Array, q: Array) -> bool:
+        known = [critical_count(path.points[i], cycles.forced) for i in inside]
+        known = [number for number in known if number >= 0]
+        return bool(known) and known[len(known) // 2] == 0
+
+    return _joined(places, [(p, np.empty(0)) for p in ends], stable)
+
+
+def _joined(
+    places: Sequence[int], ends: Sequence[tuple[float, Array]],
+    stable: Callable[[npt.NDArray[np.int64], Array, Array], bool],
+) -> Array:  # fmt: skip
+    """Spans between neighbouring special points, with the points inside, that are stable."""
     found = []
-    for (a, b), (p, q) in zip(pairwise(places), pairwise(ends), strict=True):
-        inside = np.arange(a + 1, b + 1)
-        if len(inside):  # where the least eigenvalue is farthest from zero, the sign is sure
-            sure = inside[np.argmax(np.min(np.abs(growth[inside]), axis=1))]
-            top = float(worst[sure])
-        else:
-            top = _middle(one, p[: curve.m], q[: curve.m])
-        if top < 0.0:
-            along = [float(p[n]), float(q[n])]
-            found.append([min(along), max(along)])
+    for (a, b), ((low, p), (high, q)) in zip(pairwise(places), pairwise(ends), strict=True):
+        if stable(np.arange(a + 1, b + 1), p, q):
+            found.append([min(low, high), max(low, high)])
     return np.array(found).reshape(-1, 2)
 
 

@@ -38,9 +38,9 @@ from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_onward import point_curve
 from phasekit.labelled.continuation.cycle_special import CyclePoint
 from phasekit.labelled.continuation.cycle_start import continue_orbit
-from phasekit.labelled.continuation.orbit_guess import cycles_of, first_point
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labels.arguments import bad
+from phasekit.systems.cycle_families import cycles_of, first_point
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]

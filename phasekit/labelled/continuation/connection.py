@@ -32,11 +32,12 @@ from phasekit.labelled.continuation.bounded_start import bounded_of
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch
-from phasekit.labelled.continuation.orbit_guess import first_point, scale_of, units_of
+from phasekit.labelled.continuation.orbit_guess import scale_of, units_of
 from phasekit.labelled.continuation.periodic_orbit import Simulation
 from phasekit.labelled.continuation.unfolding import UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, list_names, number, reals
 from phasekit.numerics.waits import notice
+from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem, as_problem
 
 FloatArray = npt.NDArray[np.float64]

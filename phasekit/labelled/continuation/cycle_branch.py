@@ -15,17 +15,13 @@ from phasekit.bifurcation.continuation.walk import Found
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
 from phasekit.labelled.continuation.checks import check_bounds, check_span
-from phasekit.labelled.continuation.cycle_points import (
-    Orbits,
-    clock_code,
-    orbit_dataset,
-    points_of,
-)
+from phasekit.labelled.continuation.cycle_points import Orbits, orbit_dataset, points_of
 from phasekit.labelled.continuation.cycle_special import CyclePoint, cycle_point
 from phasekit.labelled.continuation.onward import onward
 from phasekit.labelled.continuation.unfinished import announced
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
+from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
 

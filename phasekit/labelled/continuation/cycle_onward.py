@@ -23,11 +23,10 @@ from phasekit.labelled.continuation.checks import (
     refuse_kind,
 )
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
-from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.labelled.continuation.cycle_special import CyclePoint
-from phasekit.labelled.continuation.orbit_guess import first_point
 from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
+from phasekit.systems.cycle_families import clock_code, first_point
 from phasekit.systems.problem import Problem
 
 #: Special points that have curves in two parameters.

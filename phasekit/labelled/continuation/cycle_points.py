@@ -10,14 +10,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.periodic import collocation
 from phasekit.bifurcation.continuation.periodic.bounded import Bounded
 from phasekit.bifurcation.continuation.periodic.connections import ends_of, spectra, truncation
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.extended import Extended
 from phasekit.bifurcation.continuation.periodic.fourier import coefficients
-from phasekit.bifurcation.continuation.periodic.point import Point, vertical
+from phasekit.bifurcation.continuation.periodic.point import Point, critical_count, vertical
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.schema import dataset_attrs
@@ -35,27 +34,6 @@ _CHECKS = {
     "residual": "largest x' - f relative to f, or to the states at rest",
 }
 _WHICH = {"min": "least", "max": "largest", "mean": "mean"}
-ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
-
-
-def clock_code(problem: Problem, active: tuple[int, ...]) -> int:
-    """Machine code of the period of the forcing, with its derivatives; 0 without forcing."""
-    if problem.time is None:
-        return 0
-    field = SymbolicField((problem.period,), (), (*problem.parameters, problem.time))
-    return field.first(active)
-
-
-def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = False) -> int:
-    """Number of multipliers outside the unit circle; -1 where they are not known."""
-    if not point.trusted:
-        return -1
-    values = point.multipliers.tolist()
-    if not forced:
-        # Where energy is conserved, two are always 1.
-        values = sorted(values, key=lambda one: abs(one - 1.0))[2 if neutral else 1 :]
-    limit = 1.0 + (ON_CIRCLE if label not in ("", "UZ") or neutral else 0.0)
-    return sum(abs(one) > limit for one in values)
 
 
 def summary(problem: Problem, cycles: Cycles, point: Point, label: str = "") -> dict[str, Any]:

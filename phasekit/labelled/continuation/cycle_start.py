@@ -17,8 +17,6 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.points.hopf_families import (
     Family,
-    critical_pairs,
-    families,
 )
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.errors import ConvergenceError
@@ -27,14 +25,7 @@ from phasekit.labelled.continuation.branch import Branch, branch_of
 from phasekit.labelled.continuation.checks import check_options, check_parameter, check_span
 from phasekit.labelled.continuation.cycle_branch import CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of, orbit_stop_of, try_events
-from phasekit.labelled.continuation.orbit_guess import (
-    Given,
-    cycles_of,
-    first_point,
-    given_orbit,
-    scale_of,
-    units_of,
-)
+from phasekit.labelled.continuation.orbit_guess import Given, given_orbit, scale_of, units_of
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfolding import (
     UNFOLDING,
@@ -43,25 +34,12 @@ from phasekit.labelled.continuation.unfolding import (
     unfolded,
 )
 from phasekit.labels.arguments import bad
+from phasekit.systems.cycle_families import cycles_of, first_point, hopf_families, hopf_family
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 
 SAME = 1e-9  # part of its span by which a parameter that is free has moved by rounding
-
-
-def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float) -> FloatArray:
-    """Sizes of the states at rest or, where they are larger, of the orbits from a Hopf point.
-
-    A state may rest next to zero and swing all the more. By the normal form the amplitudes are
-    ``2 |q| sqrt(d width/(omega |l1|))``. They are less where l1 is small, so that this only brings
-    the sizes in line with each other: it ends where no state would swing by less than its size.
-    """
-    with np.errstate(all="ignore"):
-        swing = 2.0 * np.sqrt(np.abs(np.divide(form["d"] * width, form["omega"] * form["l1"])))
-        most = np.max(scale / q)
-    swing = np.fmin(swing, most)
-    return np.maximum(scale, swing * q) if np.isfinite(swing) else scale.copy()
 
 
 def from_hopf(
@@ -74,20 +52,12 @@ def from_hopf(
         raise bad("point", point.branch.kind, "a Hopf point of a branch of equilibria")
     curve, problem = point.branch.curve, point.branch.problem
     options = curve.options if options is None else check_options(options)
-    n, name = curve.n, point.branch.parameter
-    span = float(curve.low[n]), float(curve.high[n])
+    name, p = point.branch.parameter, float(point.special.u[curve.n])
     choice, said = _families(point)
     if not is_whole(direction) or not 0 <= direction < len(choice):
         wanted = f"a whole number from 0 to {len(choice) - 1}" if len(choice) > 1 else "0"
         raise bad("direction", direction, wanted)
-    family = choice[direction]
-    scale = grown(curve.scale[:n], np.abs(family.vector), point.normal_form, span[1] - span[0])
-    cycles = cycles_of(problem, [name], [span], scale, np.zeros(n), options)
-    p = point.parameters[name]
-    found = starts.from_hopf(
-        cycles, point.special.u[:n], p, family.omega, family.vector, family.bend
-    )
-    start = first_point(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
+    cycles, start = hopf_family(problem, curve, point.special, choice[direction], options)
     message = "; ".join([f"the Hopf point at {name} = {p:.12g}", *said])
     walker = CycleWalk(cycles)
     tracks = (None, run(walker, start, "forward")[1])
@@ -96,25 +66,12 @@ def from_hopf(
 
 def _families(point: SpecialPoint[Branch]) -> tuple[list[Family], list[str]]:
     """The families at a Hopf point, and of several what is to be said."""
-    curve = point.branch.curve
-    values, vectors = np.linalg.eig(curve.evaluate(point.special.u)[1][:, : curve.n])
-    pairs = np.flatnonzero(values.imag > 0.0)
-    if not len(pairs):
-        raise bad("point", "no pair of complex eigenvalues", "a Hopf point that has converged")
-    critical = len(critical_pairs(values))
-    if critical < 2:
-        k = pairs[np.argmin(np.abs(values.real[pairs]))]
-        return [Family(float(values.imag[k]), vectors[:, k], (0.0, 0.0))], []
-    found, said = families(curve, point.special.u)
-    together = f"{critical} pairs of eigenvalues are on the imaginary axis"
+    found, said = hopf_families(point.branch.curve, point.special.u)
     if not found:
         raise ConvergenceError(
-            f"switch: no family of periodic orbits can be told at {point!r}: {together}; "
-            f"{'; '.join(said)}"
+            f"switch: no family of periodic orbits can be told at {point!r}: {'; '.join(said)}"
         )
-    if len(found) > 1:
-        together += f", and direction=0 to {len(found) - 1} follow {len(found)} families"
-    return found, [together, *said]
+    return found, said
 
 
 def continue_orbit(

@@ -27,7 +27,7 @@ from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch, CycleBranch
 from phasekit.labelled.continuation.cycle_events import orbit_events_of
-from phasekit.labelled.continuation.cycle_points import clock_code
+from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.periodic import collocation, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
-from phasekit.bifurcation.continuation.periodic.point import Point, point_of
-from phasekit.errors import ConvergenceError
-from phasekit.labelled.continuation.cycle_points import clock_code, orbit_dataset
+from phasekit.labelled.continuation.cycle_points import orbit_dataset
 from phasekit.labels.arguments import bad
+from phasekit.systems.cycle_families import first_point
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -24,33 +21,6 @@ RESTS = 1e-6  # size beside the largest state
 
 #: A guess, its turns, and of a forced system how many periods of the forcing it takes.
 Given = tuple[Orbit, FloatArray, int]
-
-
-def cycles_of(
-    problem: Problem,
-    free: Sequence[str],
-    spans: Sequence[tuple[float, float]],
-    scale: FloatArray,
-    turns: FloatArray,
-    options: ContinuationOptions,
-    multiple: int = 1,
-    fixed: bool = False,
-) -> Cycles:
-    """The periodic orbits of a problem over some of its parameters."""
-    names = list(problem.parameters)
-    active = tuple(names.index(name) for name in free)
-    par = np.array(list(problem.parameters.values()))
-    forced = problem.time is not None
-    period = np.array([problem.periods.get(name, 0.0) for name in problem.state])
-    scale = np.where(period > 0.0, period / (2.0 * np.pi), scale)
-    for i, name in enumerate(problem.state):
-        scale[i] = options.scales.get(name, scale[i])
-    low, high = np.array(spans, dtype=float).T
-    return Cycles(
-        problem.field, np.append(par, 0.0) if forced else par, active, forced,
-        clock_code(problem, active), multiple, turns, scale, high - low, low, high, period,
-        options, fixed,
-    )  # fmt: skip
 
 
 def units_of(problem: Problem, x: FloatArray) -> FloatArray:
@@ -126,19 +96,6 @@ def sampled(
     if problem.time is not None:
         multiple = max(1, round(period / problem.forcing_period))
     return Orbit(mesh, np.ascontiguousarray(values), np.array([period, value])), turns, multiple
-
-
-def first_point(cycles: Cycles, found: Solution, where: str) -> Point:
-    """The point at which a family begins.
-
-    Raises
-    ------
-    ConvergenceError
-        If Newton's method found none.
-    """
-    if not found.converged:
-        raise ConvergenceError(f"no periodic orbit was found {where}: {found.message}")
-    return point_of(cycles, found, 0.0, 0.0)
 
 
 def orbit_of(cycles: Cycles, problem: Problem, found: Solution, where: str) -> xr.Dataset:

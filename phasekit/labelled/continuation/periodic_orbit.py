@@ -20,7 +20,6 @@ from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_options
 from phasekit.labelled.continuation.orbit_guess import (
-    cycles_of,
     given_orbit,
     orbit_of,
     sampled,
@@ -30,6 +29,7 @@ from phasekit.labelled.continuation.orbit_guess import (
 from phasekit.labelled.continuation.unfolding import NO_PARAMETER, UNFOLDING, unfolded
 from phasekit.labels.arguments import bad, list_names, number, reals
 from phasekit.numerics.waits import notice
+from phasekit.systems.cycle_families import cycles_of
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.problem_parts import refuse_aperiodic
 

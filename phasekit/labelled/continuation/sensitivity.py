@@ -16,8 +16,8 @@ from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
 from phasekit.bifurcation.continuation.periodic.functionals import numbers_of_orbit
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
-from phasekit.labelled.continuation.cycle_points import clock_code
 from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]

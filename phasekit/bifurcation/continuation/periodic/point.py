@@ -21,6 +21,7 @@ SMOOTH = 2.5  # rate times length of an interval over which they are resolved, a
 FINER = 3  # meshes that are tried for it
 ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
 STILL = 1e-12  # part of its span by which a parameter has moved between two points, or has not
+ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
 NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
 
 
@@ -83,6 +84,18 @@ def neutral(cycles: Cycles, point: Point) -> bool:
     """Whether one multiplier is 1 besides that which always is."""
     near = np.sum(np.abs(point.multipliers - 1.0) < NEUTRAL)
     return bool(near > (0 if cycles.forced else 1))
+
+
+def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = False) -> int:
+    """Number of multipliers outside the unit circle; -1 where they are not known."""
+    if not point.trusted:
+        return -1
+    values = point.multipliers.tolist()
+    if not forced:
+        # Where energy is conserved, two are always 1.
+        values = sorted(values, key=lambda one: abs(one - 1.0))[2 if neutral else 1 :]
+    limit = 1.0 + (ON_CIRCLE if label not in ("", "UZ") or neutral else 0.0)
+    return sum(abs(one) > limit for one in values)
 
 
 @dataclass(frozen=True, eq=False)

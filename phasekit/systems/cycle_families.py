@@ -1,0 +1,126 @@
+"""Families of periodic orbits of a problem, and those that begin at its Hopf points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Curve
+from phasekit.bifurcation.continuation.fields import SymbolicField
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.periodic import starts
+from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
+from phasekit.bifurcation.continuation.periodic.point import Point, point_of
+from phasekit.bifurcation.continuation.points.hopf_families import Family, critical_pairs, families
+from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.errors import ConvergenceError
+from phasekit.labels.arguments import bad
+from phasekit.systems.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def cycles_of(
+    problem: Problem,
+    free: Sequence[str],
+    spans: Sequence[tuple[float, float]],
+    scale: FloatArray,
+    turns: FloatArray,
+    options: ContinuationOptions,
+    multiple: int = 1,
+    fixed: bool = False,
+) -> Cycles:
+    """The periodic orbits of a problem over some of its parameters."""
+    names = list(problem.parameters)
+    active = tuple(names.index(name) for name in free)
+    par = np.array(list(problem.parameters.values()))
+    forced = problem.time is not None
+    period = np.array([problem.periods.get(name, 0.0) for name in problem.state])
+    scale = np.where(period > 0.0, period / (2.0 * np.pi), scale)
+    for i, name in enumerate(problem.state):
+        scale[i] = options.scales.get(name, scale[i])
+    low, high = np.array(spans, dtype=float).T
+    return Cycles(
+        problem.field, np.append(par, 0.0) if forced else par, active, forced,
+        clock_code(problem, active), multiple, turns, scale, high - low, low, high, period,
+        options, fixed,
+    )  # fmt: skip
+
+
+def clock_code(problem: Problem, active: tuple[int, ...]) -> int:
+    """Machine code of the period of the forcing, with its derivatives; 0 without forcing."""
+    if problem.time is None:
+        return 0
+    field = SymbolicField((problem.period,), (), (*problem.parameters, problem.time))
+    return field.first(active)
+
+
+def first_point(cycles: Cycles, found: Solution, where: str) -> Point:
+    """The point at which a family begins.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method found none.
+    """
+    if not found.converged:
+        raise ConvergenceError(f"no periodic orbit was found {where}: {found.message}")
+    return point_of(cycles, found, 0.0, 0.0)
+
+
+def grown(scale: FloatArray, q: FloatArray, form: Mapping[str, float], width: float) -> FloatArray:
+    """Sizes of the states at rest or, where they are larger, of the orbits from a Hopf point.
+
+    A state may rest next to zero and swing all the more. By the normal form the amplitudes are
+    ``2 |q| sqrt(d width/(omega |l1|))``. They are less where l1 is small, so that this only brings
+    the sizes in line with each other: it ends where no state would swing by less than its size.
+    """
+    with np.errstate(all="ignore"):
+        swing = 2.0 * np.sqrt(np.abs(np.divide(form["d"] * width, form["omega"] * form["l1"])))
+        most = np.max(scale / q)
+    swing = np.fmin(swing, most)
+    return np.maximum(scale, swing * q) if np.isfinite(swing) else scale.copy()
+
+
+def hopf_families(curve: Curve, u: FloatArray) -> tuple[list[Family], list[str]]:
+    """The families at a Hopf point, and of several what is to be said.
+
+    Raises
+    ------
+    ParameterError
+        If no eigenvalues there are complex.
+    """
+    values, vectors = np.linalg.eig(curve.evaluate(u)[1][:, : curve.n])
+    pairs = np.flatnonzero(values.imag > 0.0)
+    if not len(pairs):
+        raise bad("point", "no pair of complex eigenvalues", "a Hopf point that has converged")
+    critical = len(critical_pairs(values))
+    if critical < 2:
+        k = pairs[np.argmin(np.abs(values.real[pairs]))]
+        return [Family(float(values.imag[k]), vectors[:, k], (0.0, 0.0))], []
+    found, said = families(curve, u)
+    together = f"{critical} pairs of eigenvalues are on the imaginary axis"
+    if len(found) > 1:
+        together += f", and direction=0 to {len(found) - 1} follow {len(found)} families"
+    return found, [together, *said]
+
+
+def hopf_family(
+    problem: Problem, curve: Curve, special: Special, family: Family, options: ContinuationOptions
+) -> tuple[Cycles, Point]:
+    """The orbits that begin at a Hopf point of a curve of equilibria, and the first of them.
+
+    Raises
+    ------
+    ConvergenceError
+        If Newton's method found none.
+    """
+    n = curve.n
+    name = curve.field.parameters[curve.active[0]]
+    low, high, p = float(curve.low[n]), float(curve.high[n]), float(special.u[n])
+    scale = grown(curve.scale[:n], np.abs(family.vector), special.normal_form, high - low)
+    cycles = cycles_of(problem, [name], [(low, high)], scale, np.zeros(n), options)
+    found = starts.from_hopf(cycles, special.u[:n], p, family.omega, family.vector, family.bend)
+    return cycles, first_point(cycles, found, f"near the Hopf point at {name} = {p:.9g}")
