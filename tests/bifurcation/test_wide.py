@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import phasekit as pk
 from phasekit.bifurcation.continuation.periodic import collocation, kernels, multipliers, wide
 
 
@@ -39,6 +40,26 @@ def test_elimination(monkeypatch, forced, band):
     assert found[0][0] == found[1][0]
     for one, other in zip(found[0][1:], found[1][1:], strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9 * np.max(np.abs(other)))
+
+
+@pytest.mark.parametrize("time", [None, "t"], ids=["autonomous", "forced"])
+def test_newton(monkeypatch, time):
+    """Orbits of few states are the same with what is made for many."""
+    if time is None:
+        problem = pk.Problem(["y", "mu*(1 - x^2)*y - x"], ("x", "y"), {"mu": 1.0})
+    else:
+        problem = pk.Problem(
+            ["y", "F*cos(w*t) - 0.2*y - x - x^3"], ("x", "y"), {"w": 1.2, "F": 0.3},
+            time="t", period="2*pi/w",
+        )  # fmt: skip
+    found = []
+    for most in (1, 24):
+        monkeypatch.setattr(wide, "WIDE", most)
+        monkeypatch.setattr(multipliers, "WIDE", most)
+        orbit = pk.periodic_orbit(problem, [2.0, 0.0], settle=60.0)
+        found.append((float(orbit.period), float(orbit.x_max), orbit.multiplier.values))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-8)
 
 
 def test_singular_and_undefined_equations():

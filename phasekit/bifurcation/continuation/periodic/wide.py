@@ -21,7 +21,7 @@ from phasekit.bifurcation.continuation.periodic import along, kernels, newton
 
 Array = npt.NDArray[np.float64]
 
-WIDE = 1  # states from which it is faster
+WIDE = 24  # states from which it is faster
 SPARSE = 0.1  # part of entries of derivatives that are not zero, up to which they are sparse
 STIFF = 2.0  # mean decay of states over an interval from which it is not resolved
 LONG = 400  # and unknowns of an interval from which it pays
@@ -55,8 +55,13 @@ def _newton() -> Any:
     """Newton's method as the kernel has it, interpreted, with what takes long by other means."""
     code: Any = newton.newton
     own = {"condense": _condense, "solve": solve, "jets": along.jets, "inner": along.inner}
-    own |= {"residual_of": _residual, "made_unit": _unit}
+    own |= {"residual_of": _residual, "made_unit": _unit, "call": _call}
     return FunctionType(code.py_func.__code__, vars(newton) | own)
+
+
+def _call(function: Any, w: Array, x: int, par: Array, z: int, out: int) -> None:
+    """Machine code of the period of a forcing and its derivatives."""
+    along.evaluate(function, par, w, out)
 
 
 def _unit(
