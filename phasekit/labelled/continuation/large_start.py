@@ -107,16 +107,21 @@ def switch(
     point: Any, direction: int = 0, options: ContinuationOptions | None = None,
     kind: str | None = None,
 ) -> Branch:  # fmt: skip
-    """Another branch through a branch point of fields of states, followed to both sides.
+    """Another branch through a branch point of fields of states, or orbits of a Hopf point.
 
     Raises
     ------
     ParameterError
-        If it is no branch point, or the direction of the other branch is not known.
+        If it is neither, or the direction of the other branch is not known.
     """
     refuse_kind(point.kind, kind)
+    if point.kind == "hopf":
+        from phasekit.labelled.continuation.cycle_start import from_hopf
+
+        with notice(f"following periodic orbits along {point.branch.parameter}"):
+            return from_hopf(point, options, direction)
     if KINDS[point.kind].label != "BP":
-        raise bad("point", point.kind, "a branch point, pitchfork or transcritical point")
+        raise bad("point", point.kind, "a branch point, pitchfork, transcritical or Hopf point")
     others = point.special.others
     if not others:
         raise bad("point", point.status, "a branch point whose directions are known", point.message)

@@ -13,6 +13,7 @@ from phasekit.bifurcation.continuation.large.factors import Factors
 from phasekit.bifurcation.continuation.large.field import STEP
 from phasekit.bifurcation.continuation.scales import LARGE
 from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.numerics.waits import stage
 
 Array = npt.NDArray[np.float64]
 
@@ -23,6 +24,8 @@ WRONG = (
 )
 SYMMETRIC = 1e-13
 PROBES = 2
+RELAXED = 300  # steps of a relaxation
+FALLEN = 1e-9  # of the terms of f, from where on Newton's method goes on
 
 
 def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeCurve, Array]:
@@ -43,7 +46,15 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
         ) from curve.sparse.failure
     matrix, slope = curve.derivatives(u)
     check_derivatives(curve, u, matrix)
-    u = _newton(curve, u)
+    found = _newton(curve, u)
+    if found is None:
+        found = _newton(curve, _relaxed(curve, u))
+    if found is None:
+        raise ConvergenceError(
+            f"x0: no equilibrium was found from there (|f| = {float(np.max(np.abs(value))):.3g}) "
+            "by Newton's method, nor by following x' = f(x) to its end; give an x0 that is closer"
+        )
+    u = found
     matrix, slope = curve.derivatives(u)
     if not (np.isfinite(matrix.data).all() and np.isfinite(slope).all()):
         raise ConvergenceError(
@@ -55,11 +66,11 @@ def settle(curve: LargeCurve, u: Array, given: dict[str, float]) -> tuple[LargeC
     return sized(curve, u, given, motion), u
 
 
-def _newton(curve: LargeCurve, u: Array) -> Array:
+def _newton(curve: LargeCurve, u: Array) -> Array | None:
     """The equilibrium at a fixed parameter, by Newton's method with shorter steps where it must."""
     n, u = curve.n, np.array(u)
     value = curve.value(u)
-    begun, size, before = float(np.max(np.abs(value))), np.inf, np.inf
+    size, before = np.inf, np.inf
     for _ in range(STEPS):
         matrix, slope = curve.derivatives(u)
         if not np.isfinite(matrix.data).all():
@@ -84,10 +95,34 @@ def _newton(curve: LargeCurve, u: Array) -> Array:
         u, value = trial, found
         if size <= 1e-14 or (size <= 1e-9 and size >= 0.25 * before):
             return u
-    raise ConvergenceError(
-        f"x0: no equilibrium was found from there by Newton's method (|f| = {begun:.3g} there, "
-        f"{float(np.max(np.abs(value))):.3g} at its end); give an x0 that is closer"
-    )
+    return None
+
+
+def _relaxed(curve: LargeCurve, u: Array) -> Array:
+    """Where x' = f(x) leads to, by implicit Euler steps that grow as f falls.
+
+    Pseudo-transient continuation (C. Kelley, D. Keyes, SIAM J. Numer. Anal. 35 (1998) 508).
+    """
+    n, u = curve.n, np.array(u)
+    value = curve.value(u)
+    unit = sp.eye_array(n, format="csc")
+    size = float(np.sqrt(np.mean(value**2)))
+    step = 0.1 * float(np.sqrt(np.mean(curve.scale[:n] ** 2))) / size if size else 1.0
+    for _ in range(RELAXED):
+        stage(f"no equilibrium by Newton's method: following x' = f(x), |f| = {size:.1e}")
+        matrix, _ = curve.derivatives(u)
+        trial = u.copy()
+        trial[:n] += Factors(sp.csc_array(unit / step - matrix)).solve(value)
+        found = curve.value(trial)
+        after = float(np.sqrt(np.mean(found**2)))
+        if not np.isfinite(after) or after > 3.0 * size:
+            step *= 0.25
+            continue
+        step *= min(max(size / after, 0.5), 4.0) * 1.2 if after else 1.0
+        u, value, size = trial, found, after
+        if not size > FALLEN * float(np.max(abs(matrix) @ np.abs(u[:n]))):
+            break
+    return u
 
 
 def sized(
