@@ -320,3 +320,39 @@ def test_no_eigenvalue_to_the_right_is_missed(length):
     growing = values[values.real >= 0.0]
     assert np.all(growing.real <= right)
     assert np.all(np.abs(growing.imag) <= up)
+
+
+def test_fields_on_a_grid_are_arrays_over_its_coordinates():
+    axis = pk.grid("x", 0.0, 1.0, 49)
+    problem = pk.Problem({"u": "lap(u) + lam*exp(u)"}, parameters={"lam": 0.0}, grid=axis)
+    branch = pk.continuation(problem, "lam", span=(0.0, 4.0), options=BOUNDED)
+    assert branch.points.u.dims == ("point", "x")
+    assert np.array_equal(branch.points.x, axis.coordinates)
+    (fold,) = branch.special("fold")
+    assert fold["lam"] == pytest.approx(fold_of(bratu(49))["lam"], rel=1e-10)
+
+
+def test_a_start_far_away_relaxes_to_an_equilibrium():
+    problem = pk.Problem(
+        lambda u, a: np.append(a - u[:1] ** 3 + 3.0 * u[:1], u[:1] - u[1:]), 2, {"a": 0.0},
+        jac=lambda u, a: sp.csr_array([[3.0 - 3.0 * u[0] ** 2, 0.0], [1.0, -1.0]]),
+    )  # fmt: skip
+    # f falls away from the equilibria at both sides of 1: Newton's steps shrink to nothing there.
+    flat = pk.Problem(
+        lambda u, a: a - np.arctan(5.0 * u) - 1e-3 * u,
+        3,
+        {"a": 0.0},
+        jac=lambda u, a: sp.diags_array(-5.0 / (1.0 + 25.0 * u**2) - 1e-3),
+    )
+    for one, x0 in ((problem, [1.001, 5.0]), (flat, [40.0, -30.0, 90.0])):
+        branch = pk.continuation(one, "a", x0=x0, span=(-0.1, 0.1))
+        assert float(branch.points.residual.max()) < 1e-12
+
+
+@pytest.mark.slow
+def test_periodic_orbits_begin_at_hopf_points_of_fields():
+    problem, start, exact = brusselator(4)
+    _, found = hopf_points_of(problem, start, 0.8)
+    cycles = found[0].switch(options=pk.ContinuationOptions(max_points=5))
+    period = 2.0 * np.pi / found[0].normal_form["omega"]
+    assert float(cycles.points.period[0]) == pytest.approx(period, rel=1e-4)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.kernels import newton, trace
-from phasekit.bifurcation.continuation.kernels.step import CAREFUL, CROSSES, TURNS
+from phasekit.bifurcation.continuation.kernels.step import CROSSES, TURNS
 from phasekit.bifurcation.continuation.large.factors import Bordered, Factors, inner
 from phasekit.bifurcation.continuation.large.field import SparseField
 from phasekit.bifurcation.continuation.stops import Stop, place_of, stuck, track_stop
@@ -25,6 +25,8 @@ from phasekit.numerics.waits import stage
 Array = npt.NDArray[np.float64]
 
 SLOW = 0.2  # ratio of steps from which on a matrix is factored anew
+# Where branches cross, factors know a tangent to rounding over the square of such a step.
+CAREFUL = 1e-4
 SMALL = 1e-9  # steps that may be rounding
 ROUNDING = 64.0 * 2.0**-52  # of terms that cancel
 REFINED = 8  # refinements of a tangent
