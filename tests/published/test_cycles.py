@@ -14,6 +14,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.periodic import trace
+from phasekit.bifurcation.continuation.periodic.cycles import MOST
 
 ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 more = pytest.mark.skipif(not ALL, reason="longer; PHASEKIT_PUBLISHED=all runs it")
@@ -258,13 +260,22 @@ def test_rotations_of_a_damped_pendulum(al, ratio):
     assert np.allclose(other, np.exp(-al * points.period.values), rtol=1e-6)
 
 
-def test_rotations_end_on_a_saddle_node():
+def test_rotations_end_on_a_saddle_node(monkeypatch):
     system = rotation(1.0, 1.0)
+    sizes, original = [0], trace.passages
+
+    def passages(*given):
+        mesh = original(*given)
+        sizes.append(0 if mesh is None else len(mesh) - 1)
+        return mesh
+
+    monkeypatch.setattr(trace, "passages", passages)
     branch = pk.continuation(
         system, "al", orbit=pk.periodic_orbit(system, [0.0, 1.0]), span=(0.9, 1.5)
     )
     assert branch.stops[1].reason == "homoclinic"
     assert close(branch.points.al[-1], 1.1930459188)
+    assert 1000 < max(sizes) < 2 * MOST  # though next to the node they would take millions
 
 
 def test_normal_form_with_a_fold():
