@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from phasekit.labelled.continuation.cycle_branch import ConnectionBranch as ConnectionBranch
     from phasekit.labelled.continuation.cycle_branch import CycleBranch as CycleBranch
     from phasekit.labelled.continuation.diagram import diagram as diagram
+    from phasekit.labelled.continuation.fit import fit as fit
     from phasekit.labelled.continuation.harmonic_record import fourier as fourier
     from phasekit.labelled.continuation.periodic_orbit import periodic_orbit as periodic_orbit
     from phasekit.labelled.continuation.special_point import SpecialPoint as SpecialPoint
@@ -162,6 +163,7 @@ _MODULES = {
     "phasekit.labelled.continuation.critical_rate": ("critical_rate",),
     "phasekit.labelled.continuation.cycle_branch": ("ConnectionBranch", "CycleBranch"),
     "phasekit.labelled.continuation.diagram": ("diagram",),
+    "phasekit.labelled.continuation.fit": ("fit",),
     "phasekit.labelled.continuation.harmonic_record": ("fourier",),
     "phasekit.labelled.continuation.periodic_orbit": ("periodic_orbit",),
     "phasekit.labelled.figure_eights": ("figure_eights",),

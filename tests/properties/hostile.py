@@ -241,6 +241,12 @@ def branch() -> Any:
 
 
 @functools.cache
+def pair_of_folds() -> Any:
+    cusp = pk.Problem("mu + l*x - x**3", state="x", parameters={"mu": -1.0, "l": 0.75})
+    return pk.continuation(cusp, "mu", x0=[-1.3], span=(-1.0, 1.0))
+
+
+@functools.cache
 def oscillator() -> Any:
     return pk.Problem(["y", "mu*(1 - x**2)*y - x"], ("x", "y"), {"mu": 0.5})
 
@@ -498,6 +504,11 @@ FITTING: dict[str, dict[str, Callable[[], Any]]] = {
     "plot.multipliers": {"branch": cycles},
     "connection": {
         "problem": front, "orbit": lambda: ([0.0, 0.0], [1.0, 0.0]), "free": lambda: "c",
+    },
+    "fit": {
+        "problem": lambda: pair_of_folds().problem,
+        "targets": lambda: [(pair_of_folds().special("LP")[0], "mu", 0.2, 0.01)],
+        "free": lambda: ["l"], "steps": lambda: 5,
     },
     "critical_rate": {
         "problem": tipping, "ramp": lambda: {"p": "r*p*(3 - p)"},

@@ -79,8 +79,11 @@ SYSTEMS = {
 }  # fmt: skip
 
 
-def sensitivity(curve: Curve, special: Special) -> Sensitivity:
-    """How a special point of a branch, or of a curve in two parameters, moves."""
+def sensitivity(curve: Curve, special: Special, *, coefficients: bool = True) -> Sensitivity:
+    """How a special point of a branch, or of a curve in two parameters, moves.
+
+    Without ``coefficients`` those of the normal form are left out but for the frequency.
+    """
     free = len(curve.active)
     others = tuple(i for i in range(len(curve.par)) if i not in curve.active)
     if why := _hindered(curve, special):
@@ -89,11 +92,11 @@ def sensitivity(curve: Curve, special: Special) -> Sensitivity:
         return unknown(others, curve.n, free, special.normal_form, "")
     point = _Point(curve, special, others)
     with np.errstate(all="ignore"):
-        return point.solved()
+        return point.solved(coefficients=coefficients)
 
 
 def moved(
-    curve: Curve, special: Special, par: Array, by: Sensitivity
+    curve: Curve, special: Special, par: Array, by: Sensitivity, *, coefficients: bool
 ) -> tuple[Curve, Special] | None:
     """The point at other parameters, next to where its derivatives lead; None if there is none."""
     others = by.others
@@ -106,8 +109,12 @@ def moved(
         point = _Point(here, replace(special, u=u), others)
         if not point.refined():
             return None
-        form = point.form_at()
-        found = {} if form is None else dict(form(Derivatives(point.made, point.u), point.u))
+        form = point.form_at() if coefficients else None
+        found = dict.fromkeys(special.normal_form, np.nan)
+        if form is not None:
+            found.update(form(Derivatives(point.made, point.u), point.u))
+        if special.kind == "hopf" and len(curve.active) == 1:
+            found["omega"] = float(np.sqrt(point.u[-1]))
     k = m + len(others)
     extra = special.extra
     if extra is not None and point.made.size > k:
@@ -212,7 +219,7 @@ class _Point:
             before = size
         return False
 
-    def solved(self) -> Sensitivity:
+    def solved(self, *, coefficients: bool) -> Sensitivity:
         """One linear solve."""
         made, special, k = self.made, self.special, len(self.others)
         _, A, B = self._equations()
@@ -228,7 +235,10 @@ class _Point:
         form = {name: np.full(k, np.nan) for name in special.normal_form}
         for i in range(k):
             if not reasons[i]:
-                for name, value in self._form(slope[:, i]).items():
+                rates = self._form(slope[:, i]) if coefficients else {}
+                if special.kind == "hopf" and not self.two:  # the last unknown is its square
+                    rates["omega"] = 0.5 * slope[-1, i] / np.sqrt(self.u[-1])
+                for name, value in rates.items():
                     form[name][i] = value / made.scale[self.given[i]]
         slope = slope / made.scale[self.given]
         known = np.array([not why for why in reasons])

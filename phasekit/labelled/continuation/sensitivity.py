@@ -13,6 +13,7 @@ import xarray as xr
 from phasekit.bifurcation.continuation import sensitivity as equilibria
 from phasekit.bifurcation.continuation.periodic import starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.bifurcation.continuation.periodic.extended import FOLD
 from phasekit.bifurcation.continuation.periodic.functionals import numbers_of_orbit
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
@@ -45,13 +46,11 @@ def orbits(
     point: SpecialPoint[Any],
 ) -> tuple[equilibria.Sensitivity, Mapping[str, Array]]:
     """Derivatives of an orbit, and of its period and the extremes and means of its states."""
-    cycles, problem, here = point.branch.curve, point.branch.problem, point.special.point
+    cycles, problem = point.branch.curve, point.branch.problem
     names = list(problem.parameters)
     others = tuple(i for i in range(len(names)) if i not in cycles.active)
-    k, why = len(others), _hindered(point)
-    numbers = {name: np.full(k, np.nan) for name in numbers_of_orbit(cycles, here.orbit)}
-    for name in names:
-        del numbers[name]
+    k, why = len(others), hindered(point)
+    numbers = {name: np.full(k, np.nan) for name in numbers_at(point)}
     found = equilibria.unknown(others, cycles.own, len(cycles.active), {}, why)
     period, reasons = np.full(k, np.nan), [why] * k
     if not why:
@@ -69,7 +68,7 @@ def orbits(
     return replace(found, period=period, reasons=tuple(reasons)), numbers
 
 
-def _hindered(point: SpecialPoint[Any]) -> str:
+def hindered(point: SpecialPoint[Any]) -> str:
     """Why an orbit has no equations that make it an isolated one."""
     if point.branch.kind != "cycle" or len(point.branch.free) != 1:
         return "only points of families of periodic orbits in one parameter have derivatives"
@@ -85,6 +84,60 @@ def _par(cycles: Cycles, parameters: Mapping[str, float]) -> Array:
     par = cycles.par.copy()
     par[: len(parameters)] = list(parameters.values())
     return par
+
+
+def numbers_at(point: SpecialPoint[Any]) -> dict[str, float]:
+    """The period of an orbit, and extremes and means of its states."""
+    found = numbers_of_orbit(point.branch.curve, point.special.point.orbit)
+    return {k: v for k, v in found.items() if k not in point.branch.problem.parameters}
+
+
+def orbit_at(point: SpecialPoint[Any], parameters: Mapping[str, float]) -> Point | None:
+    """The orbit at other parameters than its own; None if there is none nearby."""
+    cycles: Cycles = point.branch.curve
+    here: Point = point.special.point
+    problem = point.branch.problem.replace(**parameters)
+    cycles = cycles.replace(par=_par(cycles, parameters))
+    if point.kind == "event":
+        return _event_at(problem, cycles, point, here)
+    name = next(one for one in problem.parameters if one != point.branch.parameter)
+    value, n = problem.parameters[name], cycles.own
+    size = abs(value) or 1.0
+    span = (value - size, value + size)
+    made, found = critical_orbit(problem, cycles, here, point.kind, name, span)
+    if not found.converged:
+        return None
+    x, y = found.orbit.x, found.orbit.y
+    dx, dy = np.zeros((len(x), n)), np.zeros(2)
+    if point.kind == made.kind == FOLD:  # its function is the tangent of the family
+        dx, dy[0] = x[:, n:].copy(), (y[-1] * y[0] if made.q == 4 else 0.0)
+    orbit = Orbit(found.orbit.mesh, x[:, :n].copy(), y[:2].copy())
+    return replace(here, orbit=orbit, dx=dx, dy=dy)
+
+
+def _event_at(
+    problem: Problem, cycles: Cycles, point: SpecialPoint[Any], here: Point
+) -> Point | None:
+    """The orbit at which a number is zero, by Newton's method in the parameter of the family."""
+    own, before = point.branch.parameter, np.inf
+    (event,) = (one for one in cycles.events if one.name == point.name)
+    value = float(here.orbit.y[1])
+    for _ in range(equilibria.STEPS):
+        y = np.array([here.orbit.y[0], value])
+        here = replace(here, orbit=Orbit(here.orbit.mesh, here.orbit.x, y))
+        line = _held_line(problem.replace(**{own: value}), cycles, here, own)
+        if isinstance(line, str):
+            return None
+        zeros = np.zeros_like(line.orbit.x)
+        here = replace(here, orbit=line.orbit, dx=zeros, dy=np.zeros(2))
+        step = -float(event.value(cycles, line.orbit)) / line.rate(cycles, event)
+        size = abs(step) / cycles.width[0]
+        if not size < 1e3:
+            return None
+        if size <= 1e-13 or (size <= 1e-8 and size >= 0.5 * before):
+            return here
+        value, before = value + step, size
+    return None
 
 
 @dataclass(frozen=True)
