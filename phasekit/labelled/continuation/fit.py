@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_parameter
 from phasekit.labelled.continuation.moving import Moving, moving
 from phasekit.labelled.continuation.special_point import SpecialPoint
@@ -80,6 +81,7 @@ class Fit:
         return f"<Fit {text}{': ' + self.message if self.message else ''}>"
 
 
+@call_checked
 def fit(problem: Any, targets: Sequence[Any], *, free: Sequence[str], steps: int = STEPS) -> Fit:
     """Fit parameters so that special points, amplitudes and periods have given values.
 
