@@ -99,6 +99,12 @@ CURVES: dict[str, style.Look] = {
     },
 }
 
+#: Stretches that are not proved, where proofs were asked for.
+UNPROVED: style.Look = {
+    "color": style.GRAY, "linestyle": "-", "linewidth": 7.0, "alpha": 0.4, "zorder": 1.5,
+    "solid_capstyle": "round", "label": "not proved",
+}  # fmt: skip
+
 
 @call_checked
 def branch(
@@ -119,6 +125,7 @@ def branch(
     Stable equilibria (centers of a conservative problem) are solid, unstable ones (saddles)
     dashed. Curves in two parameters are drawn in the plane of both. Of periodic orbits the largest
     and the least value of a state are drawn, thick where stable and thick dots where unstable.
+    Where proofs were asked for, stretches that are not proved are marked by a pale band.
 
     Parameters
     ----------
@@ -190,6 +197,11 @@ def branch(
             own = {**style.inked(look), "label": text}
             (line,) = axes.plot(across * stretch[0], up * stretch[-1], **own)
             handles.setdefault(text, line)
+        for across, up in _unproved(one, pair):
+            if circle is not None:
+                up, across = circle.unrolled(up, across)
+            (line,) = axes.plot(across * stretch[0], up * stretch[-1], **style.inked(UNPROVED))
+            handles.setdefault(str(UNPROVED["label"]), line)
     marks: dict[tuple[str, str], list[tuple[float, float]]] = {}  # by kind and name of an event
     for one, pair in zip(several, columns, strict=True):
         across, up = (column.values for column in pair)
@@ -223,6 +235,16 @@ def branch(
     if legend:
         style.legend_below(axes, list(handles.values()), _SHORT)
     return axes
+
+
+def _unproved(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> list[tuple[Any, Any]]:
+    """Stretches of a branch that was to be proved and is not there, one after the other."""
+    if "certified_onward" not in one.points:
+        return []
+    across, up = (column.values for column in pair)
+    open_ = np.flatnonzero(~one.points.certified_onward.values[:-1])
+    runs = np.split(open_, np.flatnonzero(np.diff(open_) > 1) + 1) if open_.size else []
+    return [(across[run[0] : run[-1] + 2], up[run[0] : run[-1] + 2]) for run in runs]
 
 
 def holds_branches(what: Any) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from fractions import Fraction
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import sympy as sp
@@ -351,6 +352,24 @@ def test_certificates_are_kept_by_copies_stores_and_longer_branches(tmp_path):
     ds = branch.to_dataset()
     assert ds.special_certified.all()
     assert ds.special_mu_enclosure.sizes == {"special_point": len(ds.special_kind), "end": 2}
+
+
+def test_pictures_mark_what_is_not_proved():
+    def bands(e):
+        problem = pk.Problem("l*x - x^3 + e", "x", {"l": -1.0, "e": e})
+        branch = pk.continuation(problem, "l", x0=[0.0], span=(-1.0, 1.0), certify=True)
+        figure, ax = plt.subplots()
+        pk.plot.branch(branch, ax=ax)
+        found = [line for line in ax.lines if line.get_label() == "not proved"]
+        plt.close(figure)
+        return branch, found
+
+    assert bands(0.0)[1] == []
+    branch, (band,) = bands(1e-13)
+    first, last = band.get_xdata()[[0, -1]]
+    onward = branch.points.certified_onward.values[:-1]
+    mu = branch.points.l.values
+    assert (first, last) == (mu[np.argmin(onward)], mu[np.flatnonzero(~onward)[-1] + 1])
 
 
 def test_nothing_is_said_without_being_asked_for():
