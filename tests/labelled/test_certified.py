@@ -365,7 +365,7 @@ def test_pictures_mark_what_is_not_proved():
         return branch, found
 
     assert bands(0.0)[1] == []
-    branch, (band,) = bands(1e-13)
+    branch, (band,) = bands(1e-18)
     first, last = band.get_xdata()[[0, -1]]
     onward = branch.points.certified_onward.values[:-1]
     mu = branch.points.l.values
