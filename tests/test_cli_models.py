@@ -126,6 +126,19 @@ def test_diagram_of_equations_names_what_is_on_it(tmp_path, capsys):
     assert "H at m = 0:" in capsys.readouterr().out.replace("-0:", "0:")
 
 
+@pytest.mark.slow
+def test_atlas_of_equations(tmp_path, capsys):
+    (tmp_path / "cusp.toml").write_text(
+        '[rates]\nx = "m + n*x - x^3"\n[parameters]\nm = 0\nn = 0\n[window]\nx = [-3, 3]\n'
+    )
+    assert main(["atlas", "cusp.toml", "--m", "-1:1", "--n", "-1:2", "--out", "a.png"]) == 0
+    said = capsys.readouterr().out
+    assert "CP cusp at" in said
+    assert "proved off the curves: n_equilibria, n_stable" in said
+    assert Path("a.png").exists()
+    assert "exactly two FROM:TO" in refused(capsys, "atlas", "cusp.toml", "--m", "-1:1")
+
+
 def test_a_map_of_a_file(capsys):
     assert main(["sweep", "well.toml"]) == 0
     ds = pk.open_map("well.zarr")

@@ -24,6 +24,7 @@ COMMANDS = {
     "basins": "draw the basins of attraction of a damped system",
     "run-up": "run a disk up and draw its bearing forces",
     "diagram": "draw the equilibria against one parameter",
+    "atlas": "draw all bifurcations of equilibria in two parameters",
     "flow": "follow a motion; draw it or write its numbers",
     "explore": "write the interactive page of a system and open it",
     "sweep": "compute the map that a TOML file describes, or resume it",
@@ -72,7 +73,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="commands:\n"
         + "\n".join(f"  {name:<10}{text}" for name, text in COMMANDS.items())
-        + "\n\nportrait, diagram, flow, explore and sweep take the file of a model (.toml, .ode):\n"
+        + "\n\nportrait, diagram, atlas, flow, explore and sweep take the file of a model "
+        "(.toml, .ode):\n"
         "  phasekit portrait model.toml --I 0.5\n"
         "\nphasekit COMMAND --help says more.",
     )

@@ -168,7 +168,7 @@ class CurveSearch:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)
                 yield
-        except (ConvergenceError, ParameterError) as error:
+        except (ConvergenceError, ParameterError, np.linalg.LinAlgError) as error:
             if counts:
                 self.missed.append(f"{what}: {error}")
 
