@@ -356,3 +356,51 @@ def test_periodic_orbits_begin_at_hopf_points_of_fields():
     cycles = found[0].switch(options=pk.ContinuationOptions(max_points=5))
     period = 2.0 * np.pi / found[0].normal_form["omega"]
     assert float(cycles.points.period[0]) == pytest.approx(period, rel=1e-4)
+
+
+def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):
+    from phasekit.labelled.continuation import large_start
+
+    monkeypatch.setattr(large_start, "available_memory", lambda: 10**9)
+    problem = pk.Problem(lambda u, a: a - u, 200_000, {"a": 0.0}, jac=-sp.eye_array(200_000))
+    with pytest.raises(pk.ParameterError, match="max_points: got 2000, wants at most"):
+        pk.continuation(problem, "a", span=(0.0, 1.0))
+
+
+def test_what_is_not_looked_for_is_said():
+    options = pk.ContinuationOptions(detect=("fold", "neutral_saddle"), max_points=3)
+    branch = pk.continuation(bratu(20), "lam", span=(0.0, 4.0), options=options)
+    assert branch.messages == ("neutral saddles are not looked for, of fields of states",)
+
+
+@pytest.mark.slow
+def test_every_fold_of_a_snake():
+    """Swift and Hohenberg's equation on half a line: two snakes meet at the end of both."""
+    n, length, nu, r = 512, 32.0 * np.pi, 1.6, -0.05
+    h = length / n
+    T = sp.diags_array([np.ones(n - 1), -2.0 * np.ones(n), np.ones(n - 1)], offsets=[-1, 0, 1])
+    T = T.tolil()
+    T[0, 0] = T[-1, -1] = -1.0
+    M = sp.eye_array(n) + T / h**2
+    M = sp.csc_array(-(M @ M))
+    x = h * (np.arange(n) + 0.5)
+    height = 2.0 * np.sqrt(-r / (19.0 * nu**2 / 18.0 - 0.75))
+    start = height * np.cos(x) / np.cosh(x * np.sqrt(-r) / 2.0)
+    problem = pk.Problem(
+        lambda u, r: M @ u + r * u + nu * u * u - u**3, [("u", n)], {"r": r},
+        jac=lambda u, r: M + sp.diags_array(r + 2.0 * nu * u - 3.0 * u * u), coords={"x": x},
+    )  # fmt: skip
+    branch = pk.continuation(problem, "r", x0=start, span=(-0.6, -0.01))
+    folds = branch.special("fold")
+    assert {point.status for point in folds} == {"converged"}
+    values = np.array([point["r"] for point in folds])
+    half = len(values) // 2
+    assert half == 28
+    # From its end the path goes back along the same states, turned.
+    assert values[:half] == pytest.approx(values[half:][::-1], abs=1e-9)
+    left, right = values[:half:2], values[1:half:2]
+    assert np.ptp(left[3:9]) < 1e-8
+    assert np.ptp(right[3:9]) < 1e-6
+    grow = branch.points.n_unstable.values
+    assert set(grow[1:-1].tolist()) <= {0, 1, 2}
+    assert branch.messages == ()

@@ -20,10 +20,13 @@ from phasekit.labelled.continuation.branch import Branch, Record, branch_of
 from phasekit.labelled.continuation.checks import check_options, refuse_kind
 from phasekit.labelled.continuation.large_branch import LargeBranch
 from phasekit.labels.arguments import bad, numeric, unknown
+from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
 from phasekit.numerics.waits import notice
 from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
+
+COPIES = 3  # of a point: in its track, on its path, in the Dataset
 
 
 def continue_fields(
@@ -32,6 +35,7 @@ def continue_fields(
 ) -> Branch:  # fmt: skip
     """Follow equilibria of fields of states along a parameter."""
     guess = state_of(problem, x0)
+    refuse_record(len(guess), options)
     curve = field_curve(problem, parameter, span, options, ends)
     with notice(f"following equilibria of {curve.n:,} states along {parameter}"):
         u = np.append(guess, problem.parameters[parameter])
@@ -42,6 +46,26 @@ def continue_fields(
         walker = LargeWalk(curve)
         tracks = run(walker, start, options.directions)
         return branch_of(LargeBranch, problem, walker, start, tracks, record)
+
+
+def refuse_record(n: int, options: ContinuationOptions) -> None:
+    """Refuse points that no memory would hold, before the first is made.
+
+    Raises
+    ------
+    ParameterError
+    """
+    sides = 2 if options.directions == "both" else 1
+    point = COPIES * 8 * (n + 1)
+    needed = point * sides * options.max_points
+    available = available_memory() if needed > ALWAYS else None
+    if available is not None and needed > SHARE * available:
+        most = int(SHARE * available / (point * sides))
+        raise bad(
+            "max_points", options.max_points, f"at most {most:,} of {n:,} states",
+            f"all of them would take {human(needed)}; {human(int(SHARE * available))} are free; "
+            "extend() goes on from an end",
+        )  # fmt: skip
 
 
 def state_of(problem: Problem, x0: Any) -> Array:

@@ -39,6 +39,8 @@ def _find(
     spectra = spectra_of(curve, path) if "hopf" in detect and not curve.symmetric else []
     placed: list[Placed] = []
     messages: list[str] = []
+    if "neutral_saddle" in detect:
+        messages.append("neutral saddles are not looked for, of fields of states")
     if spectra:
         tests = tests.copy()
         tests[:, POSITIVE] = [one.positive for one in spectra]
