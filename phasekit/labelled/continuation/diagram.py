@@ -18,6 +18,7 @@ from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.continuation import continuation
+from phasekit.labelled.continuation.diagram_cycles import families
 from phasekit.labelled.continuation.point_curves import switch
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfinished import announced, interrupted
@@ -35,11 +36,12 @@ def diagram(
     x0: Any = None,
     span: Sequence[float],
     depth: int = 3,
+    cycles: bool = False,
     record: Any = None,
     options: ContinuationOptions | None = None,
     certify: bool = False,
 ) -> tuple[Branch, ...]:
-    """Follow all connected branches of equilibria, each once.
+    """Follow all connected branches of equilibria, each once; of cycles, too, if asked.
 
     Parameters
     ----------
@@ -54,7 +56,12 @@ def diagram(
     span : (float, float)
         Lowest and highest value of the parameter.
     depth : int, default 3
-        How many times branches are switched in a row: 0 follows the starts only.
+        How many times branches are switched in a row: 0 follows the starts only. So many times
+        cycles, and fixed points of maps, are doubled.
+    cycles : bool, default False
+        Whether periodic orbits, of maps too, are followed as well: from all Hopf points, through
+        branch points and period doublings, up to the homoclinic orbits at their ends. They come
+        behind the branches of equilibria, as `CycleBranch` and `ConnectionBranch`.
     record : mapping or sequence of str, optional
         As in `continuation`.
     options : ContinuationOptions, optional
@@ -81,6 +88,9 @@ def diagram(
     Those of other systems, of polynomials and of Fourier sums are computed at 33 values spread over
     the span: an isolated branch is missed only if it lies between two of these.
 
+    Families of periodic orbits that begin at no Hopf point are not looked for. What could not be
+    followed, and what ends for its number of points, is said in warnings.
+
     Examples
     --------
     >>> from phasekit.systems.problem import Problem
@@ -92,6 +102,8 @@ def diagram(
     check_parameter(problem, parameter)
     system = problem.system
     low, high = check_span(span, None if system is None else system.unit_of(parameter))
+    if not isinstance(cycles, (bool, np.bool_)):
+        raise bad("cycles", cycles, "True or False")
     depth = whole("depth", depth, "a whole number >= 0", 0)
     branches: list[Branch] = []
     failures: list[ConvergenceError] = []
@@ -127,6 +139,8 @@ def diagram(
         if failures:
             raise failures[0]
         raise ConvergenceError("x0: the system has no equilibrium in the span")
+    if cycles and not any(interrupted(one) for one in branches):
+        return (*branches, *families(branches, depth))
     return tuple(branches)
 
 

@@ -1,0 +1,112 @@
+"""Families of periodic orbits that hang together with branches of equilibria, each once."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.periodic.functionals import numbers_of_orbit
+from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.labelled.continuation.branch import Branch
+from phasekit.labelled.continuation.cycle_branch import HomoclinicEnd
+from phasekit.labelled.continuation.special_point import SpecialPoint
+from phasekit.labelled.continuation.unfinished import interrupted
+
+#: At which a family ends that has come to another point, and what begins there.
+BEGIN = ("hopf", "period_doubling", "cycle_branch_point")
+CLOSE = 1e-2  # of the span and of the sizes of states: an end beside the point that it is at
+SAME = 1e-6
+
+
+def families(branches: Sequence[Branch], depth: int) -> list[Branch]:
+    """The families from all Hopf points, their doubled ones to a depth, and homoclinic ends."""
+    found: list[Branch] = []
+    begun: list[SpecialPoint[Any]] = []
+    queue = [
+        (point, 0) for branch in branches for point in branch.special_points if point.kind in BEGIN
+    ]
+    while queue:
+        point, level = queue.pop(0)
+        if point.status != "converged" or any(_same(point, other) for other in begun):
+            continue
+        begun.append(point)
+        if any(_ends_at(family, point) for family in found):
+            continue
+        family = _switched(point)
+        if family is None:
+            continue
+        found.append(family)
+        if interrupted(family):
+            break
+        if level < depth:
+            queue += [
+                (one, level + 1) for one in family.special_points if one.kind in BEGIN[1:]
+            ]  # fmt: skip
+    for family in list(found):
+        found += _connections(family)
+    return found
+
+
+def _switched(point: SpecialPoint[Any]) -> Branch | None:
+    """What begins at a point; None, with a warning, if it cannot be followed."""
+    try:
+        family: Branch = point.switch()
+    except (ConvergenceError, ParameterError) as error:
+        _warn(f"what begins at {point!r} is not followed: {error}")
+        return None
+    return family
+
+
+def _connections(family: Branch) -> list[Branch]:
+    """The homoclinic orbits at the ends of a family, each once."""
+    found: list[Branch] = []
+    for stop in family.stops:
+        if not isinstance(stop, HomoclinicEnd):
+            continue
+        try:
+            found.append(stop.connection())
+        except (ConvergenceError, ParameterError) as error:
+            _warn(f"the homoclinic orbit at the end of a family is not followed: {error}")
+    return found
+
+
+def _warn(message: str) -> None:
+    warnings.warn(message, RuntimeWarning, stacklevel=5)
+
+
+def _numbers(point: SpecialPoint[Any]) -> tuple[float, np.ndarray[Any, Any], np.ndarray[Any, Any]]:
+    """The parameter at a point, and the least and the largest value of each state."""
+    value = float(point.parameters[point.branch.parameter])
+    if point.way != "orbit":
+        return value, point.x, point.x
+    numbers = numbers_of_orbit(point.branch.curve, point.special.point.orbit)
+    states = point.branch.problem_state
+    low, high = (np.array([numbers[f"{x}_{part}"] for x in states]) for part in ("min", "max"))
+    return value, low, high
+
+
+def _apart(point: SpecialPoint[Any], other: SpecialPoint[Any]) -> float:
+    """Distance of two points on scaled axes, by their parameters and extremes of states."""
+    (p, low, high), (q, lower, higher) = _numbers(point), _numbers(other)
+    curve = other.branch.curve
+    width = curve.width[0] if other.way == "orbit" else curve.scale[curve.n]
+    scale = curve.scale[: len(low)]
+    gaps = [np.max(np.abs(low - lower) / scale), np.max(np.abs(high - higher) / scale)]
+    return float(max(abs(p - q) / width, *gaps))
+
+
+def _same(point: SpecialPoint[Any], other: SpecialPoint[Any]) -> bool:
+    """Whether two points of two branches are one."""
+    return point.kind == other.kind and _apart(point, other) < SAME
+
+
+def _ends_at(family: Branch, point: SpecialPoint[Any]) -> bool:
+    """Whether a family has come to a point from its other end."""
+    ends = [one for one in family.special_points if one.kind == "end"]
+    pairs = zip(family.stops, (ends[0], ends[-1]) if ends else (), strict=False)
+    return any(
+        stop.reason == point.kind and _apart(end, point) < CLOSE for stop, end in pairs
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""Diagrams with the periodic orbits that begin on them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import phasekit as pk
+
+#: r' = mu r + b r^3 - r^5: cycles from mu = 0 to a fold at mu = -1/4 and back.
+QUINTIC = pk.Problem(
+    [
+        "(mu + (x*x + y*y) - (x*x + y*y)**2)*x - 2*y",
+        "(mu + (x*x + y*y) - (x*x + y*y)**2)*y + 2*x",
+    ],
+    ("x", "y"), {"mu": -0.5},
+)  # fmt: skip
+
+
+def test_cycles_of_a_hopf_point_follow_the_equilibria():
+    rest, cycles = pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles=True)
+    assert [point.label for point in rest.special_points] == ["EP", "H", "EP"]
+    (fold,) = cycles.special("LPC")
+    assert fold["mu"] == pytest.approx(-0.25, abs=1e-9)
+    assert len(pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3))) == 1
+    with pytest.raises(pk.ParameterError, match="cycles"):
+        pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles="all")
+
+
+def test_doublings_of_a_map_to_a_depth():
+    logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 2.5}, map=True)
+    for depth, wanted in ((0, 1), (1, 2), (2, 3)):
+        found = pk.diagram(logistic, "r", x0=[0.6], span=(1.5, 3.6), depth=depth, cycles=True)
+        doublings = {round(p["r"], 9) for one in found for p in one.special("period_doubling")}
+        exact = [3.0, 1.0 + np.sqrt(6.0), 3.544090359552]
+        assert sorted(doublings)[:wanted] == pytest.approx(exact[:wanted], abs=1e-8)
+
+
+def test_what_ends_for_its_number_of_points_is_said():
+    few = pk.ContinuationOptions(max_points=25)
+    with pytest.warns(RuntimeWarning, match="not complete"):
+        pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles=True, options=few)
+
+
+@pytest.mark.slow
+def test_a_family_between_two_hopf_points_is_followed_once():
+    nerve = pk.Problem(
+        ["v - v**3/3 - w + I", "eps*(v + a - b*w)"], ("v", "w"),
+        {"I": 0.0, "eps": 0.08, "a": 0.7, "b": 0.8},
+    )  # fmt: skip
+    _, cycles = pk.diagram(nerve, "I", x0=[-1.2, -0.6], span=(0, 2), cycles=True)
+    assert [stop.reason for stop in cycles.stops] == ["hopf", "hopf"]
+    assert len(cycles.special("LPC")) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:the homoclinic orbit")  # its mirror image is not found
+def test_cycles_of_lorenz_end_in_homoclinic_orbits():
+    lorenz = pk.Problem(
+        ["s*(y - x)", "r*x - y - x*z", "x*y - b*z"], ("x", "y", "z"),
+        {"s": 10.0, "r": 0.5, "b": 8.0 / 3.0},
+    )  # fmt: skip
+    found = pk.diagram(lorenz, "r", x0=[0.0, 0.0, 0.0], span=(0.5, 30.0), cycles=True)
+    families = [one for one in found if isinstance(one, pk.CycleBranch)]
+    ends = [one for one in found if isinstance(one, pk.ConnectionBranch)]
+    both = [one for one in families if "hopf" in {stop.reason for stop in one.stops}]
+    assert len(both) == 2
+    assert ends
+    for one in ends:
+        assert one.points.r[0].item() == pytest.approx(13.92655740752, abs=1e-7)
