@@ -157,7 +157,9 @@ def _tubes_about(system: System, start: Array, end: Array) -> Tubes:
     operator = _Operator(system, chord, across, inverse, usable)
     # Where the curve is at the end of a chord is found by itself: that is known far better.
     floors = _floors(end, chord)
-    _, tip, held = _held(operator.about(end, np.zeros(len(chord))), floors, floors)
+    at_end = operator.about(end, np.zeros(len(chord)))
+    _, tip, held = _held(at_end, floors, floors)
+    tip = np.where(held[:, None], np.minimum(tip, at_end(tip)), tip)  # an image of the image
     floors = _floors(middle, chord)
     beyond = np.fmax(BEYOND, np.linalg.norm(tip, axis=1) / np.linalg.norm(chord, axis=1))
     beyond = np.where(beyond < 1.0, beyond, BEYOND)
