@@ -365,6 +365,11 @@ class Cycles:
         On each of its intervals rate times length is at most ``reach``.
         """
         found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        if self.n >= wide.WIDE:
+            slopes = found[:, self.n :].reshape(len(found), self.n, -1)[:, :, : self.n]
+            decay = float(np.mean(np.trace(slopes, axis1=1, axis2=2))) * float(orbit.y[0])
+            if abs(decay) > wide.STIFF * self.n * orbit.intervals:
+                return None  # nobody needs the digits of such decays
         counts = np.empty(orbit.intervals, dtype=np.int64)
         period = float(orbit.y[0])
         total = along.parts(orbit.mesh, found, self.scale, period, self.m, reach, counts)
