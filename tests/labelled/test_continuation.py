@@ -93,7 +93,7 @@ def test_every_form_of_f_gives_the_same_branch(form):
         (lambda: Problem({"x": "x", "z": "1"}, ("x", "y"), {}), "'z' is unknown"),
         (lambda: Problem(3.0, "x", {}), "a function"),
         (lambda: Problem("x", "x", {"a": math.nan}), "finite"),
-        (lambda: Problem("x", "x", {"a": "1"}), "a real number"),
+        (lambda: Problem("x", "x", {"a": "one"}), "a real number"),
         (lambda: Problem("x", "x", {}, periods={"y": 1.0}), "'y' is unknown"),
         (lambda: Problem("x", "x", {}, periods={"x": -1.0}), "> 0"),
         (lambda: Problem("x", "x", {}, lambda x: x), "derivatives are exact"),
@@ -620,7 +620,7 @@ def test_bearing_forces_along_a_branch():
     wanted = pk.bearing_forces(disk.replace(beta=float(at.beta)), float(at.phi), 0.0)
     np.testing.assert_allclose(at.force_magnitude, wanted.force_magnitude, rtol=1e-13)
     assert at.force_magnitude.dims == ("bearing",)
-    with pytest.raises(pk.ParameterError, match="m: got"):
+    with pytest.raises(pk.ParameterError, match="m, half_span: got"):
         continuation(DISK, "beta", span=(0.1, 1.5), record=["force_magnitude"])
 
 
