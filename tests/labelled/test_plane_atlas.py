@@ -124,6 +124,29 @@ def test_oxidation_of_co():
         assert number == np.sum((real > 0) & (real < 1))
 
 
+@pytest.mark.slow
+def test_a_predator_and_its_prey_have_the_equilibria_of_their_cubic_and_no_cusp():
+    """The cubic has a triple root at al = 0.0888 and al = 0.9012 alone, outside of the rectangle."""
+    predator = pk.Problem(
+        {"x": "x - x*y/(1 + al*x) - ep*x^2", "y": "-ga*y + x*y/(1 + al*x) - de*y^2"},
+        parameters={"al": 0.3, "de": 0.2, "ga": 1.0, "ep": 0.01},
+        window={"x": (0.5, 99.0), "y": (0.05, 30.0)},
+    )
+    span = {"al": (0.2, 0.6), "de": (0.05, 0.6)}
+    atlas = pk.atlas(predator, "al", "de", span=span)
+    assert all(atlas.complete.values())
+    assert [point.label for point in atlas.special_points] == ["BT"]
+    places = random_places(atlas, 500)
+    found = atlas.counts(**places)
+    for al, de, number in zip(*places.values(), found.n_equilibria.values, strict=True):
+        x = np.polynomial.Polynomial([0, 1])
+        f = x - (1 + al * x) - de * (1 - 0.01 * x) * (1 + al * x) ** 2
+        roots = f.roots()
+        real = roots[np.abs(roots.imag) < 1e-9].real
+        y = (1 - 0.01 * real) * (1 + al * real)
+        assert number == np.sum((real > 0.5) & (real < 99) & (y > 0.05) & (y < 30))
+
+
 def test_trigonometric_laws_have_the_curves_of_their_bifurcation_set():
     law = pk.Reduced(0.3, 0.2)
     span = {"lam": (-1.5, 1.5), "psi": (-1.5, 1.5)}
@@ -145,6 +168,7 @@ def test_trigonometric_laws_have_the_curves_of_their_bifurcation_set():
     np.testing.assert_array_equal(atlas.counts(**places).n_equilibria, np.where(inside, 4, 2))
 
 
+@pytest.mark.slow
 def test_code_is_not_proved_and_that_is_said():
     code = pk.Problem(
         lambda x, mu, nu: np.array([mu + nu * x[0] - x[0] ** 3]), "x", {"mu": 0.0, "nu": 0.0},

@@ -338,14 +338,10 @@ def atlas(
     Examples
     --------
     >>> import phasekit as pk
-    >>> predator = pk.Problem(
-    ...     {"x": "x - x*y/(1 + al*x) - ep*x^2", "y": "-ga*y + x*y/(1 + al*x) - de*y^2"},
-    ...     parameters={"al": 0.3, "de": 0.2, "ga": 1.0, "ep": 0.01},
-    ...     window={"x": (0.5, 99.0), "y": (0.05, 30.0)},
-    ... )
-    >>> found = pk.atlas(predator, "al", "de", span={"al": (0.2, 0.6), "de": (0.05, 0.6)})
-    >>> sorted({point.label for point in found.special_points})
-    ['BT', 'CP']
+    >>> cusp = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
+    >>> found = pk.atlas(cusp, "mu", "l", span={"mu": (-1, 1), "l": (-1, 2)})
+    >>> [point.label for point in found.special_points], found.complete
+    (['CP'], {'n_equilibria': True, 'n_stable': True})
     """
     problem, names, spans, low, high = _checked(problem, x, y, span, window)
     with notice(f"looking for all bifurcations in {x} and {y}"):
