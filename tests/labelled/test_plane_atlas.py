@@ -126,7 +126,7 @@ def test_oxidation_of_co():
 
 @pytest.mark.slow
 def test_a_predator_and_its_prey_have_the_equilibria_of_their_cubic_and_no_cusp():
-    """The cubic has a triple root at al = 0.0888 and al = 0.9012 alone, outside of the rectangle."""
+    """Its triple roots are at al = 0.0888 and al = 0.9012 alone, outside of the rectangle."""
     predator = pk.Problem(
         {"x": "x - x*y/(1 + al*x) - ep*x^2", "y": "-ga*y + x*y/(1 + al*x) - de*y^2"},
         parameters={"al": 0.3, "de": 0.2, "ga": 1.0, "ep": 0.01},
