@@ -98,3 +98,27 @@ def test_multipliers_of_many_states():
     broken = G.copy()
     broken[2, 0, 0] = np.nan
     assert np.isnan(multipliers.multipliers(broken)[0]).all()
+
+
+def test_leading_multipliers_of_very_many_states():
+    """Those of a product that is known: a multiple one, a pair, and the small ones no more."""
+    rng = np.random.default_rng(4)
+    n, count = 130, 12
+    turn = 1.05 * np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    whole = np.diag(np.concatenate([[-1.2, 0.7, 0.7, 0.0, 0.0], 0.5 * 0.8 ** np.arange(n - 5)]))
+    whole[3:5, 3:5] = turn
+    frames = [rng.normal(size=(n, n)) / np.sqrt(n) + 2.0 * np.eye(n) for _ in range(count)]
+    steps = [np.eye(n)] * (count - 1) + [whole]
+    G = np.array([
+        frames[(j + 1) % count] @ steps[j] @ np.linalg.inv(frames[j]) for j in range(count)
+    ])  # fmt: skip
+    values, log = multipliers.multipliers(G)
+    exact = np.array(sorted(np.linalg.eigvals(whole), key=abs, reverse=True))
+    large = np.abs(exact) > multipliers.INSIDE
+    for one in exact[large]:
+        assert np.min(np.abs(values - one)) < 1e-7
+    np.testing.assert_allclose(np.abs(values[large]), np.abs(exact[large]), rtol=1e-7)
+    assert np.all(np.abs(values[~large]) < multipliers.INSIDE)
+    assert log == pytest.approx(np.sum(np.log(np.abs(exact))), rel=1e-7)
+    assert not multipliers.hidden(G, values, 1e-12).any()
+    assert multipliers.leading(np.full_like(G, np.nan)) is None

@@ -222,6 +222,9 @@ def test_what_is_not_a_start_is_named():
     problem = bratu(20)
     for x0, says in (
         ([1.0, 2.0], "x0"), ({"v": 1.0}, "field"), ({}, "a value for each"), ("low", "x0"),
+        ([1.0], r"x0: got \[1.0\], wants a number, or an array of shape \(20,\)"),
+        (np.ones(19), r"x0: got \(19,\), wants a number, or an array"),
+        ({"u": [0.5]}, "wants a number"),
     ):  # fmt: skip
         with pytest.raises(pk.ParameterError, match=says):
             pk.continuation(problem, "lam", x0=x0, span=(0.0, 4.0))
@@ -356,6 +359,45 @@ def test_periodic_orbits_begin_at_hopf_points_of_fields():
     cycles = found[0].switch(options=pk.ContinuationOptions(max_points=5))
     period = 2.0 * np.pi / found[0].normal_form["omega"]
     assert float(cycles.points.period[0]) == pytest.approx(period, rel=1e-4)
+
+
+@pytest.mark.slow
+def test_orbits_of_fields_on_a_grid_are_those_of_a_simulation():
+    """Next to a Hopf point: period and amplitude by its normal form, and back after a period."""
+    from scipy.integrate import solve_ivp
+
+    m, A, B, first, second = 30, 2.0, 5.45, 0.008, 0.004
+    problem = pk.Problem(
+        {"u": "D1/L^2*lap(u) + u^2*v - (B + 1)*u + A", "v": "D2/L^2*lap(v) + B*u - u^2*v"},
+        parameters={"L": 0.45, "A": A, "B": B, "D1": first, "D2": second},
+        grid=pk.grid("x", 0.0, 1.0, m, values={"u": "A", "v": "B/A"}),
+    )
+    branch = pk.continuation(problem, "L", x0={"u": A, "v": B / A}, span=(0.4, 0.9))
+    (hopf,) = branch.special("hopf")
+    cycles = hopf.switch(options=pk.ContinuationOptions(max_points=3))
+    other, _, _ = brusselator(m)
+    jacobian = other.jac(hopf.x, hopf["L"]).toarray()
+    values, vectors = np.linalg.eig(jacobian)
+    k = np.argmin(np.abs(values.real) + (values.imag <= 0.0))
+    form = hopf.normal_form
+    assert form["omega"] == pytest.approx(values[k].imag, rel=1e-9)
+    gap = cycles.points.L.values - hopf["L"]
+    swing = np.sqrt(form["d"] * gap / (form["omega"] * -form["l1"]))
+    q = np.abs(vectors[m // 2, k])
+    name = f"u_{m // 2}"
+    half = 0.5 * (cycles.points[f"{name}_max"] - cycles.points[f"{name}_min"]).values
+    assert half[1:] == pytest.approx(2.0 * q * swing[1:], rel=0.01)
+    assert float(cycles.points.period[0]) == pytest.approx(2.0 * np.pi / form["omega"], rel=1e-5)
+    assert set(cycles.points.n_unstable.values) == {0}
+    last = cycles.orbit(len(cycles.points.L) - 1)
+    start = np.array([float(last[name][0]) for name in problem.state])
+    period, length = float(last.period), float(last.L)
+    motion = solve_ivp(
+        lambda t, x: other.f(x, length), (0.0, period), start, method="Radau", rtol=1e-7,
+        atol=1e-9, jac=lambda t, x: other.jac(x, length),
+    )  # fmt: skip
+    size = float(cycles.points[f"{name}_max"][-1] - cycles.points[f"{name}_min"][-1])
+    assert np.max(np.abs(motion.y[:, -1] - start)) < 1e-4 * size
 
 
 def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):

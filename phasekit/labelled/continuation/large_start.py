@@ -26,6 +26,7 @@ from phasekit.systems.problem import Problem
 
 Array = npt.NDArray[np.float64]
 
+FEW = 7  # numbers from which an error shows their shape
 COPIES = 3  # of a point: in its track, on its path, in the Dataset
 
 
@@ -97,8 +98,8 @@ def _filled(argument: str, value: Any, shape: tuple[int, ...]) -> Array:
     size = int(np.prod(shape))
     wants = f"a number, or an array of shape {shape}"
     given = np.asarray(numeric(argument, np.ravel(np.asarray(value)), None, wants))
-    if given.size not in (1, size) or not np.isfinite(given).all():
-        raise bad(argument, value, wants)
+    if (np.ndim(value) and given.size != size) or not np.isfinite(given).all():
+        raise bad(argument, value if given.size < FEW else np.shape(value), wants)
     return np.broadcast_to(given, (size,)).astype(float)
 
 

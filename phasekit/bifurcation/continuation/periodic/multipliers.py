@@ -16,6 +16,9 @@ APART = 1e-14  # entries below the diagonal blocks that are rounding
 ROUNDED = 1e-11  # the same between multipliers of unlike size, whose relative error they are
 PASSES = 12
 WIDE = 24  # states from which LAPACK is faster
+MANY = 100  # states from which only those near and outside the unit circle are found
+COLUMNS = 12  # of the first subspace in which these are looked for
+CONVERGED = 1e-9  # residual of a multiplier, beside its size, that is rounding
 LARGEST = 709.0  # logarithm of the largest numbers
 ALIKE = 0.7  # difference of logarithms of multipliers that orthogonal iteration need not part
 LOST = 0.1  # relative change of a multiplier by errors of its matrices, from which it is not known
@@ -162,14 +165,54 @@ def _triangular_wide(G: Array, passes: int, Q: Array, R: Array, log: Array, turn
     turn[:] = start.T @ Q
 
 
+def leading(G: Array) -> tuple[Complex, float] | None:
+    """What `multipliers` finds, of very many states: those of no size to speak of are 0.
+
+    Subspace iteration through all matrices, with as many columns as bring one below `INSIDE`, until
+    the residuals of all above are rounding. None where they do not become so.
+    """
+    n = G.shape[-1]
+    log = float(np.sum(np.linalg.slogdet(G)[1])) if np.isfinite(G).all() else math.nan
+    if not math.isfinite(log):
+        return None
+    rng = np.random.default_rng(7)
+    columns = COLUMNS
+    while columns <= n // 2:
+        Q = rng.normal(size=(n, columns))
+        for _ in range(PASSES):
+            Q = np.linalg.qr(Q)[0]
+            Z = Q
+            with np.errstate(all="ignore"):
+                for one in G:
+                    Z = one @ Z
+            if not np.isfinite(Z).all():
+                return None
+            values, vectors = np.linalg.eig(Q.T @ Z)
+            sizes = np.abs(values)
+            off = np.linalg.norm(Z @ vectors - Q @ vectors * values, axis=0)
+            if np.all((off <= CONVERGED * sizes) | (sizes < INSIDE)):
+                if np.min(sizes) >= INSIDE:
+                    break  # more columns
+                found = np.zeros(n, dtype=complex)
+                held = off <= CONVERGED * sizes
+                found[: np.sum(held)] = sorted(values[held], key=abs, reverse=True)
+                return found, log
+            Q = Z
+        columns *= 2
+    return None
+
+
 def multipliers(G: Array) -> tuple[Complex, float]:
     """Eigenvalues of G_N ... G_1, largest first, and the logarithm of the size of their product.
 
     The product is brought to block triangular form by orthogonal iteration, each of whose blocks
     holds multipliers of like size: so small ones are as accurate, relative to themselves, as
-    large ones.
+    large ones. Of very many states only the largest are found so, and the rest are 0 (`leading`).
     """
     n = G.shape[-1]
+    few = leading(G) if n >= MANY else None
+    if few is not None:
+        return few
     Q, R, turn = np.empty((3, n, n))
     log, cut = np.empty((2, n))
     (iterate if n < WIDE else iterate_wide)(np.ascontiguousarray(G), Q, R, log, turn, cut)
