@@ -8,7 +8,7 @@ from typing import Any
 
 from phasekit.cli import Parser, common
 from phasekit.cli.values import ends
-from phasekit.errors import ConvergenceError, ParameterError
+from phasekit.errors import ParameterError
 
 
 def run(argv: Sequence[str]) -> None:
@@ -73,21 +73,22 @@ def _branches(
         starts = found if len(found) else None
     elif problem.start:
         starts = [[problem.start.get(state, 0.0) for state in problem.state]]
-    branches: list[Any] = list(diagram(problem, name, x0=starts, span=span))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", RuntimeWarning)
+        branches: list[Any] = list(
+            diagram(problem, name, x0=starts, span=span, cycles=options.cycles)
+        )
     lines = [repr(problem)]
-    for point in [point for branch in branches for point in branch.special_points]:
-        if point.kind == "end":
-            continue
-        at = ", ".join(f"{k} = {v:.8g}" for k, v in zip(problem.state, point.x, strict=True))
-        lines.append(f"{point.label} at {name} = {point.parameters[name]:.8g}: {at}")
-    if options.cycles:
-        for point in [p for branch in branches for p in branch.special("hopf")]:
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", RuntimeWarning)
-                    branches.append(point.switch())
-            except ConvergenceError as error:
-                lines.append(f"no cycles from HB at {name} = {point.parameters[name]:.8g}: {error}")
+    for branch in branches:
+        for point in branch.special_points:
+            if point.kind == "end":
+                continue
+            where = f"{name} = {point.parameters[name]:.8g}"
+            if branch.kind == "equilibrium":
+                x = zip(problem.state, point.x, strict=True)
+                where += ": " + ", ".join(f"{k} = {v:.8g}" for k, v in x)
+            lines.append(f"{point.label} at {where}")
+    lines += [str(one.message) for one in caught]
     more: dict[str, Any] = {"units": units} if units else {}
     more |= {"y": options.y} if options.y else {}
     common.save(plot.bifurcation_diagram(branches, angles=options.angles, **more), path)
@@ -99,7 +100,7 @@ def _options(parser: Parser) -> None:
     parser.add_argument(
         "--cycles",
         action="store_true",
-        help="of equations: periodic orbits from Hopf points as well",
+        help="of equations: periodic orbits from Hopf points and their doublings as well",
     )
     common.add_units(parser)
     parser.add_argument("--out", default="diagram.png", help="picture file (%(default)s)")

@@ -62,7 +62,10 @@ def bifurcation_curves(
     with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
         warnings.simplefilter("always")
         try:
-            branches = diagram(problem, first, x0=rests, span=ranges[first]) if len(rests) else ()
+            span = ranges[first]
+            branches = (
+                diagram(problem, first, x0=rests, span=span, cycles=False) if len(rests) else ()
+            )
         except PhasekitError as error:
             branches = ()
             missing.append(f"no branch of equilibria was followed: {error}")

@@ -56,6 +56,7 @@ _UNSTABLE_CYCLE: style.Look = {
 }
 #: Kinds of branches whose states have a range at each point.
 _RANGES = ("cycle", "boundary")
+_ORBITS = (*_RANGES, "connection")  # each point is an orbit
 #: What is said of a state of periodic orbits, and short names for narrow legends.
 _EXTREMES = ", max and min"
 _SHORT = {
@@ -63,6 +64,7 @@ _SHORT = {
     for word, short in (
         ("stable equilibrium", "stable"), ("unstable equilibrium", "unstable"),
         ("stable cycle", "st. cycle"), ("unstable cycle", "unst. cycle"),
+        ("connection", "connection"),
     )
     for more in ("", _EXTREMES)
 }  # fmt: skip
@@ -190,11 +192,13 @@ def branch(
             if circle is not None:
                 up, across = circle.unrolled(up, across)
             text = str(look["label"])
-            if one.kind in _RANGES and y in one.problem_state:
+            if one.kind in _ORBITS and y in one.problem_state:
                 text += _EXTREMES
             elif mixed and one.kind == "equilibrium" and text in ("stable", "unstable"):
                 text += " equilibrium"
             own = {**style.inked(look), "label": text}
+            if np.size(across) == 1:  # no line
+                own |= {"marker": "s", "linestyle": "none", "zorder": 4}
             (line,) = axes.plot(across * stretch[0], up * stretch[-1], **own)
             handles.setdefault(text, line)
         for across, up in _unproved(one, pair):
@@ -269,7 +273,7 @@ def _columns(
     """What to draw of which branch: of the states of periodic orbits the largest and the least."""
     branches, columns = [], []
     for one in several:
-        cycle = one.kind in _RANGES and y in one.problem_state
+        cycle = one.kind in _ORBITS and y in one.problem_state
         for name in (f"{y}_max", f"{y}_min") if cycle else (y,):
             branches.append(one)
             column = _column(one, "y", name, sel)
@@ -358,7 +362,12 @@ def _looks(one: Branch) -> list[style.Look]:
             for k in kinds
         ]
     looks = (_STABLE_CYCLE, _UNSTABLE_CYCLE) if one.kind == "cycle" else (_STABLE, _UNSTABLE)
-    return [looks[int(k != 0)] for k in points.n_unstable.values]
+    found = [looks[int(k != 0)] for k in points.n_unstable.values]
+    if one.kind == "cycle" and len(found) > 1:  # beside a Hopf point rounding decides
+        for end, beside, stop in ((0, 1, one.stops[0]), (-1, -2, one.stops[-1])):
+            if stop.reason == "hopf":
+                found[end] = found[beside]
+    return found
 
 
 def _size(one: Branch, pair: tuple[xr.DataArray, xr.DataArray]) -> float:

@@ -18,11 +18,11 @@ QUINTIC = pk.Problem(
 
 
 def test_cycles_of_a_hopf_point_follow_the_equilibria():
-    rest, cycles = pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles=True)
+    rest, cycles = pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3))
     assert [point.label for point in rest.special_points] == ["EP", "H", "EP"]
     (fold,) = cycles.special("LPC")
     assert fold["mu"] == pytest.approx(-0.25, abs=1e-9)
-    assert len(pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3))) == 1
+    assert len(pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles=False)) == 1
     with pytest.raises(pk.ParameterError, match="cycles"):
         pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles="all")
 
@@ -30,7 +30,7 @@ def test_cycles_of_a_hopf_point_follow_the_equilibria():
 def test_doublings_of_a_map_to_a_depth():
     logistic = pk.Problem("r*x*(1 - x)", "x", {"r": 2.5}, map=True)
     for depth, wanted in ((0, 1), (1, 2), (2, 3)):
-        found = pk.diagram(logistic, "r", x0=[0.6], span=(1.5, 3.6), depth=depth, cycles=True)
+        found = pk.diagram(logistic, "r", x0=[0.6], span=(1.5, 3.6), depth=depth)
         doublings = {round(p["r"], 9) for one in found for p in one.special("period_doubling")}
         exact = [3.0, 1.0 + np.sqrt(6.0), 3.544090359552]
         assert sorted(doublings)[:wanted] == pytest.approx(exact[:wanted], abs=1e-8)
@@ -38,8 +38,8 @@ def test_doublings_of_a_map_to_a_depth():
 
 def test_what_ends_for_its_number_of_points_is_said():
     few = pk.ContinuationOptions(max_points=25)
-    with pytest.warns(RuntimeWarning, match="not complete"):
-        pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), cycles=True, options=few)
+    with pytest.warns(RuntimeWarning, match="beyond on this family of periodic orbits from .*mu="):
+        pk.diagram(QUINTIC, "mu", x0=[0.0, 0.0], span=(-0.5, 0.3), options=few)
 
 
 @pytest.mark.slow
@@ -48,23 +48,27 @@ def test_a_family_between_two_hopf_points_is_followed_once():
         ["v - v**3/3 - w + I", "eps*(v + a - b*w)"], ("v", "w"),
         {"I": 0.0, "eps": 0.08, "a": 0.7, "b": 0.8},
     )  # fmt: skip
-    _, cycles = pk.diagram(nerve, "I", x0=[-1.2, -0.6], span=(0, 2), cycles=True)
+    _, cycles = pk.diagram(nerve, "I", x0=[-1.2, -0.6], span=(0, 2))
     assert [stop.reason for stop in cycles.stops] == ["hopf", "hopf"]
     assert len(cycles.special("LPC")) == 2
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:the homoclinic orbit")  # its mirror image is not found
 def test_cycles_of_lorenz_end_in_homoclinic_orbits():
     lorenz = pk.Problem(
         ["s*(y - x)", "r*x - y - x*z", "x*y - b*z"], ("x", "y", "z"),
         {"s": 10.0, "r": 0.5, "b": 8.0 / 3.0},
     )  # fmt: skip
-    found = pk.diagram(lorenz, "r", x0=[0.0, 0.0, 0.0], span=(0.5, 30.0), cycles=True)
+    found = pk.diagram(lorenz, "r", x0=[0.0, 0.0, 0.0], span=(0.5, 30.0))
     families = [one for one in found if isinstance(one, pk.CycleBranch)]
     ends = [one for one in found if isinstance(one, pk.ConnectionBranch)]
     both = [one for one in families if "hopf" in {stop.reason for stop in one.stops}]
     assert len(both) == 2
-    assert ends
+    assert len(ends) == 2  # an orbit, and its mirror image
+    left, right = (one.orbit(0).x.values for one in ends)
+    assert np.sign(left[np.argmax(abs(left))]) == -np.sign(right[np.argmax(abs(right))])
     for one in ends:
         assert one.points.r[0].item() == pytest.approx(13.92655740752, abs=1e-7)
+    names = {text.get_text() for text in pk.plot.branch(found).get_legend().get_texts()}
+    assert "connection, max and min" in names
+    assert not any(name.startswith("stable cycle") for name in names)

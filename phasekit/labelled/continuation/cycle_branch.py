@@ -12,6 +12,7 @@ import xarray as xr
 from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.stops import Stop
 from phasekit.bifurcation.continuation.walk import Found
+from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record
 from phasekit.labelled.continuation.checks import check_bounds, check_span
@@ -23,6 +24,8 @@ from phasekit.labels.arguments import bad
 from phasekit.numerics.waits import notice
 from phasekit.systems.cycle_families import clock_code
 from phasekit.systems.problem import Problem
+
+GUESSES = 5  # orbits at an end of a family from which its homoclinic orbit is looked for
 
 
 @dataclass(frozen=True)
@@ -52,13 +55,30 @@ class HomoclinicEnd(Stop):
         -------
         ConnectionBranch
         """
-        branch = self.branch
+        branch, last = self.branch, len(self.branch.path) - 1
         keywords = {"free": branch.parameter, **keywords}
-        place = 0 if self.side == 0 else len(branch.path) - 1
-        value = float(branch.path[place].orbit.y[1])
-        problem = branch.problem.replace(**{branch.parameter: value})
-        found: ConnectionBranch = onward("connection")(problem, branch.orbit(place), **keywords)
-        return found
+        failure: ConvergenceError | None = None
+        for step in range(min(GUESSES, last)):  # Newton's method may fail from the longest orbit
+            place = step if self.side == 0 else last - step
+            value = float(branch.path[place].orbit.y[1])
+            problem = branch.problem.replace(**{branch.parameter: value})
+            try:
+                found: ConnectionBranch = onward("connection")(
+                    problem, branch.orbit(place), **keywords
+                )
+            except ConvergenceError as error:
+                failure = failure or error
+                continue
+            if step == 0 or self._is_nearer(found, value):
+                return found
+        assert failure is not None
+        raise failure
+
+    def _is_nearer(self, found: ConnectionBranch, value: float) -> bool:
+        """Whether a connection lies not farther from the end than the orbit that led to it."""
+        at = found.problem.parameters[self.branch.parameter]
+        own = float(self.branch.path[0 if self.side == 0 else -1].orbit.y[1])
+        return bool(abs(at - own) <= abs(value - own))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -36,12 +36,12 @@ def diagram(
     x0: Any = None,
     span: Sequence[float],
     depth: int = 3,
-    cycles: bool = False,
+    cycles: bool = True,
     record: Any = None,
     options: ContinuationOptions | None = None,
     certify: bool = False,
 ) -> tuple[Branch, ...]:
-    """Follow all connected branches of equilibria, each once; of cycles, too, if asked.
+    """Follow all connected branches of equilibria and periodic orbits, each once.
 
     Parameters
     ----------
@@ -58,10 +58,11 @@ def diagram(
     depth : int, default 3
         How many times branches are switched in a row: 0 follows the starts only. So many times
         cycles, and fixed points of maps, are doubled.
-    cycles : bool, default False
+    cycles : bool, default True
         Whether periodic orbits, of maps too, are followed as well: from all Hopf points, through
         branch points and period doublings, up to the homoclinic orbits at their ends. They come
-        behind the branches of equilibria, as `CycleBranch` and `ConnectionBranch`.
+        behind the branches of equilibria, as `CycleBranch` and `ConnectionBranch`. False:
+        equilibria alone.
     record : mapping or sequence of str, optional
         As in `continuation`.
     options : ContinuationOptions, optional
@@ -88,8 +89,9 @@ def diagram(
     Those of other systems, of polynomials and of Fourier sums are computed at 33 values spread over
     the span: an isolated branch is missed only if it lies between two of these.
 
-    Families of periodic orbits that begin at no Hopf point are not looked for. What could not be
-    followed, and what ends for its number of points, is said in warnings.
+    Families of periodic orbits that begin at no Hopf point are not looked for. Warnings say what
+    could not be followed, and which branch ended for its number of points and where, so that what
+    lies beyond was not seen.
 
     Examples
     --------

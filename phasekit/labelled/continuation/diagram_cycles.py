@@ -69,7 +69,11 @@ def _connections(family: Branch) -> list[Branch]:
         try:
             found.append(stop.connection())
         except (ConvergenceError, ParameterError) as error:
-            _warn(f"the homoclinic orbit at the end of a family is not followed: {error}")
+            value = float(family.points[family.parameter][stop.side])
+            _warn(
+                f"the homoclinic orbit at the end of the family from {family.special_points[0]!r} "
+                f"at {family.parameter} = {value:.9g} is not followed: {error}"
+            )
     return found
 
 

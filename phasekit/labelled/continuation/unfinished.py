@@ -29,9 +29,16 @@ def announced(branch: Of) -> Of:
             else ", ContinuationOptions(max_points=...) allows more points"
         )
         warnings.warn(
-            f"the branch in {branch.parameter} is not complete, {'; '.join(ends)}; extend() "
-            f"continues it{more}",
+            f"the branch in {branch.parameter} is not complete, {'; '.join(ends)}; what "
+            f"lies beyond on this {_named(branch)} was not seen; extend() continues it{more}",
             RuntimeWarning,
             stacklevel=4,
         )
     return branch
+
+
+def _named(branch: Any) -> str:
+    """What a branch is, and at which point it begins."""
+    what = "family of periodic orbits" if branch.kind == "cycle" else f"{branch.kind} branch"
+    points = branch.special_points
+    return f"{what} from {points[0]!r}" if points else what
