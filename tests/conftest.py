@@ -204,7 +204,8 @@ def every_branch_is_checked():
         detect = set(walker.options.detect)
         if walker.kind == "equilibrium" and detect == {"fold", "branch_point", "hopf"}:
             curve = walker.curve
-            special = [one for one in placed if one.special.kind != "event"]
+            both = walker.in_order([*placed, *found.outside])
+            special = [one for one in both if one.special.kind != "event"]
             branch_invariants.check(curve, path, special, found.eigenvalues, curve.conservative)
         return found, placed, messages
 

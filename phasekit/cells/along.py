@@ -35,7 +35,6 @@ Array = npt.NDArray[np.float64]
 
 DEPTH = 3  # how many times branches are switched in a row
 SAME = 1e-7  # distance on scaled axes within which points of two branches are one
-ROUNDING = 1e-12  # part of a span by which a point at its end may lie outside
 #: How many times shorter steps are where a cell lacks what its neighbours have.
 CAREFUL = 5.0
 
@@ -157,12 +156,6 @@ class _Cell:
     missed: bool = False
     families: list[CycleFamily] = field(default_factory=list)
 
-    def _within(self, special: Special) -> bool:
-        """Whether a point lies in the span: a step may pass the fold next to a bound."""
-        (low, high), at = self.span, special.u[len(self.problem.state)]
-        room = ROUNDING * (high - low)
-        return bool(low - room <= at <= high + room)
-
     def points(self) -> list[tuple[Curve, Special]]:
         """The special points of all branches, once each, by their parameter."""
         found: list[tuple[Curve, Special]] = []
@@ -174,7 +167,7 @@ class _Cell:
                     for _, other in found
                     if KINDS[other.kind].label == KINDS[special.kind].label
                 )
-                if self._within(special) and all(np.max(gap) > SAME for gap in gaps):
+                if all(np.max(gap) > SAME for gap in gaps):
                     found.append((one.curve, special))
         n = len(self.problem.state)
         return sorted(found, key=lambda point: float(point[1].u[n]))

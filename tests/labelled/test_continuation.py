@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 
 import matplotlib
 import numba
@@ -868,3 +869,25 @@ def test_values_of_a_function_with_its_derivatives():
     )
     value, slope = problem.derivatives([2.0])
     assert (value.item(), slope.item()) == (12.0, 12.0)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("gap", [s * 10.0**-k for k in (3, 6, 9, 12) for s in (1, -1)])
+def test_folds_next_to_the_end_of_a_span_count_inside_it_alone(side, gap):
+    """Folds of mu + x - x^3 lie at -+ 2/3^1.5: that on one side stands gap outside the span."""
+    fold = 2 / 3**1.5
+    law = Problem("mu + x - x^3", "x", {"mu": 0.0})
+    end = side * (fold - gap)
+    span = (end, 1.0) if side < 0 else (-1.0, end)
+    roots = np.roots([-1.0, 0.0, 1.0, end])
+    for x0 in roots[np.abs(roots.imag) < 1e-12].real:
+        branch = continuation(law.replace(mu=end), "mu", x0=[x0], span=span)
+        at = np.array([s["mu"] for s in branch.special("LP")])
+        want = [-fold, fold] if gap < 0 else [-side * fold]
+        if gap == 1e-3 and -side * x0 > 3**-0.5:  # far enough that the branch ends there
+            want = []
+        np.testing.assert_allclose(np.sort(at), want, rtol=1e-14)
+        mu = branch.points.mu.values
+        assert span[0] <= mu.min() <= mu.max() <= span[1]
+        ends = [s.message for s in branch.special_points if s.kind == "end"]
+        assert all(re.match("mu met its (lower|upper) bound", words) for words in ends)

@@ -236,3 +236,14 @@ def test_counts_are_right_in_every_cell():
     exact = np.sum((np.abs(fold) < 0.9) & (nu[:, None, None] > 0), axis=2)
     assert ds.branch_status.values.max() == pk.BranchStatus.COMPLETE
     np.testing.assert_array_equal(ds.n_fold, exact)
+
+
+def test_folds_next_to_the_ends_of_a_span_leave_stability_exact():
+    """Both folds stand gap outside the span: two stable sheets hold all over it, or within."""
+    gap = np.sort([s * 10.0**-k for k in (3, 6, 9, 12) for s in (1, -1)])
+    nu = 3 * ((1 + gap) / 2) ** (2 / 3)
+    ds = pk.sweep(CUSP, nu=nu, along=("mu", (-1, 1)), of=ALL)
+    assert ds.n_fold.values.tolist() == (2 * (gap < 0)).tolist()
+    assert ds.n_stable.values.tolist() == [2] * len(gap)
+    want = np.minimum(1 + gap, 1)[:, None] * [-1, 1]
+    np.testing.assert_allclose(ds.hysteresis.values[:, 0], want, rtol=1e-14)

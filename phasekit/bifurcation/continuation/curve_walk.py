@@ -155,6 +155,6 @@ def _with_eigenvalues(
     path: Path, found: Specials, gaps: tuple[str, ...]
 ) -> tuple[Path, list[Placed], tuple[str, ...]]:
     """A path that knows its eigenvalues, its special points, and what is not certain of it."""
-    placed, eigenvalues, doubts = found
-    path = replace(path, eigenvalues=eigenvalues)
+    placed, eigenvalues, doubts, outside = found
+    path = replace(path, eigenvalues=eigenvalues, outside=outside)
     return path, placed, (*path.messages, *doubts, *gaps)

@@ -39,6 +39,7 @@ class Path:
     eigenvalues: npt.NDArray[np.complex128] | None = None  # of f_x, where slopes are kept
     messages: tuple[str, ...] = ()  # what is not certain about them
     ends: tuple[Any, Any] = (None, None)  # special points beyond its first and last point
+    outside: tuple[Any, ...] = ()  # special points beyond its bounds, between points inside
 
     @property
     def count(self) -> int:
@@ -59,6 +60,10 @@ class Path:
             slopes=slopes[kept] if isinstance(slopes, np.ndarray) else replace(slopes, u=u),
             start=self.start - first, residual=self.residual[kept], ends=ends,
             eigenvalues=None if self.eigenvalues is None else self.eigenvalues[kept],
+            outside=tuple(
+                replace(one, index=one.index - first)
+                for one in self.outside if first <= one.index < last - 1
+            ),
         )  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from phasekit.bifurcation.continuation.locate import locate
 from phasekit.bifurcation.continuation.path import Path
 from phasekit.bifurcation.continuation.placed import SAME, Placed, _distance, inside, unique
 from phasekit.bifurcation.continuation.points.event import events_of
-from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.two_parameters import find_on
 from phasekit.bifurcation.special_points import KINDS, looked_for
 from phasekit.numerics.waits import stage
@@ -31,6 +31,7 @@ class Specials(NamedTuple):
     placed: list[Placed]
     eigenvalues: npt.NDArray[np.complex128]
     messages: tuple[str, ...]
+    outside: tuple[Placed, ...] = ()  # those beyond the bounds, which one step passed twice
 
 
 def find(curve: Curve, path: Path) -> Specials:
@@ -46,7 +47,23 @@ def find(curve: Curve, path: Path) -> Specials:
             f"detect={[*curve.detect, 'neutral_saddle']} looks for them",
         )
     every = sorted([*placed, *events], key=_order)
-    return Specials(every, eigenvalues, messages)
+    outside = tuple(one for one in every if _outside(curve, one.special))
+    within = [one for one in every if not any(one is other for other in outside)]
+    return Specials(within, eigenvalues, messages, outside)
+
+
+#: Part of a span by which a point at its end may lie outside.
+ROUNDING = 1e-13
+
+
+def _outside(curve: Curve, special: Special) -> bool:
+    """Whether a point surely lies outside the bounds, between two points inside."""
+    m = curve.m
+    low, high = curve.low[:m], curve.high[:m]
+    span = np.where(np.isfinite(high - low), high - low, curve.scale[:m])
+    room = max(ROUNDING, curve.field.accuracy) * span
+    beyond = (special.u[:m] < low - room) | (special.u[:m] > high + room)
+    return special.status == CONVERGED and bool(beyond.any())
 
 
 #: What is said of a branch where the search was interrupted.

@@ -23,7 +23,8 @@ def stable_spans(one: Traced) -> Array:
     Between special points stability does not change, and the parameter does not turn back.
     """
     curve, path, n = one.curve, one.path, one.curve.n
-    breaks = [placed for placed in one.placed if placed.kind != "neutral_saddle"]
+    every = sorted((*one.placed, *path.outside), key=lambda placed: (placed.index, placed.along))
+    breaks = [placed for placed in every if placed.kind != "neutral_saddle"]
     values = path.eigenvalues
     assert values is not None
     growth = curve.growth(values)
