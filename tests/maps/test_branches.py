@@ -1,5 +1,6 @@
 """Maps of branches: special points, stability and hysteresis along a parameter in each cell."""
 
+import dataclasses
 import warnings
 
 import dask.array as da
@@ -8,6 +9,8 @@ import pytest
 import xarray as xr
 
 import phasekit as pk
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.cells import along
 
 AB = pk.Problem(
     ["-x + p1*(1 - x)*exp(y)", "-y + p1*p2*(1 - x)*exp(y) - p3*y"],
@@ -247,3 +250,30 @@ def test_folds_next_to_the_ends_of_a_span_leave_stability_exact():
     assert ds.n_stable.values.tolist() == [2] * len(gap)
     want = np.minimum(1 + gap, 1)[:, None] * [-1, 1]
     np.testing.assert_allclose(ds.hysteresis.values[:, 0], want, rtol=1e-14)
+
+
+@pytest.mark.parametrize("always", [False, True])
+def test_what_all_neighbours_have_is_looked_for_again_or_said_to_be_missed(monkeypatch, always):
+    """The walk of one cell sees no folds: at first, so that shorter steps find them; or ever."""
+    follow, default = along.equilibrium_curve, ContinuationOptions()
+
+    def blind(problem, parameter, span, options):
+        if problem.parameters["nu"] == 0.9 and (always or options.max_step == default.max_step):
+            options = dataclasses.replace(options, detect=())
+        return follow(problem, parameter, span, options)
+
+    monkeypatch.setattr(along, "equilibrium_curve", blind)
+    nu = np.array([0.5, 0.7, 0.9, 1.1, 1.3])
+    fold = np.outer(2 * (nu / 3) ** 1.5, [-1, 1])
+    status = [pk.BranchStatus.COMPLETE] * 5
+    if always:
+        fold[2], status[2] = np.nan, pk.BranchStatus.MISSED
+        with pytest.warns(RuntimeWarning, match="in 1 special points that all neighbours have"):
+            ds = pk.sweep(CUSP, nu=nu, along=("mu", (-1, 1)), of=ALL)
+    else:
+        ds = pk.sweep(CUSP, nu=nu, along=("mu", (-1, 1)), of=ALL)
+    assert ds.branch_status.values.tolist() == status
+    assert ds.n_fold.values.tolist() == [2, 2, 0 if always else 2, 2, 2]
+    np.testing.assert_allclose(ds.special_mu, fold, rtol=1e-12)
+    seen = np.isfinite(fold[:, 0])
+    np.testing.assert_allclose(ds.hysteresis.values[seen, 0], fold[seen], rtol=1e-12)

@@ -93,7 +93,7 @@ def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]
     curve : Curve
         Of equilibria in one parameter, its states not yet scaled.
     starts : iterable of ndarray
-        Unknowns of equilibria, shape (states + 1,).
+        Unknowns of equilibria, or guesses of them, shape (states + 1,).
     depth : int
         How many times branches are switched in a row.
 
@@ -109,16 +109,19 @@ def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]
             continue
         given = {i: curve.options.scales[name] for i, name in enumerate(curve.field.states)
                  if name in curve.options.scales}  # fmt: skip
-        found.append(traced(*begun(curve, u, given, "the start")))
+        own, start = begun(curve, u, given, "the start")
+        if any(lies_on(one.curve, one.path, start.u) for one in found):
+            continue  # a start that is no equilibrium leads to one of these
+        found.append(traced(own, start))
         queue = [(found[-1], 0)]
         while queue:
             one, level = queue.pop(0)
             for special in one.specials if level < depth else ():
-                if KINDS[special.kind].label != "BP" or _seen(passed, special.u):
+                if KINDS[special.kind].label != "BP" or seen(passed, special.u):
                     continue
                 passed.append((one.curve, special.u))
                 for tangent in special.others:
-                    if _led(found, one.curve, special.u, tangent):
+                    if led(((o.curve, o.path) for o in found), one.curve, special.u, tangent):
                         continue
                     slopes = one.curve.evaluate(special.u)[1]
                     found.append(traced(one.curve, Sample(special.u, tangent, slopes)))
@@ -126,7 +129,7 @@ def connected(curve: Curve, starts: Iterable[Array], depth: int) -> list[Traced]
     return found
 
 
-def _seen(passed: list[tuple[Curve, Array]], u: Array) -> bool:
+def seen(passed: Iterable[tuple[Curve, Array]], u: Array) -> bool:
     """Whether branches were switched at a point before."""
     return any(
         np.max(np.abs(turned(curve, u[: curve.m] - other[: curve.m]) / curve.scale[: curve.m]))
@@ -135,14 +138,15 @@ def _seen(passed: list[tuple[Curve, Array]], u: Array) -> bool:
     )
 
 
-def _led(found: list[Traced], curve: Curve, u: Array, tangent: Array) -> bool:
+def led(paths: Iterable[tuple[Curve, Path]], curve: Curve, u: Array, tangent: Array) -> bool:
     """Whether both ways along a tangent at a branch point were followed before."""
+    paths = list(paths)
     for sign in (1.0, -1.0):
         step = sign * curve.options.initial_step * tangent
         probe = curve.refine(u + step, curve.weight * tangent)
         if not probe.converged:
             return False
         inside = np.all((probe.u >= curve.low) & (probe.u <= curve.high))
-        if inside and not any(lies_on(one.curve, one.path, probe.u) for one in found):
+        if inside and not any(lies_on(*path, probe.u) for path in paths):
             return False
     return True
