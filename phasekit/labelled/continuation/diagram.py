@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.continuation.connected import led, seen
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.path import Path, join
-from phasekit.bifurcation.continuation.same_path import lies_on, turned
+from phasekit.bifurcation.continuation.same_path import lies_on
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch import Branch
@@ -20,7 +21,6 @@ from phasekit.labelled.continuation.checks import check_parameter, check_span
 from phasekit.labelled.continuation.continuation import continuation
 from phasekit.labelled.continuation.diagram_cycles import families
 from phasekit.labelled.continuation.point_curves import switch
-from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.labelled.continuation.unfinished import announced, interrupted
 from phasekit.labels.arguments import bad, reals, whole
 from phasekit.systems.problem import Problem, as_problem, system_of
@@ -149,17 +149,18 @@ def diagram(
 def _grow(branches: list[Branch], first: int, depth: int) -> None:
     """Switch at every branch point of the branches from `first` on, to a depth."""
     queue = [(branches[first], 0)]
-    done: list[SpecialPoint[Branch]] = []
+    passed: list[tuple[Curve, FloatArray]] = []
     while queue:
         branch, level = queue.pop(0)
         if level >= depth:
             continue
         for point in branch.special("BP"):
-            if any(_same(point, other) for other in done):
+            curve, u = branch.curve, point.special.u
+            if seen(passed, u):
                 continue
-            done.append(point)
+            passed.append((curve, u))
             for i, tangent in enumerate(point.special.others):
-                if _led(branches, point, tangent):
+                if led(map(path_of, branches), curve, u, tangent):
                     continue
                 other = announced(switch(point, direction=i))
                 branches.append(other)
@@ -172,27 +173,6 @@ def path_of(branch: Branch) -> tuple[Curve, Path]:
     """The traced path of a branch."""
     curve = branch.curve
     return curve, join(curve, branch.start, *branch.tracks)
-
-
-def _same(a: SpecialPoint[Branch], b: SpecialPoint[Branch]) -> bool:
-    curve = a.branch.curve
-    gap = turned(curve, a.special.u[: curve.m] - b.special.u[: curve.m])
-    return bool(np.max(np.abs(gap / curve.scale[: curve.m])) < 1e-6)
-
-
-def _led(branches: list[Branch], point: SpecialPoint[Branch], t: FloatArray) -> bool:
-    """Whether both ways along another branch are known already."""
-    curve = point.branch.curve
-    for sign in (1.0, -1.0):
-        step = sign * curve.options.initial_step * t
-        probe = curve.refine(point.special.u + step, curve.weight * t)
-        if not probe.converged:
-            return False
-        u = probe.u
-        inside = np.all((u >= curve.low) & (u <= curve.high))
-        if inside and not any(lies_on(*path_of(branch), u) for branch in branches):
-            return False
-    return True
 
 
 def _repeats(branches: list[Branch], fresh: Branch) -> bool:
