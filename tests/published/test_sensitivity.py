@@ -138,7 +138,10 @@ def test_branch_point_lost_and_kept():
     assert np.isnan(found.d_free.sel(parameter="e"))
     even = pk.Problem("(l + c)*x - x**3", "x", {"l": -1.0, "c": 0.0})
     (point,) = pk.continuation(even, "l", x0=[0.0], span=(-1, 1)).special("BP")
-    assert point.sensitivity.d_free.item() == pytest.approx(-1.0, abs=1e-12)
+    found = point.sensitivity
+    assert found.d_free.item() == pytest.approx(-1.0, abs=1e-12)
+    assert found.reason.item() == ""
+    assert all("not computed" in one for one in found.coefficient_reason.values.ravel())
 
 
 def test_points_of_codimension_two():
@@ -228,3 +231,44 @@ def test_doubling_of_roessler_moves_as_its_solutions_do(name):
     found = point.sensitivity.sel(parameter=name)
     for number, column in (("c", found.d_free.item()), ("period", found.d_period.item())):
         assert column == pytest.approx((up[number] - down[number]) / (2.0 * h), rel=2e-6)
+
+
+def test_torus_point_of_a_map():
+    """The delayed map r x (1 - y) + s z at its fixed point: det J = 1, tr J = 1 at s = 0."""
+    problem = pk.Problem(["r*x*(1 - y) + s", "x"], ("x", "y"), {"r": 1.8, "s": 0.0}, map=True)
+    branch = pk.continuation(problem, "r", x0=[0.44, 0.44], span=(1.5, 2.3))
+    (point,) = branch.special("torus")
+    found = point.sensitivity.sel(parameter="s")
+    # F = r x (1 - x) + s - x, G = det J - 1 = r x - 1 at r = 2, x = 1/2.
+    J = np.array([[-1.0, 0.25], [2.0, 0.5]])
+    wanted = -np.linalg.solve(J, [1.0, 0.0])
+    np.testing.assert_allclose([*found.d_state, *found.d_free], wanted[[0, 0, 1]], rtol=1e-11)
+
+
+def test_merging_equilibria_of_a_trigonometric_law():
+    """V' = B sin x - A sin x cos x - C cos x: |B|^(2/3) + |C|^(2/3) = |A|^(2/3) where it folds."""
+    problem = pk.Problem(
+        "-(B*sin(x) - A*sin(x)*cos(x) - C*cos(x))", "x", {"A": 1.0, "B": 0.1, "C": 0.2}
+    )
+    exact = pk.critical(pk.Coefficients(A=1.0, B=0.1, C=0.2), "B", (0.05, 2.0))
+    (merger,) = exact.critical_fold.values[np.isfinite(exact.critical_fold.values)]
+    assert merger == pytest.approx((1.0 - 0.2 ** (2 / 3)) ** 1.5, rel=1e-12)
+    phi = float(exact.critical_fold_phi.values[0])
+    for start in (phi + 0.3, phi - 0.3):
+        branch = pk.continuation(problem.replace(B=merger - 0.05), "B", x0=[start], span=(0.05, 2))
+        points = [one for one in branch.special("LP") if abs(one["B"] - merger) < 1e-9]
+        if points:
+            break
+    found = points[0].sensitivity
+    for name in ("A", "C"):
+        h = 1e-4
+        values = {"A": 1.0, "C": 0.2}
+        ends = [
+            pk.critical(pk.Coefficients(B=0.1, **{**values, name: values[name] + s * h}),
+            "B", (0.05, 2.0)).critical_fold.values[0] for s in (-2, -1, 1, 2)
+        ]  # fmt: skip
+        wanted = (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * h)
+        assert found.d_free.sel(parameter=name).item() == pytest.approx(wanted, rel=1e-9)
+    b, c = merger ** (1 / 3), 0.2 ** (1 / 3)
+    assert found.d_free.sel(parameter="C").item() == pytest.approx(-b / c, rel=1e-12)
+    assert found.d_free.sel(parameter="A").item() == pytest.approx(b, rel=1e-12)

@@ -260,6 +260,10 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
 
     free, states = list(point.branch.free), list(problem.state)
     coefficients = np.array([found.form[name] for name in form]).reshape(len(form), len(others))
+    causes = np.array(found.reasons, dtype=TEXT)
+    alone = f"derivatives of this coefficient are not computed at a point of kind {point.kind}"
+    lost = np.where(causes == "", np.array(alone, dtype=TEXT), causes)
+    without = np.where(np.isfinite(coefficients), np.array("", dtype=TEXT), lost)
     data: dict[str, Any] = {
         "d_free": (
             ("free", "parameter"), found.free,
@@ -274,8 +278,11 @@ def labelled(point: SpecialPoint[Any], found: equilibria.Sensitivity) -> xr.Data
             {"long_name": "derivative of the coefficients of the normal form"},
         ),
         "reason": (
-            "parameter", np.array(found.reasons, dtype=TEXT),
-            {"long_name": "why a derivative is not known; empty where it is"},
+            "parameter", causes, {"long_name": "why a derivative is not known; empty where it is"},
+        ),
+        "coefficient_reason": (
+            ("coefficient", "parameter"), without,
+            {"long_name": "why the derivative of a coefficient is not known; empty where it is"},
         ),
     }  # fmt: skip
     if found.period is not None:

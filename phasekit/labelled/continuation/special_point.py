@@ -220,7 +220,8 @@ class SpecialPoint(Generic[Of]):
             Over `parameter`, the others: ``d_free`` of the parameters of the branch (`free`),
             ``d_state`` (`state`), ``d_coefficient`` of those of the normal form (`coefficient`),
             of periodic orbits instead ``d_period``, and ``d_number`` of the period and the
-            extremes and means of states (`number`); ``reason`` says why a column is NaN.
+            extremes and means of states (`number`); ``reason`` says why a column is NaN,
+            ``coefficient_reason`` why a coefficient is, as all those of branch points are.
             Units are those of coordinates ``free_units``, ``state_units`` over
             ``parameter_units``; empty where the problem has none.
 
