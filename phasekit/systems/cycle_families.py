@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -10,16 +11,20 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import starts
+from phasekit.bifurcation.continuation.periodic import adapt, starts
 from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
 from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.bifurcation.continuation.points.hopf_families import Family, critical_pairs, families
 from phasekit.bifurcation.continuation.points.special import Special
 from phasekit.errors import ConvergenceError
 from phasekit.labels.arguments import bad
+from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human
 from phasekit.systems.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
+
+FIRST = 2 * adapt.LEAST  # intervals of the coarsest first mesh
+PRODUCTS = 5  # matrices an interval of the elimination and of the products of multipliers
 
 
 def cycles_of(
@@ -32,7 +37,14 @@ def cycles_of(
     multiple: int = 1,
     fixed: bool = False,
 ) -> Cycles:
-    """The periodic orbits of a problem over some of its parameters."""
+    """The periodic orbits of a problem over some of its parameters.
+
+    Raises
+    ------
+    ParameterError
+        If no memory holds the equations of one of them.
+    """
+    refuse_states(len(problem.state), options)
     names = list(problem.parameters)
     active = tuple(names.index(name) for name in free)
     par = np.array(list(problem.parameters.values()))
@@ -47,6 +59,26 @@ def cycles_of(
         clock_code(problem, active), multiple, turns, scale, high - low, low, high, period,
         options, fixed,
     )  # fmt: skip
+
+
+def refuse_states(n: int, options: ContinuationOptions) -> None:
+    """Refuse orbits whose equations on a first mesh no memory would hold, before any work.
+
+    Raises
+    ------
+    ParameterError
+    """
+    count = options.intervals or FIRST
+    # Matrices of n x n an interval: derivatives, condensed equations, their elimination, products.
+    needed = 8 * n * n * count * (2 * options.degree + PRODUCTS)
+    available = available_memory() if needed > ALWAYS else None
+    if available is not None and needed > SHARE * available:
+        most = int(n * math.sqrt(SHARE * available / needed))
+        raise bad(
+            "state", n, f"at most {most:,} states for periodic orbits on {count} intervals",
+            f"equations of one would take {human(needed)}, {human(int(SHARE * available))} are "
+            "free; ContinuationOptions(intervals=..., degree=...) of fewer take less",
+        )  # fmt: skip
 
 
 def clock_code(problem: Problem, active: tuple[int, ...]) -> int:

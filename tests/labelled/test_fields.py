@@ -409,6 +409,20 @@ def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):
         pk.continuation(problem, "a", span=(0.0, 1.0))
 
 
+def test_orbits_that_no_memory_holds_are_refused_before_any_work(monkeypatch):
+    from phasekit.systems import cycle_families
+
+    monkeypatch.setattr(cycle_families, "available_memory", lambda: 10**9)
+    n = 1000
+    problem = pk.Problem(lambda u, a: a - u, n, {"a": 0.0}, jac=-sp.eye_array(n))
+    samples = np.tile(np.sin(np.linspace(0.0, 6.0, 9))[:, None], n)
+    with pytest.raises(pk.ParameterError, match="state: got 1000, wants at most 6.. states"):
+        pk.periodic_orbit(problem, samples, period=6.0)
+    options = pk.ContinuationOptions(intervals=16, degree=2)
+    with pytest.raises(pk.ParameterError, match="at most 8.. states .* on 16 intervals"):
+        pk.periodic_orbit(problem, samples, period=6.0, options=options)
+
+
 def test_what_is_not_looked_for_is_said():
     options = pk.ContinuationOptions(detect=("fold", "neutral_saddle"), max_points=3)
     branch = pk.continuation(bratu(20), "lam", span=(0.0, 4.0), options=options)
