@@ -166,7 +166,8 @@ def sweep(
         sweep_into(place, request, options, progress)
         ds = open_map(store)
         _warn_of_incomplete(system, ds)
-        _warn_of_branches(ds)
+        if along is not None:
+            _warn_of_branches(ds)
         return ds
     for name, value in {
         "chunks": chunks, "workers": workers, "client": client, "force": force or None
@@ -181,7 +182,8 @@ def sweep(
     warn_of_invalid(request.system.declared, request.system.parameters, stacklevel=3)
     ds = _computed(request, progress)
     _warn_of_incomplete(system, ds)
-    _warn_of_branches(ds)
+    if along is not None:
+        _warn_of_branches(ds)
     if target is not None:
         target.write(ds)
     return ds
@@ -205,7 +207,7 @@ def _warn_of_incomplete(system: System, ds: xr.Dataset) -> None:
 
 def _warn_of_branches(ds: xr.Dataset) -> None:
     """Say in how many cells a map may lack branches or special points, and why."""
-    if "branch_status" not in ds or ds["branch_status"].chunks is not None:
+    if ds["branch_status"].chunks is not None:
         return
     words = {
         BranchStatus.UNPROVED: "it is not proved that all equilibria at the ends of the span are "

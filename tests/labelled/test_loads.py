@@ -240,7 +240,7 @@ WRONG = [
     (lambda: pk.rotators(None, 0.1, 0.2), "None"),
     (lambda: pk.rotators(DISK, pk.flow(DISK, 0.1, 0.2, 1.0), 0.3), "^dphi: got 0.3, wants nothing"),
     (lambda: pk.rotators(DISK, MAP), "^phi: got a Dataset without 'motion_phi'"),
-    (lambda: pk.bearing_forces(BARE, 0.1, 0.2), r"^m: got nothing.*replace\(m="),
+    (lambda: pk.bearing_forces(BARE, 0.1, 0.2), r"^m, half_span: got nothing.*replace\(m="),
     (
         lambda: pk.bearing_forces(DISK.replace(half_span=None), 0.1, 0.2),
         r"^half_span: got nothing.*replace\(half_span=",
@@ -262,12 +262,12 @@ WRONG = [
     ),
     (lambda: MAP.phasekit.bearing_forces(mass=2.0), "parameter of GyroRotorDisk 'mass' is unknown"),
     (lambda: MAP.phasekit.bearing_forces(m=-2.0), "^m: got -2.0, wants a number > 0"),
-    (lambda: pk.sweep(BARE, beta=[0.1], of="separatrix_forces"), "^m: got nothing"),
+    (lambda: pk.sweep(BARE, beta=[0.1], of="separatrix_forces"), "^m, half_span: got nothing"),
     (
         lambda: pk.sweep(pk.Reduced(0.1, 0.2), lam=[0.1], of="separatrix_forces"),
         "no such parameter",
     ),
-    (lambda: pk.sweep(DISK, beta=[0.1], of="bearing_forces"), "^state_phi: got nothing"),
+    (lambda: pk.sweep(DISK, beta=[0.1], of="bearing_forces"), "^state_phi, state_dphi: got"),
 ]
 
 

@@ -279,7 +279,7 @@ CHANGES = {
     "formulas in formulas": put("problem", "f", [["x"]]),
     "too many formulas": put("problem", "f", ["x", "x"]),
     "another number of states": lambda spec: spec["problem"].update(f=["x", "y"], state=["x", "y"]),
-    "periods": put("problem", "periods", {"x": "2*pi"}),
+    "periods": put("problem", "periods", {"x": "two"}),
     "conservative": put("problem", "conservative", "yes"),
     "no problem": drop("problem"),
     "a null problem": put("problem", None),

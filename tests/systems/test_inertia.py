@@ -148,7 +148,7 @@ def test_it_goes_where_systems_go():
     section = pk.poincare_section(SLIDER, 1.0, 0.5, section="dtheta", n=2)
     assert section.sizes["crossing"] == 2
     assert pk.plot.phase_portrait(SLIDER).lines
-    with pytest.raises(pk.ParameterError, match="wants a value for steady_rotations of Slider"):
+    with pytest.raises(pk.ParameterError, match="wants values for steady_rotations of Slider"):
         pk.sweep(many, of="support_speed")
 
 
