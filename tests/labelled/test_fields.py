@@ -409,6 +409,35 @@ def test_points_that_no_memory_holds_are_refused_before_the_first(monkeypatch):
         pk.continuation(problem, "a", span=(0.0, 1.0))
 
 
+@pytest.mark.slow
+def test_leading_multipliers_are_those_of_the_variational_equations():
+    """By the midpoint rule with Richardson's extrapolation, along the orbit of a field."""
+    from scipy.interpolate import CubicSpline
+    from scipy.sparse.linalg import splu
+
+    m = 51
+    problem, start, _ = brusselator(m)
+    _, found = hopf_points_of(problem, start, 0.8)
+    cycles = found[0].switch(options=pk.ContinuationOptions(max_points=2))
+    orbit = cycles.orbit(2)
+    length, period = float(orbit.l), float(orbit.period)
+    states = np.array([orbit[name].values for name in problem.state]).T
+    along = CubicSpline(orbit.time.values, states)
+
+    def leading(count):
+        step, whole, one = period / count, np.eye(2 * m), sp.eye_array(2 * m, format="csc")
+        for k in range(count):
+            half = 0.5 * step * problem.jac(along((k + 0.5) * step), length)
+            whole = splu(sp.csc_array(one - half)).solve((one + half) @ whole)
+        values = np.linalg.eigvals(whole)
+        return values[np.lexsort((values.imag, -np.abs(values).round(9)))][:4]
+
+    exact = (4.0 * leading(800) - leading(400)) / 3.0
+    for one in exact:
+        assert np.min(np.abs(orbit.multiplier.values - one)) < 2e-6
+    assert int(cycles.points.n_unstable[2]) == 0
+
+
 def test_orbits_that_no_memory_holds_are_refused_before_any_work(monkeypatch):
     from phasekit.systems import cycle_families
 
