@@ -124,6 +124,10 @@ def test_diagram_of_equations_names_what_is_on_it(tmp_path, capsys):
     )
     assert main(["diagram", "normal.toml", "--m", "-1:1", "--out", "d.png"]) == 0
     assert "H at m = 0:" in capsys.readouterr().out.replace("-0:", "0:")
+    asked = ["diagram", "normal.toml", "--m", "-1:1", "--cycles", "--out", "c.png"]
+    assert main(asked) == 0
+    assert "H at m = 0:" in capsys.readouterr().out.replace("-0:", "0:")
+    assert (tmp_path / "c.png").stat().st_size > 5_000
 
 
 @pytest.mark.slow
