@@ -77,6 +77,10 @@ def phase_response(orbit: xr.Dataset, direct: bool = False, *, system: Any = Non
     >>> response.phase_response.dims, bool(response.phase_response_error < 1e-6)
     (('time', 'state'), True)
     """
+    given_as: Any = orbit
+    if not isinstance(given_as, xr.Dataset):
+        hint = "orbit = pk.periodic_orbit(system, [...]) finds one from a state nearby"
+        raise bad("orbit", orbit, "a Dataset, such as pk.periodic_orbit returns", hint)
     flag("direct", direct)
     problem = _problem_of(orbit, system)
     if "multiplier" in orbit:

@@ -447,11 +447,17 @@ class Branch:
     if not TYPE_CHECKING:
 
         def __getattr__(self, name: str) -> Any:
-            """An older name, with a warning."""
+            """An older name, with a warning; of another the way to what it names."""
             if name == "known":
                 deprecate("Branch.known()", "(Branch.curve, Branch.problem)")
                 return lambda: (self.walker.curve, self.problem)
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            text = f"{type(self).__name__!r} object has no attribute {name!r}"
+            single = name.removesuffix("s").removesuffix("_point")
+            if single in SPECIAL:
+                text += f'; branch.special("{single}") gives these points'
+            elif single in ("eigenvalue", "multiplier", "stability", "value", "data"):
+                text += "; branch.points is a Dataset of the values along the branch"
+            raise AttributeError(text)
 
     def save(self, path: str | PathLike[str], *, overwrite: bool = False) -> None:
         """Save everything, to be loaded and extended exactly.
