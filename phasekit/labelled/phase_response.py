@@ -77,12 +77,8 @@ def phase_response(orbit: xr.Dataset, direct: bool = False, *, system: Any = Non
     >>> response.phase_response.dims, bool(response.phase_response_error < 1e-6)
     (('time', 'state'), True)
     """
-    given_as: Any = orbit
-    if not isinstance(given_as, xr.Dataset):
-        hint = "orbit = pk.periodic_orbit(system, [...]) finds one from a state nearby"
-        raise bad("orbit", orbit, "a Dataset, such as pk.periodic_orbit returns", hint)
-    flag("direct", direct)
     problem = _problem_of(orbit, system)
+    flag("direct", direct)
     if "multiplier" in orbit:
         _slowest(orbit["multiplier"].values)
     cycles, found = _solved(problem, orbit)
@@ -131,7 +127,9 @@ def _slowest(multipliers: npt.NDArray[np.complex128]) -> float:
 def _problem_of(orbit: Any, system: Any) -> Problem:
     """The problem of an orbit at its parameters."""
     if not isinstance(orbit, xr.Dataset) or "time" not in orbit.dims or "period" not in orbit:
-        raise bad("orbit", orbit, "what pk.periodic_orbit or branch.orbit(i) returns")
+        raise bad(
+            "orbit", orbit, "what pk.periodic_orbit(system, state) or branch.orbit(i) returns"
+        )
     if system is not None:
         problem = as_problem(system, moving=True)
     else:

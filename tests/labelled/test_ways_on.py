@@ -14,8 +14,9 @@ BRANCH = pk.continuation(LINE, "mu", x0=[1.0], span=(-1, 2))
         ("folds", 'branch.special("fold")'),
         ("hopf", 'branch.special("hopf")'),
         ("hopf_points", 'branch.special("hopf")'),
-        ("eigenvalues", "branch.points"),
-        ("stability", "branch.points"),
+        ("eigenvalues", "each of branch.special_points has eigenvalues"),
+        ("stability", "branch.points.n_unstable"),
+        ("data", "branch.points"),
         ("nothing", "no attribute 'nothing'"),
     ],
 )

@@ -455,7 +455,10 @@ class Branch:
             single = name.removesuffix("s").removesuffix("_point")
             if single in SPECIAL:
                 text += f'; branch.special("{single}") gives these points'
-            elif single in ("eigenvalue", "multiplier", "stability", "value", "data"):
+            elif single in ("eigenvalue", "stability"):
+                text += "; branch.points.n_unstable counts unstable directions, and each of "
+                text += "branch.special_points has eigenvalues"
+            elif single in ("value", "data"):
                 text += "; branch.points is a Dataset of the values along the branch"
             raise AttributeError(text)
 
