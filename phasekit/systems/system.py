@@ -459,8 +459,10 @@ def as_system(system: Any, *, rung: type[Law] = Law, what: str = "") -> System:
         hint = "it is a class: call it with its parameters"
     elif hasattr(system, "data_vars"):
         hint = "a map gives its system back by ds.phasekit.system()"
-    else:
-        hint = getattr(system, "answered_by", "")
+    elif hasattr(system, "answered_by"):
+        hint = system.answered_by
+    elif callable(system) and issubclass(MODELS["Problem"].rung, rung):
+        hint = "pk.Problem(f, state=..., parameters=...) makes one"
     names = [name for name, kind in MODELS.items() if issubclass(kind.rung, rung)]
     raise bad("system", system, f"one of {', '.join(names)}", hint)
 

@@ -29,3 +29,9 @@ def test_a_branch_says_where_its_values_are(name, words):
 def test_the_response_of_a_phase_asks_for_an_orbit():
     with pytest.raises(pk.ParameterError, match=r"orbit: got .*pk\.periodic_orbit\(system"):
         pk.phase_response(LINE, [1.0])
+
+
+@pytest.mark.parametrize("function", [pk.equilibria, pk.flow], ids=lambda f: f.__name__)
+def test_a_function_is_told_what_makes_a_system_of_it(function):
+    with pytest.raises(pk.ParameterError, match=r"function, wants .*pk\.Problem\(f, state="):
+        function(lambda x: x)
