@@ -39,11 +39,11 @@ from phasekit.bifurcation.continuation.kernels.defining import (
     HOPF,
     TORUS,
 )
-from phasekit.bifurcation.continuation.periodic.on_curves import OrbitTest
 from phasekit.bifurcation.continuation.points.curve_test import CurveTest
 from phasekit.bifurcation.special_points import PointKind
 from phasekit.bifurcation.special_points import look_for as add_point_test
 from phasekit.bifurcation.special_points import register as add_point_kind
+from phasekit.cycles.on_curves import OrbitTest
 from phasekit.laws.ladder import Conservative, Flow, Map, Routhian, Standing, Trait
 from phasekit.laws.terms import Rate
 from phasekit.laws.trigonometric import Trigonometric

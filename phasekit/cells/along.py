@@ -16,10 +16,10 @@ from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.continuation.same_path import turned
-from phasekit.bifurcation.continuation.stable_spans import most, overlaps, stable_spans
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.along_cycles import CycleFamily, families_of
 from phasekit.cells.equations import each_cell, problem_without_values
+from phasekit.cycles.stable_spans import most, overlaps, stable_spans
 from phasekit.errors import BranchStatus, ConvergenceError, PointStatus, SpecialPointKind
 from phasekit.labels.arguments import bad, pair, unknown
 from phasekit.laws.equations import equations_of

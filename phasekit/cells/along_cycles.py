@@ -10,12 +10,12 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import collocation
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
-from phasekit.bifurcation.continuation.stable_spans import stable_cycles
 from phasekit.bifurcation.continuation.stops import Stop
 from phasekit.bifurcation.continuation.walk import run, search
+from phasekit.cycles import collocation
+from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.stable_spans import stable_cycles
 from phasekit.systems.cycle_families import hopf_families, hopf_family
 from phasekit.systems.problem import Problem
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import collocation, starts
-from phasekit.bifurcation.continuation.periodic.adjoint import adjoint
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
+from phasekit.cycles import collocation, starts
+from phasekit.cycles.adjoint import adjoint
+from phasekit.cycles.cycles import Cycles, Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.branch_points import attrs_of

@@ -225,7 +225,7 @@ def _with_period(
 def _of_orbit(
     motion: xr.Dataset, found: dict[str, xr.DataArray], harmonics: int | None
 ) -> xr.Dataset:
-    from phasekit.bifurcation.continuation.periodic.fourier import coefficients
+    from phasekit.cycles.fourier import coefficients
 
     count, period = int(motion["n_intervals"]), float(motion["period"])
     t = np.asarray(motion["time"].values, float)

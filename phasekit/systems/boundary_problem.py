@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NoReturn, Self
 import numpy as np
 
 from phasekit.bifurcation.continuation.functions import Formula
-from phasekit.bifurcation.continuation.periodic.bounded import (
+from phasekit.cycles.bounded import (
     Condition,
     EndFormulas,
     EndFunction,

@@ -11,11 +11,11 @@ import numpy.typing as npt
 from phasekit.bifurcation.continuation.curve import Curve
 from phasekit.bifurcation.continuation.fields import SymbolicField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import adapt, starts
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
-from phasekit.bifurcation.continuation.periodic.point import Point, point_of
 from phasekit.bifurcation.continuation.points.hopf_families import Family, critical_pairs, families
 from phasekit.bifurcation.continuation.points.special import Special
+from phasekit.cycles import adapt, starts
+from phasekit.cycles.cycles import Cycles, Solution
+from phasekit.cycles.point import Point, point_of
 from phasekit.errors import ConvergenceError
 from phasekit.labels.arguments import bad
 from phasekit.labels.grid import ALWAYS, SHARE, available_memory, human

@@ -7,9 +7,9 @@ import pytest
 from numpy.polynomial import Polynomial
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.periodic import along, collocation, kernels
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.multipliers import across, multipliers
+from phasekit.cycles import along, collocation, kernels
+from phasekit.cycles.cycles import Cycles
+from phasekit.cycles.multipliers import across, multipliers
 from phasekit.numerics import differences
 
 

@@ -9,9 +9,9 @@ import pytest
 import phasekit
 import phasekit as pk
 from phasekit.bifurcation.continuation import locate
-from phasekit.bifurcation.continuation.periodic import events
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.special_points import KINDS, TESTS
+from phasekit.cycles import events
 from phasekit.plot.parts.style import POINTS_OF
 
 #: Where special points are made, and by which calls.

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.periodic import collocation, kernels, multipliers, wide
+from phasekit.cycles import collocation, kernels, multipliers, wide
 
 
 @pytest.mark.parametrize("forced", [False, True], ids=["autonomous", "forced"])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.periodic.linear import Linear
-from phasekit.bifurcation.continuation.periodic.normal_forms import at_fold
+from phasekit.cycles.linear import Linear
+from phasekit.cycles.normal_forms import at_fold
 from phasekit.errors import ConvergenceError
 
 #: I, the period and a b at the fold with the smaller I, by eps. They are those of the return map P

@@ -14,8 +14,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import phasekit as pk
-from phasekit.bifurcation.continuation.periodic import trace
-from phasekit.bifurcation.continuation.periodic.cycles import MOST
+from phasekit.cycles import trace
+from phasekit.cycles.cycles import MOST
 
 ALL = os.environ.get("PHASEKIT_PUBLISHED") == "all"
 more = pytest.mark.skipif(not ALL, reason="longer; PHASEKIT_PUBLISHED=all runs it")

@@ -10,11 +10,11 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import collocation, starts
-from phasekit.bifurcation.continuation.periodic.bounded import Bounded, Condition
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
-from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.bifurcation.continuation.walk import run
+from phasekit.cycles import collocation, starts
+from phasekit.cycles.bounded import Bounded, Condition
+from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.cycles import Orbit
 from phasekit.errors import ConvergenceError
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import check_parameter

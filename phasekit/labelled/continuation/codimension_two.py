@@ -21,8 +21,6 @@ from phasekit.bifurcation.continuation.curve_walk import CurveWalk
 from phasekit.bifurcation.continuation.derivatives import Derivatives
 from phasekit.bifurcation.continuation.kernels.defining import EQUILIBRIUM, FOLD, HOPF
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import starts
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
 from phasekit.bifurcation.continuation.points.bogdanov_takens import chain
 from phasekit.bifurcation.continuation.points.pair import normal_form, plane_of
 from phasekit.bifurcation.continuation.points.special import Special
@@ -30,6 +28,8 @@ from phasekit.bifurcation.continuation.reduction import simple
 from phasekit.bifurcation.continuation.two_parameters import two_parameter_curve
 from phasekit.bifurcation.continuation.walk import run
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.cycles import starts
+from phasekit.cycles.cycle_walk import CycleWalk
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, branch_of

@@ -13,9 +13,10 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import collocation, starts
-from phasekit.bifurcation.continuation.periodic.bounded import Bounded
-from phasekit.bifurcation.continuation.periodic.connections import (
+from phasekit.bifurcation.continuation.walk import run
+from phasekit.cycles import collocation, starts
+from phasekit.cycles.bounded import Bounded
+from phasekit.cycles.connections import (
     Ends,
     Rest,
     ends_of,
@@ -23,9 +24,8 @@ from phasekit.bifurcation.continuation.periodic.connections import (
     planes,
     rest_near,
 )
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
-from phasekit.bifurcation.continuation.periodic.cycles import Orbit, Solution
-from phasekit.bifurcation.continuation.walk import run
+from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.cycles import Orbit, Solution
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.bounded_start import bounded_of

@@ -9,9 +9,9 @@ from typing import Any, Self, cast
 import numpy as np
 import xarray as xr
 
-from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.stops import Stop
 from phasekit.bifurcation.continuation.walk import Found
+from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, Place, Record

@@ -16,8 +16,8 @@ import numpy as np
 import xarray as xr
 
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.cycles.cycles import Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.checks import check_options
 from phasekit.labelled.continuation.cycle_branch import CycleBranch

@@ -9,14 +9,14 @@ import numpy as np
 
 from phasekit.bifurcation.continuation.fields import refuse_uncompiled
 from phasekit.bifurcation.continuation.functions import Formula
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.functionals import (
+from phasekit.bifurcation.special_points import looked_for
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.functionals import (
     Functional,
     OfOrbit,
     number_names,
 )
-from phasekit.bifurcation.continuation.periodic.on_curves import CYCLE
-from phasekit.bifurcation.special_points import looked_for
+from phasekit.cycles.on_curves import CYCLE
 from phasekit.errors import ParameterError
 from phasekit.labelled.continuation.user_events import ending, named
 from phasekit.labels.arguments import bad

@@ -9,12 +9,12 @@ import numpy as np
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import starts
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Solution
-from phasekit.bifurcation.continuation.periodic.extended import Extended, extended
-from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.walk import run
+from phasekit.cycles import starts
+from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.cycles import Cycles, Solution
+from phasekit.cycles.extended import Extended, extended
+from phasekit.cycles.point import Point
 from phasekit.labelled.continuation.branch import branch_of
 from phasekit.labelled.continuation.checks import (
     check_options,

@@ -10,16 +10,16 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from phasekit.bifurcation.continuation.periodic import collocation
-from phasekit.bifurcation.continuation.periodic.bounded import Bounded
-from phasekit.bifurcation.continuation.periodic.connections import ends_of, spectra, truncation
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.extended import Extended
-from phasekit.bifurcation.continuation.periodic.fourier import coefficients
-from phasekit.bifurcation.continuation.periodic.point import Point, critical_count, vertical
 from phasekit.bifurcation.continuation.walk import Found
 from phasekit.bifurcation.special_points import KINDS
 from phasekit.cells.schema import dataset_attrs
+from phasekit.cycles import collocation
+from phasekit.cycles.bounded import Bounded
+from phasekit.cycles.connections import ends_of, spectra, truncation
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.extended import Extended
+from phasekit.cycles.fourier import coefficients
+from phasekit.cycles.point import Point, critical_count, vertical
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.harmonic_record import Fourier
 from phasekit.systems.problem import Problem

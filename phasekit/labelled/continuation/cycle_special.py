@@ -8,9 +8,9 @@ from typing import Any, ClassVar
 
 import xarray as xr
 
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles
-from phasekit.bifurcation.continuation.periodic.family import Found
 from phasekit.bifurcation.special_points import KINDS
+from phasekit.cycles.cycles import Cycles
+from phasekit.cycles.family import Found
 from phasekit.labelled.continuation.cycle_points import orbit_dataset, parameters_at
 from phasekit.labelled.continuation.onward import Of
 from phasekit.labelled.continuation.special_point import SpecialPoint, fixed

@@ -11,14 +11,14 @@ import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import starts
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.point import Point
 from phasekit.bifurcation.continuation.points.hopf_families import (
     Family,
 )
 from phasekit.bifurcation.continuation.walk import run
+from phasekit.cycles import starts
+from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.point import Point
 from phasekit.errors import ConvergenceError
 from phasekit.inputs import is_whole
 from phasekit.labelled.continuation.branch import Branch, branch_of

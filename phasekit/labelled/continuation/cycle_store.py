@@ -15,14 +15,14 @@ import numpy as np
 import numpy.typing as npt
 
 from phasekit.bifurcation.continuation.curve import Stop
-from phasekit.bifurcation.continuation.periodic.bounded import Bounded
-from phasekit.bifurcation.continuation.periodic.connections import Ends, ends_of
-from phasekit.bifurcation.continuation.periodic.cycle_walk import CycleWalk
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.extended import Extended
-from phasekit.bifurcation.continuation.periodic.family import Tracks
-from phasekit.bifurcation.continuation.periodic.point import Point, State
-from phasekit.bifurcation.continuation.periodic.trace import Track
+from phasekit.cycles.bounded import Bounded
+from phasekit.cycles.connections import Ends, ends_of
+from phasekit.cycles.cycle_walk import CycleWalk
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.extended import Extended
+from phasekit.cycles.family import Tracks
+from phasekit.cycles.point import Point, State
+from phasekit.cycles.trace import Track
 from phasekit.labelled.continuation.bounded_start import conditions_of
 from phasekit.labelled.continuation.branch_stored import Stored, damaged
 from phasekit.labelled.continuation.cycle_branch import ConnectionBranch, CycleBranch

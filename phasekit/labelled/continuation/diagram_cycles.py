@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from phasekit.bifurcation.continuation.periodic.functionals import numbers_of_orbit
+from phasekit.cycles.functionals import numbers_of_orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.cycle_branch import HomoclinicEnd

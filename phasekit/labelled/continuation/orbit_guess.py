@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from phasekit.bifurcation.continuation.periodic import collocation, starts
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit, Solution
+from phasekit.cycles import collocation, starts
+from phasekit.cycles.cycles import Cycles, Orbit, Solution
 from phasekit.labelled.continuation.cycle_points import orbit_dataset
 from phasekit.labels.arguments import bad
 from phasekit.systems.cycle_families import first_point

@@ -13,9 +13,9 @@ import xarray as xr
 
 from phasekit.bifurcation.continuation.code_fields import PythonField
 from phasekit.bifurcation.continuation.options import ContinuationOptions
-from phasekit.bifurcation.continuation.periodic import along, collocation, starts
-from phasekit.bifurcation.continuation.periodic.cycles import Orbit
 from phasekit.cells.schema import dataset_attrs
+from phasekit.cycles import along, collocation, starts
+from phasekit.cycles.cycles import Orbit
 from phasekit.errors import ConvergenceError, ParameterError
 from phasekit.inputs import call_checked
 from phasekit.labelled.continuation.checks import check_options

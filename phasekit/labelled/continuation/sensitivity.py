@@ -11,11 +11,11 @@ import numpy.typing as npt
 import xarray as xr
 
 from phasekit.bifurcation.continuation import sensitivity as equilibria
-from phasekit.bifurcation.continuation.periodic import starts
-from phasekit.bifurcation.continuation.periodic.cycles import Cycles, Orbit
-from phasekit.bifurcation.continuation.periodic.extended import FOLD
-from phasekit.bifurcation.continuation.periodic.functionals import numbers_of_orbit
-from phasekit.bifurcation.continuation.periodic.point import Point
+from phasekit.cycles import starts
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.extended import FOLD
+from phasekit.cycles.functionals import numbers_of_orbit
+from phasekit.cycles.point import Point
 from phasekit.labelled.continuation.cycle_onward import CURVES, critical_orbit
 from phasekit.labelled.continuation.special_point import SpecialPoint
 from phasekit.systems.cycle_families import clock_code

@@ -1,0 +1,187 @@
+"""Points of a family between two of its points: at a distance, or where a number vanishes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.cycles.criteria import determinant, fold_test
+from phasekit.cycles.cycles import Cycles, Orbit
+from phasekit.cycles.point import Point, State, point_of
+from phasekit.cycles.starts import other_tangent, resolved, singularity
+
+Array = npt.NDArray[np.float64]
+Value = Callable[[Any, bool], float]
+
+SPLIT = 1e-2  # part of a step between the zeros into which rounding parts a double one
+STILL = 1e-11  # part of a stretch, as far as orbits are known, within which roots settle
+FINER = 1.1  # times the points of a mesh that does not resolve what goes off
+ZOOMS, ZOOM = 3, 0.06  # windows in which it is looked for, and half of one beside the last
+NODES = 9  # points of the family through which a branch point is interpolated
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """The family between two of its points, by the distance s along the tangent of the first."""
+
+    cycles: Cycles
+    a: Point | State
+    b: Point
+    mesh: Array | None = None
+
+    def __post_init__(self) -> None:
+        """Bring both ends to one mesh."""
+        mesh = self.b.orbit.mesh
+        if self.a.orbit.intervals > self.b.orbit.intervals:
+            mesh = self.a.orbit.mesh
+        mesh = mesh if self.mesh is None else self.mesh
+        a, (dx,) = self.cycles.on(mesh, self.a.orbit, self.a.dx)
+        b, (db,) = self.cycles.on(mesh, self.b.orbit, self.b.dx)
+        rows, rows_y, target = self.cycles.rows(a, dx, self.a.dy)
+        length = float(np.sum(rows[-1] * (b.x - a.x)) + rows_y[-1] @ (b.y - a.y))
+        # db/ds of the second end, where its tangent has this part along that of the first.
+        rate = float(np.sum(rows[-1] * db) + rows_y[-1] @ self.b.dy)
+        own: dict[str, Any] = {
+            "ends": (a, b), "tangents": ((dx, self.a.dy), (db / rate, self.b.dy / rate)),
+            "rows": (rows, rows_y, target), "length": length,
+        }  # fmt: skip
+        for name, value in own.items():
+            object.__setattr__(self, name, value)
+
+    ends: tuple[Orbit, Orbit] = None  # type: ignore[assignment]
+    tangents: Any = None
+    rows: Any = None
+    length: float = 0.0
+
+    def point(self, s: float) -> Point | None:
+        """The point at a distance; None if Newton's method finds none."""
+        (a, b), ((dx, dy), (ex, ey)) = self.ends, self.tangents
+        t, h = s / self.length, self.length
+        # Cubic through both ends with their tangents.
+        c = (2 * t**3 - 3 * t**2 + 1, t**3 - 2 * t**2 + t, 3 * t**2 - 2 * t**3, t**3 - t**2)
+        x = c[0] * a.x + h * c[1] * dx + c[2] * b.x + h * c[3] * ex
+        y = c[0] * a.y + h * c[1] * dy + c[2] * b.y + h * c[3] * ey
+        rows, rows_y, target = self.rows
+        # The phase of the guess, which the second end may have measured by another orbit.
+        target = target.copy()
+        target[-1] += s
+        target[0] = np.sum(rows[0] * x)
+        found = self.cycles.correct(Orbit(a.mesh, x, y), rows, rows_y, target, iterations=12)
+        if not found.converged:
+            return None
+        made = point_of(self.cycles, found, self.a.arclength + s, s)
+        return made
+
+
+def root(stretch: Stretch, test: Value) -> Point | None:
+    """The point of a stretch where a test function vanishes, by secants within a bracket."""
+    forced = stretch.cycles.forced
+    low, high = 0.0, stretch.length
+    left, right = test(stretch.a, forced), test(stretch.b, forced)
+    best: Point | None = None
+    least = np.inf
+    s, before = high, np.inf
+    side = 0
+    f_left, f_right = left, right
+    for _ in range(60):
+        s = (
+            low + (high - low) * f_left / (f_left - f_right)
+            if f_left != f_right
+            else 0.5 * (low + high)
+        )
+        if not low < s < high:
+            s = 0.5 * (low + high)
+        point = stretch.point(s)
+        if point is None:
+            return None
+        value = test(point, forced)
+        if abs(value) <= least:  # of what jumps, the last one
+            best, least = point, abs(value)
+        if value == 0.0 or abs(s - before) <= STILL * stretch.length:
+            break
+        before = s
+        if (value >= 0.0) == (left >= 0.0):
+            low, f_left = s, value
+            if side == -1:
+                f_right *= 0.5  # Illinois
+            side = -1
+        else:
+            high, f_right = s, value
+            if side == 1:
+                f_left *= 0.5
+            side = 1
+        if high - low <= 1e-14 * stretch.length:
+            break
+    return best
+
+
+def branching(stretch: Stretch, test: Value) -> Point | None:
+    """A branch point, where the equations are singular: from the points to both of its sides.
+
+    The family is smooth through it, so its points at a distance say where it is to rounding.
+    """
+    cycles = stretch.cycles
+
+    def singular(point: Point, forced: bool) -> float:
+        return determinant(point, forced) if cycles.closes else singularity(cycles, point)
+
+    low, high = 0.0, stretch.length
+    for _ in range(1 if cycles.closes else ZOOMS):  # determinants are smooth, borders not
+        nodes = 0.5 * (1.0 - np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES))
+        points = [stretch.point(float(low + s * (high - low))) for s in nodes]
+        made = [(s, p) for s, p in zip(nodes, points, strict=True) if p is not None]
+        if len(made) < NODES - 2:
+            return None
+        at = np.array([s for s, _ in made])
+        s = _crossing(at, *(
+            np.array([value(p, cycles.forced) for _, p in made]) for value in (singular, fold_test)
+        ))  # fmt: skip
+        if s is None:
+            return None
+        width, middle = high - low, low + s * (high - low)
+        low = max(0.0, middle - ZOOM * width)
+        high = min(stretch.length, middle + ZOOM * width)
+    weights = np.array(
+        [np.prod((s - np.delete(at, k)) / (at[k] - np.delete(at, k))) for k in range(len(at))]
+    )
+    mixed = [
+        sum(w * getattr(p, name) for w, (_, p) in zip(weights, made, strict=True))
+        for name in ("dx", "dy")
+    ]
+    orbit = Orbit(
+        made[0][1].orbit.mesh,
+        np.asarray(sum(w * p.orbit.x for w, (_, p) in zip(weights, made, strict=True))),
+        np.asarray(sum(w * p.orbit.y for w, (_, p) in zip(weights, made, strict=True))),
+    )
+    checked = cycles.looked_at(orbit, *mixed)
+    if not cycles.closes:
+        null, _ = other_tangent(cycles, orbit, checked.W, (checked.dx, checked.dy))
+        finer = resolved(cycles, orbit.mesh, null)
+        if finer is not None and len(finer) > FINER * len(orbit.mesh):
+            return branching(Stretch(cycles, stretch.a, stretch.b, finer), test)
+    return point_of(cycles, checked, stretch.a.arclength + middle, middle)
+
+
+def _crossing(at: Array, determinants: Array, rates: Array) -> float | None:
+    """Where two families cross, between 0 and 1.
+
+    The determinant changes its sign there, but at a pitchfork along the family whose parameter
+    turns back: there it only touches zero.
+    """
+    found, turns = (_zeros(at, values) for values in (determinants, rates))
+    if len(turns):
+        found = found[[np.min(np.abs(turns - one)) > SPLIT for one in found]]
+        found = found if len(found) else turns
+    return float(found[np.argmin(np.abs(found - 0.5))]) if len(found) else None
+
+
+def _zeros(at: Array, values: Array) -> Array:
+    """Zeros between 0 and 1 of the polynomial through values."""
+    fit = np.polynomial.Polynomial.fit(at, values, len(at) - 1, domain=[0.0, 1.0])
+    roots = fit.roots()
+    inside = (np.abs(roots.imag) < 1e-6) & (roots.real > -1e-9) & (roots.real < 1.0 + 1e-9)
+    return np.asarray(roots[inside].real)

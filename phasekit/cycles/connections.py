@@ -1,0 +1,442 @@
+"""Orbits that connect equilibria, in infinite time: what holds at their ends, and their checks.
+
+Over a long time an orbit begins in the plane that the unstable manifold of the first equilibrium
+touches there, and ends in that of the stable manifold of the last one, both at a given distance
+([Beyn1990]; [Kuznetsov2004] 6.4): ``L (x - e) = 0`` with the rows of L orthogonal to the invariant
+subspace, of an ordered real Schur form. The manifold itself lies off that plane by the square of
+the distance, ``L (x - e) = h(x - e)``; what this moves the parameters by is the error of
+truncation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.cycles import collocation, wide
+from phasekit.cycles.bounded import Bounded, Rows, of_ends
+from phasekit.cycles.cycles import Orbit
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+SOURCE, TARGET = 0, 1  # the ends
+MOST = 40  # steps of Newton's method to an equilibrium
+SETTLED = 1e-13  # the last of them, on scaled axes
+STEP = 2.0**-8  # of second differences, on scaled axes
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """An equilibrium at an end of an orbit, on scaled axes.
+
+    Attributes
+    ----------
+    x : ndarray
+        The state itself.
+    A : ndarray
+        Derivatives of f by the states, on scaled axes.
+    moves : ndarray, shape (n, parameters)
+        By what it moves with the free parameters, on scaled axes.
+    """
+
+    x: Array
+    A: Array
+    moves: Array
+
+    def eigenvalues(self) -> Complex:
+        """Eigenvalues, the largest real part first."""
+        values = np.linalg.eigvals(self.A).astype(complex)
+        return values[np.lexsort((values.imag, -values.real))]
+
+    def unstable(self) -> int:
+        """Number of eigenvalues with a positive real part."""
+        return int(np.sum(self.eigenvalues().real > 0.0))
+
+
+def slopes_at(bounded: Any, x: Array, y: Array) -> tuple[Array, Array]:
+    """F at a state, and its derivatives by states and free parameters, without scales."""
+    mesh, n = np.array([0.0, 1.0]), bounded.n
+    places = np.tile(x, (bounded.m + 1, 1))
+    found = bounded.jets(mesh, places, y, bounded.m, bounded.sizes)[0]
+    return found[:n], found[n:].reshape(n, -1)
+
+
+def rest_near(bounded: Any, x: Array, y: Array) -> Rest | None:
+    """The equilibrium that Newton's method finds from a state; None if there is none."""
+    x, n, scale = x.copy(), bounded.n, bounded.scale
+    before = math.inf
+    for _ in range(MOST):
+        f, slopes = slopes_at(bounded, x, y)
+        if not (np.isfinite(f).all() and np.isfinite(slopes).all()):
+            return None
+        try:
+            step = np.linalg.solve(slopes[:, :n], f)
+        except np.linalg.LinAlgError:
+            return None
+        x = x - step
+        size = float(np.max(np.abs(step) / scale))
+        if size <= SETTLED or (size < 1e-9 and size >= 0.5 * before):
+            break
+        before = size
+    else:
+        return None
+    f, slopes = slopes_at(bounded, x, y)
+    A = slopes[:, :n] * scale / scale[:, None]
+    moves = -np.linalg.solve(slopes[:, :n], slopes[:, n:]) / scale[:, None]
+    return Rest(x, A, moves)
+
+
+def planes(A: Array, count: int, stable: bool) -> tuple[Array, Array]:
+    """Bases of the most unstable (or stable) eigenvalues' subspace, and of what is orthogonal."""
+    from scipy.linalg import schur
+
+    if count in (0, len(A)):
+        whole, none = np.eye(len(A)), np.zeros((len(A), 0))
+        return (whole, none) if count else (none, whole)
+    sign = -1.0 if stable else 1.0
+    parts = np.sort(sign * np.linalg.eigvals(A).real)[::-1]
+    limit = 0.5 * (parts[count - 1] + parts[count])
+    _, Q, own = schur(A, output="real", sort=lambda re, im=0.0: sign * re > limit)
+    if own != count:  # a pair that the count parts
+        raise np.linalg.LinAlgError("a complex pair stands on both sides of the count")
+    return Q[:, :count], Q[:, count:]
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """What holds at both ends of a connecting orbit.
+
+    Attributes
+    ----------
+    unstable : int
+        Dimension of the unstable manifold that the orbit leaves in.
+    stable : int
+        Dimension of the stable manifold that it arrives in.
+    distances : tuple of float
+        From the equilibria, on scaled axes (see `measure`).
+    same : bool
+        Whether it leaves and arrives at the same equilibrium.
+    n : int
+        Number of states.
+    both : bool
+        Whether both distances are held; else the first, and time is held or free.
+    """
+
+    unstable: int
+    stable: int
+    distances: tuple[float, float]
+    same: bool
+    n: int
+    both: bool = True
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return 2 * self.n - self.unstable - self.stable + 1 + self.both
+
+    def rests(self, bounded: Any, orbit: Orbit) -> tuple[Rest, Rest] | None:
+        """The equilibria at both ends."""
+        first = rest_near(bounded, orbit.x[0], orbit.y)
+        if first is None:
+            return None
+        last = rest_near(bounded, first.x if self.same else orbit.x[-1], orbit.y)
+        return None if last is None else (first, last)
+
+    def frames(self, rests: tuple[Rest, Rest]) -> tuple[Array, Array]:
+        """What is orthogonal to the invariant subspaces at both ends, in columns."""
+        return (
+            planes(rests[0].A, self.unstable, stable=False)[1],
+            planes(rests[1].A, self.stable, stable=True)[1],
+        )
+
+    def measure(self, rest: Rest, side: int) -> Array:
+        """Square of the distance from an equilibrium, as a form.
+
+        Along the linear flow in the plane it only grows, or only decays: B^T M + M B = +-1. A pair
+        of complex eigenvalues would bring an orbit to the same plain distance several times, and a
+        curve of orbits would go back on itself through them.
+        """
+        from scipy.linalg import solve_continuous_lyapunov
+
+        count = self.unstable if side == SOURCE else self.stable
+        n = len(rest.A)
+        if count < 2:
+            return np.eye(n)
+        plane, across = planes(rest.A, count, stable=side == TARGET)
+        B = plane.T @ rest.A @ plane
+        M = solve_continuous_lyapunov(B.T, np.eye(count) * (1.0 if side == SOURCE else -1.0))
+        if not np.isfinite(M).all() or np.min(np.linalg.eigvalsh(M)) <= 0.0:
+            return np.eye(n)
+        return np.asarray(plane @ M @ plane.T * (count / np.trace(M)) + across @ across.T)
+
+    def linear(self, bounded: Any, orbit: Orbit) -> Rows:
+        """Derivatives of what vanishes, and its values.
+
+        How the subspaces turn with the parameters is left out: at this distance that is rounding.
+        """
+        n, scale, k = bounded.n, bounded.scale, bounded.q - 1
+        values = np.full(self.count, np.nan)
+        slopes = np.zeros((self.count, 2 * n + k))
+        rests = self.rests(bounded, orbit)
+        if rests is None:
+            return of_ends(orbit, slopes, values)
+        try:
+            frames = self.frames(rests)
+        except np.linalg.LinAlgError:
+            return of_ends(orbit, slopes, values)
+        row = 0
+        for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
+            rest, L = rests[side], frames[side].T
+            z = (x - rest.x) / scale
+            along = self.measure(rest, side) @ z
+            far = math.sqrt(max(float(z @ along), 0.0)) or 1e-300
+            held = side == SOURCE or self.both
+            rows = np.vstack([L, along[None] / (far * self.distances[side])]) if held else L
+            here = slice(row, row + len(rows))
+            columns = slice(side * n, (side + 1) * n)
+            gap = [far / self.distances[side] - 1.0] if held else []
+            values[here] = np.append(L @ z, gap)
+            slopes[here, columns] = rows / scale
+            slopes[here, 2 * n :] = -rows @ rest.moves
+            row = here.stop
+        return of_ends(orbit, slopes, values)
+
+
+def ends_of(bounded: Bounded) -> Ends:
+    """The conditions of a connecting orbit."""
+    (ends,) = bounded.conditions
+    assert isinstance(ends, Ends)
+    return ends
+
+
+def truncation(bounded: Bounded, orbit: Orbit) -> Array:
+    """By what the free parameters are off, since manifolds are no planes, to first order."""
+    ends = ends_of(bounded)
+    rests = ends.rests(bounded, orbit)
+    if rests is None:
+        return np.full(bounded.q - 1, np.nan)
+    frames = ends.frames(rests)
+    right, row = np.zeros(bounded.bordering), bounded.bordering - 1 - ends.count
+    for side, x in ((SOURCE, orbit.x[0]), (TARGET, orbit.x[-1])):
+        L = frames[side]
+        count = ends.unstable if side == SOURCE else ends.stable
+        z = (x - rests[side].x) / bounded.scale
+        right[row : row + L.shape[1]] = bend(bounded, rests[side], orbit.y, z, count, side, L)
+        row += L.shape[1] + 1
+    nothing = np.zeros_like(orbit.x)
+    rows, rows_y, _ = bounded.rows(orbit, nothing, np.zeros(bounded.q))
+    rows_y[-1, -1 if ends.both else 0] = 1.0  # the last parameter stays, or time
+    return solved(bounded, orbit, rows, rows_y, right)[1][1:]
+
+
+def solved(
+    bounded: Bounded, orbit: Orbit, rows: Array, rows_y: Array, right: Array
+) -> tuple[Array, Array]:
+    """What the linear equations of an orbit say of right sides of its bordering rows."""
+    W = bounded.looked_at(orbit, np.zeros_like(orbit.x), np.zeros(bounded.q)).W
+    W[:, :, -1] = 0.0
+    dx, dy = np.empty((2, *orbit.x.shape)), np.empty((2, bounded.q))
+    none = np.zeros(bounded.n)
+    if wide.solve(W, rows, rows_y, right, none, none, bounded.m, dx, dy) == 0.0:
+        dx[:], dy[:] = np.nan, np.nan
+    return dx[0], dy[0]
+
+
+def bend(
+    bounded: Bounded, rest: Rest, y: Array, z: Array, count: int, side: int, L: Array
+) -> Array:
+    """By what an invariant manifold leaves the plane that it touches, at a point z of that.
+
+    ``L^T z = h`` with ``D h A_u z = L^T A L h + L^T B(z, z)/2``, solved in eigenvectors of the
+    plane ([Kuznetsov2004] 8.7).
+    """
+    if L.shape[1] == 0 or count == 0:
+        return np.zeros(L.shape[1])
+    plane = planes(rest.A, count, stable=side == TARGET)[0]
+    values, vectors = np.linalg.eig(plane.T @ rest.A @ plane)
+    modes = plane @ vectors  # in columns
+    parts = np.linalg.solve(vectors, plane.T @ z)
+    across = L.T @ rest.A @ L
+    found = np.zeros(L.shape[1], complex)
+    second = {}
+    for i in range(count):
+        for j in range(i, count):
+            second[i, j] = L.T @ quadratic(bounded, rest, y, modes[:, i], modes[:, j])
+    for i in range(count):
+        for j in range(count):
+            rate = (values[i] + values[j]) * np.eye(L.shape[1]) - across
+            found += parts[i] * parts[j] * np.linalg.solve(rate, 0.5 * second[min(i, j), max(i, j)])
+    return np.asarray(found.real)
+
+
+def quadratic(bounded: Bounded, rest: Rest, y: Array, a: Complex, b: Complex) -> Complex:
+    """B(a, b) at an equilibrium, of complex directions on scaled axes, by differences of slopes."""
+
+    def along(u: Array, v: Array) -> Array:
+        size = float(np.max(np.abs(u)))
+        if size == 0.0:
+            return np.zeros(len(u))
+        h = STEP / size
+
+        def slopes(k: float) -> Array:
+            found = slopes_at(bounded, rest.x + k * u * bounded.scale, y)[1][:, : bounded.n]
+            return np.asarray((found * bounded.scale / bounded.scale[:, None]) @ v)
+
+        near, wide = ((slopes(k) - slopes(-k)) / (2.0 * k) for k in (h, 2.0 * h))
+        return np.asarray((4.0 * near - wide) / 3.0)
+
+    real = along(a.real, b.real) - along(a.imag, b.imag)
+    return np.asarray(real + 1j * (along(a.real, b.imag) + along(a.imag, b.real)))
+
+
+# ------------------------------------------------------------------------------ along curves
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Eigenvalues at the ends of a connecting orbit, the leading ones first.
+
+    ``out`` are those of the manifold that it leaves in, ``into`` of that which it arrives in;
+    ``others`` are the stable ones at the source and the unstable ones at the target.
+    """
+
+    out: Complex
+    into: Complex
+    others: tuple[Complex, Complex]
+
+
+@lru_cache(maxsize=8)
+def spectra(bounded: Bounded, orbit: Orbit) -> Spectra | None:
+    """Eigenvalues at both ends; None where there is no equilibrium."""
+    ends = ends_of(bounded)
+    rests = ends.rests(bounded, orbit)
+    if rests is None:
+        return None
+    first, last = (rest.eigenvalues() for rest in rests)
+    out, rest_of_first = first[: ends.unstable][::-1], first[ends.unstable :]
+    into, rest_of_last = last[len(last) - ends.stable :], last[: len(last) - ends.stable][::-1]
+    return Spectra(out, into, (rest_of_first, rest_of_last))
+
+
+def extended(
+    orbit: Orbit, bounded: Bounded, rests: tuple[Rest, Rest], distances: tuple[float, float]
+) -> Orbit:
+    """An orbit whose ends are led to given distances, along the linear flow, or cut there."""
+    ends = ends_of(bounded)
+    m, scale = bounded.m, bounded.scale
+    orbit = _trimmed(orbit, rests, m, scale, distances)
+    mesh, x, length = orbit.mesh * orbit.y[0], orbit.x, float(orbit.y[0])
+    pieces, times = [x], [collocation.times(orbit.mesh, m) * length]
+    for side in (SOURCE, TARGET):
+        rest = rests[side]
+        count = ends.unstable if side == SOURCE else ends.stable
+        plane, _ = planes(rest.A, count, stable=side == TARGET)
+        z = plane.T @ (((x[0] if side == SOURCE else x[-1]) - rest.x) / scale)
+        values, vectors = np.linalg.eig(plane.T @ rest.A @ plane)
+        parts = np.linalg.solve(vectors, z.astype(complex))
+        sign = -1.0 if side == SOURCE else 1.0
+        slowest = float(np.min(np.abs(values.real)))
+        form = plane.T @ ends.measure(rest, side) @ plane
+        far = float(np.sqrt(z @ form @ z))
+        if not far > distances[side] or slowest == 0.0:
+            continue
+
+        def state(t: float, parts: Complex = parts, values: Complex = values,
+                  vectors: Complex = vectors, sign: float = sign) -> Array:  # fmt: skip
+            return np.asarray((vectors @ (np.exp(sign * values * t) * parts)).real)
+
+        high = math.log(far / distances[side]) / slowest + 1.0 / slowest
+        low = 0.0
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if np.sqrt(state(middle) @ form @ state(middle)) > distances[side]:
+                low = middle
+            else:
+                high = middle
+        reach = high
+        fast = float(np.max(np.abs(values)))
+        steps = int(np.clip(4.0 * reach * fast, 12, 400))
+        grid = np.linspace(0.0, reach, steps + 1)[1:]
+        more = np.array([rest.x + scale * (plane @ state(t)) for t in grid])
+        if side == SOURCE:
+            pieces.insert(0, more[::-1])
+            times.insert(0, -grid[::-1])
+            mesh = np.concatenate([-grid[::-1], mesh])
+        else:
+            pieces.append(more)
+            times.append(length + grid)
+            mesh = np.concatenate([mesh, length + grid])
+    t, values_at = np.concatenate(times), np.concatenate(pieces)
+    whole = t[-1] - t[0]
+    mesh = (mesh - t[0]) / whole
+    mesh[0], mesh[-1] = 0.0, 1.0
+    from scipy.interpolate import PchipInterpolator
+
+    at = (t - t[0]) / whole
+    at[-1] = 1.0
+    placed = PchipInterpolator(at, values_at, axis=0)(collocation.times(mesh, m))
+    y = orbit.y.copy()
+    y[0] = whole
+    return Orbit(mesh, np.ascontiguousarray(placed), y)
+
+
+def _trimmed(
+    orbit: Orbit, rests: tuple[Rest, Rest], m: int, scale: Array, distances: tuple[float, float]
+) -> Orbit:
+    """An orbit without the mesh intervals that lie nearer to its equilibria than it is to end."""
+    far = [
+        np.linalg.norm((orbit.x[::m] - rest.x) / scale, axis=1) > distance
+        for rest, distance in zip(rests, distances, strict=True)
+    ]
+    if not (np.any(far[0]) and np.any(far[1])):
+        return orbit
+    first = max(int(np.argmax(far[0])) - 1, 0)
+    last = min(len(far[1]) - int(np.argmax(far[1][::-1])), len(far[1]) - 1)
+    if last - first < 4 or (first == 0 and last == len(far[1]) - 1):
+        return orbit
+    mesh = orbit.mesh[first : last + 1]
+    y = orbit.y.copy()
+    y[0] *= mesh[-1] - mesh[0]
+    mesh = (mesh - mesh[0]) / (mesh[-1] - mesh[0])
+    return Orbit(mesh, orbit.x[first * m : last * m + 1].copy(), y)
+
+
+LOST = (
+    1e-6  # real part of an eigenvalue, beside the largest size, at which an end is not hyperbolic
+)
+LONG = 30.0  # times the length of the start, at which an end is nearly so
+
+
+def ending(bounded: Bounded, made: Orbit, start: Orbit) -> tuple[str, str] | None:
+    """Why a curve of connections ends at a point: a kind of point and words, or None."""
+    found = spectra(bounded, made)
+    if found is None:
+        return "lost", "there is no equilibrium any more at an end of the orbit"
+    leading = []
+    for values, where in ((found.out, "source"), (found.into, "target")):
+        if len(values):
+            leading.append((abs(float(values[0].real)), values[0], where))
+    size = float(max(np.max(np.abs(values)) for values in (found.out, found.into) if len(values)))
+    wrong = bool(np.any(found.out.real <= 0.0) or np.any(found.into.real >= 0.0))
+    least, value, where = min(leading, key=lambda one: one[0])
+    long = made.y[0] > LONG * start.y[0]
+    if not (wrong or least < LOST * size or (long and least < 1e-2 * size)):
+        return None
+    both = all(one[0] < 3e-2 * size for one in leading) and len(leading) == 2
+    if both:
+        return "bogdanov_takens", "two eigenvalues come to zero: a Bogdanov-Takens point is near"
+    if value.imag:
+        return "shilnikov_hopf", (
+            f"a pair of eigenvalues of the {where} comes to the imaginary axis: a Shil'nikov-Hopf "
+            "point is near"
+        )
+    return "non_central_saddle_node", (
+        f"an eigenvalue of the {where} comes to zero: the orbit goes on as one to a saddle-node, "
+        "which is not followed"
+    )

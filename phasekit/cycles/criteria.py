@@ -1,0 +1,99 @@
+"""Functions of the multipliers and the tangent whose signs change at special points of families."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.cycles.point import Point
+
+Complex = npt.NDArray[np.complex128]
+
+ROUNDED = 1e-14  # least relative error of a matrix of multipliers
+SURE = 10.0  # times an error that tells
+CRITICAL = 1e-3  # distance from 1 of multipliers that may be those of a fold
+
+
+def nontrivial(values: Complex, forced: bool) -> list[complex]:
+    """Multipliers but for the one that is 1 for every orbit of an autonomous system."""
+    mu: list[complex] = values.tolist()
+    if not forced:
+        mu.remove(min(mu, key=lambda one: abs(one - 1.0)))
+    return mu
+
+
+def unstable(values: Complex, forced: bool) -> int:
+    """Number of multipliers outside the unit circle."""
+    return sum(abs(mu) > 1.0 for mu in nontrivial(values, forced))
+
+
+def none_passes(a: Point, b: Point, forced: bool) -> bool:
+    """Whether the number of real multipliers beyond 1 stays odd or even, unlike at a fold.
+
+    Nothing is known of it next to a fold, where one is 1 but for errors.
+    """
+    beyond = 0
+    for point in (a, b):
+        mu = nontrivial(point.multipliers, forced)
+        if any(abs(one - 1.0) < CRITICAL for one in mu):
+            return False
+        beyond += sum(one.imag == 0.0 and one.real > 1.0 for one in mu)
+    return beyond % 2 == 0
+
+
+def fold_test(point: Point, forced: bool) -> float:
+    """The tangent's part along the parameter."""
+    return float(point.dy[1])
+
+
+def _parts(values: Iterable[complex], at: float) -> complex:
+    """Product of at - z, each beside its size."""
+    return math.prod((at - z) / (1.0 + math.hypot(z.real, z.imag)) for z in values)
+
+
+def doubling_test(point: Point, forced: bool) -> float:
+    """det(M + 1), each factor beside its size."""
+    return _parts((-mu for mu in point.multipliers.tolist()), 1.0).real
+
+
+def torus_test(point: Point, forced: bool) -> float:
+    """Product of 1 - mu_i mu_j over pairs, each beside its size."""
+    mu = nontrivial(point.multipliers, forced)
+    return _parts((a * b for a, b in combinations(mu, 2)), 1.0).real
+
+
+def conjugate(point: Point, forced: bool) -> bool:
+    """Whether the two multipliers whose product is next to 1 are no real ones."""
+    pairs = combinations(nontrivial(point.multipliers, forced), 2)
+    one, _ = min(pairs, key=lambda pair: abs(1.0 - pair[0] * pair[1]))
+    return complex_pair(point, one)
+
+
+def complex_pair(point: Point, one: complex) -> bool:
+    """Whether a multiplier is one of a conjugate pair, for all that its error lets one say.
+
+    Errors of the matrix part a double real one into a pair at the root of their size.
+    """
+    error = max(point.trivial_error, point.liouville_error, ROUNDED)
+    largest = max(1.0, float(np.max(np.abs(point.multipliers))))
+    return one.imag**2 > SURE * error * largest * abs(one)
+
+
+def second_doubling(point: Point, forced: bool) -> float:
+    """Derivative of det(M - mu) at -1, where one multiplier is that."""
+    mu = nontrivial(point.multipliers, forced)
+    rest = ([-one for one in mu[:i] + mu[i + 1 :]] for i in range(len(mu)))
+    return sum(_parts(part, 1.0).real for part in rest) if len(mu) > 1 else 1.0
+
+
+def determinant(point: Point, forced: bool) -> float:
+    """det(M - 1) or, of an autonomous system, the derivative of det(M - mu) at 1."""
+    mu = point.multipliers.tolist()
+    if forced:
+        return _parts(mu, 1.0).real
+    n = len(mu)
+    return sum(_parts(mu[:i] + mu[i + 1 :], 1.0).real for i in range(n)) if n > 1 else 0.0

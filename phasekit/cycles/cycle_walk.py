@@ -1,0 +1,126 @@
+"""How families of periodic orbits and curves of their special points are walked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, ClassVar
+
+import numpy as np
+
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.bifurcation.continuation.specials import NOT_SEARCHED
+from phasekit.bifurcation.continuation.stops import Stop
+from phasekit.bifurcation.continuation.walk import Tracks
+from phasekit.cycles.cycles import Cycles, where
+from phasekit.cycles.events import find
+from phasekit.cycles.family import Found, Path, join
+from phasekit.cycles.point import Point, State
+from phasekit.cycles.trace import Track, begin, follow
+from phasekit.cycles.vertical import said_of
+
+START = 1e-6  # arclength within which a point is the start itself
+
+
+@dataclass(frozen=True)
+class CycleWalk:
+    """A family of orbits as a `Walker`."""
+
+    curve: Cycles
+    chunk: ClassVar[int] = 8
+    looks_back: ClassVar[bool] = False
+
+    def over(self, **changes: Any) -> CycleWalk:
+        """The same with changes of the family, such as wider bounds."""
+        return CycleWalk(self.curve.replace(**changes))
+
+    @property
+    def kind(self) -> str:
+        """What it is a curve of."""
+        kind: str = getattr(self.curve, "kind", "cycle")
+        return kind
+
+    @property
+    def bounded(self) -> tuple[str, ...]:
+        """Names of what its bounds are bounds of."""
+        return tuple(self.curve.field.parameters[i] for i in self.curve.active)
+
+    @property
+    def options(self) -> ContinuationOptions:
+        """How far and how finely."""
+        return self.curve.options
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Kinds, labels and names of special points at which it ends."""
+        return self.curve.ends
+
+    def hindered(self, start: Point) -> None:
+        """Nothing is known beforehand."""
+
+    def turned(self, start: Point) -> Point:
+        """The start in the other direction."""
+        return start.flipped()
+
+    def begin(self, start: Point) -> State:
+        """The state of a walk that begins at a point."""
+        return begin(self.curve, start)
+
+    def follow(self, state: State, points: int, start: Point) -> Track:
+        """At most so many points from a state."""
+        return follow(self.curve, state, points, start)
+
+    def passed(self, start: Point, track: Track, since: int) -> list[Found]:
+        """Special points from one of its points on."""
+        last = track.points[since - 1] if since else start
+        path = Path((last, *track.points[since:]), 0, (track.stop, track.stop))
+        found = self.in_order(find(self.curve, path)[0])
+        return [replace(one, index=one.index + since) for one in found]
+
+    def is_start(self, seen: Found, start: Point) -> bool:
+        """Whether a special point is the start itself."""
+        return abs(seen.point.arclength) <= START
+
+    def within(self, state: State) -> bool:
+        """Whether a state stands inside its bounds."""
+        cycles, y = self.curve, state.orbit.y
+        p = y[1 : 1 + len(cycles.low)]
+        low, high = cycles.options.bounds.get("period", (-np.inf, np.inf))
+        return bool(np.all((p > cycles.low) & (p < cycles.high)) and low < y[0] < high)
+
+    def words(self, seen: Found) -> str:
+        """Where a special point is."""
+        return where(self.curve, seen.point.orbit)
+
+    def joined(self, start: Point, tracks: Tracks, origin: Stop) -> Path:
+        """One path of two tracks; without a first one, the origin says why it begins there."""
+        return join(start, tracks, origin)
+
+    def search(self, path: Path) -> tuple[Path, list[Found], tuple[str, ...]]:
+        """The path, its special points in order, and which coefficients are zero all along it."""
+        found, zeros = find(self.curve, path)
+        return path, self.in_order(found), zeros
+
+    def unsearched(self, path: Path) -> tuple[Path, list[Found], tuple[str, ...]]:
+        """The same where there was no time to look for any."""
+        return path, [], NOT_SEARCHED
+
+    def notes(self, path: Path) -> tuple[str, ...]:
+        """That a family is vertical."""
+        return said_of(self.curve, path)
+
+    def at_ends(self, path: Path) -> list[Found]:
+        """The two ends of a path as special points."""
+        first, last = (
+            path.points[-k] if end is None else end.point for k, end in enumerate(path.ends)
+        )
+        return [
+            Found("end", point, index, (at, at), "converged", stop.message, {})
+            for index, point, stop, at in (
+                (-2, first, path.stops[0], float(first.orbit.y[1])),
+                (path.count, last, path.stops[1], float(last.orbit.y[1])),
+            )
+        ]
+
+    def in_order(self, found: list[Found]) -> list[Found]:
+        """Special points as they come along the family."""
+        return sorted(found, key=lambda one: (one.index, one.point.arclength))

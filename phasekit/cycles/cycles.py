@@ -1,0 +1,419 @@
+"""One family of periodic orbits: its equations, and Newton's method for them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.fields import Field
+from phasekit.bifurcation.continuation.options import ContinuationOptions
+from phasekit.cycles import along, collocation, newton, wide
+from phasekit.cycles.jets import Jets
+from phasekit.cycles.multipliers import across, hidden, multipliers
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+LARGE = 3.0  # size of an orbit, beside its scale, from which on it has a scale of its own
+MARGIN = 6.0  # that scale beside the orbit, where it is much larger
+REST = 1e-12  # amplitude, beside the size of a state, that is rounding
+MOST = 20_000  # intervals of a mesh that resolves them
+
+
+def _size(one: complex) -> float:
+    """Size of a multiplier by which it is sorted; what is not known comes last."""
+    size = abs(one)
+    return -1.0 if math.isnan(size) else size
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """A closed curve: values at all places of a mesh, and y = (period, free parameters)."""
+
+    mesh: Array
+    x: Array
+    y: Array
+
+    @property
+    def intervals(self) -> int:
+        """Number of intervals."""
+        return len(self.mesh) - 1
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """What Newton's method left: the orbit, the direction in which it goes on, and checks.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    dx, dy : ndarray
+        The unit tangent.
+    steps : int
+        Newton steps; 0 if it did not converge.
+    residual : float
+        Largest |x' - T f| beside the largest |T f|, both on scaled axes.
+    sign : float
+        Sign of the determinant of the equations with the tangent as last row.
+    divergence : float
+        Integral of the trace of f_x over the period.
+    W : ndarray
+        The condensed equations (see `kernels.condense`).
+    length : float
+        Of the tangent whose part along the direction of the plane is 1.
+    """
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    steps: int
+    residual: float
+    sign: float
+    divergence: float
+    W: Array
+    message: str = ""
+    length: float = 1.0
+
+    @property
+    def converged(self) -> bool:
+        """Whether Newton's method came to an end."""
+        return self.steps > 0
+
+
+@dataclass(frozen=True, eq=False)
+class Cycles:
+    """Periodic orbits of a field over its free parameters.
+
+    Attributes
+    ----------
+    field : Field
+        The right-hand side; of a forced system time is the last of its parameters.
+    par : ndarray
+        All parameters; those that are free are not used.
+    active : tuple of int
+        Places of the free parameters.
+    forced : bool
+        Whether f depends on time.
+    clock : int
+        Of a forced system, machine code of its period and the derivatives by free parameters.
+    multiple : int
+        How many periods of the forcing the orbit takes.
+    turns : ndarray
+        By how much each state grows over a period: angles only.
+    scale, width : ndarray
+        Sizes of the states and of the free parameters.
+    low, high : ndarray
+        Bounds of the free parameters.
+    period : ndarray
+        Periods of the states that are angles, else 0.
+    fixed : bool
+        Whether the period keeps its value, for which one more parameter is free.
+    events : tuple of Functional
+        Numbers of orbits whose zeros are looked for.
+    ends : tuple of str
+        Names of events, kinds and labels of special points at which the family ends.
+    """
+
+    field: Field
+    par: Array
+    active: tuple[int, ...]
+    forced: bool
+    clock: int
+    multiple: int
+    turns: Array
+    scale: Array
+    width: Array
+    low: Array
+    high: Array
+    period: Array
+    options: ContinuationOptions
+    fixed: bool = False
+    events: tuple[Any, ...] = ()
+    ends: tuple[str, ...] = ()
+
+    @property
+    def n(self) -> int:
+        """Number of states."""
+        return len(self.scale)
+
+    @property
+    def m(self) -> int:
+        """Degree of the polynomials."""
+        return self.options.degree
+
+    @property
+    def q(self) -> int:
+        """Number of free parameters and the period."""
+        return 1 + len(self.active)
+
+    @property
+    def bordering(self) -> int:
+        """Number of bordering rows."""
+        return self.q
+
+    @property
+    def closes(self) -> bool:
+        """Whether orbits come back: else as many rows as states say what holds at their ends."""
+        return self.bordering == self.q
+
+    @property
+    def critical(self) -> bool:
+        """Whether folds and branch points are looked for."""
+        return len(self.active) == 1
+
+    @property
+    def moving(self) -> int:
+        """Number of states with a part in tangents; those behind follow from them."""
+        return self.n
+
+    @cached_property
+    def closure(self) -> Array:
+        """By what each state is multiplied after a period."""
+        return np.ones(self.n)
+
+    @cached_property
+    def jets(self) -> Jets:
+        """The right-hand side with its derivatives."""
+        time = (len(self.par) - 1,) if self.forced else ()
+        return Jets(self.field, self.par, (*time, *self.active), self.forced)
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Sizes of states and active parameters, for differences; that of time is the period."""
+        time = np.ones(1) if self.forced else np.ones(0)
+        # F is linear in what has no span: any size will do.
+        width = np.where(np.isfinite(self.width), self.width, 1.0)
+        return np.concatenate([self.scale, time, width])
+
+    def replace(self, **changes: Any) -> Cycles:
+        """A copy with some attributes changed."""
+        return replace(self, **changes)
+
+    @cached_property
+    def tolerance(self) -> float:
+        """Size of the last of Newton's steps, on these scales."""
+        return self.options.tolerance
+
+    @cached_property
+    def _growing(self) -> npt.NDArray[np.bool_]:
+        """States whose scale grows with the orbit."""
+        free: npt.NDArray[np.bool_] = self.period == 0.0
+        free[self.own :] = False
+        for i, name in enumerate(self.field.states[: self.own]):
+            free[i] &= name not in self.options.scales
+        return free
+
+    def sized(self, orbit: Orbit) -> Cycles:
+        """These orbits on the scales of one of them, where it is much larger than the first.
+
+        The scales depend on that orbit alone, so that a family goes on as if it had never stopped.
+        They are so much larger than it that its amplitude changes by half of itself in the longest
+        of steps. Angles, and states whose scales the user has set, keep theirs.
+        """
+        ratio = along.largest(orbit.x, self.scale, self._growing)
+        if not LARGE < ratio < math.inf:
+            return self
+        grown = 1.0 + MARGIN * (ratio - LARGE)  # from 1 on, so that steps do not jump
+        made = self.replace(scale=np.where(self._growing, grown * self.scale, self.scale))
+        for name in ("jets", "closure", "_growing"):  # which know no scales
+            made.__dict__[name] = getattr(self, name)
+        made.__dict__["tolerance"] = self.options.tolerance / MARGIN  # beside the orbit itself
+        return made
+
+    def length(self, mesh: Array, dx: Array, dy: Array) -> float:
+        """Length of a direction."""
+        return math.sqrt(self.inner(mesh, dx, dx, dy, dy))
+
+    def own_period(self, y: Array) -> tuple[float, Array]:
+        """The period of the forcing, times the multiple, and its derivatives."""
+        k = len(self.active)
+        w = np.zeros(2 * k + 1)
+        w[:k] = y[1:]
+        par = self.par.copy()
+        along.evaluate(self.clock, par, w, k)
+        return self.multiple * float(w[k]), self.multiple * w[k + 1 :]
+
+    def vertical(self, dy: Array) -> bool:
+        """Whether a tangent has no part along the parameter, as in conservative families."""
+        pairs = zip(dy[1:].tolist(), self.width.tolist(), strict=False)
+        return all(abs(one) <= 1e-9 * width for one, width in pairs)
+
+    def inner(self, mesh: Array, a: Array, b: Array, dy_a: Array, dy_b: Array) -> float:
+        """Inner product of two directions: the mean over states and time, and the parameters."""
+        c = collocation.scheme(self.m)
+        return along.product(mesh, c.weights, c.value, self.scale, self.width, a, b, dy_a, dy_b)
+
+    def rows(self, orbit: Orbit, dx: Array, dy: Array) -> tuple[Array, Array, Array]:
+        """Bordering rows, phase or period first, direction last; with their values at the orbit."""
+        c = collocation.scheme(self.m)
+        rows, at = np.empty((self.q, *orbit.x.shape)), np.empty(self.q)
+        along.borders(
+            orbit.mesh, c.weights, c.value, c.slope, orbit.x, dx, self.scale, self.forced, rows, at
+        )
+        rows_y = np.zeros((self.q, self.q))
+        if self.fixed:
+            rows_y[1, 0] = 1.0
+        rows_y[-1, 1:] = dy[1:] / self.width**2
+        return rows, rows_y, at + rows_y @ orbit.y
+
+    def rows_beside(self, orbit: Orbit, rows: Array, rows_y: Array, target: Array) -> Any:
+        """The bordering rows beside an orbit, if they are not the same everywhere; else None."""
+        return None
+
+    def correct(
+        self,
+        guess: Orbit,
+        rows: Array,
+        rows_y: Array,
+        target: Array,
+        *,
+        iterations: int | None = None,
+        damped: bool = False,
+    ) -> Solution:
+        """Newton's method in the plane rows . x + rows_y . y = target."""
+        c = collocation.scheme(self.m)
+        mesh, x, y = guess.mesh, guess.x.copy(), guess.y.copy()
+        n, q, jets = self.n, self.q, self.jets
+        local = self.sized(guess)
+        if x.shape != ((len(mesh) - 1) * self.m + 1, n) or y.shape != (q,):
+            raise ValueError(f"an orbit of shape {x.shape} with {y.shape} on {len(mesh)} points")
+        W = np.empty((len(mesh) - 1, self.m * n, n + q + 1))
+        dx, dy = np.empty((2, *x.shape)), np.empty((2, q))
+        most = iterations or self.options.max_iterations
+        sign, divergence = 0.0, np.nan
+        self.field.failure = None
+        values, size, step = np.empty((0, 0)), np.inf, 0
+        if not jets.given:
+            values = np.empty(((len(mesh) - 1) * self.m, n * (1 + n + len(jets.active))))
+        one = jets.given or not self.closes  # step at a time
+        while True:
+            if jets.given:
+                values = jets(mesh, x, y, self.m, local.sizes)
+            rows, rows_y, target = self.rows_beside(Orbit(mesh, x, y), rows, rows_y, target) or (
+                rows, rows_y, target,
+            )  # fmt: skip
+            end, steps, side, residual, trace, size, length = wide.follow(
+                n,
+                jets.given, jets.first, jets.mode, jets.par, jets.places, self.forced, self.clock,
+                self.multiple, mesh, c.nodes, c.weights, c.value, c.slope, c.side, local.scale,
+                local.sizes, self.width, self.closure, self.turns, rows, rows_y, target, x, y, W,
+                dx, dy, values, local.tolerance, 1 if one else most, damped, size,
+            )  # fmt: skip
+            step += steps
+            if steps:  # else the last ones stand
+                sign, divergence = side, trace
+            if end != newton.ON_ITS_WAY or step >= most:
+                break
+        orbit = Orbit(mesh, x, y)
+        if end in (newton.FOUND, newton.CHECKED):
+            found = (step, residual, sign, divergence, W)
+            part = 1.0 if local is self else self.length(mesh, dx[1], dy[1])
+            return Solution(orbit, dx[1] / part, dy[1] / part, *found, length=length * part)
+        message = {
+            newton.NOT_FINITE: f"f or its derivatives are not finite{self.field.raised}",
+            newton.SINGULAR: "the equations are singular",
+        }.get(end, "Newton's method did not converge")
+        return Solution(orbit, dx[1], dy[1], 0, residual, sign, divergence, W, message)
+
+    def looked_at(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+        """An orbit that was found otherwise, with its residual and condensed equations."""
+        c = collocation.scheme(self.m)
+        W = np.empty((orbit.intervals, self.m * self.n, self.n + self.q + 1))
+        jets = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        _, residual, _, divergence = wide.condense(
+            jets, self.forced, orbit.mesh, c.nodes, c.weights, c.value, c.slope, c.side,
+            self.scale, orbit.x, orbit.y, W,
+        )  # fmt: skip
+        length = float(np.sqrt(self.inner(orbit.mesh, dx, dx, dy, dy))) or 1.0
+        return Solution(orbit, dx / length, dy / length, 1, residual, 0.0, divergence, W)
+
+    def multipliers(
+        self, W: Array, orbit: Orbit, divergence: float = math.nan
+    ) -> tuple[Complex, float, float]:
+        """Floquet multipliers, the logarithm of the size of their product, the trivial one's error.
+
+        Those that errors hide are NaN, where the ``divergence`` tells what errors are.
+
+        Of an autonomous system one belongs to f along the orbit. The others are those across it,
+        which stay accurate where the orbit comes near an equilibrium; it is itself a check.
+        """
+        n = self.n
+        G = np.ascontiguousarray(W[:, (self.m - 1) * n :, :n])
+        if not self.forced and n > 1:
+            f = self.jets.at_mesh(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+            A = np.empty((len(f), n - 1, n - 1))
+            trivial, off = across(G, f, self.scale, A)
+            if not math.isnan(trivial):
+                others, log = multipliers(A)
+                others[hidden(A, others, abs(log - divergence))] = math.nan
+                whole = sorted([complex(trivial), *others.tolist()], key=_size, reverse=True)
+                log += math.log(abs(trivial)) if trivial != 0.0 else -math.inf
+                return np.array(whole), log, abs(trivial - 1.0) + off
+        values, log = multipliers(G)
+        trivial = 0.0 if self.forced else float(np.min(np.abs(values - 1.0)))
+        values[hidden(G, values, abs(log - divergence))] = math.nan
+        return values, log, trivial
+
+    def resolving(self, orbit: Orbit, reach: float) -> Array | None:
+        """A mesh that resolves the variational equations, too; None if it is too fine.
+
+        On each of its intervals rate times length is at most ``reach``.
+        """
+        found = self.jets(orbit.mesh, orbit.x, orbit.y, self.m, self.sizes)
+        if self.n >= wide.WIDE:
+            slopes = found[:, self.n :].reshape(len(found), self.n, -1)[:, :, : self.n]
+            decay = float(np.mean(np.trace(slopes, axis1=1, axis2=2))) * float(orbit.y[0])
+            if abs(decay) > wide.STIFF * self.n * orbit.intervals:
+                return None  # nobody needs the digits of such decays
+        counts = np.empty(orbit.intervals, dtype=np.int64)
+        period = float(orbit.y[0])
+        total = along.parts(orbit.mesh, found, self.scale, period, self.m, reach, counts)
+        if not total <= MOST:
+            return None
+        mesh = np.empty(int(np.sum(counts)) + 1)
+        along.divided(orbit.mesh, counts, mesh)
+        return mesh
+
+    def on_finer(self, orbit: Orbit, dx: Array, dy: Array) -> Solution:
+        """An orbit that was brought to a finer mesh for the sake of its multipliers."""
+        return self.correct(orbit, *self.rows(orbit, dx, dy))
+
+    def divergence(self, found: float) -> float:
+        """Integral of the trace of f_x over a period, of what `kernels.condense` found."""
+        return found
+
+    @property
+    def own(self) -> int:
+        """Number of states of the orbit itself."""
+        return self.n
+
+    def amplitudes(self, orbit: Orbit) -> Array:
+        """Half the range of each state, without its turns; where it hardly moves, a part of all."""
+        half = np.empty(self.n)
+        along.amplitudes(orbit.mesh, orbit.x, self.turns, self.scale, self.m, half)
+        return half
+
+    def mesh_error(self, orbit: Orbit) -> float:
+        """Largest estimated error of a state, beside its amplitude; of what is at rest none."""
+        high = collocation.scheme(self.m).high
+        found = along.error(orbit.mesh, orbit.x, self.turns, self.scale, high, self.closure, REST)
+        return float(found) * collocation.factor(self.m)
+
+    def on(self, mesh: Array, orbit: Orbit, *more: Array) -> tuple[Orbit, tuple[Array, ...]]:
+        """The orbit, and directions, on another mesh."""
+        at = collocation.times(mesh, self.m)
+        moved = [collocation.interpolate(orbit.mesh, one, self.m, at) for one in (orbit.x, *more)]
+        return Orbit(mesh, moved[0], orbit.y.copy()), tuple(moved[1:])
+
+
+def where(cycles: Cycles, orbit: Orbit) -> str:
+    """The period, if it is one, and the free parameters, in words."""
+    names = ["period", *(cycles.field.parameters[i] for i in cycles.active)]
+    # On curves of folds and tori kappa or omega follows.
+    values = list(zip(names, orbit.y.tolist(), strict=False))[0 if cycles.closes else 1 :]
+    return ", ".join(f"{name} = {value:.9g}" for name, value in values)

@@ -1,0 +1,89 @@
+"""A traced family of periodic orbits as one path, with its special points found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.curve import Stop
+from phasekit.cycles.point import Point
+from phasekit.cycles.trace import Track
+
+Array = npt.NDArray[np.float64]
+
+Tracks = tuple[Track | None, Track | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A special point of a family, after one of its points.
+
+    Attributes
+    ----------
+    kind : str
+    point : Point
+    index : int
+        The point of the path before it.
+    interval : tuple of float
+        Values of the parameter at the points between which it was found.
+    status : {"converged", "guess"}
+    message : str
+    normal_form : dict
+    others : tuple
+        Directions (dx, dy) of other families, on the mesh of the point.
+    name : str
+        Of an event, else empty.
+    """
+
+    kind: str
+    point: Point
+    index: int
+    interval: tuple[float, float]
+    status: str
+    message: str
+    normal_form: dict[str, float]
+    others: tuple[tuple[Array, Array], ...] = ()
+    name: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Points in order along the family, and why it ends on both sides."""
+
+    points: tuple[Point, ...]
+    start: int
+    stops: tuple[Stop, Stop]
+    #: The special points at which it was told to end.
+    ends: tuple[Found | None, Found | None] = (None, None)
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return len(self.points)
+
+    @property
+    def closed(self) -> bool:
+        """Whether the family ends on its start."""
+        return self.stops[1].reason == "closed"
+
+    def part(self, first: int, last: int, ends: tuple[Found | None, Found | None]) -> Path:
+        """Points of it, between the special points at which it ends."""
+        return replace(self, points=self.points[first:last], start=self.start - first, ends=ends)
+
+
+def join(start: Point, tracks: Tracks, first: Stop) -> Path:
+    """One path of two tracks from the same start; without a first track, ``first`` says why."""
+    backward, forward = tracks
+    behind = [] if backward is None else [p.flipped() for p in backward.points[::-1]]
+    ahead = [] if forward is None else list(forward.points)
+    stops = (
+        first if backward is None else backward.stop,
+        Stop("start", "the start; this direction was not requested")
+        if forward is None
+        else forward.stop,
+    )
+    if stops[1].reason == "closed":
+        stops = (stops[1], stops[1])
+    return Path((*behind, start, *ahead), len(behind), stops)

@@ -1,0 +1,160 @@
+"""A right-hand side and its derivatives at all Gauss points of an orbit, whatever form it has."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.bifurcation.continuation.code_fields import PythonField
+from phasekit.bifurcation.continuation.fields import Field
+from phasekit.cycles import along, lines
+from phasekit.cycles.collocation import at_gauss, scheme
+from phasekit.errors import PhasekitError
+from phasekit.numerics import differences
+
+Array = npt.NDArray[np.float64]
+
+STEP = 2.0**-10  # of differences of fourth order, at first
+SAME = 1e-13  # by which f of many states at once may differ from f of each
+
+
+class Jets:
+    """F and its derivatives by states and active parameters (of a forced system time first)."""
+
+    def __init__(self, field: Field, par: Array, active: tuple[int, ...], forced: bool) -> None:
+        self.field, self.par, self.forced = field, par.copy(), forced
+        self.active = active
+        self.places = np.array(active, dtype=np.int64)
+        self.many: bool | None = None  # whether a Python f takes many states at once
+        # Whether kernels are given the derivatives, and what those call that take them themselves.
+        self.given = isinstance(field, PythonField)
+        self.mode = differences.SHARP if field.mode == differences.PLAIN else field.mode
+        self.first = 0 if self.given else field.first(active, sharp=True)
+
+    def __call__(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
+        """Rows of f and its derivatives, at one Gauss point each."""
+        n, a = x.shape[1], len(self.active)
+        c = scheme(m)
+        if isinstance(self.field, PythonField):
+            at = mesh[:-1, None] + np.diff(mesh)[:, None] * c.nodes
+            return self._python(at_gauss(x, m).reshape(-1, n), y, at.ravel(), scale)
+        out = np.empty(((len(mesh) - 1) * m, n * (1 + n + a)))
+        along.jets(
+            self.first, self.mode, self.par, self.places, self.forced,
+            mesh, c.nodes, c.value, x, y, scale, out,
+        )  # fmt: skip
+        return out
+
+    @property
+    def exact(self) -> bool:
+        """Whether derivatives by states are known without differences of f."""
+        if isinstance(self.field, PythonField):
+            return self.field.jacobian is not None
+        return self.mode == differences.DERIVED
+
+    def values(self, u: Array) -> Array:
+        """F at points, the rows of u: states and active parameters."""
+        if not isinstance(self.field, PythonField):
+            return self.field.values(np.ascontiguousarray(u), self.par.copy(), self.active)
+        n = len(self.field.states)
+        given: dict[str, Any] = dict(zip(self.field.parameters, self.par.tolist(), strict=True))
+        for column, place in zip(u[:, n:].T, self.active, strict=True):
+            same = np.all(column == column[0])
+            given[self.field.parameters[place]] = float(column[0]) if same else column
+        return self._values(np.ascontiguousarray(u[:, :n]), given)
+
+    def at_mesh(self, mesh: Array, x: Array, y: Array, m: int, scale: Array) -> Array:
+        """F at the beginning of each interval."""
+        n = x.shape[1]
+        points = np.ascontiguousarray(x[::m])
+        if isinstance(self.field, PythonField):
+            return self._python(points[:-1], y, mesh[:-1], scale)[:, :n]
+        out = np.empty((len(mesh) - 1, n * (1 + n + len(self.active))))
+        along.jets(
+            self.first, self.mode, self.par, self.places, self.forced, mesh, np.zeros(1),
+            np.array([[1.0, 0.0]]), points, y, scale, out,
+        )  # fmt: skip
+        return out[:, :n]
+
+    def _python(self, x: Array, y: Array, s: Array, scale: Array) -> Array:
+        field: Any = self.field
+        n, a = x.shape[1], len(self.active)
+        names = [field.parameters[i] for i in self.active]
+        given: dict[str, Any] = dict(zip(field.parameters, self.par.tolist(), strict=True))
+        free = list(y[1:].tolist())
+        given.update(zip(names[1:] if self.forced else names, free, strict=True))
+        if self.forced:
+            given[names[0]] = y[0] * s
+        out = np.empty((len(x), n * (1 + n + a)))
+        if not np.isfinite(x).all() or not np.isfinite(y).all():
+            out[:] = np.nan
+            return out
+        f = out[:, :n] = self._values(x, given)
+        slopes = np.empty((len(x), n, n + a))
+        sizes = scale.tolist()
+        if self.forced:
+            sizes[n] = float(y[0])
+        begin = 0
+        if field.jacobian is not None:
+            slopes[:, :, :n] = [
+                field.slopes(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)
+            ]
+            begin = n
+        columns = []
+        noise = lines.EPSILON * np.max(np.abs(f), axis=0)
+        for j in range(begin, n + a):
+            size = float(np.max(np.abs(x[:, j] if j < n else self._p(given, j - n))))
+            h = STEP * 2.0 ** np.floor(np.log2(max(size, sizes[j])))
+
+            def value_at(k: float, j: int = j) -> Array:
+                if j >= n:
+                    name = names[j - n]
+                    return self._values(x, given | {name: given[name] + k})
+                shifted = x.copy()
+                shifted[:, j] += k
+                return self._values(shifted, given)
+
+            wide, near = ((value_at(k) - value_at(-k)) / (2.0 * k) for k in (2.0 * h, h))
+            columns.append((j, value_at, h, (wide, near)))
+            noise += lines.EPSILON * h / STEP * np.max(np.abs(near), axis=0)
+        for j, line, h, sides in columns:
+            slopes[:, :, j] = lines.slope_along(line, h, noise, sides=sides)
+        out[:, n:] = slopes.reshape(len(x), -1)
+        out[~np.isfinite(f).all(axis=1), :] = np.nan
+        return out
+
+    def _p(self, given: dict[str, Any], k: int) -> Any:
+        return given[self.field.parameters[self.active[k]]]
+
+    def _parameters(self, given: dict[str, Any], i: int) -> dict[str, Any]:
+        """The parameters at one of many times."""
+        return {k: float(v[i]) if isinstance(v, np.ndarray) else v for k, v in given.items()}
+
+    def _values(self, x: Array, given: dict[str, Any]) -> Array:
+        field: Any = self.field
+        if self.many is not False:
+            try:
+                found = field.function(np.ascontiguousarray(x.T), **given)
+                rows = [np.broadcast_to(np.asarray(row, dtype=float), len(x)) for row in found]
+                whole = np.stack(rows, axis=1) if len(rows) == x.shape[1] else None
+            except PhasekitError:
+                raise
+            except Exception:  # noqa: BLE001 - f of one state; it is called state by state
+                whole = None
+            if self.many and whole is not None:
+                return whole
+            if self.many is None:
+                single = self._each(x, given)
+                self.many = whole is not None and bool(
+                    np.allclose(whole, single, rtol=SAME, atol=SAME * float(np.max(np.abs(single))))
+                )
+                return single
+        return self._each(x, given)
+
+    def _each(self, x: Array, given: dict[str, Any]) -> Array:
+        field: Any = self.field
+        return np.array(
+            [field.value(one.copy(), self._parameters(given, i)) for i, one in enumerate(x)]
+        )

@@ -1,0 +1,168 @@
+"""A point of a family of periodic orbits, with its checks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from phasekit.cycles.cycles import Cycles, Orbit, Solution
+from phasekit.cycles.multipliers import LARGEST
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+TRUSTED = 1e-5  # error of the product of multipliers, beside 1 or its size, above which no tests
+NEAR = 5e-7  # the same of the trivial multiplier
+UNRESOLVED = 3.0  # times the mesh error or its tolerance by which exponents are not resolved
+SMOOTH = 2.5  # rate times length of an interval over which they are resolved, at first
+FINER = 3  # meshes that are tried for it
+ALIKE = 1e-3  # the same by itself, above which nothing is known of multipliers
+STILL = 1e-12  # part of its span by which a parameter has moved between two points, or has not
+ON_CIRCLE = 1e-6  # distance from the unit circle of multipliers at special points
+NEUTRAL = 1e-3  # distance from 1 of multipliers that are 1 since energy is conserved
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a family: the orbit, the unit tangent, multipliers and checks.
+
+    ``liouville_error`` is how far the logarithm of the product of multipliers is from the integral
+    of the divergence, beside 1 and its size.
+    """
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    multipliers: Complex
+    arclength: float
+    step: float
+    newton_steps: int
+    residual: float
+    sign: float
+    trivial_error: float
+    liouville_error: float
+    mesh_error: float
+
+    def flipped(self) -> Point:
+        """The same point of a family that is followed the other way round."""
+        return replace(self, dx=-self.dx, dy=-self.dy, sign=-self.sign, arclength=-self.arclength)
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the multipliers pass their checks."""
+        # A mesh that is coarser than its tolerance, as one that was asked for, may be off by more.
+        near = max(NEAR, min(UNRESOLVED * self.mesh_error, ALIKE))
+        if not (self.trivial_error <= near and self.liouville_error <= ALIKE):
+            return False
+        sizes = [abs(one) for one in self.multipliers.tolist()]
+        if not all(map(math.isfinite, sizes)):
+            return False
+        log = sum(math.log(one) if one > 0.0 else -LARGEST for one in sizes)
+        # What the product itself is wrong by, beside 1 or its size.
+        part = (1.0 + abs(log)) * math.exp(max(min(log, 0.0), -LARGEST)) if log < LARGEST else 1.0
+        return self.liouville_error * part <= TRUSTED
+
+
+def vertical(cycles: Cycles, point: Point) -> bool:
+    """Whether the parameter keeps its value since energy is conserved: one more multiplier is 1.
+
+    Where cycles explode along canards the parameter hardly moves either.
+    """
+    return cycles.vertical(point.dy) and neutral(cycles, point)
+
+
+def still(cycles: Cycles, a: Point, b: Point) -> bool:
+    """Whether a family is vertical between two points, even where one is too small to tell."""
+    moved = bool(np.all(np.abs(b.orbit.y[1:] - a.orbit.y[1:]) > STILL * cycles.width))
+    return not moved and neutral(cycles, a) and neutral(cycles, b)
+
+
+def neutral(cycles: Cycles, point: Point) -> bool:
+    """Whether one multiplier is 1 besides that which always is."""
+    near = np.sum(np.abs(point.multipliers - 1.0) < NEUTRAL)
+    return bool(near > (0 if cycles.forced else 1))
+
+
+def critical_count(point: Point, forced: bool, label: str = "", neutral: bool = False) -> int:
+    """Number of multipliers outside the unit circle; -1 where they are not known."""
+    if not point.trusted:
+        return -1
+    values = point.multipliers.tolist()
+    if not forced:
+        # Where energy is conserved, two are always 1.
+        values = sorted(values, key=lambda one: abs(one - 1.0))[2 if neutral else 1 :]
+    limit = 1.0 + (ON_CIRCLE if label not in ("", "UZ") or neutral else 0.0)
+    return sum(abs(one) > limit for one in values)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """All that it takes to go on as if the trace had never stopped."""
+
+    orbit: Orbit
+    dx: Array
+    dy: Array
+    step: float
+    arclength: float
+    since: int  # points since the mesh was last fitted
+    since_start: int = 0
+    #: The point before on the same mesh, and its tangent.
+    behind: tuple[Orbit, Array, Array] | None = None
+
+    def ahead(self, cycles: Cycles, step: float) -> Orbit:
+        """Where the family is expected a step along the tangent.
+
+        On the cubic through the last two points with their tangents: in the plane that the step
+        leads to, as the tangent's part is that of the curve itself.
+        """
+        orbit, dx, dy = self.orbit, self.dx, self.dy
+        if self.behind is None:
+            return Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+        last, ex, ey = self.behind
+        gap_x, gap_y = last.x - orbit.x, last.y - orbit.y
+        back = cycles.inner(orbit.mesh, gap_x, dx, gap_y, dy)
+        along = cycles.inner(orbit.mesh, ex, dx, ey, dy)
+        if not (back < 0.0 < along):
+            return Orbit(orbit.mesh, orbit.x + step * dx, orbit.y + step * dy)
+        r = step / back
+        # By the gap, the last tangent and this one.
+        g, t, u = r * r * (3.0 - 2.0 * r), step * r * (r - 1.0) / along, step * (1.0 - r) ** 2
+        gap_x[:, cycles.moving :] = 0.0
+        return Orbit(
+            orbit.mesh,
+            orbit.x + (g * gap_x + t * ex + u * dx),
+            orbit.y + (g * gap_y + t * ey + u * dy),
+        )
+
+
+def point_of(cycles: Cycles, s: Solution, arclength: float, step: float) -> Point:
+    """A point of what Newton's method found."""
+    divergence = cycles.divergence(s.divergence)
+    values, log, trivial = cycles.multipliers(s.W, s.orbit, divergence)
+    error = cycles.mesh_error(s.orbit)
+    # An orbit may be smooth where its variational equations are stiff.
+    least = UNRESOLVED * max(error, cycles.options.mesh_tolerance)
+    reach = SMOOTH
+    for _ in range(FINER):
+        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
+        mesh = cycles.resolving(s.orbit, reach) if part > 1.0 else None
+        if mesh is None:
+            break
+        orbit, (dx,) = cycles.on(mesh, s.orbit, s.dx)
+        fine = cycles.on_finer(orbit, dx, s.dy)
+        if not fine.converged:
+            fine = cycles.looked_at(orbit, dx, s.dy)
+        divergence = cycles.divergence(fine.divergence)
+        values, log, trivial = cycles.multipliers(fine.W, fine.orbit, divergence)
+        part = abs(log - divergence) / (least * (1.0 + abs(divergence)))
+        # The error of a decay goes with the power 2 m of the length of intervals.
+        reach *= 0.8 * min(max(part, 1.0), 1e4) ** (-0.5 / cycles.m)
+    # In logarithms, as the product may be beyond all numbers.
+    defect = abs(log - divergence) / (1.0 + abs(divergence))
+    return Point(
+        s.orbit, s.dx, s.dy, values, arclength, step, s.steps, s.residual, s.sign, trivial,
+        defect, error,
+    )  # fmt: skip
