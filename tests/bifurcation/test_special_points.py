@@ -2,6 +2,7 @@
 
 import ast
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,19 +10,20 @@ import pytest
 import phasekit
 import phasekit as pk
 from phasekit.bifurcation.continuation import locate
+from phasekit.bifurcation.continuation.points import pair
 from phasekit.bifurcation.continuation.points.special import CONVERGED, Special
 from phasekit.bifurcation.special_points import KINDS, TESTS
 from phasekit.cycles import events
 from phasekit.plot.parts.style import POINTS_OF
 
 #: Where special points are made, and by which calls.
-FOLDER = Path(phasekit.__file__).parent / "bifurcation"
+FOLDERS = [Path(phasekit.__file__).parent / name for name in ("bifurcation", "cycles")]
 
 
 def made() -> set[str]:
     """Kinds that the sources name where they make a special point."""
     names = set()
-    for path in FOLDER.rglob("*.py"):
+    for path in (path for folder in FOLDERS for path in folder.rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Special":
                 names |= {
@@ -72,3 +74,11 @@ def test_a_normal_form_has_the_coefficients_that_the_registry_names(kind, f, sta
     (point,) = pk.continuation(problem, "p", x0=start[1], span=span).special(kind)
     assert set(point.normal_form) == set(KINDS[kind].normal_form)
     assert np.isfinite(list(point.normal_form.values())).all()
+
+
+def test_where_zero_is_an_eigenvalue_too_a_pair_has_no_first_coefficient():
+    """There it has a pole; the matrix is singular to the last bit."""
+    slopes = np.array([[0.0, -1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    form = pair.normal_form(SimpleNamespace(curve=SimpleNamespace(n=3), slopes=slopes), 1.0)
+    assert np.isnan([form["l1"], form["d"]]).all()
+    assert form["omega"] == 1.0

@@ -207,6 +207,10 @@ def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
     """
     n = d.curve.n
     A = d.slopes[:, :n]
+    try:
+        inverse = np.linalg.inv(A)
+    except np.linalg.LinAlgError:  # zero is an eigenvalue, too: there l1 has a pole
+        return {"l1": np.nan, "omega": float(omega), "d": np.nan}
     values, vectors = np.linalg.eig(A)
     q = vectors[:, np.argmin(np.abs(values - 1j * omega))]
     q = q / np.linalg.norm(q)
@@ -216,7 +220,7 @@ def normal_form(d: forms.Derivatives, omega: float) -> dict[str, float]:
     bar = np.conj(q)
     still, double = d.second(q, bar), d.second(q, q)
     matrix = 2j * omega * np.eye(n) - A
-    second = forms.fed(d, q, np.linalg.solve(A, still.value.real), np.linalg.inv(A), still.error)
+    second = forms.fed(d, q, np.linalg.solve(A, still.value.real), inverse, still.error)
     third = forms.fed(
         d, bar, np.linalg.solve(matrix, double.value), np.linalg.inv(matrix), double.error
     )
