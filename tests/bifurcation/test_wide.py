@@ -115,6 +115,7 @@ def test_leading_multipliers_of_very_many_states():
     values, log = multipliers.multipliers(G)
     exact = np.array(sorted(np.linalg.eigvals(whole), key=abs, reverse=True))
     large = np.abs(exact) > multipliers.INSIDE
+    assert 0 < np.sum(large) < large.size
     for one in exact[large]:
         assert np.min(np.abs(values - one)) < 1e-7
     np.testing.assert_allclose(np.abs(values[large]), np.abs(exact[large]), rtol=1e-7)

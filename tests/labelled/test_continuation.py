@@ -890,4 +890,5 @@ def test_folds_next_to_the_end_of_a_span_count_inside_it_alone(side, gap):
         mu = branch.points.mu.values
         assert span[0] <= mu.min() <= mu.max() <= span[1]
         ends = [s.message for s in branch.special_points if s.kind == "end"]
+        assert len(ends) == 2
         assert all(re.match("mu met its (lower|upper) bound", words) for words in ends)

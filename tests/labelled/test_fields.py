@@ -321,6 +321,7 @@ def test_no_eigenvalue_to_the_right_is_missed(length):
         assert np.min(np.abs(values - one)) < 1e-8
     right, up = box_of(matrix, scale)
     growing = values[values.real >= 0.0]
+    assert (growing.size > 0) == (length > 0.52)  # the first of the pairs crosses at 0.513
     assert np.all(growing.real <= right)
     assert np.all(np.abs(growing.imag) <= up)
 

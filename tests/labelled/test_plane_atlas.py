@@ -45,7 +45,7 @@ def test_the_cusp_has_one_curve_and_its_numbers_are_those_of_roots():
     np.testing.assert_allclose(
         [point["mu"], point["l"], point.normal_form["c"]], [0, 0, -1], atol=1e-12
     )
-    assert all(atlas.complete.values())
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
     places = random_places(atlas, 10_000)
     found = atlas.counts(**places)
     mu, ell = places["mu"], places["l"]
@@ -65,7 +65,7 @@ def test_the_symmetric_double_zero_is_complete():
         a, b = np.concatenate(lines).T
         off = a if curve.kind == "branch_point" else np.where(a < 0, b, np.minimum(b - a, b))
         np.testing.assert_allclose(off, 0, atol=1e-9)
-    assert all(atlas.complete.values())
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
     places = random_places(atlas, 10_000)
     a, b = places["a"], places["b"]
     found = atlas.counts(**places)
@@ -134,7 +134,7 @@ def test_a_predator_and_its_prey_have_the_equilibria_of_their_cubic_and_no_cusp(
     )
     span = {"al": (0.2, 0.6), "de": (0.05, 0.6)}
     atlas = pk.atlas(predator, "al", "de", span=span)
-    assert all(atlas.complete.values())
+    assert atlas.complete == {"n_equilibria": True, "n_stable": True}
     assert [point.label for point in atlas.special_points] == ["BT"]
     places = random_places(atlas, 500)
     found = atlas.counts(**places)
