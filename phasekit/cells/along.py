@@ -189,7 +189,7 @@ class _Cell:
         """Whether these are all branches."""
         if self.failure:
             return BranchStatus.FAILED
-        if not self.starts:
+        if not self.starts and self.proved:
             return BranchStatus.NO_EQUILIBRIUM
         if any(one.unfinished for one in self.traced) or not all(
             one.finished for one in self.families

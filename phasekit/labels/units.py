@@ -103,7 +103,8 @@ def si_unit(unit: object) -> str | None:
 
 #: A number as people write it, with a decimal point or comma or as a part of pi, and its unit.
 TYPED = re.compile(
-    r"\s*(?:(?P<digits>[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)(?!\s*\*?\s*(?:pi|\u03c0)\b)"
+    r"\s*(?:(?P<digits>[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)"
+    r"(?![\d.,]|\s*\*?\s*(?:pi|\u03c0)\b)"
     r"|(?P<sign>[-+]?)\s*(?P<times>\d+(?:\.\d+)?)?\s*\*?\s*(?:pi|\u03c0)(?:\s*/\s*(?P<over>\d+(?:\.\d+)?))?)"
     r"\s*(?P<unit>.*?)\s*"
 )

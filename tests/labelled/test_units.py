@@ -167,3 +167,9 @@ def test_variables_of_others():
     xr.testing.assert_identical(odd.phasekit.to(x="parsec"), odd)
     with pytest.raises(pk.ParameterError, match="unit of x: got 'm', wants 'parsec'"):
         odd.phasekit.to(x="m")
+
+
+@pytest.mark.parametrize(("text", "parts"), [("0.5pi", 0.5), ("12pi/24", 0.5), ("1.5*pi/2", 0.75)])
+def test_multiples_of_pi_of_several_digits(text, parts):
+    disk = pk.GyroRotorDisk(beta=text, e=0.1, a=0.05, r=0.1, omega1=10.0)
+    assert disk.beta == pytest.approx(parts * np.pi, rel=1e-15)

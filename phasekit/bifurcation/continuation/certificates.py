@@ -558,7 +558,8 @@ def _other(mark: Mark, errors: Array) -> Enclosure:
     if mark.kind == "end":
         known = bool(np.isfinite(error).all())
         reason = "" if known else "the stretch next to it is not proved"
-        return Enclosure(known, mark.u - error, mark.u + error, reason)
+        low, high = np.nextafter(mark.u - error, -np.inf), np.nextafter(mark.u + error, np.inf)
+        return Enclosure(known, low, high, reason)
     nothing = np.full(len(mark.u), np.nan)
     if mark.kind in CROSSINGS:
         reason = (
@@ -601,14 +602,14 @@ def _of_kind(
                 "the formulas are too wide",
             ))  # fmt: skip
             continue
-        reason = ""
-        if kind == "hopf" and not (low[i, n + 1] > 0.0 or high[i, n + 1] < 0.0):
-            reason = "omega may be 0"
-        box = slice(0, n + 1)
-        on = _on(chain, mark.place, low[i, box] / units, high[i, box] / units)
-        if not on:
+        reason, box = "", slice(0, n + 1)
+        # Where omega, sigma or the sine is 0 these equations hold at folds and doublings, too.
+        pair = kind in ("hopf", "neutral_saddle", "torus")
+        bad = pair and not (low[i, n + 1] > 0.0 or high[i, n + 1] < 0.0)
+        if bad:
+            reason = "its two eigenvalues may be one, of a fold or a doubling"
+        elif not _on(chain, mark.place, low[i, box] / units, high[i, box] / units):
             reason = "no tube holds it: whether it is on this branch is not proved"
-        bad = reason == "omega may be 0"
         found.append(Enclosure(not bad, low[i, :shown], high[i, :shown], reason))
     return found
 

@@ -109,6 +109,10 @@ def moved(
         point = _Point(here, replace(special, u=u), others)
         if not point.refined():
             return None
+        # Beyond a double zero the same equations are those of the other kind.
+        if len(curve.active) == 1 and special.kind in ("hopf", "neutral_saddle"):
+            if not (point.u[-1] > 0.0) == (special.kind == "hopf"):
+                return None
         form = point.form_at() if coefficients else None
         found = dict.fromkeys(special.normal_form, np.nan)
         if form is not None:

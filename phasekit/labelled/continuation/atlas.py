@@ -361,6 +361,8 @@ def atlas(
                     search.cut(along, float(place[1 - k]), [float(place[k])])
             if len(search.curves) == before:
                 break
+        else:
+            found = counts.regions()
     corner = zip(low.tolist(), high.tolist(), strict=True)
     made = Atlas(
         problem, names, spans, dict(zip(problem.state, corner, strict=True)),

@@ -196,7 +196,7 @@ class RegionSearch:
         """The number in each region, counted once in each part in which it cannot change."""
         from scipy import ndimage
 
-        parts, many = ndimage.label(clear)
+        parts, many = ndimage.label(clear & (region > 0))
         spots, _ = self._places(parts, many)
         i, j = self.cells(spots).T
         own = region[i, j] - 1

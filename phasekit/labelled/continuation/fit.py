@@ -28,6 +28,7 @@ SMALL = 1e-10  # part of the parameters by which a last step changes them
 IDENTIFIED = 1e-8  # least part of the largest singular value that tells of a combination
 SAME = 1e-9
 HIGHEST = 1e12  # of the damping
+LOST = "a special point is lost on the way to the targets"
 
 
 @dataclass(frozen=True, repr=False)
@@ -275,10 +276,10 @@ class _Search:
                     return ""
                 continue
             if small:  # no way down that rounding leaves
-                return ""
+                return "" if made is not None else LOST
             damping = max(1e-3, 10.0 * damping)
             if damping > HIGHEST:
-                return "a special point is lost on the way to the targets"
+                return LOST
         return f"{steps} steps were not enough"
 
     def _lost(self) -> str:

@@ -170,9 +170,9 @@ class Sheets:
         """Which boxes may hold an equilibrium, contracted; whether it may merge, or lose."""
         n, (start, end) = self.n, self._plane
         step = (end - start) / self._side
-        # Outward, and the whole plane's own ends.
-        p, q = start + first * step, start + last * step
-        p, q = p - 4e-16 * np.abs(p), q + 4e-16 * np.abs(q)
+        # Outward, by more than rounding of the plane's ends.
+        blur = 4e-16 * np.maximum(np.abs(start), np.abs(end))
+        p, q = start + first * step - blur, start + last * step + blur
         f, slopes, _, undefined = self._values(low, high, p, q)
         possible = np.all((f[0] <= 0.0) & (f[1] >= 0.0), axis=1) | undefined
         rows = np.flatnonzero(possible)
