@@ -490,3 +490,19 @@ def test_every_fold_of_a_snake():
     grow = branch.points.n_unstable.values
     assert set(grow[1:-1].tolist()) <= {0, 1, 2}
     assert branch.messages == ()
+
+
+@pytest.mark.parametrize("pace", [1.0, 1e-11])
+def test_eigenvalues_of_slow_fields_and_double_ones_are_all_counted(pace):
+    """On a ring all but the first are double; a unit of time changes no number."""
+    from phasekit.bifurcation.continuation.large.spectrum import spectrum_at
+
+    n, r = 200, 3.0
+    ring = sp.diags([1.0, -2.0, 1.0], [-1, 0, 1], shape=(n, n)).tolil()
+    ring[0, n - 1] = ring[n - 1, 0] = 1.0
+    turn = sp.kron(np.array([[0.0, -2.0], [2.0, 0.0]]), sp.eye(n))
+    matrix = pace * (sp.kron(sp.eye(2), 100.0 * ring + r * sp.eye(n)) + turn)
+    own = r - 400.0 * np.sin(np.pi * np.arange(n) / n) ** 2
+    found = spectrum_at(sp.csc_array(matrix), np.ones(2 * n))
+    assert found.complete
+    assert found.positive == 2 * int(np.sum(own > 0.0))

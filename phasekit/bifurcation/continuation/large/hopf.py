@@ -86,7 +86,7 @@ def _located(
             return complex(np.nan, np.nan)
         part = (s - low) / (high - low)
         expected = first + part * (last - first)
-        near = pairs_near(point.matrix, 1j * expected.imag, 2)
+        near = pairs_near(point.matrix, 1j * expected.imag * (1.0 + BESIDE), 2)
         if near is None:
             return complex(np.nan, np.nan)
         values = near[0]

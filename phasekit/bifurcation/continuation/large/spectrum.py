@@ -98,7 +98,7 @@ def spectrum_at(matrix: Any, scale: Array) -> Spectrum:
     else:
         complete = False
     values = np.array(found, dtype=complex)
-    size = np.max(np.abs(values), initial=1.0)
+    size = np.max(np.abs(values), initial=0.0)
     values.imag[np.abs(values.imag) <= 1e-9 * size] = 0.0  # real ones, but for rounding
     return Spectrum(values, complete)
 
@@ -117,12 +117,8 @@ def nearest(matrix: Any, center: complex, count: int = NEAREST) -> tuple[Complex
         return None
     values = found[0]
     radius = INSIDE * float(np.max(np.abs(values - center)))
-    values = np.where(values.imag < 0.0, np.conj(values), values)
-    kept: list[complex] = []
-    for one in values.tolist():
-        if not _seen(one, kept):
-            kept.append(one)
-    return np.array(kept), radius
+    # Conjugates are farther from the center; copies of multiple ones count.
+    return values[values.imag >= -1e-9 * np.max(np.abs(values))], radius
 
 
 def pairs_near(
