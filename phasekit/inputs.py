@@ -17,11 +17,15 @@ from typing import Any, TypeAlias, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from phasekit.docstrings import with_section
 from phasekit.errors import ArgumentError, ParameterError
 from phasekit.spellings import argument_meant, respelled
 
 FloatArray: TypeAlias = NDArray[np.float64]
 Function = TypeVar("Function", bound=Callable[..., Any])
+
+#: What a function raises whose docstring does not say it.
+UNUSABLE = "ParameterError\n    If an argument is unusable."
 
 #: Largest number of elements that a description or a representation writes out.
 SHOWN = 5
@@ -260,7 +264,8 @@ def refuse_call(function: Any, strange: Iterable[str], missing: Iterable[str] = 
 def call_checked(function: Function, name: str = "") -> Function:
     """Make a call with an unknown, missing or surplus argument say what the arguments are.
 
-    A method that is named by what it makes, `name`, does not list its object.
+    A method that is named by what it makes, `name`, does not list its object. A docstring need not
+    say that a `ParameterError` is raised if an argument is unusable.
     """
     signature = inspect.signature(function)
     expected = list(signature.parameters)[bool(name) :]
@@ -289,4 +294,6 @@ def call_checked(function: Function, name: str = "") -> Function:
             message = f"{name or function.__name__}() {text};{hint} its arguments are {listed}"
             raise ArgumentError(message) from None
 
+    if "\nRaises\n" not in inspect.cleandoc(function.__doc__ or ""):
+        called.__doc__ = with_section(function.__doc__, "Raises", UNUSABLE)
     return cast(Function, called)

@@ -11,10 +11,11 @@ from phasekit.labels.arguments import (
     NumberLike,
     call_checked,
 )
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 
 
 @call_checked
+@returns("near_center")
 def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     """Period and frequency of small oscillations about the centers, to first order in energy.
 
@@ -28,13 +29,7 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On the dim ``equilibrium``: ``near_center_period`` in s and ``near_center_frequency`` in
-        s^-1; NaN but for centers.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
+        NaN but for centers.
 
     Notes
     -----
@@ -55,6 +50,7 @@ def near_center(system: Any, energy: NumberLike) -> xr.Dataset:
 
 
 @call_checked
+@returns("near_separatrix")
 def near_separatrix(system: Any, gap: NumberLike) -> xr.Dataset:
     """Period next to the separatrices, to leading order in the energy from the saddle.
 
@@ -68,12 +64,7 @@ def near_separatrix(system: Any, gap: NumberLike) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On the dim ``saddle``: ``near_separatrix_period`` in s, NaN where the saddle is absent.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
+        NaN where the saddle is absent.
 
     Notes
     -----

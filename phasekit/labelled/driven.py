@@ -26,7 +26,7 @@ from phasekit.laws.perturbed import OWN
 from phasekit.numerics.waits import notice
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import System, as_system
-from phasekit.table.quantities import ROWS, select
+from phasekit.table.quantities import ROWS, returns, select
 from phasekit.table.row import STATE, Pass
 
 
@@ -166,6 +166,7 @@ def _exponents(*arrays: Any, **options: Any) -> Any:
 
 
 @state_arguments
+@returns("lyapunov")
 def lyapunov(
     system: Any,
     phi0: Any = None,
@@ -204,16 +205,10 @@ def lyapunov(
     Returns
     -------
     xarray.Dataset
-        On ``exponent``: ``lyapunov_exponent`` in s^-1, the largest first, and its
-        ``lyapunov_error``. ``lyapunov_sum``, which is -damping where there is no quadratic
-        damping, as a check (of a `FreeGyroRotor` the mean of -damping M22/M, M the inertia at the
-        momentum). Of a `Problem` also ``lyapunov_dimension``; the sum is the mean of the divergence
-        of f, and NaN unless all exponents are computed.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
+        The sum is -damping where there is no quadratic damping, as a check (of a `FreeGyroRotor`
+        the mean of -damping M22/M, M the inertia at the momentum). Of a `Problem` also
+        ``lyapunov_dimension``; the sum is the mean of the divergence of f, and NaN unless all
+        exponents are computed.
 
     Notes
     -----

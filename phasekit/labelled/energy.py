@@ -14,10 +14,11 @@ import xarray as xr
 
 from phasekit.cells.states import at_states
 from phasekit.labels.arguments import NumberLike, state_arguments
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 
 
 @state_arguments
+@returns("potential")
 def potential(system: Any, phi: NumberLike) -> xr.Dataset:
     """Potential V of the equation of motion, per unit of inertia.
 
@@ -27,16 +28,6 @@ def potential(system: Any, phi: NumberLike) -> xr.Dataset:
         A `GyroRotorDisk`, `Reduced`, `Coefficients` or any other system.
     phi : float, 1-D array_like or xarray.DataArray
         Angles in rad.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``potential`` in s^-2.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
 
     Notes
     -----
@@ -53,6 +44,7 @@ def potential(system: Any, phi: NumberLike) -> xr.Dataset:
 
 
 @state_arguments
+@returns("potential_gradient")
 def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
     """Gradient V' of the potential: ``phi'' = -V'``.
 
@@ -62,16 +54,6 @@ def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
         Any system.
     phi : float, 1-D array_like or xarray.DataArray
         Angles in rad.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``potential_gradient`` in s^-2.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
 
     Notes
     -----
@@ -87,6 +69,7 @@ def gradient(system: Any, phi: NumberLike) -> xr.Dataset:
 
 
 @state_arguments
+@returns("potential_curvature")
 def curvature(system: Any, phi: NumberLike) -> xr.Dataset:
     """Curvature V'' of the potential.
 
@@ -96,16 +79,6 @@ def curvature(system: Any, phi: NumberLike) -> xr.Dataset:
         Any system.
     phi : float, 1-D array_like or xarray.DataArray
         Angles in rad.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``potential_curvature`` in s^-2.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
 
     Notes
     -----
@@ -121,6 +94,7 @@ def curvature(system: Any, phi: NumberLike) -> xr.Dataset:
 
 
 @state_arguments
+@returns("energy_integral")
 def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     """Energy integral of a state: constant along every motion.
 
@@ -130,11 +104,6 @@ def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
         Any system.
     phi, dphi : float, 1-D array_like or xarray.DataArray
         Angles in rad and angular velocities in s^-1.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``energy_integral`` in s^-2.
 
     Raises
     ------
@@ -156,6 +125,7 @@ def energy(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
 
 
 @state_arguments
+@returns("phase_velocity")
 def phase_velocity(system: Any, phi: NumberLike, energy: NumberLike) -> xr.Dataset:
     """Angular velocity at an angle, on the level of an energy.
 
@@ -167,11 +137,6 @@ def phase_velocity(system: Any, phi: NumberLike, energy: NumberLike) -> xr.Datas
         Angles in rad.
     energy : float, 1-D array_like or xarray.DataArray
         Energies in s^-2, as `energy` gives them.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``phase_velocity`` in s^-1, >= 0; NaN where the energy is below the potential.
 
     Raises
     ------

@@ -53,11 +53,6 @@ def orbit_families(system: Any, n: int = 200, *, energy_max: float | None = None
         energy; energies are close to each other next to separatrices. NaN where a family is
         absent.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     From the energy integral [Veljovic2015] (14); `orbits` explains the quantities.

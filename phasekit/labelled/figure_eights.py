@@ -55,11 +55,6 @@ def figure_eights(
         have equal energy, and the eight passes from one to the other) and ``event_change``
         (birth, death, exchange, or none of the eight).
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     The separatrices are level sets of the energy at the saddles ([Veljovic2015] (14)), so there is

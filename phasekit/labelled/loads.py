@@ -22,7 +22,7 @@ from phasekit.labels.conversion import in_si
 from phasekit.systems.disk import GyroRotorDisk
 from phasekit.systems.system import System, as_system
 from phasekit.table.loads import DISK
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 from phasekit.table.row import Quantity
 
 FRAMES = ("disk", "carrier")
@@ -32,6 +32,7 @@ SELECTED = ("equilibrium", "saddle", "side")
 
 
 @state_arguments
+@returns("rotators")
 def rotators(
     disk: GyroRotorDisk,
     phi: NumberLike | xr.Dataset,
@@ -59,13 +60,11 @@ def rotators(
     Returns
     -------
     xarray.Dataset
-        ``rotator`` in s^-2 on (``rotator_name``, ``carrier_axis``): R01 with the base vector
-        [n1, r0], R011 with S_n1, R022 with S_n2, R1 with D_n1, R2 with D_n2; the coupling rotators
-        R012 along [n1, S_n2], R12 along [n1, J_n2], and R12c along the vector that enters the rate
-        of angular momentum. ``rotator_intensity``; ``gamma2`` in rad, the angle of R022 from its
-        base vector, and ``gamma2_rate`` in s^-1 (of free motions, for constant domega1; NaN
-        otherwise and at equilibria); the hodograph of R022, ``hodograph_u`` and ``hodograph_v``. A
-        rotator whose base vector is zero is undefined: NaN.
+        Names of rotators: R01 with the base vector [n1, r0], R011 with S_n1, R022 with S_n2, R1
+        with D_n1, R2 with D_n2; the coupling rotators R012 along [n1, S_n2], R12 along [n1, J_n2],
+        and R12c along the vector that enters the rate of angular momentum. ``gamma2_rate`` holds of
+        free motions, for constant domega1; it is NaN otherwise and at equilibria. A rotator whose
+        base vector is zero is undefined: NaN.
 
     Raises
     ------
@@ -90,6 +89,7 @@ def rotators(
 
 
 @state_arguments
+@returns("bearing_forces")
 def bearing_forces(
     disk: GyroRotorDisk,
     phi: NumberLike | xr.Dataset,
@@ -118,12 +118,9 @@ def bearing_forces(
     Returns
     -------
     xarray.Dataset
-        In N on (``bearing``, axis): ``force``, its parts ``force_kinetic`` and ``force_weight``;
-        ``force_magnitude`` on ``bearing``; ``force_axial``. ``deviation_couple`` in N m, the size
-        of half_span [n2, F_A2 - F_B2] of the kinetic parts; ``drive_torque`` in N m, what moves a
-        massless support as it moves. ``force_component`` on (``bearing``, ``component``): the
-        kinetic part for constant omega1 along the papers' w1 = n1, w2 = sin(phi) u2 - cos(phi) v2
-        and w3 = -v01, and along the rotator R022 (F_24 times the rotator's intensity).
+        Components: along the papers' w1 = n1, w2 = sin(phi) u2 - cos(phi) v2 and w3 = -v01, and
+        along the rotator R022 (F_24 times the rotator's intensity). The drive torque moves a
+        massless support as it moves.
 
     Raises
     ------
@@ -157,6 +154,7 @@ def bearing_forces(
 
 
 @state_arguments
+@returns("fixed_bearing_forces")
 def fixed_bearing_forces(
     disk: GyroRotorDisk,
     phi: NumberLike | xr.Dataset,
@@ -180,12 +178,6 @@ def fixed_bearing_forces(
         States, or a motion, as in `rotators`.
     rho_b1 : float, 1-D array_like or xarray.DataArray
         Place of B1 above O1 in m, negative below; not zero.
-
-    Returns
-    -------
-    xarray.Dataset
-        In N on (``fixed_bearing``, ``carrier_axis``): ``fixed_force``, its parts
-        ``fixed_force_kinetic`` and ``fixed_force_weight``.
 
     Raises
     ------

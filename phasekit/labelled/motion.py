@@ -29,10 +29,11 @@ from phasekit.numerics.waits import notice
 from phasekit.spellings import argument_meant
 from phasekit.systems.perturbed import Perturbed
 from phasekit.systems.system import System, as_system
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 
 
 @state_arguments
+@returns("motion")
 def flow(
     system: Any,
     phi0: Any = None,
@@ -99,13 +100,12 @@ def flow(
     Returns
     -------
     xarray.Dataset
-        ``motion_phi`` in rad, continuous in time (a rotation runs past pi), and ``motion_dphi``
-        in s^-1. NaN where a motion with damping and drive could not be followed to a time, which
-        a RuntimeWarning says. With events also ``event_name``, ``event_time``, ``event_phi`` and
-        ``event_dphi`` on the dim ``event``; after one that ends the motion it is NaN. Where there
-        are several motions, ``n_events`` says how many each has, and the others are NaN. Of a
-        `Problem` ``motion_`` and ``event_`` and the name of each state. With paths they
-        have the dim ``path``, and ``noise_step`` is the longest step.
+        A rotation runs past pi. NaN where a motion with damping and drive could not be followed to
+        a time, which a RuntimeWarning says. With events also ``event_name``, ``event_time``,
+        ``event_phi`` and ``event_dphi`` on the dim ``event``; after one that ends the motion it is
+        NaN. Where there are several motions, ``n_events`` says how many each has, and the others
+        are NaN. Of a `Problem` ``motion_`` and ``event_`` and the name of each state. With paths
+        they have the dim ``path``, and ``noise_step`` is the longest step.
 
     Raises
     ------
@@ -241,6 +241,7 @@ def checked_tolerances(rtol: float | None, atol: float | None) -> dict[str, floa
 
 
 @call_checked
+@returns("motion")
 def separatrix_motion(
     system: Any, t: NumberLike, *, saddle: str | int | None = None, side: str = "right"
 ) -> xr.Dataset:
@@ -263,13 +264,8 @@ def separatrix_motion(
     Returns
     -------
     xarray.Dataset
-        ``motion_phi`` in rad, continuous from the saddle's angle, and ``motion_dphi`` in s^-1; NaN
-        where the saddle is absent, and on a side to which its separatrix runs away.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
+        Continuous from the saddle's angle; NaN where the saddle is absent, and on a side to which
+        its separatrix runs away.
 
     Notes
     -----

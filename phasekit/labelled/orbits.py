@@ -29,7 +29,7 @@ from phasekit.labels.arguments import (
 )
 from phasekit.phase.numerical.families import BACKWARD, FORWARD, MOST
 from phasekit.systems.system import System, as_system
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 
 #: Families that have orbits of given action; of any potential rotations, and wells by number.
 FAMILIES = {family.name.lower(): family.value for family in OrbitFamily if family > 0}
@@ -41,6 +41,7 @@ _LEAST = 1e-290
 
 
 @state_arguments
+@returns("orbits")
 def orbits(
     system: Any,
     phi0: NumberLike | None = None,
@@ -78,20 +79,16 @@ def orbits(
     Returns
     -------
     xarray.Dataset
-        ``orbit_kind`` (`OrbitKind`), ``orbit_energy`` in s^-2, ``period`` in s (infinite on a
-        separatrix; that of small oscillations at a center), ``frequency`` and ``action`` in
-        s^-1 (the action is NaN on a separatrix), ``phi_min`` and ``phi_max`` in rad (unwrapped;
-        NaN for a rotation), and ``amplitude``, half the way between them. Cells without an orbit,
-        below the center or at an absent saddle, are not_computed and NaN. A state is an equilibrium
-        if it is at rest and V' = 0 there in floating point, and asymptotic if its energy is a
-        saddle's within the rounding of the state; so the double next to a center is a libration of
-        almost no action. An orbit of a `Potential` that leaves the line, or its interval, is
-        unbounded; its period is infinite.
-        Results of a `Potential` have estimates of their errors, ``period_error`` and
-        ``action_error``, and bounds of those of the turning points, ``phi_min_error`` and
-        ``phi_max_error``: infinite where rounding hides where, or whether, the orbit turns.
-        Closed forms have none: their turning points are right to a few units in the last place,
-        next to separatrices as well.
+        The period is that of small oscillations at a center, the action NaN on a separatrix; angles
+        are unwrapped. Cells without an orbit, below the center or at an absent saddle, are
+        not_computed and NaN. A state is an equilibrium if it is at rest and V' = 0 there in
+        floating point, and asymptotic if its energy is a saddle's within the rounding of the state;
+        so the double next to a center is a libration of almost no action. An orbit of a `Potential`
+        that leaves the line, or its interval, is unbounded; its period is infinite. Results of a
+        `Potential` have estimates of their errors, ``period_error`` and ``action_error``, and
+        bounds of those of the turning points, ``phi_min_error`` and ``phi_max_error``: infinite
+        where rounding hides where, or whether, the orbit turns. Closed forms have none: their
+        turning points are right to a few units in the last place, next to separatrices as well.
         States whose energies no doubles hold are not_computed.
 
         Under a constant torque, ``pk.Perturbed(system, torque=...)``, the energy is
@@ -189,6 +186,7 @@ def with_notes(ds: xr.Dataset, **attrs: str) -> xr.Dataset:
 
 
 @state_arguments
+@returns("orbit_family", "action", "angle", "frequency", "twist", "angle_error")
 def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     """Action and angle variable of states, and how the frequency changes with the action.
 
@@ -202,13 +200,10 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``orbit_family`` (`OrbitFamily`), ``action`` and ``frequency`` in s^-1, ``angle`` in rad,
-        in [0, 2 pi), and ``twist``: d(frequency)/d(action). The angle grows evenly in time, at
-        ``frequency``; it is 0 where a libration is at its greatest phi, or a rotation at the lower
-        center. Those of a `Potential` have estimates of their errors, and no twist; an angle whose
-        error may exceed 1e-7 is NaN. The code of a family is there the sum of 2^k over the numbers
-        k of the centers that the orbit goes round, -1 of a rotation forward and -2 backward, 0 of
-        an orbit in no family.
+        The angle grows evenly in time, at ``frequency``. Those of a `Potential` have estimates of
+        their errors, and no twist; an angle whose error may exceed 1e-7 is NaN. The code of a
+        family is there the sum of 2^k over the numbers k of the centers that the orbit goes round,
+        -1 of a rotation forward and -2 backward, 0 of an orbit in no family.
 
     Raises
     ------
@@ -236,6 +231,7 @@ def action_angle(system: Any, phi: NumberLike, dphi: NumberLike) -> xr.Dataset:
 
 
 @call_checked
+@returns("state_of")
 def state_of(
     system: Any,
     action: NumberLike,
@@ -261,9 +257,8 @@ def state_of(
     Returns
     -------
     xarray.Dataset
-        ``phi_of_angle`` in rad and ``dphi_of_angle`` in s^-1; NaN where the family has no orbit
-        of that action. Those of a `Potential` have estimates of their errors, and are NaN where
-        these exceed 1e-7 of the orbit's size.
+        NaN where the family has no orbit of that action. Those of a `Potential` have estimates of
+        their errors, and are NaN where these exceed 1e-7 of the orbit's size.
 
     Raises
     ------

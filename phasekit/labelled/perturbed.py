@@ -20,7 +20,7 @@ from phasekit.labelled.orbits import family_code, wants_family, with_notes
 from phasekit.labels.arguments import bad, call_checked, one_of, whole
 from phasekit.labels.coordinates import LABELS
 from phasekit.systems.system import as_system
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 from phasekit.table.row import Quantity
 
 #: The family that is meant where none is named, of numbered centers and of those with names.
@@ -28,6 +28,7 @@ LOWEST = ("the well of the lowest center", "lower_well")
 
 
 @call_checked
+@returns("melnikov")
 def melnikov(system: Any) -> xr.Dataset:
     """Melnikov's function on the separatrices: thresholds of irregular motion.
 
@@ -39,14 +40,9 @@ def melnikov(system: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On (``saddle``, ``side``): ``melnikov_mean`` in s^-2, the mean energy gained along the
-        loop; ``melnikov_amplitude`` in s^-2 and ``melnikov_phase`` in rad of
-        ``M(t0) = mean + amplitude cos(nu t0 + phase)``; ``chaos_threshold``, the amplitude of the
-        forcing above which stable and unstable manifolds intersect, at the given damping (NaN
-        without damping, infinite where the loop does not respond); ``turnstile_area`` in s^-1,
-        the flux across the separatrix in one period, to first order without damping;
-        ``threshold_validity``, a code of `Validity`. Where the code is not HOLDS, the results are
-        NaN and the code is the reason.
+        The threshold is that of the given damping: NaN without damping, infinite where the loop
+        does not respond. Where ``threshold_validity`` is not HOLDS, the results are NaN and the
+        code is the reason.
 
         With several frequencies the amplitude is the largest deviation from the mean over all
         times, and the phase is NaN. The threshold is that of the first harmonic of the forcing,
@@ -79,6 +75,7 @@ def melnikov(system: Any) -> xr.Dataset:
 
 
 @call_checked
+@returns("quiet_frequencies")
 def quiet_frequencies(system: Any, *, n: int = 8) -> xr.Dataset:
     """Frequencies of a torque to which the lobes of a figure-eight do not respond.
 
@@ -92,10 +89,9 @@ def quiet_frequencies(system: Any, *, n: int = 8) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``quiet_frequency`` in s^-1 on (``saddle``, ``side``, ``order``): the zeros of Melnikov's
-        function of a torque ``cos(nu t)``, multiples of the first; NaN for loops that wind.
-        Those of a `Potential` have ``quiet_frequency_error``; they are the least ones, and NaN
-        from where the response, which falls exponentially, is lost in rounding.
+        The zeros of Melnikov's function of a torque ``cos(nu t)``, multiples of the first; NaN for
+        loops that wind. Those of a `Potential` have ``quiet_frequency_error``; they are the least
+        ones, and NaN from where the response, which falls exponentially, is lost in rounding.
 
     Raises
     ------
@@ -134,6 +130,7 @@ def quiet_frequencies(system: Any, *, n: int = 8) -> xr.Dataset:
 
 
 @call_checked
+@returns("capture")
 def capture(system: Any, *, start: str = "outside") -> xr.Dataset:
     """Probability of capture in each well, for a motion that slowly reaches a separatrix.
 
@@ -149,14 +146,12 @@ def capture(system: Any, *, start: str = "outside") -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On ``region`` (left, right, none): ``capture_flux`` in s^-2 and ``capture_probability``,
-        which sums to 1. Left and right are the lobes of the lower saddle; in a system with one
-        well the side from which the rotation came stays empty. "none": the motion is not captured,
-        never reaches the separatrix, or stays round both wells because they shrink too fast.
-        NaN where there is no such separatrix, and from rotation over three or more wells with
-        saddles of several energies. ``capture_error`` estimates the error of the probabilities,
-        and ``capture_validity`` is a code of `Validity`: where it is not HOLDS, the results are
-        NaN and the code is the reason.
+        The dim ``region`` is left, right, none; over it the probability sums to 1. Left and right
+        are the lobes of the lower saddle; in a system with one well the side from which the
+        rotation came stays empty. "none": the motion is not captured, never reaches the separatrix,
+        or stays round both wells because they shrink too fast. NaN where there is no such
+        separatrix, and from rotation over three or more wells with saddles of several energies.
+        Where ``capture_validity`` is not HOLDS, the results are NaN and the code is the reason.
 
     Raises
     ------
@@ -186,6 +181,7 @@ def capture(system: Any, *, start: str = "outside") -> xr.Dataset:
 
 
 @call_checked
+@returns("escape")
 def escape_rate(system: Any, *, center: str | int | None = None) -> xr.Dataset:
     """Rates of thermal escape from a well, over each saddle at its ends.
 
@@ -201,15 +197,13 @@ def escape_rate(system: Any, *, center: str | int | None = None) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On (``saddle``, ``side``): ``escape_rate`` in s^-1 and ``barrier`` in s^-2; the side is that
-        of the saddle on which the well lies. Over the lower saddle it leads into the other well;
-        over the upper one, which winds, out of both wells together, on either side.
-        ``escape_regime`` (`EscapeRegime`) says what limits it, ``escape_error`` the relative error.
+        The side is that of the saddle on which the well lies. Over the lower saddle it leads into
+        the other well; over the upper one, which winds, out of both wells together, on either side.
         Under a torque both ends of a well differ; the rate is that of the end which is reached
         first, over the higher one at low damping next to nothing. In a row of wells, over the lower
-        end of the well, then over that of the wells on both sides of it together, and so on.
-        Absent ones, barriers below 2 kT, rates that are not known within their own size and
-        systems with a drive are NaN.
+        end of the well, then over that of the wells on both sides of it together, and so on. Absent
+        ones, barriers below 2 kT, rates that are not known within their own size and systems with a
+        drive are NaN.
 
     Raises
     ------
@@ -241,6 +235,7 @@ def escape_rate(system: Any, *, center: str | int | None = None) -> xr.Dataset:
 
 
 @call_checked
+@returns("critical_torques")
 def critical_torque(system: Any) -> xr.Dataset:
     """Smallest and largest constant torque for which an equilibrium exists.
 
@@ -252,16 +247,10 @@ def critical_torque(system: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On ``direction`` (minus, plus): ``critical_torque`` in s^-2, signed, and ``critical_phi``
-        in rad, where equilibria merge. Those of a `Potential` have ``critical_torque_error``, an
+        On ``direction`` (minus, plus). Those of a `Potential` have ``critical_torque_error``, an
         estimate, ``critical_phi_error``, a bound, and ``critical_complete``: whether they are
         proved to be the extremes. On an interval equilibria may leave at an end of it instead; on a
         line without ends the torque is infinite where V' has no bound, and has no place.
-
-    Raises
-    ------
-    ParameterError
-        If the system is unusable.
 
     Notes
     -----
@@ -292,6 +281,7 @@ def critical_torque(system: Any) -> xr.Dataset:
 
 
 @call_checked
+@returns("retrapping")
 def retrapping_torque(system: Any) -> xr.Dataset:
     """Smallest constant torque that sustains a rotation, at small damping.
 
@@ -303,8 +293,7 @@ def retrapping_torque(system: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``retrapping_torque`` in s^-2 on ``direction`` (minus, plus), signed, and
-        ``retrapping_validity``, a code of `Validity`. Where the code is not HOLDS, the torque is
+        On ``direction`` (minus, plus). Where ``retrapping_validity`` is not HOLDS, the torque is
         NaN and the code is the reason.
 
     Raises
@@ -330,6 +319,7 @@ def retrapping_torque(system: Any) -> xr.Dataset:
 
 
 @call_checked
+@returns("resonances")
 def resonances(
     system: Any, *, n: int | Sequence[int], m: int = 1, family: str | None = None
 ) -> xr.Dataset:
@@ -350,18 +340,12 @@ def resonances(
     Returns
     -------
     xarray.Dataset
-        On ``order``: ``resonance_action`` in s^-1, where ``n Omega(J) = m nu``, nu the frequency of
-        the first harmonic of the forcing, or else of the modulation; ``resonance_width``, the
-        half-width in action; ``resonance_overlap``, the sum of the half-widths of this order and
-        the next over their distance: near 1 motion between them becomes irregular. NaN where the
-        family has no such orbit; of several, that of least action, in "outer" and rotations that
-        next to the separatrix. The width is 0 where no harmonic has the frequency m nu, and NaN
-        closer to the separatrix than 1e-12 of its height. Under a torque nothing rotates: NaN.
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
+        At a resonance ``n Omega(J) = m nu``, nu the frequency of the first harmonic of the forcing,
+        or else of the modulation; with an overlap near 1 motion between neighbours becomes
+        irregular. NaN where the family has no such orbit; of several, that of least action, in
+        "outer" and rotations that next to the separatrix. The width is 0 where no harmonic has the
+        frequency m nu, and NaN closer to the separatrix than 1e-12 of its height. Under a torque
+        nothing rotates: NaN.
 
     Notes
     -----

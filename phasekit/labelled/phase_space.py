@@ -18,10 +18,11 @@ from phasekit.labels.arguments import (
 )
 from phasekit.systems.parameter import warn_of_invalid
 from phasekit.systems.system import as_system
-from phasekit.table.quantities import select
+from phasekit.table.quantities import returns, select
 
 
 @call_checked
+@returns("equilibria")
 def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
     """All equilibria, their kinds, energies and frequencies, as branches.
 
@@ -38,16 +39,9 @@ def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        On the dim ``equilibrium`` (lower_center, lower_saddle, upper_center, upper_saddle):
-        ``phi``, ``kind`` (`EquilibriumKind`), ``energy``, ``curvature``, ``natural_frequency``
-        (centers) and ``exponent`` (saddles); besides ``n_equilibria`` (distinct ones; -1 in
-        invalid cells) and ``fold_margin`` (> 0 where four exist, 0 on the fold). Absent ones
-        are NaN, their kind is absent.
-
-    Raises
-    ------
-    ParameterError
-        If the system is unusable.
+        The dim ``equilibrium`` has the labels lower_center, lower_saddle, upper_center and
+        upper_saddle. What is absent is NaN, and its kind is absent; only centers have a frequency,
+        only saddles an exponent.
 
     Notes
     -----
@@ -100,6 +94,7 @@ def equilibria(system: Any, box: Any = None, *, n: Any = None) -> xr.Dataset:
 
 
 @call_checked
+@returns("separatrices")
 def separatrices(system: Any) -> xr.Dataset:
     """Separatrices: their topology, turning points and areas; whether there is a figure-eight.
 
@@ -111,16 +106,8 @@ def separatrices(system: Any) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``topology`` (`Topology`) and ``figure_eight``: whether a separatrix has the shape of an
-        eight round two centers, the "trigger of coupled singularities" center, saddle, center of
-        the papers. On the dim ``saddle`` (lower, upper; a single one is upper): ``saddle_phi``,
-        ``saddle_energy``, ``saddle_exponent``, ``loop`` (`Loop`) and ``winding_area``. On
-        (``saddle``, ``side``): ``turning_offset``, ``turning_phi`` and ``lobe_area``.
-
-    Raises
-    ------
-    ParameterError
-        If the system is unusable.
+        The dim ``saddle`` has the labels lower and upper; a single saddle is the upper one. The dim
+        ``side`` is that of the saddle, left or right.
 
     Notes
     -----

@@ -56,11 +56,6 @@ def bifurcation_set(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Examples
     --------
     >>> import phasekit as pk

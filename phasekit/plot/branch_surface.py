@@ -84,11 +84,6 @@ def branch_surface(
     -------
     mpl_toolkits.mplot3d.axes3d.Axes3D
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     The surface is V'(phi) = 0, of [Veljovic2015] (12) or of any potential, on a grid; the folds and

@@ -78,11 +78,6 @@ def force_polygon(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     [HedrihVeljovic2013] (26) to (28) and the components after them, corrected.

@@ -54,11 +54,6 @@ def hysteresis_loop(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Examples
     --------
     >>> import numpy as np

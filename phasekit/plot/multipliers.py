@@ -41,11 +41,6 @@ def multipliers(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     Without forcing one multiplier is always 1; it is drawn as well. Where most multipliers are

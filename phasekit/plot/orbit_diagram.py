@@ -55,11 +55,6 @@ def orbit_diagram(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Examples
     --------
     >>> import numpy as np

@@ -65,11 +65,6 @@ def period_energy(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     The energy is that of [Veljovic2015] eq. (14). Where there are two wells, their orbits of one
@@ -147,11 +142,6 @@ def frequency_action(
     Returns
     -------
     matplotlib.axes.Axes
-
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
 
     Notes
     -----

@@ -112,11 +112,6 @@ def phase_portrait(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     The level curves are [Veljovic2015] eq. (14); the figure-eight is the homoclinic orbit of its

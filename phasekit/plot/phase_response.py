@@ -42,11 +42,6 @@ def phase_response(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     Above zero a kick in the direction of the state brings the next turn forward, below zero it

@@ -44,11 +44,6 @@ def poincare_section(
     -------
     matplotlib.axes.Axes
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Examples
     --------
     >>> import phasekit as pk

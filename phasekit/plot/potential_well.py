@@ -48,11 +48,6 @@ def potential_well(
     Axes or tuple of two Axes
         The given Axes; (well, portrait) if there are two.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     The layout is that of Fig. 4 of [Veljovic2015]. The potential is

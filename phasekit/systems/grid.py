@@ -136,11 +136,6 @@ def grid(
     Axis
         For ``Problem(..., grid=...)``; several make a grid of more dimensions.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Notes
     -----
     Places have equal distances h. The first is at a distance h from an end where fields have a

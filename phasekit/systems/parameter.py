@@ -148,11 +148,6 @@ def parameter(
     Any
         A field of a `System`.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Examples
     --------
     >>> import phasekit as pk

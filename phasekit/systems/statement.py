@@ -97,11 +97,6 @@ def coordinate(
     Coordinate
         For ``coordinate`` of a `System`.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Examples
     --------
     >>> import phasekit as pk

@@ -9,8 +9,12 @@ from __future__ import annotations
 
 import html
 import itertools
-from collections.abc import Iterator, Mapping
+import re
+import textwrap
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, TypeVar
 
+from phasekit.docstrings import with_section
 from phasekit.laws.ladder import Law, Routhian
 from phasekit.table import loads, motion, numerical, orbits, perturbed, phase_space, steady
 from phasekit.table.row import Quantity, Table
@@ -36,6 +40,41 @@ TABLE = Table(
 )
 #: Every row by its name, those that a name means, and how a user adds one.
 ROWS, select, add = TABLE.rows, TABLE.select, TABLE.add
+
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def returns(*of: str) -> Callable[[Function], Function]:
+    """Let the docstring of a labelled function name the quantities that it returns."""
+
+    def completed(function: Function) -> Function:
+        named = [row for row in ROWS.values() if row.group in of or row.name in of]
+        lines = [line for row in named for line in _WRAP.wrap(described(row))]
+        text = "\n".join(["xarray.Dataset", *lines])
+        function.__doc__ = with_section(function.__doc__, "Returns", text)
+        return function
+
+    return completed
+
+
+_WRAP = textwrap.TextWrapper(99, "    - ", "      ", break_long_words=False)
+
+
+def described(row: Quantity) -> str:
+    """A row in one line: name, dims, units, codes, meaning and equation.
+
+    >>> described(ROWS["potential_gradient"])
+    "``potential_gradient`` in s^-2: gradient of the potential (``V' = B sin(phi) - A sin(phi) \
+cos(phi) - C cos(phi)``)."
+    """
+    dims = ", ".join(f"``{dim}``" for dim in row.dims)
+    on = f" on ({dims})" if len(row.dims) > 1 else f" on {dims}" if dims else ""
+    raised = re.sub(r"(?<=[A-Za-z])-?[0-9]", r"^\g<0>", row.units)
+    units = "" if row.units == "1" else f" in {raised}"
+    codes = f", a code of `{row.flags.__name__}`" if row.flags is not None else ""
+    equation = f"``{row.equation}``" if re.search(r"[=<>^|/()]", row.equation) else row.equation
+    return f"``{row.name}``{on}{units}: {row.long_name}{codes} ({equation})."
 
 
 def variant(row: Quantity, rung: type[Law]) -> Mapping[str, str]:

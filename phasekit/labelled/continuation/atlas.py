@@ -310,11 +310,6 @@ def atlas(
         each once; points of codimension two; the regions between the curves with their numbers of
         equilibria and of stable ones.
 
-    Raises
-    ------
-    ParameterError
-        If an argument is unusable.
-
     Warns
     -----
     RuntimeWarning
