@@ -18,7 +18,7 @@ from phasekit.labelled.continuation import certified
 
 #: Parts of a thousand random curves that are tried.
 PARTS = 1 if os.environ.get("PHASEKIT_PUBLISHED") == "all" else 5
-X, MU, W = sp.symbols("x mu w", real=True)
+X, Y, MU, W = sp.symbols("x y mu w", real=True)
 DEGREES = [(i, j) for i in range(5) for j in range(3) if i + j <= 4]
 NAMES = [f"c{i}{j}" for i, j in DEGREES]
 #: A plane curve whose coefficients are parameters, so that it is compiled once.
@@ -295,6 +295,77 @@ def test_a_hopf_point_is_enclosed_with_its_frequency():
         assert high - low < 1e-13
     assert "proved: " in repr(branch)
     assert branch.table().certified.all()
+
+
+@pytest.mark.parametrize("kind", ["hopf", "torus"])
+@pytest.mark.parametrize("turn", [0.0, 0.3])
+def test_a_pair_that_may_be_one_eigenvalue_is_no_certified_pair(kind, turn):
+    """At folds and doublings the equations of pairs hold, too, with a single root."""
+    sign = -1 if kind == "torus" else 0
+    c, s = sp.Float(np.cos(turn)), sp.Float(np.sin(turn))
+    u, v = c * X + s * Y, c * Y - s * X
+    # Eigenvalues 0 and -2, of the map -1 and -2, at u = v = 0, MU = 0.
+    own = (MU - u**2 + sign * u, -2 * v + u * MU)
+    f = (c * own[0] - s * own[1], s * own[0] + c * own[1])
+    if kind == "torus":
+        f = tuple(row - MU * (c, s)[i] + MU * u * (c, s)[i] for i, row in enumerate(f))
+    equations = certificates.Equations(f, (X, Y), MU, {}, kind == "torus")
+    points = np.zeros((3, 3))
+    found = certificates.certificate(
+        equations, points, np.ones(3), [certificates.Mark(kind, np.zeros(3), 1)]
+    ).specials[0]
+    assert not found.certified
+    assert "may be one" in found.reason
+
+
+@pytest.mark.parametrize("again", [1, 2, 3])
+@pytest.mark.parametrize("place", [0, 4, 8])
+def test_points_that_are_the_same_are_proved_as_far_as_their_neighbours(again, place):
+    """Also the first ones of all, and where the stretch next to them is not proved."""
+    turn = np.linspace(-1.0, 1.0, 9)
+    points = np.insert(
+        np.stack([turn, turn**2], axis=1), place, [[turn[place], turn[place] ** 2]] * again, axis=0
+    )
+    for f, proved in (
+        (MU - X**2, True),
+        ((MU - X**2) * (MU - X**2 - sp.Rational(1, 10**9)), False),
+    ):
+        equations = certificates.Equations((f,), (X,), MU, {}, False)
+        found = certificates.certificate(equations, points, np.ones(2), [])
+        assert found.stretches.tolist() == [proved] * (8 + again)
+        known = np.isfinite(found.radius).all(axis=1)
+        same = np.arange(place, place + again)
+        assert not known[same].any()
+        assert np.delete(known, same).tolist() == [proved] * 8
+        assert all(bool(why) != proved for why in found.reasons)
+
+
+def test_nothing_is_proved_of_a_branch_of_one_point():
+    equations = certificates.Equations((MU - X**2,), (X,), MU, {}, False)
+    found = certificates.certificate(equations, np.ones((4, 2)), np.ones(2), [])
+    assert not found.stretches.any()
+    assert not np.isfinite(found.radius).any()
+    assert not np.isfinite(found.errors).any()
+    assert all("no tube" in why for why in found.reasons)
+
+
+def test_the_error_of_a_point_is_about_its_own_curve(monkeypatch):
+    """A tube that is turned about and holds another curve says nothing of the first point."""
+    turn = np.linspace(0.5, 1.0, 9)
+    points = np.stack([turn, turn**2], axis=1)
+    equations = certificates.Equations(((MU - X**2) * (MU - X**2 - 1),), (X,), MU, {}, False)
+    own = certificates.tubes_about
+
+    def moved(system, start, end):
+        again = len(start) == 1
+        shift = again * np.array([0.0, 1.0]) / system.units
+        return own(system, start + shift, end + shift)
+
+    assert np.isfinite(certificates.certificate(equations, points, np.ones(2), []).errors).all()
+    monkeypatch.setattr(certificates, "tubes_about", moved)
+    errors = certificates.certificate(equations, points, np.ones(2), []).errors
+    assert np.isnan(errors[0]).all()
+    assert np.isfinite(errors[1:]).all()
 
 
 def test_points_of_maps_are_enclosed():

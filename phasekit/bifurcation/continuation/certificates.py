@@ -157,8 +157,8 @@ def certificate(
     stretches, reasons = _stretches(chain, points, units, crossings)
     radius = np.full((len(points) - 1, len(units)), np.nan)
     sizes = np.einsum("kij,kj->ki", np.abs(leaves.across), leaves.radius) * (1.0 + FRAME) * units
-    for k in np.flatnonzero(stretches):
-        radius[k] = np.max(sizes[chain.owner == k], axis=0, initial=0.0)
+    for k in np.intersect1d(np.flatnonzero(stretches), chain.owner):
+        radius[k] = np.max(sizes[chain.owner == k], axis=0)
     errors = _errors(system, chain, len(points), units)
     specials = _specials(equations, chain, marks, errors, units)
     for i, mark in enumerate(marks):
@@ -241,8 +241,9 @@ def _stretches(
 ) -> tuple[Flags, list[str]]:
     """Which stretches are proved, and why others are not."""
     count = len(points) - 1
-    stretches, reasons = np.ones(count, dtype=bool), [""] * count
     proved, owner = chain.tubes.proved, chain.owner
+    owned = np.isin(np.arange(count), owner)
+    stretches, reasons = owned.copy(), [""] * count
     for k in np.unique(owner[~proved]):
         stretches[k] = False
         open_ = (owner == k) & ~proved
@@ -259,10 +260,15 @@ def _stretches(
                 f"{where}: other branches may be nearer than intervals can tell, or derivatives "
                 "vanish together"
             )
-    # Points that are the same but for rounding are on the curve on both sides, or on neither.
-    for k in np.setdiff1d(np.arange(count), owner):
-        before = stretches[k - 1] if k else stretches[k + 1] if k + 1 < count else False
-        stretches[k], reasons[k] = before, "" if before else reasons[k - 1] if k else ""
+    # Points that are the same but for rounding are on the curve of the stretch before them, or of
+    # the first one of all, as far as that is proved.
+    places = np.flatnonzero(owned)
+    for k in np.flatnonzero(~owned):
+        if places.size:
+            near = places[max(int(np.searchsorted(places, k)) - 1, 0)]
+            stretches[k], reasons[k] = stretches[near], reasons[near]
+        else:
+            reasons[k] = "all points are the same but for rounding: no tube is about a point"
     return stretches, reasons
 
 
@@ -280,7 +286,8 @@ def _errors(system: System, chain: _Chain, count: int, units: Array) -> Array:
         back = tubes_about(system, there.end, there.end - there.chord)
         size = np.einsum("kij,kj->ki", np.abs(back.across), back.tip) * (1.0 + FRAME) * units
         size += 2.0 * UNIT * (np.abs(there.end) + np.abs(there.chord)) * units
-        errors[owner[first]] = np.where(back.proved[:, None], size, np.nan)
+        same = back.proved & there.hold(back.end, back.across, back.tip)
+        errors[owner[first]] = np.where(same[:, None], size, np.nan)
     return errors
 
 
