@@ -271,6 +271,8 @@ def call_checked(function: Function, name: str = "") -> Function:
     expected = list(signature.parameters)[bool(name) :]
     kinds = {parameter.kind for parameter in signature.parameters.values()}
     takes_all = inspect.Parameter.VAR_KEYWORD in kinds
+    own = signature.parameters.values()
+    by_name = [one.name for one in own if one.kind is inspect.Parameter.KEYWORD_ONLY]
 
     @functools.wraps(function)
     def called(*args: Any, **kwargs: Any) -> Any:
@@ -290,6 +292,8 @@ def call_checked(function: Function, name: str = "") -> Function:
                 text = f"got an unexpected keyword argument {strange[0]!r}"
                 meant = argument_meant(strange[0], expected)
                 hint = f" did you mean {meant!r}?" if meant else ""
+            elif by_name and text == "too many positional arguments":
+                hint = f" {by_name[0]}= and those after it go by name;"
             listed = ", ".join(expected)
             message = f"{name or function.__name__}() {text};{hint} its arguments are {listed}"
             raise ArgumentError(message) from None

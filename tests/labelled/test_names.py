@@ -86,7 +86,10 @@ DRIVEN = pk.Perturbed(SYSTEM, damping=0.1, forcing=pk.Harmonic(0.1, 1.0))
             r"flow\(\) got .* 'times'; did you mean 't'",
         ),
         (lambda: pk.flow(SYSTEM, 0.1, 0.0), "flow.*missing a required argument: 't'; its arg"),
-        (lambda: pk.flow(SYSTEM, 0.1, 0.0, 1.0, 2.0), "too many positional arguments"),
+        (
+            lambda: pk.flow(SYSTEM, 0.1, 0.0, 1.0, 2.0),
+            "too many positional arguments; x0= and those",
+        ),
         (lambda: pk.orbits(SYSTEM, energi=1.0), "did you mean 'energy'"),
         (lambda: pk.orbit_families(SYSTEM, energymax=1.0), "did you mean 'energy_max'"),
         (lambda: pk.escape_rate(DRIVEN, centre="lower_center"), "did you mean 'center'"),
