@@ -8,6 +8,7 @@ import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import phasekit as pk
@@ -23,7 +24,7 @@ for part in PARTS:
 (START,) = re.findall(r"```python\n(.*?)```", HEAD, re.DOTALL)
 TITLES = list(BLOCKS)
 SECOND_CENTER, DIAGRAM, MAP, PERIOD, LOOP, POTENTIAL, HOPF, PORTRAITS, FORCE, LARGE = TITLES[:10]
-NEURON, FORCED, TIPPING = TITLES[10:13]
+NEURON, FORCED, TIPPING, RING, FOXES = TITLES[10:15]
 
 
 @pytest.fixture(autouse=True)
@@ -221,3 +222,27 @@ def test_m_tipping():
     assert 0.02 < share < 0.98
     error = np.sqrt(share * (1 - share) * (1 / 800 + 1 / 1000))
     assert names["early"] == pytest.approx(share, abs=4 * error)
+
+
+def test_firing_that_starts_from_zero():
+    names = run(RING)
+    assert names["fold"] == pytest.approx(1.0, abs=1e-12)
+    omega = 1.0 + names["distance"]
+    np.testing.assert_allclose(
+        names["turning"].period, 2 * np.pi / np.sqrt(omega**2 - 1), rtol=1e-9
+    )
+    assert names["slope"] == pytest.approx(-0.5, abs=0.01)
+
+
+def test_prey_and_predators():
+    names = run(FOXES)
+    assert names["drift"] < 1e-8
+    period = names["period"].values
+    assert np.all(np.diff(period) > 0.0)
+    for i, (x, y) in enumerate(zip(*names["start"].values(), strict=True)):
+        around = solve_ivp(
+            lambda t, u: [u[0] * (1 - 0.5 * u[1]), u[1] * (0.25 * u[0] - 0.75), *u[:2]],
+            (0.0, period[i]), [x, y, 0.0, 0.0], rtol=1e-11, atol=1e-12,
+        ).y[:, -1]  # fmt: skip
+        np.testing.assert_allclose(around, [x, y, 3 * period[i], 2 * period[i]], rtol=1e-7)
+    assert period.min() > 2 * np.pi / np.sqrt(0.75)  # that of small oscillations
