@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phasekit.errors import ParameterError
-from phasekit.labels.units import TYPED, UNITS, brief_value, number
+from phasekit.labels.units import UNITS, brief_value, number, read_typed
 
 #: Most values that a range may have.
 LONGEST = 10_000_000
@@ -32,8 +32,8 @@ def span(name: str, text: str, units: str) -> NDArray[np.float64]:
     if len(parts) != 3:
         raise ParameterError(f"{name}: got {text!r}, wants FROM:TO:COUNT, such as 0:90deg:181")
     first, last, count = parts
-    bare = TYPED.fullmatch(first)
-    suffix = TYPED.fullmatch(last)
+    bare = read_typed(first)
+    suffix = read_typed(last)
     if bare is not None and suffix is not None and not bare["unit"]:
         first += suffix["unit"]
     return between(name, first, last, count, units)

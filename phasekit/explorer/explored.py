@@ -13,7 +13,7 @@ from phasekit.explorer.curves import bifurcation_curves
 from phasekit.explorer.equations import check_equations, facts_of_equations, time_shown
 from phasekit.labelled.motion import flow
 from phasekit.labels.arguments import bad, number, reals, unknown
-from phasekit.labels.units import UNITS
+from phasekit.labels.units import grammar
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.problem import Problem
 from phasekit.systems.rests import corners, equilibria_of
@@ -67,8 +67,7 @@ def explored_facts(
         bifurcation_curves(problem, pair, {name: sliders[name] for name in pair}, rests)
         for pair in pairs
     ]
-    units = {str(one["units"]) for one in (*facts["parameters"], *facts["states"])} | {"rad"}
-    facts["units"] = {u: {n: float(x) for n, x in UNITS.get(u, {}).items()} for u in units}
+    facts["written"] = grammar()
     return facts
 
 

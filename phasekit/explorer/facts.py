@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from phasekit.explorer.law import is_machine
+from phasekit.labels.units import grammar
 from phasekit.laws.ladder import is_turn
 from phasekit.systems.parameter import Parameter
 from phasekit.systems.system import System
@@ -33,6 +34,7 @@ def facts_of(system: System, values: dict[str, float]) -> dict[str, Any]:
         "parameters": [_parameter(p, values, system) for p in system.declared],
         "used": list(system.formula_inputs()),
         "machine": is_machine(system),
+        "written": grammar(),
         "python": _python(system),
     }
 

@@ -29,7 +29,7 @@ from phasekit.inputs import (
     reals,
     whole,
 )  # fmt: skip
-from phasekit.labels.units import TYPED, factor, si_unit
+from phasekit.labels.units import factor, read_typed, si_unit
 from phasekit.labels.units import number as typed
 from phasekit.spellings import respelled
 
@@ -150,7 +150,7 @@ def _listed(value: Any) -> Sequence[Any]:
 def _typed(argument: str, value: Any, units: str) -> Any:
     """Return numbers that are written as text; what is none is left to be refused."""
     if isinstance(value, str):
-        return typed(argument, value, units) if TYPED.fullmatch(value) else value
+        return typed(argument, value, units) if read_typed(value) else value
     return [_typed(argument, item, units) if isinstance(item, str) else item for item in value]
 
 

@@ -103,13 +103,37 @@ def si_unit(unit: object) -> str | None:
 
 #: A number as people write it, with a decimal point or comma or as a part of pi, and its unit.
 TYPED = re.compile(
-    r"\s*(?:(?P<digits>[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][-+]?\d+)?)"
-    r"(?![\d.,]|\s*\*?\s*(?:pi|\u03c0)\b)"
-    r"|(?P<sign>[-+]?)\s*(?P<times>\d+(?:\.\d+)?)?\s*\*?\s*(?:pi|\u03c0)(?:\s*/\s*(?P<over>\d+(?:\.\d+)?))?)"
+    r"\s*(?:(?P<digits>[-+]?(?:[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+)(?:[eE][-+]?[0-9]+)?)"
+    r"(?![0-9.,]|\s*\*?\s*(?:pi|\u03c0)(?!\w))"
+    r"|(?P<sign>[-+]?)\s*(?P<times>[0-9]+(?:\.[0-9]+)?)?\s*\*?\s*(?:pi|\u03c0)"
+    r"(?:\s*/\s*(?P<over>[0-9]+(?:\.[0-9]+)?))?)"
     r"\s*(?P<unit>.*?)\s*"
 )
 #: What may be a number with a decimal comma, or thousands.
-_THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2},\d{3}")
+_THOUSANDS = re.compile(r"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
+
+
+def grammar() -> dict[str, Any]:
+    """Return what another language needs to read numbers as `number` does; JSON can hold it.
+
+    Returns
+    -------
+    dict
+        ``typed`` and ``thousands``, patterns of the whole text, with named groups as JavaScript
+        writes them; ``aliases``, other names of units; ``units``, by the unit of results the
+        numbers to multiply by.
+
+    Examples
+    --------
+    >>> grammar()["units"]["m"]["mm"], grammar()["aliases"]["degrees"]
+    (0.001, 'deg')
+    """
+    return {
+        "typed": TYPED.pattern.replace("(?P<", "(?<"),
+        "thousands": _THOUSANDS.pattern,
+        "aliases": dict(_ALIASES),
+        "units": {held: {n: float(x) for n, x in fits.items()} for held, fits in UNITS.items()},
+    }
 
 
 def number(name: str, text: Any, units: str) -> float:
@@ -141,7 +165,7 @@ def number(name: str, text: Any, units: str) -> float:
     known = UNITS.get(units, {})
     wants = f"a number in {' or '.join(known)}" if known else "a number without unit"
     plain = isinstance(text, (int, float)) and not isinstance(text, bool)
-    match = TYPED.fullmatch(text) if isinstance(text, str) else None
+    match = read_typed(text)
     unit = usual(match["unit"]) if match else ""
     if not plain and (match is None or (unit and unit not in known)):
         raise ParameterError(f"{name}: got {brief_value(text)}, wants {wants}")
@@ -161,6 +185,19 @@ def number(name: str, text: Any, units: str) -> float:
     if not math.isfinite(value):
         raise ParameterError(f"{name}: got {brief_value(text)}, wants {wants}, and a finite one")
     return value
+
+
+def read_typed(text: object) -> re.Match[str] | None:
+    """Return how a text is read as a number; None where it is none.
+
+    Examples
+    --------
+    >>> read_typed("\N{MINUS SIGN}5 mm")["digits"], read_typed("mm") is None
+    ('-5', True)
+    """
+    if not isinstance(text, str):
+        return None
+    return TYPED.fullmatch(text.replace("\N{MINUS SIGN}", "-"))
 
 
 def _decimal(match: re.Match[str]) -> Decimal:

@@ -75,11 +75,70 @@ def test_what_a_parameter_cannot_be_is_refused_by_its_name(shown):
         assert page.run(f"document.getElementById('value-{index}').getAttribute('aria-invalid')")
     page.run("(() => { phasekit.state.values[3] = 0; phasekit.state.values[1] = 0; })()")
     page.run("phasekit.update(null)")
+    page.settle()
     assert "no such system" in page.run("document.getElementById('alert').textContent")
+    assert page.run("document.body.classList.contains('invalid')")
+    assert page.run("document.querySelectorAll('td').length") == 0
+    for name in ("values", "hover", "map-text", "odds"):
+        assert page.run(f"document.getElementById('{name}').textContent") == ""
+    assert "e=0," in page.run("document.getElementById('python').value")
+    type_in(page, 3, "0,2")
+    page.settle()
+    assert not page.run("document.body.classList.contains('invalid')")
+    assert page.run("document.getElementById('alert').hidden")
+    assert page.run("document.querySelectorAll('td').length") > 10
+
+
+def test_a_complaint_goes_with_the_next_move(shown):
+    page = shown(DISK)
+    type_in(page, 0, "9rad")
+    assert not page.run("document.getElementById('alert').hidden")
+    page.run("document.querySelector('[aria-label=\"e, slider\"]').focus()")
+    page.key("ArrowRight", 39)
+    assert page.run("document.getElementById('alert').hidden")
+    assert page.run("document.getElementById('value-0').value") == "0.6981317"
+
+
+#: Numbers as people write them, and what only looks like one.
+WRITTEN = (
+    "40deg", "24mm", "300rpm", "pi/4", "0,7", "-π/8", "1.5e-1", "2*pi", "3pi", "2 π", "24 mm",
+    "1.153mm", "-24mm", "\u22125 cm", "+.5", "5.", ",5m", "1e3", "1E-3 um", "90 degrees", "1 rev/min",
+    "2 rad/s^2", "3 rad s-1", "1.5pi/7", "pi", "-pi/2rad", "1e308", "7°",
+    "1,234", "12,345mm", "1,2,3", "1.2.3", "", " ", "abc", "1e999", "pi/0", "pi*", "pi/", "--1", "1;2",
+    "alert(1)", "constructor", "2 toString", "2 __proto__", "1/2", "40 parsec", "NaN", "Infinity",
+    "0x10", "1_000", "٣", "3²", "1e", "mm", "4 0", "1e5e5", "pipi", "2pie", "1\n", "1\u00a0mm",
+)  # fmt: skip
+
+
+def test_numbers_are_read_as_python_and_the_command_line_read_them(shown):
+    from phasekit.labels.units import number
+
+    page = shown(DISK)
+    for units in ("rad", "m", "s-1", "s-2", "1"):
+        found = page.run(
+            f"{json.dumps(WRITTEN)}.map((text) => phasekit.readNumber(text, {units!r}))"
+        )
+        assert len(found) == len(WRITTEN)
+        for text, value in zip(WRITTEN, found, strict=True):
+            try:
+                wants = number("q", text, units)
+            except pk.ParameterError:
+                assert not math.isfinite(float(value)), (text, units)
+            else:
+                assert value == pytest.approx(wants, rel=4e-16), (text, units)
+    read = [
+        not math.isnan(float(page.run(f"phasekit.readNumber({t!r}, 'm')")))
+        for t in ("24mm", "24deg")
+    ]
+    assert read == [True, False]
+    assert page.run("phasekit.readNumber('1.153mm', 'm')") == 0.001153
+    type_in(page, 1, "1,234")
+    assert page.run("document.getElementById('alert').textContent") == "e: wants 1234 or 1.234"
 
 
 def test_a_click_in_the_portrait_starts_an_orbit(shown):
-    page = shown(DISK)
+    page = shown(DISK, "#orbits=")
+    assert state(page)["orbits"] == []
     where = at(page, "#portrait", 0.6, 5.0)
     page.mouse("mouseMoved", *where)
     assert "libration, lower well, period " in page.run(
@@ -116,7 +175,7 @@ def test_a_click_in_map_or_diagram_moves_the_system(shown):
 
 
 def test_the_keyboard_does_what_the_mouse_does(shown):
-    page = shown(DISK)
+    page = shown(DISK, "#orbits=")
     page.run("document.getElementById('portrait').focus()")
     for _ in range(3):
         page.key("ArrowRight", 39)
@@ -144,6 +203,49 @@ def test_the_fold_curve_of_the_map_is_the_fold(shown):
     for beta, a in edges[::17]:
         margin = pk.equilibria(DISK.replace(beta=beta, a=a)).fold_margin.item()
         assert abs(margin) < 1e-9
+
+
+def test_the_fold_curve_is_right_under_torque(shown):
+    """There V' and V'' vanish together: roots of a polynomial in exp(i x), by NumPy."""
+
+    def gap(A, B, C, torque):
+        # V'' = B cos x - A cos 2x + C sin x, times 2 z^2 with z = exp(i x).
+        z = np.roots([-A, B - 1j * C, 0.0, B + 1j * C, -A])
+        x = np.angle(z[np.abs(np.abs(z) - 1.0) < 1e-4])
+        slope = (B - A * np.cos(x)) * np.sin(x) - C * np.cos(x) - torque
+        return np.abs(slope).min() / (abs(A) + abs(B) + abs(C) + abs(torque))
+
+    page = shown(DISK, "#torque=60")
+    page.until("phasekit.scene.map.next > phasekit.scene.map.columns")
+    edges = page.run("phasekit.scene.map.edges.flat()")
+    assert len(edges) > 200
+    for beta, a in edges[::17]:
+        assert gap(*DISK.replace(beta=beta, a=a).coefficients(), 60.0) < 1e-9
+    page = shown(DISK, "#x=a&y=torque")
+    page.until("phasekit.scene.map.next > phasekit.scene.map.columns")
+    edges = page.run("phasekit.scene.map.edges.flat()")
+    assert len(edges) > 200
+    for a, torque in edges[::17]:
+        assert gap(*DISK.replace(a=a).coefficients(), torque) < 1e-9
+
+
+def test_numbers_of_equilibria_under_torque_are_those_of_a_fine_grid(shown):
+    page = shown(pk.Coefficients(1.0, 0.2, 0.1))
+    rng = np.random.default_rng(8)
+    cases = [*rng.normal(size=(300, 4)), *(rng.normal(size=(60, 4)) * [1, 0, 0, 1])]
+    cases += [
+        *(rng.normal(size=(60, 4)) * [0, 1, 1, 1]),
+        *(rng.normal(size=(60, 4)) * [1, 1, 0, 1e-3]),
+    ]
+    found = page.run(
+        f"{json.dumps([c.tolist() for c in cases])}.map(([A, B, C, T]) => "
+        "phasekit.countEquilibria(phasekit.law, [A, B, C], T))"
+    )
+    x = np.linspace(-np.pi, np.pi, 40001)
+    for (A, B, C, torque), count in zip(cases, found, strict=True):
+        slope = (B - A * np.cos(x)) * np.sin(x) - C * np.cos(x) - torque
+        assert count == np.count_nonzero(slope[1:] * slope[:-1] < 0), (A, B, C, torque)
+    assert {*found} == {0, 2, 4}
 
 
 def test_a_link_brings_the_state_back(shown):

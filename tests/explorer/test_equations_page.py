@@ -55,7 +55,7 @@ def test_sliders_have_units_ranges_and_what_was_asked_for():
     assert (two["low"], two["high"]) == (-0.08, 0.32)
     assert given["duration"] == 80.0
     assert given["maps"] == []
-    assert given["units"]["s-1"]["rpm"] == pytest.approx(2 * np.pi / 60)
+    assert given["written"]["units"]["s-1"]["rpm"] == pytest.approx(2 * np.pi / 60)
     # Twelve turns of the focus at the slowest.
     assert facts(page_of("planar"))["duration"] == 300.0
     assert facts(page_of("forced"))["duration"] == pytest.approx(80 * np.pi)

@@ -32,10 +32,14 @@ function addSlider(parent, name, words, units, read, write, range) {
   slider.addEventListener("input", () => {
     const [low, high] = range();
     const value = low + ((high - low) * slider.valueAsNumber) / STEPS;
-    if (control.write(value) === "") soon(control);
+    if (control.write(value) === "") {
+      complain([]);
+      soon(control);
+    }
   });
   number.addEventListener("change", () => {
-    const why = control.write(readNumber(number.value, units, inDegrees(units === "rad")));
+    const doubts = doubt(number.value);
+    const why = doubts ? `${name}: wants ${doubts}` : control.write(readNumber(number.value, units, inDegrees(units === "rad")));
     number.setAttribute("aria-invalid", String(why !== ""));
     complain(why ? [why] : []);
     if (why === "") update(null);
@@ -150,11 +154,13 @@ function table(id, heads, rows) {
   heads.forEach((text) => head.append(element("th", text, { scope: "col" })));
   const body = element("tbody", "");
   for (const row of rows) {
-    const line = element("tr", "");
-    row.forEach((text, i) => line.append(i ? element("td", text) : element("th", text, { scope: "row" })));
+    const line = element("tr", "", { role: "row" });
+    // On a narrow screen each stands on a line of its own, after the head of its column.
+    row.forEach((text, i) => line.append(i ? element("td", text, { role: "cell", "data-head": heads[i] }) : element("th", text, { role: "rowheader", scope: "row", "data-head": heads[i] })));
     body.append(line);
   }
   const top = element("thead", "");
   top.append(head);
+  $(id).setAttribute("role", "table");
   $(id).replaceChildren(top, body);
 }

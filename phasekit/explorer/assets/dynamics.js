@@ -185,6 +185,27 @@ class Landscape {
   }
 }
 
+// Number of zeros of B sin x - A sin x cos x - C cos x - torque on the circle. In t = tan(y/2), with x = y + turn, they are
+// the real roots of a quartic: four, two or none by its invariants. The turn keeps them away from t = infinity.
+const PLACES = [0, 1, 2, 3, 4, 5, 6].map((i) => (TWO_PI * i) / 7);
+function countTilted(A, B, C, torque) {
+  const size = Math.max(Math.abs(A), Math.abs(B), Math.abs(C), Math.abs(torque));
+  const [u, v, w, level] = [A / size, B / size, C / size, torque / size];
+  const slope = (x) => (v - u * Math.cos(x)) * Math.sin(x) - w * Math.cos(x) - level;
+  const far = PLACES.reduce((best, x) => (Math.abs(slope(x)) > Math.abs(slope(best)) ? x : best), 0);
+  const turn = far - Math.PI;
+  const [s, k] = [Math.sin(turn), Math.cos(turn)];
+  const [s1, c1] = [v * k + w * s, v * s - w * k];
+  const [s2, c2] = [-0.5 * u * (k * k - s * s), -u * s * k];
+  const [a, b, c, d, e] = [c2 - c1 - level, 2 * s1 - 4 * s2, -6 * c2 - 2 * level, 2 * s1 + 4 * s2, c1 + c2 - level];
+  const one = 12 * a * e - 3 * b * d + c * c;
+  const two = 72 * a * c * e + 9 * b * c * d - 27 * (a * d * d + e * b * b) - 2 * c ** 3;
+  if (4 * one ** 3 < two * two) return 2;
+  const inner = 8 * a * c - 3 * b * b;
+  const outer = 64 * a ** 3 * e - 16 * a * a * c * c + 16 * a * b * b * c - 16 * a * a * b * d - 3 * b ** 4;
+  return inner < 0 && outer < 0 ? 4 : 0;
+}
+
 // Negative where there are four equilibria, positive where two, 0 on the fold; for A, B, C >= 0.
 function astroid(a, b, c) {
   if (b === 0 || c === 0) return b + c - a;

@@ -42,7 +42,7 @@ function makeControls() {
     $("starts").append(line);
     input.addEventListener("change", () => {
       const value = readNumber(input.value, one.angle ? "rad" : one.units, inDegrees(one.angle));
-      const why = Number.isFinite(value) ? "" : `${one.name}: wants a number`;
+      const why = Number.isFinite(value) ? "" : `${one.name}: wants ${doubt(input.value) || "a number"}`;
       input.setAttribute("aria-invalid", String(why !== ""));
       complain(why ? [why] : []);
       if (!why) state.next[i] = value;
@@ -108,6 +108,8 @@ function update(moved) {
     $("status").textContent = INVALID;
     cancel();
     for (const id of ["equilibria", "cycles", "motions"]) $(id).replaceChildren();
+    for (const id of ["equilibria-note", "cycles-note", "hover", "portrait-text", "series-text", "map-text"]) $(id).textContent = "";
+    later(tellTaken);
     scene.searched = "";
     scene.diagram = null;
     return;
@@ -122,6 +124,8 @@ function update(moved) {
   drawSeries(plots.series, scene);
   startDiagram();
   if (MAPS.length) drawMap(plots.map, scene);
+  hover(scene.pointed);
+  $("copied").textContent = "";
   scene.timing = performance.now() - start;
   later(tell);
   search();
@@ -341,6 +345,7 @@ function drawDot(t) {
 // ---------------------------------------------------------------- hands
 
 function startMotion(x0) {
+  complain([]);
   state.next = x0;
   state.motions = [...state.motions.slice(1 - MOST_MOTIONS), x0];
   update(null);
@@ -357,6 +362,7 @@ function stateAt(x, y) {
 
 function moveTo(pairs) {
   for (const [name, value] of pairs) if (!refused(NAMES.indexOf(name), value)) setValue(name, value);
+  complain([]);
   update(null);
 }
 

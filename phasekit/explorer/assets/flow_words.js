@@ -37,14 +37,18 @@ function tell() {
   $("series-text").textContent = motions.length ? ended.join("; ") || "\u00a0" : "Start a motion in the portrait.";
   $("legend").textContent = legend();
   $("diagram-help").textContent = `${LAW.discrete ? "Gray: iterates" : FORCED ? "Gray: states once a period" : LAW.n === 1 ? "Gray: where the motion comes to rest" : LAW.n === 2 ? "Gray: greatest and least values along the motion" : "Gray: greatest values along the motion"} after a while.${FORCED ? "" : ` Blue: stable ${LAW.discrete ? "fixed points" : "equilibria"}; red: unstable ones.`} Click, or left and right arrow, moves the system.`;
-  const base = location.protocol === "about:" ? "" : location.href.split("#")[0];
-  $("link").value = base + writeLink();
-  $("python").value = pythonOf();
+  tellTaken();
   const counts = new Map();
   rests.forEach((one) => counts.set(one.kind, (counts.get(one.kind) ?? 0) + 1));
   const say = `${[...counts].map(([kind, count]) => `${count} ${kind}`).join(", ") || (FORCED ? "forced system" : "no equilibrium")}${PLANAR ? `, ${cycles.length} limit cycles` : ""}`;
   if (say !== scene.said) $("status").textContent = scene.said = say;
   $("portrait-text").textContent = `${say}; the tables below have the numbers.`;
+}
+
+function tellTaken() {
+  const base = location.protocol === "about:" ? "" : location.href.split("#")[0];
+  $("link").value = base + writeLink();
+  $("python").value = pythonOf();
 }
 
 function tellCycles(cycles) {
@@ -83,6 +87,7 @@ function legend() {
 }
 
 function hover(at) {
+  scene.pointed = at;
   if (!at) {
     $("hover").textContent = "\u00a0";
     return;

@@ -60,6 +60,8 @@ function showControls(moved) {
 
 // ---------------------------------------------------------------- drawing
 
+const INVALID = "At these parameters there is no such system, or a number is not finite";
+
 // Draws what a change needs; `moved` is the slider under the hand.
 function update(moved) {
   const start = performance.now();
@@ -71,11 +73,13 @@ function update(moved) {
   const seconds = LAW.kind === "trigonometric";
   scene.words = { x: FACTS.angle ? `${x}, ${state.angles}` : x, v: seconds ? `d${x}/dt, s⁻¹` : `d${x}/dt`, V: seconds ? "V, s⁻²" : "V" };
   scene.loaded = Boolean(LAW.loads) && scene.p.every(Number.isFinite);
+  document.body.classList.toggle("invalid", !pot.valid);
   if (!pot.valid) {
-    complain(["At these parameters there is no such system, or a number is not finite"]);
+    complain([INVALID]);
+    later(tellInvalid);
     return;
   }
-  if ($("alert").textContent.startsWith("At these")) complain([]);
+  if ($("alert").textContent === INVALID) complain([]);
   scene.view = view(pot, state.orbits);
   scene.curves = state.orbits.map((one) => orbitCurve(pot, one, state.damping, scene.view));
   drawPortrait(plots.portrait, pot, scene);
@@ -83,6 +87,8 @@ function update(moved) {
   drawDiagram(plots.diagram, diagramScene(), (value) => make(...potentialAt(state.diagram, value)));
   drawForces();
   startMap();
+  hover(scene.pointed);
+  $("copied").textContent = "";
   scene.timing = performance.now() - start;
   later(tell);
 }
@@ -110,7 +116,7 @@ function startMap() {
     scene.map = null;
     return;
   }
-  const closed = LAW.kind === "trigonometric" && xName !== TORQUE && yName !== TORQUE && state.torque === 0;
+  const closed = LAW.kind === "trigonometric";
   const fixed = AXES.filter((name) => name !== xName && name !== yName).map(valueOf);
   const key = JSON.stringify([xName, yName, rangeOf(xName), rangeOf(yName), fixed]);
   if (key !== scene.mapKey) {
@@ -146,6 +152,7 @@ function startOrbit(x, v) {
   state.orbits = [...state.orbits.slice(-7), [x, v]];
   update(null);
   const orbit = scene.pot.orbit(x, v);
+  complain([]);
   $("status").textContent = `Orbit started: ${familyWords(orbit)}, period ${digits(orbit.period, 6)}`;
 }
 
@@ -155,6 +162,7 @@ function moveTo(pairs) {
     if (index >= 0 && refused(index, value)) continue;
     setValue(name, value);
   }
+  complain([]);
   update(null);
 }
 
@@ -184,6 +192,7 @@ function wire() {
   $("clear").addEventListener("click", () => { state.orbits = []; update(null); });
   $("reset").addEventListener("click", () => {
     Object.assign(state, startState(), { theme: state.theme, angles: state.angles });
+    state.orbits = firstOrbits();
     complain([]);
     update(null);
   });
@@ -213,6 +222,7 @@ function load() {
   const { theme } = state;
   Object.assign(state, startState(), { theme });
   complain(location.hash ? readLink(location.hash) : []);
+  state.orbits ??= firstOrbits();
   applyTheme();
 }
 
@@ -238,5 +248,5 @@ load();
 
 // For tests and for the console of the browser.
 window.phasekit = {
-  state, scene, plots, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, dataOf: () => dataOf(scene), update, special,
+  state, scene, plots, law: LAW, make, Potential, countEquilibria, forceCurves, orbitCurve, readNumber, dataOf: () => dataOf(scene), update, special,
 };

@@ -249,9 +249,10 @@ class Potential extends Landscape {
 
 // Number of equilibria, for maps: the same, without their places.
 function countEquilibria(law, p, torque) {
-  if (law.kind === "trigonometric" && torque === 0) {
+  if (law.kind === "trigonometric") {
     const [a, b, c, n] = law.products(p);
-    if (!(n > 0) || !Number.isFinite((a + b + c) / n)) return -1;
+    if (!(n > 0) || !Number.isFinite((a + b + c) / n + torque)) return -1;
+    if (torque !== 0) return countTilted(a / n, b / n, c / n, torque);
     if (a === 0 && b === 0 && c === 0) return 0;
     const [x, y, z] = [Math.abs(a), Math.abs(b), Math.abs(c)];
     return astroid(x, y, z) < 0 ? 4 : 2;

@@ -15,17 +15,32 @@ function refused(index, value) {
   return inside ? "" : `${one.name}: wants ${one.wants}`;
 }
 
-// A number as people write it: 40deg, 24 mm, 300rpm, pi/4, 2*pi, 0,7; without a unit it is multiplied by `bare`.
-// NaN where it is none.
-const WRITTEN = /^([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?|[-+]?pi)((?:\s*[*/]\s*(?:(?:\d+\.?\d*|\.\d+)|pi))*)\s*(.*)$/i;
+// How Python reads numbers that people write; both read by the same patterns and the same units.
+const TYPED = new RegExp(`^(?:${FACTS.written.typed})$`);
+const THOUSANDS = new RegExp(`^(?:${FACTS.written.thousands})$`);
+const unitsOf = (units) => FACTS.written.units[units] ?? {};
+const readTyped = (text) => TYPED.exec(text.replaceAll("−", "-"));
+
+// A number as people write it: 40deg, 24 mm, 300rpm, pi/4, 0,7; without a unit it is multiplied by `bare`, but for parts of
+// pi. NaN where it is none, or where its comma may be one of thousands.
 function readNumber(text, units, bare = 1) {
-  const plain = text.trim().replace(/−/g, "-").replace(/π/g, "pi").replace(/^([-+]?\d*),(\d+)/, "$1.$2");
-  const found = WRITTEN.exec(plain.replace(/^([-+]?(?:\d+\.?\d*|\.\d+))\s*(pi)/i, "$1*$2"));
-  if (!found) return NaN;
-  const one = (word) => (/^[-+]?pi$/i.test(word) ? Math.sign(parseFloat(`${word[0] === "-" ? "-" : ""}1`)) * Math.PI : Number(word));
-  let value = one(found[1]);
-  for (const [, sign, word] of found[2].matchAll(/([*/])\s*([\d.]+|pi)/gi)) value = sign === "*" ? value * one(word) : value / one(word);
-  if (!found[3]) return value * bare;
-  const factors = FACTS.units?.[units] ?? {};
-  return Object.hasOwn(factors, found[3]) ? value * factors[found[3]] : NaN;
+  const found = readTyped(text)?.groups;
+  if (!found || THOUSANDS.test(found.digits ?? "")) return NaN;
+  const turned = found.digits === undefined;
+  const plain = found.unit.replaceAll("**", "").replaceAll("^", "");
+  const unit = Object.hasOwn(FACTS.written.aliases, plain) ? FACTS.written.aliases[plain] : plain;
+  const factors = unitsOf(units);
+  if (unit && !Object.hasOwn(factors, unit)) return NaN;
+  const factor = unit ? factors[unit] : turned && units === "rad" ? 1 : bare;
+  if (turned) return ((found.sign === "-" ? -1 : 1) * Number(found.times ?? 1) * Math.PI * factor) / Number(found.over ?? 1);
+  const [digits, power = "0"] = found.digits.replace(",", ".").toLowerCase().split("e");
+  // Powers of ten are rounded once.
+  const tens = Math.round(Math.log10(factor));
+  return factor === Number(`1e${tens}`) ? Number(`${digits}e${Number(power) + tens}`) : Number(`${digits}e${power}`) * factor;
+}
+
+// What a comma of thousands may mean, or "".
+function doubt(text) {
+  const digits = readTyped(text)?.groups.digits ?? "";
+  return THOUSANDS.test(digits) ? `${digits.replace(",", "")} or ${digits.replace(",", ".")}` : "";
 }

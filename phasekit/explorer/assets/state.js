@@ -10,7 +10,7 @@ function startState() {
     values: FACTS.parameters.map((one) => one.value),
     damping: 0,
     torque: 0,
-    orbits: [],
+    orbits: null, // until a link or the system says which
     diagram: AXES[0],
     x: AXES[0],
     y: AXES.includes("a") ? "a" : AXES[1] ?? TORQUE,
@@ -48,7 +48,7 @@ function writeLink() {
   });
   if (state.damping) parts.push(["damping", String(state.damping)]);
   if (state.torque) parts.push(["torque", String(state.torque)]);
-  if (state.orbits.length) parts.push(["orbits", state.orbits.map((one) => one.join("_")).join("~")]);
+  parts.push(["orbits", state.orbits.map((one) => one.join("_")).join("~")]);
   parts.push(["diagram", state.diagram], ["x", state.x], ["y", state.y], ["angles", state.angles]);
   if (state.theme) parts.push(["theme", state.theme]);
   return `#${parts.map(([key, value]) => `${encodeURIComponent(key)}=${encodeURIComponent(value)}`).join("&")}`;
@@ -76,7 +76,8 @@ function readLink(text) {
       dampingRange[1] = Math.max(dampingRange[1], state.damping);
     } else if (key === "torque") setValue(TORQUE, finite(key, value, -Infinity) ?? state.torque);
     else if (key === "orbits") {
-      const found = value.split("~").map((one) => one.split("_").map(Number));
+      const plain = (one) => (one.trim() === "" ? NaN : Number(one));
+      const found = value ? value.split("~").map((one) => one.split("_").map(plain)) : [];
       const whole = found.filter((one) => one.length === 2 && one.every(Number.isFinite));
       if (whole.length < found.length) complaints.push("orbits: wants pairs of numbers");
       state.orbits = whole.slice(-8);
@@ -111,3 +112,19 @@ function sampler(name, other) {
 }
 
 const make = (p, torque) => new Potential(LAW, p, torque);
+
+// An orbit to begin with: round the deepest center, from some way to the next equilibrium.
+function firstOrbits() {
+  const pot = make(...potentialAt());
+  const centers = pot.points.filter((one) => one.kind === CENTER);
+  if (!centers.length) return [];
+  const center = centers.reduce((a, b) => (b.energy < a.energy ? b : a));
+  const i = pot.points.indexOf(center);
+  const [low, high] = pot.window();
+  const next = pot.at(i + 1) ?? high;
+  for (const share of [0.6, 0.3, 0.1]) {
+    const x = Number((center.x + share * (next - center.x)).toPrecision(3));
+    if (x > low && x < high && pot.orbit(x, 0).kind === "libration") return [[x, 0]];
+  }
+  return [];
+}

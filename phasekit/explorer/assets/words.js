@@ -15,17 +15,17 @@ function tell() {
   $("odds").textContent = loops.some((one) => one.shares)
     ? "With a little damping, an orbit that comes in from outside is caught by one of the two sides; the shares of the areas, in percent, are the odds of each (exact as the damping goes to zero)."
     : loops.length ? "Areas enclosed by the separatrices; of one that winds round the circle, the area under one turn." : "There is no saddle, and so no separatrix.";
-  table("orbits", [`start (${x}, d${x}/dt)`, "family", `period${unitOf("s")}`, `action${unitOf("s⁻¹")}`, "least", "greatest", `energy${unitOf("s⁻²")}`],
+  table("orbits", [`start (${x}, d${x}/dt)`, "family", `period${unitOf("s")}`, `action${unitOf("s⁻¹")}`, "from … to", `energy${unitOf("s⁻²")}`],
     state.orbits.map((one) => {
       const orbit = pot.orbit(...one);
-      return [`${angleText(one[0], 6)}, ${digits(one[1], 6)}`, familyWords(orbit), digits(orbit.period, 11), digits(orbit.action, 11), angleText(orbit.low, 9), angleText(orbit.high, 9), digits(orbit.energy, 9)];
+      return [`${angleText(one[0], 6)}, ${digits(one[1], 6)}`, familyWords(orbit), digits(orbit.period, 11), digits(orbit.action, 11), Number.isFinite(orbit.low) ? `${angleText(orbit.low, 8)} … ${angleText(orbit.high, 8)}` : "–", digits(orbit.energy, 9)];
     }));
   $("orbit-note").textContent = !state.orbits.length
     ? "A click in the portrait starts one."
     : state.damping > 0 ? "Family, period, action and turning points are those that the start has without damping." : "";
-  const base = location.protocol === "about:" ? "" : location.href.split("#")[0];
-  $("link").value = base + writeLink();
-  $("python").value = pythonOf(scene);
+  $("values").textContent = pot.coefficients
+    ? ["A", "B", "C"].map((name, i) => `${name} = ${digits(pot.coefficients[i], 8)}`).join(", ") + unitOf("s⁻²") : "";
+  tellTaken();
   const counts = { [CENTER]: 0, [SADDLE]: 0, [DEGENERATE]: 0 };
   pot.points.forEach((one) => (counts[one.kind] += 1));
   const say = `${counts[CENTER]} centers and ${counts[SADDLE]} saddles${counts[DEGENERATE] ? `, ${counts[DEGENERATE]} degenerate` : ""}`;
@@ -33,6 +33,20 @@ function tell() {
   $("portrait-text").textContent = `${say}, at ${pot.points.map((one) => `${angleText(one.x, 4)} (${one.kind})`).join(", ")}; the tables below have the numbers.`;
   $("map-text").textContent = scene.map ? `${state.x} = ${digits(valueOf(state.x))}, ${state.y} = ${digits(valueOf(state.y))}: ${pot.points.length} equilibria` : "Choose two different parameters.";
   tellForces();
+}
+
+function tellTaken() {
+  const base = location.protocol === "about:" ? "" : location.href.split("#")[0];
+  $("link").value = base + writeLink();
+  $("python").value = pythonOf(scene);
+}
+
+// Without a system there are no numbers of it.
+function tellInvalid() {
+  for (const id of ["equilibria", "separatrices", "orbits"]) $(id).replaceChildren();
+  for (const id of ["values", "odds", "orbit-note", "hover", "portrait-text", "map-text", "force-text"]) $(id).textContent = "";
+  $("status").textContent = scene.said = INVALID;
+  tellTaken();
 }
 
 function tellForces() {
@@ -48,6 +62,7 @@ function tellForces() {
 }
 
 function hover(at) {
+  scene.pointed = at;
   if (!at) {
     $("hover").textContent = "\u00a0";
     return;
