@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 import phasekit as pk
+from phasekit.labelled.continuation import atlas as atlas_module
+from phasekit.systems.plane_regions import RegionSearch
 
 CUSP = pk.Problem("mu + l*x - x^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-3, 3)})
 #: Holmes: the symmetric unfolding of a double zero eigenvalue.
@@ -55,6 +57,17 @@ def test_the_cusp_has_one_curve_and_its_numbers_are_those_of_roots():
     assert found.complete.all()
 
 
+@pytest.mark.parametrize("size", [1.0, 1e-9])
+def test_two_cusps_at_one_place_are_told_apart_by_their_states_of_any_size(size):
+    g = f"((x/{size!r})^2 - 1)"
+    both = pk.Problem(
+        f"mu + l*{g} - {g}^3", "x", {"mu": 0.0, "l": 0.0}, window={"x": (-2 * size, 2 * size)}
+    )
+    atlas = pk.atlas(both, "mu", "l", span={"mu": (-0.4, 0.4), "l": (-0.4, 0.4)})
+    assert [point.kind for point in atlas.special_points] == ["cusp", "cusp"]
+    np.testing.assert_allclose([point.x[0] / size for point in atlas.special_points], [-1, 1])
+
+
 @pytest.mark.slow
 def test_the_symmetric_double_zero_is_complete():
     """Branch points a = 0, Hopf points b = 0 (a < 0) of x = 0 and b = a (a > 0) of x^2 = a."""
@@ -71,6 +84,54 @@ def test_the_symmetric_double_zero_is_complete():
     found = atlas.counts(**places)
     np.testing.assert_array_equal(found.n_equilibria, np.where(a > 0, 3, 1))
     np.testing.assert_array_equal(found.n_stable, np.where(a > 0, 2 * (b < a), b < 0))
+
+
+@pytest.mark.parametrize("low", [-1.25, -0.75, -0.7265625, -0.7109375])
+def test_regions_are_counted_one_by_one_though_curves_that_change_nothing_lie_between(low):
+    """At a Hopf curve equilibria do not change: off others their number is counted once."""
+    span = (low, low + 2.0)
+    ends = np.array([(-3.0, 1.0), span]).T
+    t = np.linspace(-3, 2, 8192)
+    curves = (
+        ("branch_point", (0 * t, t)),
+        ("hopf", (t[t < 0], 0 * t[t < 0])),
+        ("hopf", (t[t > 0], t[t > 0])),
+    )
+
+    def lines(steps):
+        for kind, curve in curves:
+            places = np.stack(curve, axis=1)
+            yield kind, places[np.all((places >= ends[0]) & (places <= ends[1]), axis=1)]
+
+    search = RegionSearch(
+        SYMMETRIC, ("a", "b"), {"a": (-3.0, 1.0), "b": span}, np.full(2, -2.0), np.full(2, 2.0),
+        np.ones(2, bool), lines,
+    )  # fmt: skip
+    search.sheets = None
+    found = search.regions()
+    a, b = found.place.T
+    assert len(a) == 4
+    np.testing.assert_array_equal(found.n_equilibria, np.where(a > 0, 3, 1))
+    np.testing.assert_array_equal(found.n_stable, np.where(a > 0, 2 * (b < a), b < 0))
+
+
+def test_a_curve_that_is_found_in_the_last_round_bounds_regions(monkeypatch):
+    """All equilibria are within a circle of folds between the cuts."""
+    monkeypatch.setattr(atlas_module, "ROUNDS", 1)
+    island = pk.Problem(
+        "x^2 + (a - 13/100)^2 + (b - 17/100)^2 - 1/100", "x", {"a": 0.0, "b": 0.0},
+        window={"x": (-1, 1)},
+    )  # fmt: skip
+    atlas = pk.atlas(island, "a", "b", span={"a": SQUARE, "b": SQUARE})
+    (curve,) = atlas.curves
+    a, b = curve.points.a.values, curve.points.b.values
+    np.testing.assert_allclose(np.hypot(a - 0.13, b - 0.17), 0.1, atol=1e-12)
+    ds = atlas.to_dataset()
+    inside = np.hypot(ds.region_a - 0.13, ds.region_b - 0.17) < 0.1
+    np.testing.assert_array_equal(ds.region_n_equilibria, np.where(inside, 2, 0))
+    assert inside.values.sum() == 1
+    assert atlas.complete["n_equilibria"]
+    assert "1 equilibria" not in repr(atlas)
 
 
 @pytest.mark.slow

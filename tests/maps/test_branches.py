@@ -198,6 +198,12 @@ def test_cells_that_fail_say_so():
         warnings.simplefilter("error")
         ds = pk.sweep(none, a=[1.0], along=("mu", (-1, 1)), of="special_points")
     assert ds.branch_status.values.tolist() == [pk.BranchStatus.NO_EQUILIBRIUM]
+    # Of a double equilibrium nothing is enclosed: that is no proof that there is none.
+    double = pk.Problem("a + x^2", "x", {"a": 1.0, "mu": 0.0}, window={"x": (-3, 3)})
+    with pytest.warns(RuntimeWarning, match="it is not proved that all equilibria"):
+        ds = pk.sweep(double, a=[0.0, 1.0], along=("mu", (-1, 1)), of="special_points")
+    wanted = [pk.BranchStatus.UNPROVED, pk.BranchStatus.NO_EQUILIBRIUM]
+    assert ds.branch_status.values.tolist() == wanted
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,7 @@ import xarray as xr
 
 from phasekit.cells.schema import dataset_attrs
 from phasekit.inputs import call_checked
-from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch
-from phasekit.labelled.continuation.atlas_regions import Regions, RegionSearch, missing
+from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
 from phasekit.labelled.continuation.branch import Branch
 from phasekit.labelled.continuation.branch_points import attrs_of
 from phasekit.labelled.continuation.checks import check_parameter, check_span
@@ -24,6 +23,7 @@ from phasekit.labelled.pictures import picture
 from phasekit.labels.arguments import bad, numeric, unknown
 from phasekit.labels.grid import LABEL_DTYPE, variable
 from phasekit.numerics.waits import notice, stage
+from phasekit.systems.plane_regions import FINE, Regions, RegionSearch
 from phasekit.systems.problem import Problem, as_problem
 from phasekit.systems.rests import corners, window_of
 
@@ -35,6 +35,8 @@ CUTS = 5
 ROUNDS = 4
 #: Places through which they are looked for each time.
 PLACES = 6
+#: Parts of the rectangle and of the window within which points of one kind are the same.
+SAME = 1e-6, 1e-4
 #: What a curve of the atlas is called, by what was followed.
 CALLED = {"event": "window_exit"}
 
@@ -84,22 +86,28 @@ class Atlas:
     def special_points(self) -> tuple[SpecialPoint[Branch], ...]:
         """Points of codimension two, each once though two curves meet there."""
         found: list[SpecialPoint[Branch]] = []
-        scale = np.array([high - low for low, high in self.span.values()])
+        near = [
+            part * (high - low)
+            for part, ends in zip(SAME, (self.span, self.window), strict=True)
+            for low, high in ends.values()
+        ]
+        turn = np.array([0.0, 0.0, *(self.problem.periods.get(x, 0.0) for x in self.window)])
+        places: list[Array] = []
         for curve in self.curves:
             if curve.kind == "event":
                 continue
             for point in curve.special_points:
                 if point.kind in ("end", "event"):
                     continue
-                at = np.array([point[name] for name in self.names])
-                same = (
-                    one for one in found
-                    if one.kind == point.kind
-                    and np.all(np.abs(at - [one[n] for n in self.names]) < 1e-6 * scale)
-                    and np.allclose(one.x, point.x, rtol=1e-4, atol=1e-6)
-                )  # fmt: skip
-                if next(same, None) is None:
+                at = np.array([point[name] for name in (*self.names, *self.window)])
+                gaps = [
+                    at - other
+                    for one, other in zip(found, places, strict=True) if one.kind == point.kind
+                ]  # fmt: skip
+                gaps = [gap - turn * np.rint(gap / np.where(turn > 0.0, turn, 1.0)) for gap in gaps]
+                if not any(np.all(np.abs(gap) < near) for gap in gaps):
                     found.append(point)
+                    places.append(at)
         return tuple(found)
 
     @property
@@ -239,7 +247,7 @@ class Atlas:
             Of each of ``curves``: runs of shape (points, 2); of a Hopf curve without its neutral
             saddles.
         """
-        return [self._counts.lines(curve) for curve in self.curves]
+        return [polyline(curve, self.names, FINE * self._counts.step) for curve in self.curves]
 
     def plot(self, ax: Any = None, **keywords: Any) -> Any:
         """Draw the curves, the regions and the points of codimension two.
@@ -272,7 +280,7 @@ class Atlas:
         for (number, stable), rows in sorted(labels.items()):
             part = area[rows].sum() / found.region.size
             lines.append(
-                f"{number} equilibria, {stable} stable: {len(rows)} "
+                f"{number} equilibri{'a' if number != 1 else 'um'}, {stable} stable: {len(rows)} "
                 f"region{'s'[: len(rows) != 1]}, {part:.1%} of the plane"
             )
         proved = [name for name, sure in self.complete.items() if sure]
@@ -345,11 +353,11 @@ def atlas(
             for k, value in enumerate(np.linspace(*spans[other], CUTS)):
                 stage(f"cut {k + 1} of {CUTS} along {along}, {len(search.curves)} curves")
                 search.cut(along, float(value), np.linspace(*spans[along], CUTS))
-        counts = RegionSearch(search)
+        counts = RegionSearch(problem, names, spans, low, high, search.faces, search.lines)
         for _ in range(ROUNDS):
             stage(f"what may change between {len(search.curves)} curves")
             found = counts.regions()
-            places = missing(found, counts)
+            places = counts.missing(found)
             before = len(search.curves)
             for place in places[:PLACES]:
                 for k, along in enumerate(names):

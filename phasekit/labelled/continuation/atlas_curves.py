@@ -112,6 +112,12 @@ class CurveSearch:
         with self._quiet(f"the curve through {point!r}", kind != "branch_point"):
             self._add(point.curve(second, self.span[second], options=options))
 
+    def lines(self, steps: Array) -> Iterator[tuple[str, Array]]:
+        """Kinds of the curves, and their points, closer than steps."""
+        for curve in self.curves:
+            for line in polyline(curve, self.names, steps):
+                yield curve.kind, line
+
     def _add(self, curve: Branch) -> None:
         """Keep a curve that is new, and follow what else passes its points of codimension two."""
         held = getattr(curve.walker.curve, "held", None)

@@ -44,13 +44,6 @@ class Changes(NamedTuple):
     """One may change its stability."""
     leaving: Flags
     """One may lie on a face of the window."""
-    visited: int
-    """Number of boxes that were looked at."""
-
-    @property
-    def cells(self) -> tuple[Flags, Flags, Flags]:
-        """Of all three."""
-        return self.merging, self.losing, self.leaving
 
 
 class Sheets:
@@ -107,15 +100,15 @@ class Sheets:
             found[:], leaving[:] = crossed[:2], crossed.leaving
         if within is None:
             within = np.zeros((1, 2), np.int64), np.full((1, 2), side, np.int64)
-        visited = self._search(found, None, within)
+        self._search(found, None, within)
         for i in np.flatnonzero(self.faces):
             for end in self.window:
-                visited += self._search(leaving, (int(i), float(end[i])), within)
-        return Changes(found[0], found[1], leaving[0], visited)
+                self._search(leaving, (int(i), float(end[i])), within)
+        return Changes(found[0], found[1], leaving[0])
 
     def _search(
         self, marks: Flags, face: tuple[int, float] | None, within: tuple[Index, Index]
-    ) -> int:
+    ) -> None:
         """Mark the cells that are left; of a face of the window those with an equilibrium on it."""
         side = self._side
         a, b = (end[None].copy() for end in self.window)
@@ -124,9 +117,7 @@ class Sheets:
         first, last = within
         a, b = np.repeat(a, len(first), axis=0), np.repeat(b, len(first), axis=0)
         open_ = np.ones((len(first), len(marks)), bool)
-        visited = 0
         while len(a):
-            visited += len(a)
             if len(a) > MOST_BOXES:
                 self._mark(marks, first, last, open_)
                 break
@@ -157,7 +148,6 @@ class Sheets:
             a, b = _halved(a, b, along)
             first, last = _parted(first, last, along - self.n)
             open_ = np.tile(open_, (2, 1))
-        return visited
 
     @staticmethod
     def _mark(marks: Flags, first: Index, last: Index, open_: Flags) -> None:

@@ -65,11 +65,6 @@ class Tubes(NamedTuple):
         """Whether it is the same curve in each tube and the next, of shape (chords - 1,)."""
         return joined(self.rows(slice(None, -1)), self.rows(slice(1, None)))
 
-    @property
-    def complete(self) -> bool:
-        """Whether one curve passes all tubes."""
-        return bool(self.proved.all() and self.joined.all())
-
     def rows(self, which: Any) -> Tubes:
         """Some of them."""
         return Tubes(*(array[which] for array in self))
@@ -105,45 +100,32 @@ class Tubes(NamedTuple):
         inside: Flags = s <= (0.5 + 0.999 * self.beyond) * size
         return inside & np.all(w <= self.alone, axis=1) & self.proved
 
-    def holds(self, points: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """The first tube in which a zero at each point is on the curve; -1 where there is none."""
-        found, nothing = [], np.zeros((len(self.middle), self.middle.shape[1], 0))
-        for u in np.asarray(points, dtype=float):
-            inside = self.hold(np.broadcast_to(u, self.middle.shape), nothing, nothing[:, 0])
-            found.append(int(np.argmax(inside)) if inside.any() else -1)
-        return np.array(found, dtype=np.int64)
-
 
 def joined(first: Tubes, then: Tubes) -> Flags:
     """Whether tubes hold the same curve as those of the same rows that begin where they end."""
     return then.hold(first.end, first.across, first.tip) & first.proved
 
 
-def tubes(system: System, points: npt.ArrayLike) -> Tubes:
-    """Prove that a curve of zeros passes near some points, one after the other.
+def tubes_about(system: System, start: Array, end: Array) -> Tubes:
+    """Prove that curves of zeros pass through tubes about chords, each of its own.
 
     Parameters
     ----------
     system : System
         N - 1 formulas of N unknowns; its parameters may be intervals.
-    points : array_like, shape (points, N)
-        In order along the curve, as a continuation by pseudo-arclength finds them.
+    start, end : array, shape (chords, N)
+        Points next to each other along a curve, as a continuation by pseudo-arclength finds them.
 
     Examples
     --------
     >>> import sympy as sp
     >>> x, mu = sp.symbols("x mu", real=True)
     >>> turn = np.linspace(-1.0, 1.0, 21)
-    >>> found = tubes(System([mu - x**2], [x, mu], {}), np.stack([turn, turn**2], axis=1))
-    >>> found.complete, bool(found.radius.max() < 0.01)
+    >>> points = np.stack([turn, turn**2], axis=1)
+    >>> found = tubes_about(System([mu - x**2], [x, mu], {}), points[:-1], points[1:])
+    >>> bool(found.proved.all()), bool(found.radius.max() < 0.01)
     (True, True)
     """
-    u = np.asarray(points, dtype=float)
-    return tubes_about(system, u[:-1], u[1:])
-
-
-def tubes_about(system: System, start: Array, end: Array) -> Tubes:
-    """Tubes about chords, each of its own."""
     with np.errstate(all="ignore"):  # what is not finite is not proved
         return _tubes_about(system, start, end)
 

@@ -1,21 +1,21 @@
-"""Regions of an atlas: what is the same all over each, and where that is proved."""
+"""Regions of a plane of two parameters: what is the same all over each, and where it is proved."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from phasekit.bifurcation.regions import depths
 from phasekit.errors import FlowEquilibriumKind
-from phasekit.labelled.continuation.atlas_curves import KINDS_OF_CURVES, CurveSearch, polyline
-from phasekit.labelled.continuation.branch import Branch
 from phasekit.laws.formulas import symbols_of
 from phasekit.numerics.intervals.program import NoRule
 from phasekit.numerics.intervals.sheets import Changes, Sheets
 from phasekit.numerics.intervals.stability import MOST
+from phasekit.systems.problem import Problem
 from phasekit.systems.rests import equilibria_of_cells
 
 Array = npt.NDArray[np.float64]
@@ -65,18 +65,35 @@ class Regions(NamedTuple):
 
 @dataclass
 class RegionSearch:
-    """Counts equilibria between the curves of a search."""
+    """Counts equilibria between curves.
 
-    search: CurveSearch
+    Attributes
+    ----------
+    problem, names, span, low, high
+        What `atlas` takes, checked: parameters, their ranges, corners of the window.
+    faces : array of bool, shape (states,)
+        Of which states the ends of the window are looked at.
+    lines : callable
+        From steps of both parameters the curves as they are now, with their kinds (fold,
+        branch_point, hopf; event where an equilibrium leaves the window), as points closer than
+        these steps.
+    """
+
+    problem: Problem
+    names: tuple[str, str]
+    span: dict[str, tuple[float, float]]
+    low: Array
+    high: Array
+    faces: Flags
+    lines: Callable[[Array], Iterable[tuple[str, Array]]]
 
     def __post_init__(self) -> None:
         """The rectangle, and the bounds of what happens in it, where formulas have such."""
-        search = self.search
-        ends = np.array([search.span[name] for name in search.names])
+        ends = np.array([self.span[name] for name in self.names])
         self.start, self.end = ends.T
         self.side = 1 << DEPTH
         self.step = (self.end - self.start) / self.side
-        problem = search.problem
+        problem = self.problem
         self.sheets: Sheets | None = None
         self.why = ""
         if problem.kind != "symbolic":
@@ -88,39 +105,33 @@ class RegionSearch:
             others = {
                 symbols[name]: float(value)
                 for name, value in problem.parameters.items()
-                if name not in search.names
+                if name not in self.names
             }
             try:
                 self.sheets = Sheets(
                     problem.f, [symbols[name] for name in problem.state],
-                    [symbols[name] for name in search.names], others, (search.low, search.high),
-                    search.faces,
+                    [symbols[name] for name in self.names], others, (self.low, self.high),
+                    self.faces,
                 )  # fmt: skip
             except NoRule as rule:
                 self.why = f"no bounds are known for {rule}"
-
-    def lines(self, curve: Branch, finer: int = 1) -> list[Array]:
-        """A curve as points closer than cells."""
-        return polyline(curve, self.search.names, FINE / finer * self.step)
 
     def cells(self, places: Array, finer: int = 1) -> Index:
         """The cells in which points lie."""
         found = np.floor((places - self.start) / self.step * finer).astype(np.int64)
         return np.asarray(np.clip(found, 0, finer * self.side - 1))
 
-    def crossed(self, curves: Sequence[Branch], finer: int = 1) -> Changes:
+    def crossed(self, finer: int = 1) -> Changes:
         """Cells that curves cross, of a grid so many times finer."""
-        side = finer * self.side
-        found = {kind: np.zeros((side, side), bool) for kind in KINDS_OF_CURVES}
-        for curve in curves:
-            for line in self.lines(curve, finer):
-                # A curve on a line of the grid crosses the cells of both sides.
-                for off in (-1e-7, 1e-7):
-                    for way in ((off, off), (off, -off)):
-                        i, j = self.cells(line + np.array(way) * self.step, finer).T
-                        found[curve.kind][i, j] = True
-        merging = found["fold"] | found["branch_point"]
-        return Changes(merging, merging | found["hopf"], found["event"], 0)
+        merging, losing, leaving = np.zeros((3, finer * self.side, finer * self.side), bool)
+        what = {"fold": merging, "branch_point": merging, "hopf": losing, "event": leaving}
+        for kind, line in self.lines(FINE / finer * self.step):
+            # A curve on a line of the grid crosses the cells of both sides.
+            for off in (-1e-7, 1e-7):
+                for way in ((off, off), (off, -off)):
+                    i, j = self.cells(line + np.array(way) * self.step, finer).T
+                    what[kind][i, j] = True
+        return Changes(merging, merging | losing, leaving)
 
     def changes(self, own: Changes) -> Changes:
         """Cells in which a number may change, and no further halvings exclude it."""
@@ -138,11 +149,11 @@ class RegionSearch:
             blocks = np.argwhere(far)
             parts = 1 << deeper
             fine = self.sheets.changes(
-                self.start, self.end, DEPTH + deeper, self.crossed(self.search.curves, parts),
+                self.start, self.end, DEPTH + deeper, self.crossed(parts),
                 (blocks * parts, (blocks + 1) * parts),
             )  # fmt: skip
             shape = (self.side, parts, self.side, parts)
-            for whole, part in zip(found.cells, fine.cells, strict=True):
+            for whole, part in zip(found, fine, strict=True):
                 left = np.asarray(np.any(part.reshape(shape), axis=(1, 3)))
                 whole[far] &= left[far]
         return found
@@ -151,7 +162,7 @@ class RegionSearch:
         """The regions between the curves that are there now."""
         from scipy import ndimage
 
-        own = self.crossed(self.search.curves)
+        own = self.crossed()
         found = self.changes(own)
         any_curve = own.merging | own.losing | own.leaving
         blocked = found.merging | found.leaving
@@ -160,8 +171,7 @@ class RegionSearch:
         place, reach = self._places(region, count)
         number, why = self._agreed(region, count, ~blocked, place, 0)
         stable, why_stable = self._agreed(region, count, ~blocked_stable, place, 1)
-        problem = self.search.problem
-        undamped = problem.conservative and len(problem.state) > 1
+        undamped = self.problem.conservative and len(self.problem.state) > 1
         return Regions(
             region.astype(np.int64) - 1, place, number, stable, reach,
             blocked & ~any_curve, blocked_stable & ~any_curve,
@@ -173,22 +183,12 @@ class RegionSearch:
         """Middles of the cells that lie deepest in each region, and how deep."""
         from scipy import ndimage
 
-        padded = np.pad(region, 1)
-        depth = ndimage.distance_transform_cdt(self._same(padded), metric="chessboard")[1:-1, 1:-1]
+        depth = depths(region, region > 0)
         at = np.zeros((count, 2), np.int64)
         for k, where in enumerate(ndimage.find_objects(region)):
             own = np.where(region[where] == k + 1, depth[where], -1)
             at[k] = [s.start for s in where] + np.array(np.unravel_index(own.argmax(), own.shape))
         return self.start + (at + 0.5) * self.step, depth[at[:, 0], at[:, 1]] / self.side
-
-    @staticmethod
-    def _same(region: Index) -> Flags:
-        """Cells whose neighbors are all of their region."""
-        same = region > 0
-        for axis in (0, 1):
-            for way in (-1, 1):
-                same &= np.roll(region, way, axis) == region
-        return same
 
     def _agreed(
         self, region: Index, count: int, clear: Flags, place: Array, which: int
@@ -213,27 +213,25 @@ class RegionSearch:
 
     def counted(self, places: Array) -> tuple[Index, Flags]:
         """Numbers of equilibria and of stable ones at points; whether both are proved."""
-        names = self.search.names
         problems = [
-            self.search.problem.replace(**dict(zip(names, map(float, place), strict=True)))
+            self.problem.replace(**dict(zip(self.names, map(float, place), strict=True)))
             for place in places
         ]
-        found = equilibria_of_cells(problems, self.search.low, self.search.high)
+        found = equilibria_of_cells(problems, self.low, self.high)
         numbers = np.array(
             [(len(one.x), np.isin(one.kind, STABLE).sum()) for one in found], np.int64
         ).reshape(-1, 2)
         return numbers, np.array([one.complete for one in found], bool)
 
+    def missing(self, found: Regions) -> list[tuple[Any, ...]]:
+        """Points of the plane at which a curve may pass that is not there yet."""
+        from scipy import ndimage
 
-def missing(found: Regions, regions: RegionSearch) -> list[tuple[Any, ...]]:
-    """Places where a curve may be that is not there yet: points of the plane to look through."""
-    from scipy import ndimage
-
-    spots: list[tuple[Any, ...]] = []
-    for cells in (found.far(found.open_equilibria), found.far(found.open_stable)):
-        parts, count = ndimage.label(cells, np.ones((3, 3)))
-        for k in range(1, count + 1):
-            rows = np.argwhere(parts == k)
-            middle = rows[np.argmin(np.abs(rows - rows.mean(axis=0)).sum(axis=1))]
-            spots.append(tuple(regions.start + (middle + 0.5) * regions.step))
-    return spots
+        spots: list[tuple[Any, ...]] = []
+        for cells in (found.far(found.open_equilibria), found.far(found.open_stable)):
+            parts, count = ndimage.label(cells, np.ones((3, 3)))
+            for k in range(1, count + 1):
+                rows = np.argwhere(parts == k)
+                middle = rows[np.argmin(np.abs(rows - rows.mean(axis=0)).sum(axis=1))]
+                spots.append(tuple(self.start + (middle + 0.5) * self.step))
+        return spots
